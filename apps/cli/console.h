@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// What the command line says to a person (progress, tables, warnings) or, with --json, to a machine.
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <mutex>
+#include <nlohmann/json_fwd.hpp>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "forest/core/progress.h"
+
+namespace forest::cli {
+
+/// A progress bar on standard error; silent when that is no terminal, and for stages shorter than a second.
+class ProgressBar final : public Progress {
+ public:
+  void begin(std::string_view stage, std::size_t total) override;
+  void advance(std::size_t steps = 1) override;
+  void end() override;
+
+ private:
+  using Clock = std::chrono::steady_clock;
+  void draw(Clock::time_point now);
+
+  std::mutex mutex_;
+  std::string stage_;
+  std::size_t total_ = 0, done_ = 0;
+  Clock::time_point begin_, drawn_;
+  bool shown_ = false;
+};
+
+class Console {
+ public:
+  bool json = false;         // --json: machine-readable results on standard output
+  unsigned threads = 0;      // --threads: 0 for all cores
+
+  Progress& progress() { return bar_; }
+  void say(std::string_view line);      // to standard output, unless --json
+  void warn(std::string_view sentence); // to standard error
+  void print(const nlohmann::ordered_json& value);  // to standard output, when --json
+  /// Columns aligned, numbers right; to standard output, unless --json.
+  void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
+
+ private:
+  ProgressBar bar_;
+};
+
+/// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the installation.
+std::filesystem::path data_folder();
+
+}  // namespace forest::cli

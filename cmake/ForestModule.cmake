@@ -1,0 +1,56 @@
+# forest_module([DEPENDS <module>...] [PRIVATE <target>...])
+#
+# A module is a folder of .h/.cpp pairs with their *_test.cpp beside them. From
+# the folder follow: library forest_<name> (alias forest::<name>), one test
+# program, and a check that each header compiles alone.
+# -Wno-restrict: GCC 12 warns falsely of std::string concatenation (GCC bug 105329).
+set(FOREST_WARNINGS -Wall -Wextra -Wshadow -Wconversion $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
+                    $<$<BOOL:${FOREST_WARNINGS_AS_ERRORS}>:-Werror>)
+if(FOREST_SANITIZE)
+  add_compile_options(-fsanitize=${FOREST_SANITIZE} -fno-omit-frame-pointer)
+  add_link_options(-fsanitize=${FOREST_SANITIZE})
+endif()
+
+# A test program that ctest runs, told where the project and the real data are.
+function(forest_test target)
+  target_compile_definitions(${target} PRIVATE FOREST_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+  target_compile_options(${target} PRIVATE ${FOREST_WARNINGS})
+  target_link_libraries(${target} PRIVATE GTest::gtest_main GTest::gmock rapidcheck)
+endfunction()
+
+function(forest_module)
+  cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "DEPENDS;PRIVATE")
+  file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR}/forest ${CMAKE_CURRENT_SOURCE_DIR})
+  string(REPLACE "/" "_" name ${name})
+  string(REPLACE "/" "_" depends "${arg_DEPENDS}")
+  list(TRANSFORM depends PREPEND "forest::")
+
+  file(GLOB headers CONFIGURE_DEPENDS *.h)
+  file(GLOB sources CONFIGURE_DEPENDS *.cpp)
+  set(tests ${sources})
+  list(FILTER tests INCLUDE REGEX "_test\\.cpp$")
+  list(FILTER sources EXCLUDE REGEX "_test\\.cpp$")
+
+  if(sources)
+    add_library(forest_${name} ${sources})
+    set(scope PUBLIC)
+    target_compile_options(forest_${name} PRIVATE ${FOREST_WARNINGS})
+    target_link_libraries(forest_${name} PRIVATE ${arg_PRIVATE})
+  else()
+    add_library(forest_${name} INTERFACE)
+    set(scope INTERFACE)
+  endif()
+  add_library(forest::${name} ALIAS forest_${name})
+  target_compile_features(forest_${name} ${scope} cxx_std_20)
+  target_sources(forest_${name} ${scope} FILE_SET HEADERS BASE_DIRS ${PROJECT_SOURCE_DIR} FILES ${headers})
+  target_link_libraries(forest_${name} ${scope} ${depends})
+  target_include_directories(forest_${name} SYSTEM ${scope} ${EIGEN_INCLUDE_DIRS})
+
+  if(tests)
+    add_executable(forest_${name}_test ${tests})
+    target_link_libraries(forest_${name}_test PRIVATE forest::${name} ${arg_PRIVATE})
+    forest_test(forest_${name}_test)
+    add_test(NAME ${name} COMMAND forest_${name}_test)
+    set_tests_properties(${name} PROPERTIES LABELS unit)
+  endif()
+endfunction()

@@ -1,0 +1,51 @@
+// SPDX-License-Identifier: Apache-2.0
+// A planted tissue as plain data: which neuron stands where. At rest it is a SONATA circuit (io/sonata.h).
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "forest/core/vec.h"
+
+namespace forest::circuit {
+
+/// One row of node_types.csv: what the instances of a type share.
+struct CellType {
+  std::string name;        // for example "L5 pyramidal"
+  std::string population;  // of the repository, where its neurons come from
+  bool excitatory = true;
+
+  bool operator==(const CellType&) const = default;
+};
+
+/// A layer of the tissue, from the pia downwards. y is 0 at the white matter and grows towards the pia.
+struct Layer {
+  std::string name;                 // "L2/3"
+  float bottom = 0.f, top = 0.f;    // y of its limits, µm
+
+  bool operator==(const Layer&) const = default;
+};
+
+/// One planted neuron. A point p of its morphology (soma centre at the origin) stands at position + orientation * p.
+struct Instance {
+  Vec3 position = Vec3::Zero();        // of the soma, µm
+  Quat orientation = Quat::Identity();
+  std::uint32_t morphology = 0;        // index in Circuit::morphologies
+  std::uint32_t type = 0;              // index in Circuit::types
+  std::uint32_t layer = 0;             // index in Circuit::layers
+};
+
+struct Circuit {
+  std::string name = "column";
+  std::vector<Layer> layers;
+  std::vector<CellType> types;
+  std::vector<std::string> morphologies;  // names; the neurons themselves travel beside the circuit
+  std::vector<Instance> instances;
+  float radius = 0.f;                     // of the column about the y axis, µm; 0 when the tissue is no column
+};
+
+/// Throws Error that names the first instance whose indices or numbers are wrong.
+void check(const Circuit& circuit);
+
+}  // namespace forest::circuit

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Loops on all cores (oneTBB). Results must not depend on the number of threads: iteration i writes only what is i's.
+#pragma once
+
+#include <cstddef>
+#include <functional>
+
+namespace forest {
+
+/// Calls body(begin, end) for disjoint ranges that cover [0, count), at least `grain` iterations each where possible.
+/// The first exception thrown by a body is rethrown here.
+void parallel_ranges(std::size_t count, std::size_t grain,
+                     const std::function<void(std::size_t begin, std::size_t end)>& body);
+
+/// Calls body(i) for every i in [0, count).
+template <class Body>
+void parallel_for(std::size_t count, std::size_t grain, Body&& body) {
+  parallel_ranges(count, grain, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t i = begin; i < end; ++i) body(i);
+  });
+}
+
+/// Limits every parallel loop for as long as the object lives; 0 means all cores.
+class ThreadLimit {
+ public:
+  explicit ThreadLimit(unsigned threads);
+  ~ThreadLimit();
+  ThreadLimit(const ThreadLimit&) = delete;
+  ThreadLimit& operator=(const ThreadLimit&) = delete;
+
+ private:
+  void* control_ = nullptr;
+};
+
+}  // namespace forest

@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/core/random.h"
+
+#include <Random123/philox.h>
+
+#include <algorithm>
+#include <boost/math/special_functions/erf.hpp>
+#include <cmath>
+#include <numbers>
+
+namespace forest {
+
+std::uint32_t Random::operator()() {
+  if (used_ == 4) {
+    const r123::Philox4x32::ctr_type counter{{block_++, stream_, std::uint32_t(item_), std::uint32_t(item_ >> 32)}};
+    const r123::Philox4x32::key_type key{{std::uint32_t(seed_), std::uint32_t(seed_ >> 32)}};
+    const auto block = r123::Philox4x32{}(counter, key);
+    std::copy_n(block.begin(), 4, words_.begin());
+    used_ = 0;
+  }
+  return words_[used_++];
+}
+
+double Random::uniform() {
+  const std::uint64_t high = (*this)(), low = (*this)();
+  return double((high << 21) ^ (low >> 11)) * 0x1p-53;
+}
+
+double Random::uniform(double low, double high) { return low + (high - low) * uniform(); }
+
+std::uint32_t Random::below(std::uint32_t count) {
+  // Lemire 2019: multiply, and reject the few low products that would favour small results.
+  std::uint64_t product = std::uint64_t((*this)()) * count;
+  if (std::uint32_t(product) < count) {
+    const std::uint32_t threshold = (0u - count) % count;
+    while (std::uint32_t(product) < threshold) product = std::uint64_t((*this)()) * count;
+  }
+  return std::uint32_t(product >> 32);
+}
+
+double Random::normal(double mean, double sd) {
+  const double radius = std::sqrt(-2. * std::log1p(-uniform()));
+  return mean + sd * radius * std::cos(2. * std::numbers::pi * uniform());
+}
+
+double Random::truncated_normal(double mean, double sd, double low, double high) {
+  if (!(sd > 0.)) return std::clamp(mean, low, high);
+  const auto phi = [&](double x) { return 0.5 * std::erfc(-(x - mean) / (sd * std::numbers::sqrt2)); };
+  const double p = uniform(phi(low), phi(high));
+  if (p <= 0. || p >= 1.) return std::clamp(mean, low, high);
+  return std::clamp(mean - sd * std::numbers::sqrt2 * boost::math::erfc_inv(2. * p), low, high);
+}
+
+double Random::exponential(double mean) { return -mean * std::log1p(-uniform()); }
+
+double Random::gamma(double shape, double scale) {
+  if (shape < 1.) return gamma(shape + 1., scale) * std::pow(1. - uniform(), 1. / shape);
+  const double d = shape - 1. / 3., c = 1. / std::sqrt(9. * d);
+  for (;;) {
+    const double x = normal(), v = std::pow(1. + c * x, 3);
+    if (v > 0. && std::log1p(-uniform()) < 0.5 * x * x + d - d * v + d * std::log(v)) return d * v * scale;
+  }
+}
+
+}  // namespace forest
