@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Many values in five numbers.
+#pragma once
+
+#include <cstddef>
+#include <span>
+
+namespace forest::statistics {
+
+/// Of the values that are defined (not NaN). All but `count` are NaN when there is none.
+struct Summary {
+  std::size_t count = 0;
+  double mean, sd;  // sd: of a sample (n - 1); 0 for a single value
+  double min, median, max;
+};
+
+Summary summarize(std::span<const double> values);
+
+}  // namespace forest::statistics
