@@ -21,19 +21,22 @@ struct CellType {
 
 /// A layer of the tissue, from the pia downwards. y is 0 at the white matter and grows towards the pia.
 struct Layer {
-  std::string name;                 // "L2/3"
-  float bottom = 0.f, top = 0.f;    // y of its limits, µm
+  std::string name;               // "L2/3"
+  float bottom = 0.f, top = 0.f;  // y of its limits, µm
 
   bool operator==(const Layer&) const = default;
 };
 
-/// One planted neuron. A point p of its morphology (soma centre at the origin) stands at position + orientation * p.
+/// One planted neuron. A point p of its morphology (soma centre at the origin) stands at position +
+/// orientation * p.
 struct Instance {
-  Vec3 position = Vec3::Zero();        // of the soma, µm
+  Vec3 position = Vec3::Zero();  // of the soma, µm
   Quat orientation = Quat::Identity();
-  std::uint32_t morphology = 0;        // index in Circuit::morphologies
-  std::uint32_t type = 0;              // index in Circuit::types
-  std::uint32_t layer = 0;             // index in Circuit::layers
+  std::uint32_t morphology = 0;  // index in Circuit::morphologies
+  std::uint32_t type = 0;        // index in Circuit::types
+  std::uint32_t layer = 0;       // index in Circuit::layers
+
+  bool operator==(const Instance&) const = default;
 };
 
 struct Circuit {
@@ -42,10 +45,26 @@ struct Circuit {
   std::vector<CellType> types;
   std::vector<std::string> morphologies;  // names; the neurons themselves travel beside the circuit
   std::vector<Instance> instances;
-  float radius = 0.f;                     // of the column about the y axis, µm; 0 when the tissue is no column
+  float radius = 0.f;  // of the column about the y axis, µm; 0 when the tissue is no column
+
+  bool operator==(const Circuit&) const = default;
 };
 
-/// Throws Error that names the first instance whose indices or numbers are wrong.
+/// Throws Error that names the first layer, type, morphology or instance that is wrong: a layer without
+/// thickness, a name that is empty or used twice, an index beyond its list, a position that is not finite, an
+/// orientation that is no rotation.
 void check(const Circuit& circuit);
+
+/// How many neurons of one type stand in one layer.
+struct Tally {
+  std::uint32_t layer = 0, type = 0;  // indices
+  std::size_t count = 0;              // > 0
+  double density = 0.;                // per mm³ of the layer; 0 when the tissue is no column
+
+  bool operator==(const Tally&) const = default;
+};
+
+/// In the order of layers, then types; what does not occur is left out.
+std::vector<Tally> tally(const Circuit& circuit);
 
 }  // namespace forest::circuit

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/circuit/plant.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+#include <unordered_set>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+
+namespace forest::circuit {
+namespace {
+
+// Streams of a neuron's random numbers, far from those of growing so that one seed may serve both.
+enum Stream : std::uint32_t { morphology_stream = 0x706c0000, rotation_stream, position_stream };
+
+constexpr int most_trials = 1000000;  // for one soma, before its layer is called full
+
+/// Spheres in a grid. A sphere is entered in every cell that its box touches, so two that overlap share a
+/// cell.
+class Spheres {
+ public:
+  Spheres(const Bounds& bounds, float cell, std::size_t count) : low_(bounds.low), scale_(1.f / cell) {
+    for (int axis = 0; axis < 3; ++axis)
+      size_[axis] = std::max(1, int(std::ceil(bounds.extent()[axis] * scale_)));
+    first_.assign(std::size_t(size_[0]) * std::size_t(size_[1]) * std::size_t(size_[2]), none);
+    spheres_.reserve(count);
+    entries_.reserve(2 * count);
+  }
+
+  /// Whether a sphere here would keep `gap` to all others.
+  bool free(const Vec3& centre, float radius, float gap) const {
+    bool clear = true;
+    for_cells(centre, radius + gap, [&](std::size_t cell) {
+      for (std::uint32_t e = first_[cell]; clear && e != none; e = entries_[e].next) {
+        const Vec4& other = spheres_[entries_[e].sphere];
+        const float reach = radius + other.w() + gap;
+        clear = (other.head<3>() - centre).squaredNorm() >= reach * reach;
+      }
+      return clear;
+    });
+    return clear;
+  }
+
+  void add(const Vec3& centre, float radius) {
+    const auto sphere = std::uint32_t(spheres_.size());
+    spheres_.emplace_back(centre.x(), centre.y(), centre.z(), radius);
+    for_cells(centre, radius, [&](std::size_t cell) {
+      entries_.push_back({sphere, first_[cell]});
+      first_[cell] = std::uint32_t(entries_.size() - 1);
+      return true;
+    });
+  }
+
+ private:
+  static constexpr std::uint32_t none = 0xffffffffu;
+  struct Entry {
+    std::uint32_t sphere, next;
+  };
+
+  template <class Visit>
+  void for_cells(const Vec3& centre, float reach, Visit&& visit) const {
+    std::array<int, 3> from, to;
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto last = float(size_[axis] - 1);
+      const auto cell = [&](float x) {
+        return int(std::clamp(std::floor((x - low_[axis]) * scale_), 0.f, last));
+      };
+      from[std::size_t(axis)] = cell(centre[axis] - reach);
+      to[std::size_t(axis)] = cell(centre[axis] + reach);
+    }
+    for (int z = from[2]; z <= to[2]; ++z)
+      for (int y = from[1]; y <= to[1]; ++y)
+        for (int x = from[0]; x <= to[0]; ++x)
+          if (!visit((std::size_t(z) * std::size_t(size_[1]) + std::size_t(y)) * std::size_t(size_[0]) +
+                     std::size_t(x)))
+            return;
+  }
+
+  Vec3 low_;
+  float scale_;
+  Eigen::Vector3i size_;
+  std::vector<std::uint32_t> first_;
+  std::vector<Vec4> spheres_;
+  std::vector<Entry> entries_;
+};
+
+double sphere_volume(double radius) { return 4. / 3. * std::numbers::pi * radius * radius * radius; }
+
+/// As wide as a common soma, yet not so narrow that a sparse tissue has many more cells than neurons.
+float cell_width(const cortex::Column& column, std::vector<float> radii, float gap) {
+  std::ranges::nth_element(radii, radii.begin() + std::ptrdiff_t(radii.size() / 2));
+  const Vec3 extent = column.bounds().extent();
+  const double room = double(extent.x()) * double(extent.y()) * double(extent.z()) / double(radii.size());
+  return std::max(2.f * radii[radii.size() / 2] + gap, float(std::cbrt(room)));
+}
+
+[[noreturn]] void refuse_layer(const Recipe& recipe, const cortex::Column& column, std::uint32_t layer,
+                               std::span<const Instance> instances, std::span<const float> radii) {
+  double filled = 0.;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < instances.size(); ++i)
+    if (instances[i].layer == layer)
+      filled += sphere_volume(double(radii[i] + recipe.soma_gap / 2.f)), ++count;
+  throw Error(fmt::format(
+      "the {} somata of layer {} do not fit without overlap: with their gaps they would fill {:.0f} % of it, "
+      "and random packing stops at about 38 %; lower its density or the gap, or plant neurons with smaller "
+      "somata",
+      count, recipe.layers[layer].name, 100. * filled / column.volume(layer)));
+}
+
+void place(const Recipe& recipe, const cortex::Column& column, std::span<const float> radii,
+           std::uint64_t seed, std::span<Instance> instances, Progress& progress) {
+  if (instances.empty()) return;
+  std::vector<std::uint32_t> order(instances.size());
+  std::iota(order.begin(), order.end(), 0u);
+  std::ranges::stable_sort(order, std::greater{}, [&](std::uint32_t i) { return radii[i]; });
+
+  Spheres spheres(column.bounds(), cell_width(column, {radii.begin(), radii.end()}, recipe.soma_gap),
+                  instances.size());
+  progress.begin("planting", instances.size());
+  constexpr std::size_t step = 1024;
+  for (std::size_t k = 0; k < order.size(); ++k) {
+    const std::uint32_t i = order[k];
+    Random random(seed, i, position_stream);
+    int trial = 0;
+    do {
+      if (trial++ == most_trials) refuse_layer(recipe, column, instances[i].layer, instances, radii);
+      instances[i].position = column.sample(instances[i].layer, random);
+    } while (!spheres.free(instances[i].position, radii[i], recipe.soma_gap));
+    spheres.add(instances[i].position, radii[i]);
+    if (k % step == step - 1) progress.advance(step);
+  }
+  progress.advance(order.size() % step);
+  progress.end();
+}
+
+/// The candidates of each type, by index. A type of which none is planted may go without.
+std::vector<std::vector<std::uint32_t>> choices(const Recipe& recipe, std::span<const Candidate> candidates,
+                                                const std::vector<std::vector<std::uint32_t>>& wanted) {
+  std::unordered_set<std::string_view> names;
+  for (const Candidate& candidate : candidates) {
+    if (!names.insert(candidate.name).second)
+      throw Error(fmt::format("two neurons to plant are called {}; rename one of them", candidate.name));
+    if (!std::isfinite(candidate.soma_radius) || candidate.soma_radius < 0.f)
+      throw Error(fmt::format("the soma of {} has a radius of {} µm; correct the neuron", candidate.name,
+                              candidate.soma_radius));
+  }
+  std::vector<std::vector<std::uint32_t>> result(recipe.types.size());
+  for (std::size_t type = 0; type < recipe.types.size(); ++type) {
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      if (candidates[i].population == recipe.types[type].population) result[type].push_back(std::uint32_t(i));
+    std::size_t count = 0;
+    for (const auto& layer : wanted) count += layer[type];
+    if (count && result[type].empty())
+      throw Error(
+          fmt::format("{} neurons of type {} are to be planted, but population {} is empty; grow or import "
+                      "neurons into it first",
+                      count, recipe.types[type].name, recipe.types[type].population));
+  }
+  return result;
+}
+
+/// Leaves out the candidates that were not planted.
+void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates) {
+  std::vector<std::uint32_t> number(candidates.size(), 0);
+  for (const Instance& instance : circuit.instances) number[instance.morphology] = 1;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (number[i])
+      number[i] = std::uint32_t(circuit.morphologies.size()),
+      circuit.morphologies.push_back(candidates[i].name);
+  for (Instance& instance : circuit.instances) instance.morphology = number[instance.morphology];
+}
+
+}  // namespace
+
+Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
+              Progress& progress) {
+  check(recipe);
+  const auto wanted = counts(recipe);
+  const auto choice = choices(recipe, candidates, wanted);
+  const cortex::Column tissue = column(recipe);
+
+  Circuit circuit{.name = recipe.name,
+                  .layers = {},
+                  .types = recipe.types,
+                  .morphologies = {},
+                  .instances = {},
+                  .radius = recipe.radius};
+  for (const cortex::Slab& slab : tissue.layers())
+    circuit.layers.push_back({slab.name, slab.bottom, slab.top});
+  for (std::uint32_t layer = 0; layer < wanted.size(); ++layer)
+    for (std::uint32_t type = 0; type < wanted[layer].size(); ++type)
+      circuit.instances.insert(circuit.instances.end(), wanted[layer][type],
+                               Instance{.type = type, .layer = layer});
+
+  std::vector<float> radii(circuit.instances.size());
+  parallel_for(circuit.instances.size(), 4096, [&](std::size_t i) {
+    Instance& instance = circuit.instances[i];
+    const auto& mine = choice[instance.type];
+    instance.morphology = mine[Random(seed, i, morphology_stream).below(std::uint32_t(mine.size()))];
+    radii[i] = candidates[instance.morphology].soma_radius;
+    if (recipe.rotate) {
+      const double angle = Random(seed, i, rotation_stream).uniform(0., 2. * std::numbers::pi);
+      instance.orientation =
+          Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY())).cast<float>();
+    }
+  });
+  place(recipe, tissue, radii, seed, circuit.instances, progress);
+  name_morphologies(circuit, candidates);
+  return circuit;
+}
+
+}  // namespace forest::circuit

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Planting: from a recipe and the neurons at hand to a circuit. Counts are exact, somata do not overlap, and
+// the result is a pure function of (recipe, candidates, seed), the same at any number of threads.
+//
+// Somata are placed by random sequential addition (Feder 1980, "Random sequential adsorption"): each is given
+// uniform places in its layer until it is clear of those before it. Large somata go first, as they find room
+// hardest. A grid of cells keeps each trial at the cost of a few comparisons, so that a million neurons take
+// about a second at common densities. Random sequential addition jams when spheres fill about 38 % of the
+// volume; before that it is refused.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+
+#include "forest/circuit/circuit.h"
+#include "forest/circuit/recipe.h"
+#include "forest/core/progress.h"
+
+namespace forest::circuit {
+
+/// A neuron that may be planted, any number of times.
+struct Candidate {
+  std::string name;         // distinct among the candidates
+  std::string population;   // as in CellType::population
+  float soma_radius = 0.f;  // µm, >= 0
+};
+
+/// Circuit::morphologies holds the candidates that were planted, in their order; instances are in the order
+/// of layers, then types. Each instance has a candidate of its type's population, all with equal chance.
+/// Throws Error when a population has no candidate, and when somata do not fit into a layer (naming it).
+Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
+              Progress& progress = Progress::none());
+
+}  // namespace forest::circuit

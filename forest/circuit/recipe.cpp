@@ -1,0 +1,309 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/circuit/recipe.h"
+
+#include <algorithm>
+#include <cmath>
+#include <initializer_list>
+#include <numeric>
+#include <sstream>
+#include <toml.hpp>
+#include <unordered_set>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+
+namespace forest::circuit {
+namespace {
+
+constexpr double most_neurons = 1e8;     // more do not fit the memory of any machine this runs on
+constexpr double fraction_slack = 1e-3;  // people write 0.33 + 0.33 + 0.34
+
+/// A TOML value with the place it came from, read key by key; every complaint names its line.
+class Node {
+ public:
+  Node(const toml::value& value, const std::string& file, std::string where)
+      : value_(value), file_(file), where_(std::move(where)) {}
+
+  [[noreturn]] void refuse(const std::string& sentence) const {
+    throw InputError(file_, value_.location().line(), sentence);
+  }
+
+  /// A table may hold these keys and no others; a misspelled key must not be passed over in silence.
+  void allow(std::initializer_list<std::string_view> keys) const {
+    const auto* offender = static_cast<const toml::value*>(nullptr);
+    std::string name;
+    for (const auto& [key, value] : table()) {
+      if (std::ranges::find(keys, std::string_view(key)) != keys.end()) continue;
+      // The table is unordered: name the first in the file.
+      if (!offender || value.location().line() < offender->location().line()) offender = &value, name = key;
+    }
+    if (offender)
+      Node(*offender, file_, where_)
+          .refuse(fmt::format("{} has no key \"{}\"; its keys are {}", where_, name, fmt::join(keys, ", ")));
+  }
+
+  std::optional<Node> find(const std::string& key) const {
+    const auto& all = table();
+    const auto found = all.find(key);
+    if (found == all.end()) return std::nullopt;
+    return Node(found->second, file_, where_ + "'s " + key);
+  }
+  Node at(const std::string& key) const {
+    if (auto node = find(key)) return *node;
+    refuse(fmt::format("{} lacks \"{}\"; add it", where_, key));
+  }
+
+  std::string string() const {
+    if (!value_.is_string()) refuse(where_ + " must be a text in quotation marks");
+    std::string text = value_.as_string().str;
+    if (text.empty()) refuse(where_ + " is empty; give it a name");
+    return text;
+  }
+  bool boolean() const {
+    if (!value_.is_boolean()) refuse(where_ + " must be true or false");
+    return value_.as_boolean();
+  }
+  double number(double low, double high, const char* unit) const {
+    const double x = value_.is_integer()    ? double(value_.as_integer())
+                     : value_.is_floating() ? value_.as_floating()
+                                            : std::nan("");
+    if (!(x >= low && x <= high))
+      refuse(fmt::format("{} must be a number from {:g} to {:g}{}{}", where_, low, high, *unit ? " " : "",
+                         unit));
+    return x;
+  }
+  std::uint32_t whole() const {
+    if (!value_.is_integer() || value_.as_integer() < 0 || double(value_.as_integer()) > most_neurons)
+      refuse(fmt::format("{} must be a whole number from 0 to {:.0f}", where_, most_neurons));
+    return std::uint32_t(value_.as_integer());
+  }
+  const toml::table& table() const {
+    if (!value_.is_table()) refuse(where_ + " must be a table of keys and values");
+    return value_.as_table();
+  }
+  std::vector<Node> tables(const std::string& key) const {
+    const Node list = at(key);
+    if (!list.value_.is_array() || list.value_.as_array().empty())
+      list.refuse(fmt::format("write each {} as a table of its own, headed [[{}]]", key, key));
+    std::vector<Node> nodes;
+    for (const toml::value& value : list.value_.as_array())
+      nodes.emplace_back(value, file_, fmt::format("{} {}", key, nodes.size() + 1));
+    return nodes;
+  }
+
+ private:
+  const toml::value& value_;
+  const std::string& file_;
+  std::string where_;
+};
+
+constexpr double longest = 1e5;  // µm: ten centimetres, the largest brain slab anyone plants
+
+CellType read_type(const Node& node) {
+  node.allow({"name", "population", "excitatory"});
+  CellType type;
+  type.name = node.at("name").string();
+  type.population = node.find("population") ? node.at("population").string() : type.name;
+  if (const auto excitatory = node.find("excitatory")) type.excitatory = excitatory->boolean();
+  return type;
+}
+
+std::vector<double> read_mix(const Node& node, std::span<const CellType> types, const std::string& layer) {
+  std::vector<double> mix(types.size());
+  for (const auto& [name, unused] : node.table()) {
+    const auto type = std::ranges::find(types, name, &CellType::name);
+    if (type == types.end())
+      node.at(name).refuse(fmt::format(
+          "layer {} holds neurons of type \"{}\", which is not declared; add a [[type]] of that name", layer,
+          name));
+    mix[std::size_t(type - types.begin())] = node.at(name).number(0., 1., "");
+  }
+  const double sum = std::accumulate(mix.begin(), mix.end(), 0.);
+  if (std::abs(sum - 1.) > fraction_slack)
+    node.refuse(
+        fmt::format("the fractions of the types of layer {} sum to {:.6g}; make them sum to 1", layer, sum));
+  for (double& fraction : mix) fraction /= sum;
+  return mix;
+}
+
+Recipe::Layer read_layer(const Node& node, std::span<const CellType> types) {
+  node.allow({"name", "thickness", "density", "count", "mix"});
+  Recipe::Layer layer;
+  layer.name = node.at("name").string();
+  layer.thickness = float(node.at("thickness").number(1e-3, longest, "µm"));
+  if (const auto count = node.find("count")) {
+    layer.count = count->whole();
+    if (const auto density = node.find("density"))
+      density->refuse(fmt::format("layer {} has a count and a density; give one of them", layer.name));
+  } else {
+    layer.density = node.at("density").number(0., 1e9, "neurons/mm³");
+  }
+  layer.mix = read_mix(node.at("mix"), types, layer.name);
+  return layer;
+}
+
+Recipe read_root(const Node& root) {
+  root.allow({"name", "neurons", "rotate", "column", "soma", "type", "layer"});
+  Recipe recipe;
+  recipe.name = root.at("name").string();
+  if (const auto neurons = root.find("neurons")) recipe.neurons = neurons->whole();
+  if (const auto rotate = root.find("rotate")) recipe.rotate = rotate->boolean();
+  const Node column = root.at("column");
+  column.allow({"radius"});
+  recipe.radius = float(column.at("radius").number(1e-3, longest, "µm"));
+  if (const auto soma = root.find("soma")) {
+    soma->allow({"gap"});
+    recipe.soma_gap = float(soma->at("gap").number(0., 1e4, "µm"));
+  }
+  std::unordered_set<std::string> seen;
+  for (const Node& node : root.tables("type")) {
+    recipe.types.push_back(read_type(node));
+    if (!seen.insert(recipe.types.back().name).second)
+      node.refuse(fmt::format("two types are called {}; names must differ", recipe.types.back().name));
+  }
+  seen.clear();
+  for (const Node& node : root.tables("layer")) {
+    recipe.layers.push_back(read_layer(node, recipe.types));
+    if (!seen.insert(recipe.layers.back().name).second)
+      node.refuse(fmt::format("two layers are called {}; names must differ", recipe.layers.back().name));
+  }
+  try {
+    check(recipe);
+  } catch (const Error& error) {  // a sentence about the numbers as a whole
+    (root.find("neurons") ? root.at("neurons") : column).refuse(error.what());
+  }
+  return recipe;
+}
+
+// toml11 draws its message over several lines with a picture of the source; the first line holds the reason.
+std::string reason(const std::exception& error) {
+  std::string text = error.what();
+  text.erase(std::min(text.find('\n'), text.size()));
+  for (const std::string_view prefix : {"[error] ", "toml::"})
+    if (text.starts_with(prefix)) text.erase(0, prefix.size());
+  if (const auto colon = text.find(": "); colon != std::string::npos && text.find(' ') > colon)
+    text.erase(0, colon + 2);
+  return text.empty() ? "it cannot be parsed" : text;
+}
+
+// The parser recurses; text that opens brackets without end would exhaust the stack.
+void refuse_deep_nesting(std::string_view text, const std::string& file) {
+  constexpr int deepest = 64;
+  int depth = 0;
+  std::size_t line = 1;
+  for (const char c : text) {
+    if (c == '\n') ++line;
+    if (c == '[' || c == '{') ++depth;
+    if (c == ']' || c == '}') depth = std::max(0, depth - 1);
+    if (depth > deepest)
+      throw InputError(file, line, "brackets are nested too deeply for a recipe; close them");
+  }
+}
+
+}  // namespace
+
+Recipe parse_recipe(std::string_view text, const std::string& file) {
+  refuse_deep_nesting(text, file);
+  toml::value root;
+  try {
+    std::istringstream stream{std::string(text)};
+    root = toml::parse(stream, file);
+  } catch (const toml::exception& error) {
+    throw InputError(file, error.location().line(), "this is not TOML: " + reason(error) + "; correct it");
+  } catch (const std::exception& error) {
+    throw InputError(file, 0, "this is not TOML: " + reason(error) + "; correct it");
+  }
+  return read_root(Node(root, file, "the recipe"));
+}
+
+Recipe read_recipe(const std::filesystem::path& path) {
+  return parse_recipe(MappedFile(path).text(), path.string());
+}
+
+void check(const Recipe& recipe) {
+  column(recipe);  // throws when a length is none
+  if (recipe.types.empty()) throw Error("a recipe needs at least one cell type");
+  if (!(recipe.soma_gap >= 0.f)) throw Error("the gap between somata must not be negative");
+  for (const Recipe::Layer& layer : recipe.layers) {
+    const double sum = std::accumulate(layer.mix.begin(), layer.mix.end(), 0.);
+    if (layer.mix.size() != recipe.types.size() || !(std::abs(sum - 1.) < 1e-6) ||
+        std::ranges::any_of(layer.mix, [](double x) { return x < 0.; }))
+      throw Error(fmt::format("layer {} needs a fraction for each of the {} types, and they must sum to 1",
+                              layer.name, recipe.types.size()));
+    if (!(layer.density >= 0.))
+      throw Error(fmt::format("the density of layer {} must not be negative", layer.name));
+  }
+  counts(recipe);  // throws when they do not work out
+}
+
+cortex::Column column(const Recipe& recipe) {
+  std::vector<cortex::Column::Layer> layers;
+  for (const Recipe::Layer& layer : recipe.layers) layers.push_back({layer.name, layer.thickness});
+  return cortex::Column(recipe.radius, layers);
+}
+
+std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double> weights) {
+  std::vector<std::uint32_t> shares(weights.size());
+  const double sum = std::accumulate(weights.begin(), weights.end(), 0.);
+  if (!(sum > 0.)) return shares;
+
+  std::vector<std::pair<double, std::size_t>> remainders;
+  std::uint32_t given = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    const double quota = double(total) * (weights[i] / sum);
+    shares[i] = std::uint32_t(quota);
+    given += shares[i];
+    remainders.emplace_back(quota - double(shares[i]), i);
+  }
+  std::ranges::stable_sort(remainders, std::greater{}, &std::pair<double, std::size_t>::first);
+  for (std::size_t k = 0; given < total; ++given, ++k) ++shares[remainders[k % remainders.size()].second];
+  return shares;
+}
+
+std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe) {
+  const cortex::Column tissue = column(recipe);
+  std::vector<double> expected;  // of the layers whose number follows from a density
+  double fixed = 0.;
+  for (std::size_t i = 0; i < recipe.layers.size(); ++i) {
+    const auto& layer = recipe.layers[i];
+    if (layer.count) fixed += *layer.count;
+    expected.push_back(layer.count ? 0. : layer.density * tissue.volume(i) * 1e-9);
+  }
+  const double sum = std::accumulate(expected.begin(), expected.end(), 0.);
+  const double rest = recipe.neurons ? double(*recipe.neurons) - fixed : std::round(sum);
+  if (rest + fixed > most_neurons)
+    throw Error(
+        fmt::format("the recipe asks for {:.3g} neurons, more than the {:.0f} that can be planted; lower its "
+                    "densities or radius",
+                    rest + fixed, most_neurons));
+  if (rest < 0.)
+    throw Error(
+        fmt::format("the counts of the layers sum to {:.0f}, but the recipe has {} neurons; raise "
+                    "\"neurons\" or lower the counts",
+                    fixed, *recipe.neurons));
+  if (rest > 0. && sum <= 0.)
+    throw Error(
+        fmt::format("{:.0f} neurons are left over, but no layer has a density to share them by; give one a "
+                    "density, or make the counts sum to {}",
+                    rest, *recipe.neurons));
+
+  const auto by_density = apportion(std::uint32_t(rest), expected);
+  std::vector<std::vector<std::uint32_t>> result;
+  for (std::size_t i = 0; i < recipe.layers.size(); ++i)
+    result.push_back(apportion(recipe.layers[i].count.value_or(by_density[i]), recipe.layers[i].mix));
+  return result;
+}
+
+Recipe with_type(Recipe recipe, CellType type, double fraction) {
+  if (!(fraction >= 0. && fraction <= 1.)) throw Error("the fraction of an added type must be from 0 to 1");
+  recipe.types.push_back(std::move(type));
+  for (Recipe::Layer& layer : recipe.layers) {
+    for (double& share : layer.mix) share *= 1. - fraction;
+    layer.mix.push_back(fraction);
+  }
+  return recipe;
+}
+
+}  // namespace forest::circuit

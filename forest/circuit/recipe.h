@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// What to plant: a column, its layers, and which cell types stand in them. Written by people in TOML;
+// docs/circuit/recipe.md describes the keys, data/recipes/ holds recipes that ship with the project.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "forest/circuit/circuit.h"
+#include "forest/cortex/column.h"
+
+namespace forest::circuit {
+
+struct Recipe {
+  /// A layer and what stands in it. Its number of neurons is `count`, or else follows from `density`.
+  struct Layer {
+    std::string name;
+    float thickness = 0.f;  // µm, > 0
+    double density = 0.;    // neurons/mm³, >= 0
+    std::optional<std::uint32_t> count;
+    std::vector<double> mix;  // fraction of each of Recipe::types, in their order; sums to 1
+  };
+
+  std::string name = "column";
+  float radius = 0.f;  // of the column, µm, > 0
+  std::vector<CellType> types;
+  std::vector<Layer> layers;  // from the pia downwards
+  /// The exact number of neurons in all. Densities then only say how they are shared among the layers without
+  /// a count.
+  std::optional<std::uint32_t> neurons;
+  float soma_gap = 0.f;  // least distance between the surfaces of two somata, µm, >= 0
+  bool rotate = true;    // each neuron by a random angle about the vertical axis
+};
+
+/// Reads a recipe. Throws InputError (file, line, remedy): not TOML, an unknown or missing key, a number out
+/// of range, a type that is not declared, fractions that do not sum to 1.
+Recipe parse_recipe(std::string_view text, const std::string& file);
+Recipe read_recipe(const std::filesystem::path& path);
+
+/// Throws Error that says which of the sentences above is violated.
+void check(const Recipe& recipe);
+
+/// The column a recipe speaks of.
+cortex::Column column(const Recipe& recipe);
+
+/// The number of neurons to plant, exactly: [layer][type]. Whole numbers by largest remainder, first among
+/// the layers, then among the types of a layer. Throws Error when the explicit counts exceed `neurons`.
+std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe);
+
+/// Shares out `total` in proportion to `weights` (>= 0) by Hamilton's method of largest remainders: the sum
+/// is exact and no share is a whole unit away from its proportion. Ties go to the first. All weights 0 gives
+/// shares of 0.
+std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double> weights);
+
+/// A recipe in which a new type takes `fraction` of every layer, the others making room in proportion.
+Recipe with_type(Recipe recipe, CellType type, double fraction);
+
+}  // namespace forest::circuit
