@@ -1,5 +1,6 @@
 # Every library the project uses, from Debian 12 packages (tools/packages.txt). The reason for each stands in
 # docs/ARCHITECTURE.md. A room names what it needs in PRIVATE; only Eigen is seen in public headers.
+set(Python3_EXECUTABLE /usr/bin/python3) # Debian's, which has h5py and numpy, whatever else is on the PATH
 find_package(Python3 REQUIRED COMPONENTS Interpreter)
 find_package(PkgConfig REQUIRED)
 find_package(GTest REQUIRED)

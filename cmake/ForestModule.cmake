@@ -7,7 +7,7 @@
 set(FOREST_WARNINGS -Wall -Wextra -Wshadow -Wconversion $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict>
                     $<$<BOOL:${FOREST_WARNINGS_AS_ERRORS}>:-Werror>)
 if(FOREST_SANITIZE)
-  add_compile_options(-fsanitize=${FOREST_SANITIZE} -fno-omit-frame-pointer)
+  add_compile_options(-fsanitize=${FOREST_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${FOREST_SANITIZE})
 endif()
 
@@ -52,5 +52,6 @@ function(forest_module)
     forest_test(forest_${name}_test)
     add_test(NAME ${name} COMMAND forest_${name}_test)
     set_tests_properties(${name} PROPERTIES LABELS unit)
+    add_dependencies(unit_tests forest_${name}_test)
   endif()
 endfunction()
