@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/cli/console.h"
 
-#include <fmt/format.h>
-#include <unistd.h>
-
 #include <algorithm>
 #include <cstdlib>
+#include <unistd.h>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 namespace forest::cli {
@@ -39,7 +39,8 @@ void ProgressBar::draw(Clock::time_point now) {
   constexpr std::size_t width = 30;
   if (total_) {
     const std::size_t filled = std::min(width, width * done_ / total_);
-    fmt::print(stderr, "\r\033[K{:<12} {}{} {}/{}", stage_, std::string(filled, '#'), std::string(width - filled, '.'), done_, total_);
+    fmt::print(stderr, "\r\033[K{:<12} {}{} {}/{}", stage_, std::string(filled, '#'),
+               std::string(width - filled, '.'), done_, total_);
   } else {
     fmt::print(stderr, "\r\033[K{:<12} {}", stage_, done_);
   }
@@ -62,7 +63,8 @@ void Console::print(const nlohmann::ordered_json& value) {
   if (json) fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
-void Console::table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows) {
+void Console::table(const std::vector<std::string>& header,
+                    const std::vector<std::vector<std::string>>& rows) {
   if (json) return;
   bar_.end();
   const auto number = [](const std::string& cell) {
@@ -101,7 +103,8 @@ std::filesystem::path data_folder() {
   std::error_code ignored;
   const auto program = std::filesystem::read_symlink("/proc/self/exe", ignored);
   const auto installed = program.parent_path().parent_path() / "share" / "brainforest";
-  return std::filesystem::exists(installed, ignored) ? installed : std::filesystem::path(FOREST_SOURCE_DIR) / "data";
+  return std::filesystem::exists(installed, ignored) ? installed
+                                                     : std::filesystem::path(FOREST_SOURCE_DIR) / "data";
 }
 
 }  // namespace forest::cli

@@ -5,10 +5,11 @@
 #include <chrono>
 #include <filesystem>
 #include <mutex>
-#include <nlohmann/json_fwd.hpp>
 #include <string>
 #include <string_view>
 #include <vector>
+
+#include <nlohmann/json_fwd.hpp>
 
 #include "forest/core/progress.h"
 
@@ -34,12 +35,12 @@ class ProgressBar final : public Progress {
 
 class Console {
  public:
-  bool json = false;         // --json: machine-readable results on standard output
-  unsigned threads = 0;      // --threads: 0 for all cores
+  bool json = false;     // --json: machine-readable results on standard output
+  unsigned threads = 0;  // --threads: 0 for all cores
 
   Progress& progress() { return bar_; }
-  void say(std::string_view line);      // to standard output, unless --json
-  void warn(std::string_view sentence); // to standard error
+  void say(std::string_view line);                  // to standard output, unless --json
+  void warn(std::string_view sentence);             // to standard error
   void print(const nlohmann::ordered_json& value);  // to standard output, when --json
   /// Columns aligned, numbers right; to standard output, unless --json.
   void table(const std::vector<std::string>& header, const std::vector<std::vector<std::string>>& rows);
@@ -48,7 +49,8 @@ class Console {
   ProgressBar bar_;
 };
 
-/// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the installation.
+/// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the
+/// installation.
 std::filesystem::path data_folder();
 
 }  // namespace forest::cli

@@ -1,13 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <fmt/format.h>
+#include <memory>
 
 #include <CLI/CLI.hpp>
-#include <memory>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
-#include "forest/core/error.h"
-#include "forest/core/parallel.h"
 
 int main(int argc, char** argv) {
   using namespace forest;
@@ -21,7 +22,8 @@ int main(int argc, char** argv) {
     CLI::App* command = app.add_subcommand(verb.name, verb.summary);
     command->footer(fmt::format("Example:\n  {}", verb.example));
     command->add_flag("--json", console.json, "Print results as JSON");
-    command->add_option("--threads", console.threads, "Number of threads; 0 for all cores")->check(CLI::NonNegativeNumber);
+    command->add_option("--threads", console.threads, "Number of threads; 0 for all cores")
+        ->check(CLI::NonNegativeNumber);
     command->callback([&run, job = verb.setup(*command, console)] { run = job; });
   }
   try {

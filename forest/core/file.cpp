@@ -1,14 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/file.h"
 
-#include <fcntl.h>
-#include <sys/mman.h>
-#include <sys/stat.h>
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstring>
+#include <fcntl.h>
+#include <unistd.h>
 #include <utility>
+
+#include <sys/mman.h>
+#include <sys/stat.h>
 
 #include "forest/core/error.h"
 
@@ -16,7 +16,8 @@ namespace forest {
 
 MappedFile::MappedFile(const std::filesystem::path& path) {
   const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
-  if (file < 0) throw InputError(path, 0, std::string("cannot be opened (") + std::strerror(errno) + "); check the path");
+  if (file < 0)
+    throw InputError(path, 0, std::string("cannot be opened (") + std::strerror(errno) + "); check the path");
   struct stat status {};
   if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(file);

@@ -25,8 +25,8 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// Writes beside `path` and renames, so that a killed program leaves the old file or the new one, never a part.
-/// Throws Error when the folder is missing or the disk is full; then nothing is left behind.
+/// Writes beside `path` and renames, so that a killed program leaves the old file or the new one, never a
+/// part. Throws Error when the folder is missing or the disk is full; then nothing is left behind.
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file(const std::filesystem::path& path, std::string_view text);
 

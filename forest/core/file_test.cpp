@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/file.h"
 
-#include <gtest/gtest.h>
-
 #include <filesystem>
+
+#include <gtest/gtest.h>
 
 #include "forest/core/error.h"
 #include "forest/core/hash.h"

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/hash.h"
 
-#include <fmt/format.h>
 #include <xxhash.h>
+
+#include <fmt/format.h>
 
 namespace forest {
 

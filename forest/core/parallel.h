@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Loops on all cores (oneTBB). Results must not depend on the number of threads: iteration i writes only what is i's.
+// Loops on all cores (oneTBB). Results must not depend on the number of threads: iteration i writes only what
+// is i's.
 #pragma once
 
 #include <cstddef>
@@ -7,8 +8,8 @@
 
 namespace forest {
 
-/// Calls body(begin, end) for disjoint ranges that cover [0, count), at least `grain` iterations each where possible.
-/// The first exception thrown by a body is rethrown here.
+/// Calls body(begin, end) for disjoint ranges that cover [0, count), at least `grain` iterations each where
+/// possible. The first exception thrown by a body is rethrown here.
 void parallel_ranges(std::size_t count, std::size_t grain,
                      const std::function<void(std::size_t begin, std::size_t end)>& body);
 

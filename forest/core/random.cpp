@@ -1,18 +1,19 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/random.h"
 
-#include <Random123/philox.h>
-
 #include <algorithm>
-#include <boost/math/special_functions/erf.hpp>
 #include <cmath>
 #include <numbers>
+
+#include <Random123/philox.h>
+#include <boost/math/special_functions/erf.hpp>
 
 namespace forest {
 
 std::uint32_t Random::operator()() {
   if (used_ == 4) {
-    const r123::Philox4x32::ctr_type counter{{block_++, stream_, std::uint32_t(item_), std::uint32_t(item_ >> 32)}};
+    const r123::Philox4x32::ctr_type counter{
+        {block_++, stream_, std::uint32_t(item_), std::uint32_t(item_ >> 32)}};
     const r123::Philox4x32::key_type key{{std::uint32_t(seed_), std::uint32_t(seed_ >> 32)}};
     const auto block = r123::Philox4x32{}(counter, key);
     std::copy_n(block.begin(), 4, words_.begin());

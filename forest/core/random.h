@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Counter-based random numbers: Philox 4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"),
-// from Random123. A sequence is a pure function of (seed, item, stream), so a forest is the same at any number of
-// threads. The distributions are ours, because those of the standard library differ between implementations.
+// Counter-based random numbers: Philox 4x32-10 (Salmon et al. 2011, "Parallel random numbers: as easy as 1,
+// 2, 3"), from Random123. A sequence is a pure function of (seed, item, stream), so a forest is the same at
+// any number of threads. The distributions are ours, because those of the standard library differ between
+// implementations.
 #pragma once
 
 #include <array>
@@ -22,13 +23,13 @@ class Random {
   static constexpr result_type min() { return 0; }
   static constexpr result_type max() { return 0xffffffffu; }
 
-  double uniform();                                    // in [0, 1), 53 bits
-  double uniform(double low, double high);             // in [low, high)
-  std::uint32_t below(std::uint32_t count);            // in [0, count), unbiased; count > 0
-  double normal(double mean = 0., double sd = 1.);     // Box–Muller
+  double uniform();                                 // in [0, 1), 53 bits
+  double uniform(double low, double high);          // in [low, high)
+  std::uint32_t below(std::uint32_t count);         // in [0, count), unbiased; count > 0
+  double normal(double mean = 0., double sd = 1.);  // Box–Muller
   double truncated_normal(double mean, double sd, double low, double high);  // by inversion, low <= high
   double exponential(double mean);
-  double gamma(double shape, double scale);            // Marsaglia & Tsang 2000
+  double gamma(double shape, double scale);  // Marsaglia & Tsang 2000
 
  private:
   std::uint64_t seed_, item_;

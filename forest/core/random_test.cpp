@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/random.h"
 
-#include <gtest/gtest.h>
-
-#include <boost/math/distributions/chi_squared.hpp>
 #include <cmath>
 #include <functional>
 #include <vector>
+
+#include <boost/math/distributions/chi_squared.hpp>
+#include <gtest/gtest.h>
 
 namespace forest {
 namespace {
@@ -44,7 +44,8 @@ TEST(Random, BelowIsUnbiased) {
 
 TEST(Random, NormalFollowsItsDistribution) {
   Random random(9);
-  EXPECT_GT(chi_squared_p(32, 100000, [&] { return int(32 * normal_cdf((random.normal(3, 2) - 3) / 2)); }), 1e-4);
+  EXPECT_GT(chi_squared_p(32, 100000, [&] { return int(32 * normal_cdf((random.normal(3, 2) - 3) / 2)); }),
+            1e-4);
 }
 
 TEST(Random, TruncatedNormalFollowsItsDistributionAndKeepsItsLimits) {

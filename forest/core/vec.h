@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Vectors, matrices and rotations: Eigen's, under the names used throughout. Lengths are µm, y points to the pia.
+// Vectors, matrices and rotations: Eigen's, under the names used throughout. Lengths are µm, y points to the
+// pia.
 #pragma once
+
+#include <numbers>
 
 #include <Eigen/Core>
 #include <Eigen/Geometry>
-#include <numbers>
 
 namespace forest {
 

@@ -39,7 +39,8 @@ std::vector<std::uint32_t> simplify(std::span<const Vec4> vertices, float tolera
     float worst = tolerance;
     std::size_t split = 0;
     for (std::size_t i = first + 1; i < last; ++i)
-      if (const float d = deviation(vertices[i], vertices[first], vertices[last]); d > worst) worst = d, split = i;
+      if (const float d = deviation(vertices[i], vertices[first], vertices[last]); d > worst)
+        worst = d, split = i;
     if (!split) continue;
     keep[split] = true;
     open.emplace_back(first, split);

@@ -13,15 +13,17 @@ TEST(Polyline, NoDroppedVertexIsFurtherThanTheTolerance) {
   for (int round = 0; round < 50; ++round) {
     std::vector<Vec4> line{Vec4::Zero()};
     for (int i = 0; i < 100; ++i)
-      line.push_back(line.back() + Vec4(1, float(random.normal()), float(random.normal()), float(random.normal(0, .01))));
+      line.push_back(line.back() +
+                     Vec4(1, float(random.normal()), float(random.normal()), float(random.normal(0, .01))));
     const float tolerance = float(random.uniform(.1, 5));
     const auto kept = simplify(line, tolerance);
     EXPECT_EQ(kept.front(), 0u);
     EXPECT_EQ(kept.back(), 100u);
     for (std::size_t k = 1; k < kept.size(); ++k)
       for (std::uint32_t i = kept[k - 1]; i <= kept[k]; ++i)
-        EXPECT_LE(distance_to_segment(line[i].head<3>(), line[kept[k - 1]].head<3>(), line[kept[k]].head<3>()),
-                  tolerance * 1.0001f);
+        EXPECT_LE(
+            distance_to_segment(line[i].head<3>(), line[kept[k - 1]].head<3>(), line[kept[k]].head<3>()),
+            tolerance * 1.0001f);
   }
 }
 

@@ -9,7 +9,7 @@
 namespace forest {
 
 struct RoundCone {
-  Vec3 a, b;             // centres of the two end spheres, µm
+  Vec3 a, b;                 // centres of the two end spheres, µm
   float radius_a, radius_b;  // µm, >= 0
 };
 
@@ -18,8 +18,9 @@ struct Ray {
   Vec3 direction;  // unit length
 };
 
-/// Distance along the ray to where it enters the cone from outside; none when it misses or the cone lies behind.
-/// After the derivation in Quilez, "Round cone intersection" (iquilezles.org/articles/intersectors), written anew.
+/// Distance along the ray to where it enters the cone from outside; none when it misses or the cone lies
+/// behind. After the derivation in Quilez, "Round cone intersection" (iquilezles.org/articles/intersectors),
+/// written anew.
 std::optional<float> intersect(const Ray& ray, const RoundCone& cone);
 
 /// Signed distance from a point to the surface, negative inside.

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/geometry/round_cone.h"
 
-#include <gtest/gtest.h>
-
 #include <cmath>
+
+#include <gtest/gtest.h>
 
 #include "forest/core/random.h"
 
@@ -11,14 +11,16 @@ namespace forest {
 namespace {
 
 Vec3 in_cube(Random& random, double half) {
-  return {float(random.uniform(-half, half)), float(random.uniform(-half, half)), float(random.uniform(-half, half))};
+  return {float(random.uniform(-half, half)), float(random.uniform(-half, half)),
+          float(random.uniform(-half, half))};
 }
 
 TEST(RoundCone, TheEntryPointIsOnTheSurfaceAndNothingLiesBefore) {
   Random random(3);
   int hits = 0;
   for (int i = 0; i < 20000; ++i) {
-    const RoundCone cone{in_cube(random, 2), in_cube(random, 2), float(random.uniform(.05, 1)), float(random.uniform(.05, 1))};
+    const RoundCone cone{in_cube(random, 2), in_cube(random, 2), float(random.uniform(.05, 1)),
+                         float(random.uniform(.05, 1))};
     const Ray ray{in_cube(random, 1) + Vec3(0, 0, 10), (in_cube(random, 3) - Vec3(0, 0, 10)).normalized()};
     const auto t = intersect(ray, cone);
     float nearest = 1e9f;  // along the ray by sphere tracing, an independent way

@@ -16,7 +16,8 @@ double sum_over_segments(std::span<const Point> points, Measure measure) {
 template <class Measure>
 double sum_over_sections(const Morphology& m, Measure measure) {
   double sum = 0.;
-  for (std::size_t i = 0; i < m.sections().size(); ++i) sum += sum_over_segments(m.points(SectionId(i)), measure);
+  for (std::size_t i = 0; i < m.sections().size(); ++i)
+    sum += sum_over_segments(m.points(SectionId(i)), measure);
   return sum;
 }
 
@@ -36,9 +37,15 @@ double segment_volume(const Point& a, const Point& b) {
   return std::numbers::pi / 3. * segment_length(a, b) * (r * r + r * s + s * s);
 }
 
-double section_length(const Morphology& m, SectionId id) { return sum_over_segments(m.points(id), segment_length); }
-double section_area(const Morphology& m, SectionId id) { return sum_over_segments(m.points(id), segment_area); }
-double section_volume(const Morphology& m, SectionId id) { return sum_over_segments(m.points(id), segment_volume); }
+double section_length(const Morphology& m, SectionId id) {
+  return sum_over_segments(m.points(id), segment_length);
+}
+double section_area(const Morphology& m, SectionId id) {
+  return sum_over_segments(m.points(id), segment_area);
+}
+double section_volume(const Morphology& m, SectionId id) {
+  return sum_over_segments(m.points(id), segment_volume);
+}
 double total_length(const Morphology& m) { return sum_over_sections(m, segment_length); }
 double total_area(const Morphology& m) { return sum_over_sections(m, segment_area); }
 

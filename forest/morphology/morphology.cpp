@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/morphology/morphology.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/morphology/measure.h"
@@ -32,8 +32,9 @@ bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.
 void check_points(std::span<const Point> points, std::string_view owner) {
   for (const Point& p : points)
     if (!finite(p) || p.radius < 0.f)
-      throw Error(fmt::format("a point of {} is ({}, {}, {}) with radius {}; coordinates must be finite and radii not negative",
-                              owner, p.x, p.y, p.z, p.radius));
+      throw Error(fmt::format(
+          "a point of {} is ({}, {}, {}) with radius {}; coordinates must be finite and radii not negative",
+          owner, p.x, p.y, p.z, p.radius));
 }
 
 }  // namespace
@@ -93,8 +94,9 @@ Bounds Morphology::bounds() const {
 }
 
 bool Morphology::operator==(const Morphology& other) const {
-  return data_ == other.data_ || (data_->soma == other.data_->soma && data_->points == other.data_->points &&
-                                  data_->sections == other.data_->sections && data_->spines == other.data_->spines);
+  return data_ == other.data_ ||
+         (data_->soma == other.data_->soma && data_->points == other.data_->points &&
+          data_->sections == other.data_->sections && data_->spines == other.data_->spines);
 }
 
 MorphologyBuilder::MorphologyBuilder() : data_(std::make_shared<Morphology::Data>()) {}
@@ -112,9 +114,13 @@ void MorphologyBuilder::set_soma(Soma soma) {
                     : soma.kind == SomaKind::cylinders
                         ? count >= 2 && soma.parents.size() == count && soma.parents[0] == -1
                         : count >= 3 && !soma.contour_starts.empty() && soma.contour_starts[0] == 0;
-  if (!good) throw Error("the soma's points do not fit its kind: a sphere has 1, cylinders 2 or more with parents, contours 3 or more");
+  if (!good)
+    throw Error(
+        "the soma's points do not fit its kind: a sphere has 1, cylinders 2 or more with parents, contours 3 "
+        "or more");
   for (std::size_t i = 1; i < soma.parents.size(); ++i)
-    if (soma.parents[i] < 0 || std::size_t(soma.parents[i]) >= i) throw Error("a soma point must come after its parent");
+    if (soma.parents[i] < 0 || std::size_t(soma.parents[i]) >= i)
+      throw Error("a soma point must come after its parent");
   for (std::size_t i = 1; i < soma.contour_starts.size(); ++i)
     if (soma.contour_starts[i] <= soma.contour_starts[i - 1] || soma.contour_starts[i] >= count)
       throw Error("the contours of a soma must begin at increasing points");
@@ -128,10 +134,15 @@ SectionId MorphologyBuilder::add_section(SectionId parent, SectionKind kind, std
 SectionId MorphologyBuilder::add_section(SectionId parent, SectionKind kind, std::span<const Point> points,
                                          std::int32_t tag, std::int32_t soma_point) {
   auto& all = data_->points;
-  if (parent.valid() && parent.value() >= data_->sections.size()) throw Error("a section must be added after its parent");
+  if (parent.valid() && parent.value() >= data_->sections.size())
+    throw Error("a section must be added after its parent");
   if (points.empty()) throw Error("a section needs at least one point");
   check_points(points, fmt::format("section {}", data_->sections.size()));
-  Section section{.parent = parent, .first_point = std::uint32_t(all.size()), .kind = kind, .tag = tag, .soma_point = soma_point};
+  Section section{.parent = parent,
+                  .first_point = std::uint32_t(all.size()),
+                  .kind = kind,
+                  .tag = tag,
+                  .soma_point = soma_point};
   if (parent.valid()) {
     const Section& above = data_->sections[parent.value()];
     const Point joint = all[above.first_point + above.point_count - 1];
@@ -171,7 +182,8 @@ Morphology MorphologyBuilder::build() {
   d.children.resize(count - d.roots.size());
   auto next = d.first_child;
   for (std::size_t i = 0; i < count; ++i)
-    if (const SectionId parent = d.sections[i].parent; parent.valid()) d.children[next[parent.value()]++] = SectionId(i);
+    if (const SectionId parent = d.sections[i].parent; parent.valid())
+      d.children[next[parent.value()]++] = SectionId(i);
   Morphology result{std::shared_ptr<const Morphology::Data>(std::move(data_))};
   data_ = std::make_shared<Morphology::Data>();
   return result;

@@ -1,10 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The neuron as a value. A *section* runs from one node (soma, branch point, terminal) to the next; a *segment* is the
-// piece between two consecutive points of a section. Terms of N++ (stem, terminal, nonterminal, bifurcation,
-// multifurcation) are in docs/glossary.md.
+// The neuron as a value. A *section* runs from one node (soma, branch point, terminal) to the next; a
+// *segment* is the piece between two consecutive points of a section. Terms of N++ (stem, terminal,
+// nonterminal, bifurcation, multifurcation) are in docs/glossary.md.
 //
-//        0────┬─1──      sections are in parent-first order: parent(i) < i. The first point of a child repeats the
-//   soma      └─2──┬─3   last point of its parent (its radius may differ), so each section is drawn and measured
+//        0────┬─1──      sections are in parent-first order: parent(i) < i. The first point of a child
+//        repeats the
+//   soma      └─2──┬─3   last point of its parent (its radius may differ), so each section is drawn and
+//   measured
 //                  └─4   alone. A root may have a single point, any other section has at least two.
 #pragma once
 
@@ -23,8 +25,17 @@ namespace forest {
 
 using SectionId = Id<struct SectionTag>;
 
-/// Numbers are those of SWC. Kinds a file knows and we do not are `custom`, their number kept in Section::tag.
-enum class SectionKind : std::uint8_t { undefined = 0, axon = 2, basal = 3, apical = 4, custom = 5, unspecified = 6, glia = 7 };
+/// Numbers are those of SWC. Kinds a file knows and we do not are `custom`, their number kept in
+/// Section::tag.
+enum class SectionKind : std::uint8_t {
+  undefined = 0,
+  axon = 2,
+  basal = 3,
+  apical = 4,
+  custom = 5,
+  unspecified = 6,
+  glia = 7
+};
 
 /// "axon", "basal", …; and back, with `custom` for unknown words.
 std::string_view name_of(SectionKind kind);
@@ -42,8 +53,9 @@ struct Section {
   SectionId parent;                                // none for a root
   std::uint32_t first_point = 0, point_count = 0;  // into Morphology::points()
   SectionKind kind = SectionKind::undefined;
-  std::int32_t tag = 0;         // the number the file gave, for example the SWC type
-  std::int32_t soma_point = -1; // a root: index in Soma::points of the point it leaves from; -1 when not known
+  std::int32_t tag = 0;  // the number the file gave, for example the SWC type
+  std::int32_t soma_point =
+      -1;  // a root: index in Soma::points of the point it leaves from; -1 when not known
 
   bool operator==(const Section&) const = default;
 };
@@ -58,8 +70,9 @@ struct Soma {
   std::vector<std::int32_t> parents;
   std::vector<std::uint32_t> contour_starts;
 
-  Point sphere() const;  // centre and radius of a sphere of the same place and mean size; radius 0 when there is none
-  double area() const;   // µm²; of contours: the sphere of their mean radius
+  Point sphere()
+      const;  // centre and radius of a sphere of the same place and mean size; radius 0 when there is none
+  double area() const;  // µm²; of contours: the sphere of their mean radius
   bool operator==(const Soma&) const = default;
 };
 
@@ -76,7 +89,8 @@ struct Spine {
   bool operator==(const Spine&) const = default;
 };
 
-using Annotations = std::vector<std::pair<std::string, std::string>>;  // what a file says of its cell, in its order
+using Annotations =
+    std::vector<std::pair<std::string, std::string>>;  // what a file says of its cell, in its order
 
 /// Immutable; copies share their arrays.
 class Morphology {
@@ -130,7 +144,8 @@ class MorphologyBuilder {
 
   void reserve(std::size_t sections, std::size_t points);
   void set_soma(Soma soma);
-  /// Adds a section. For a child whose first point is not at its parent's last point, that point is put in front of it.
+  /// Adds a section. For a child whose first point is not at its parent's last point, that point is put in
+  /// front of it.
   SectionId add_section(SectionId parent, SectionKind kind, std::span<const Point> points);
   SectionId add_section(SectionId parent, SectionKind kind, std::span<const Point> points, std::int32_t tag,
                         std::int32_t soma_point = -1);

@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/morphology/morphology.h"
 
-#include <gtest/gtest.h>
-
 #include <limits>
+
+#include <gtest/gtest.h>
 
 #include "forest/core/error.h"
 #include "forest/morphology/measure.h"
@@ -15,7 +15,8 @@ namespace {
 Morphology bifurcating() {
   MorphologyBuilder builder;
   builder.set_soma({.kind = SomaKind::sphere, .points = {{0, 0, 0, 5}}, .parents = {}, .contour_starts = {}});
-  const auto stem = builder.add_section({}, SectionKind::apical, std::vector<Point>{{0, 5, 0, 2}, {0, 15, 0, 1}});
+  const auto stem =
+      builder.add_section({}, SectionKind::apical, std::vector<Point>{{0, 5, 0, 2}, {0, 15, 0, 1}});
   builder.add_section(stem, SectionKind::apical, std::vector<Point>{{3, 19, 0, 1}});
   builder.add_section(stem, SectionKind::apical, std::vector<Point>{{0, 15, 0, .5f}, {-3, 19, 0, .5f}});
   return builder.build();
@@ -55,21 +56,27 @@ TEST(MorphologyBuilder, RefusesWhatIsNotANeuron) {
   EXPECT_THROW(b.add_section({}, SectionKind::axon, std::vector<Point>{{nan, 0, 0, 1}}), Error);
   EXPECT_THROW(b.add_section({}, SectionKind::axon, std::vector<Point>{{0, 0, 0, -1}}), Error);
   EXPECT_THROW(b.add_spine({}), Error);
-  EXPECT_THROW(b.set_soma({.kind = SomaKind::sphere, .points = {}, .parents = {}, .contour_starts = {}}), Error);
+  EXPECT_THROW(b.set_soma({.kind = SomaKind::sphere, .points = {}, .parents = {}, .contour_starts = {}}),
+               Error);
 }
 
 TEST(Validate, ReturnsWhatIsOdd) {
   MorphologyBuilder b;
-  const auto root = b.add_section({}, SectionKind::basal, std::vector<Point>{{0, 0, 0, 1}, {1, 0, 0, 0}, {1, 0, 0, 1}});
+  const auto root =
+      b.add_section({}, SectionKind::basal, std::vector<Point>{{0, 0, 0, 1}, {1, 0, 0, 0}, {1, 0, 0, 1}});
   b.add_section(root, SectionKind::axon, std::vector<Point>{{2, 0, 0, 1}});
   std::vector<std::string_view> codes;
   for (const Finding& f : validate(b.build())) codes.push_back(f.code);
-  const std::vector<std::string_view> expected{"no-soma", "zero-radius", "zero-length", "unifurcation", "kind-change"};
+  const std::vector<std::string_view> expected{"no-soma", "zero-radius", "zero-length", "unifurcation",
+                                               "kind-change"};
   EXPECT_EQ(codes, expected);
 }
 
 TEST(Soma, CylindersHaveLateralArea) {
-  const Soma soma{.kind = SomaKind::cylinders, .points = {{0, -5, 0, 5}, {0, 5, 0, 5}}, .parents = {-1, 0}, .contour_starts = {}};
+  const Soma soma{.kind = SomaKind::cylinders,
+                  .points = {{0, -5, 0, 5}, {0, 5, 0, 5}},
+                  .parents = {-1, 0},
+                  .contour_starts = {}};
   EXPECT_NEAR(soma.area(), std::numbers::pi * 100., 1e-6);
   EXPECT_NEAR(soma.sphere().radius, 5.f, 1e-5f);
 }

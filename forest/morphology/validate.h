@@ -14,14 +14,15 @@ enum class Severity : std::uint8_t { note, warning };
 
 struct Finding {
   Severity severity = Severity::note;
-  std::string_view code;   // a stable word, for example "no-soma"
-  SectionId section;       // none when the whole neuron is meant
-  std::int64_t point = -1; // within the section
-  std::string sentence;    // what it is and what to do
+  std::string_view code;    // a stable word, for example "no-soma"
+  SectionId section;        // none when the whole neuron is meant
+  std::int64_t point = -1;  // within the section
+  std::string sentence;     // what it is and what to do
 };
 
-/// Looks for: no soma, no section, zero radii, zero-length segments, single-point stems, unifurcations, multifurcations,
-/// kinds that change below a branch point, jumps (a segment much longer than the rest), stems far from the soma.
+/// Looks for: no soma, no section, zero radii, zero-length segments, single-point stems, unifurcations,
+/// multifurcations, kinds that change below a branch point, jumps (a segment much longer than the rest),
+/// stems far from the soma.
 std::vector<Finding> validate(const Morphology& m);
 
 }  // namespace forest
