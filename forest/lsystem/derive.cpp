@@ -1,0 +1,312 @@
+// SPDX-License-Identifier: Apache-2.0
+// The word is a doubly linked list in an arena, and only modules that some production rewrites are visited,
+// so that a step costs what it changes, not what has grown before. A step first evaluates all successors
+// beside the old word, which contexts still see unchanged, and then links them in.
+#include "forest/lsystem/derive.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/turtle.h"
+
+namespace forest::lsystem {
+namespace {
+
+constexpr std::uint32_t none = 0xffffffffu;
+constexpr Symbol blank = 0xffff;  // where a module has vanished
+constexpr auto push_symbol = Symbol(Action::push), pop_symbol = Symbol(Action::pop);
+
+struct Node {
+  Symbol symbol = blank;
+  std::uint16_t count = 0;
+  std::uint32_t first = 0;  // parameter
+  std::uint32_t previous = none, next = none;
+};
+
+struct Change {
+  std::uint32_t node, begin, count;  // the successor lies at nodes begin to begin + count - 1
+};
+
+struct Candidate {
+  const Production* production;
+  double weight;
+};
+
+}  // namespace
+
+struct Deriver::State {
+  const Grammar& grammar;
+  std::vector<Node> nodes;
+  std::vector<double> parameters;
+  std::vector<std::uint32_t> active, later;  // nodes that productions may rewrite, in the order of the word
+  std::vector<Change> changes;
+  std::size_t live = 0;  // modules in the word
+  std::vector<double> slots, stack, cell;
+  std::vector<Candidate> candidates;
+  std::vector<std::size_t> written;  // modules, by production
+  std::vector<std::uint32_t> seen;   // nodes matched by contexts
+  Word word;
+
+  explicit State(const Grammar& g)
+      : grammar(g),
+        slots(g.slots + 1),
+        stack(g.stack + 1),
+        cell(g.cell_values),
+        written(g.productions.size()) {}
+
+  bool rewritten(Symbol s) const { return s != blank && !grammar.productions_of[s].empty(); }
+
+  [[noreturn]] void fail(const Production& p, std::string_view what) const {
+    throw InputError(grammar.file, p.line, fmt::format("production {} {}", p.id, what));
+  }
+
+  double* evaluate(const Program& program, Random& random) {
+    return run(program, slots.data(), cell, grammar.tables, random, stack.data());
+  }
+
+  // Appends modules whose parameters lie on the stack; false when a number is not finite.
+  bool append(std::span<const Shape> shapes) {
+    const double* value = stack.data();
+    for (const Shape& s : shapes) {
+      nodes.push_back({s.symbol, s.count, std::uint32_t(parameters.size()), none, none});
+      for (std::uint16_t i = 0; i < s.count; ++i, ++value) {
+        if (!std::isfinite(*value)) return false;
+        parameters.push_back(*value);
+      }
+    }
+    return true;
+  }
+
+  void begin(Random& random) {
+    nodes.clear(), parameters.clear(), active.clear();
+    std::ranges::fill(written, 0);
+    run(grammar.cell, slots.data(), {}, grammar.tables, random, stack.data());
+    std::copy_n(slots.begin(), cell.size(), cell.begin());
+    evaluate(grammar.axiom_values, random);
+    if (!append(grammar.axiom))
+      throw InputError(grammar.file, 0,
+                       "the axiom has a parameter that is not a finite number; mend its expression");
+    live = nodes.size();
+    for (std::uint32_t i = 0; i < nodes.size(); ++i) {
+      nodes[i].previous = i == 0 ? none : i - 1;
+      nodes[i].next = i + 1 == nodes.size() ? none : i + 1;
+      if (rewritten(nodes[i].symbol)) active.push_back(i);
+    }
+  }
+
+  bool passed_over(std::uint32_t n) const {
+    return nodes[n].symbol == blank || grammar.ignored[nodes[n].symbol];
+  }
+
+  // From a bracket to its partner, forwards or backwards.
+  std::uint32_t partner(std::uint32_t n, Symbol open, Symbol close, std::uint32_t Node::*onward) const {
+    for (int depth = 0; n != none; n = nodes[n].*onward) {
+      if (nodes[n].symbol == open) ++depth;
+      if (nodes[n].symbol == close && --depth == 0) return n;
+    }
+    return none;
+  }
+
+  bool fits(std::uint32_t n, const Shape& s) const {
+    return n != none && nodes[n].symbol == s.symbol && nodes[n].count == s.count;
+  }
+
+  // The modules between the root and this one, past the branches that leave on the way.
+  bool left_matches(std::uint32_t n, const std::vector<Shape>& pattern) {
+    for (std::size_t i = pattern.size(); i-- > 0;) {
+      for (n = nodes[n].previous; n != none; n = nodes[n].previous) {
+        if (nodes[n].symbol == pop_symbol) {
+          n = partner(n, pop_symbol, push_symbol, &Node::previous);
+          if (n == none) return false;
+        } else if (nodes[n].symbol != push_symbol && !passed_over(n)) {
+          break;
+        }
+      }
+      if (!fits(n, pattern[i])) return false;
+      seen[i] = n;
+    }
+    return true;
+  }
+
+  // The modules that follow on this branch; a bracketed part of the pattern is matched with the branch that
+  // stands there.
+  bool right_matches(std::uint32_t n, const std::vector<Shape>& pattern, std::size_t offset) {
+    const auto onward = [&] {
+      do n = nodes[n].next;
+      while (n != none && passed_over(n));
+    };
+    onward();
+    for (std::size_t i = 0; i < pattern.size(); ++i) {
+      const Symbol wanted = pattern[i].symbol;
+      if (wanted == pop_symbol) {  // the rest of the branch does not matter
+        for (int depth = 1; n != none; n = nodes[n].next) {
+          if (nodes[n].symbol == push_symbol) ++depth;
+          if (nodes[n].symbol == pop_symbol && --depth == 0) break;
+        }
+      } else if (wanted != push_symbol) {
+        while (n != none && nodes[n].symbol == push_symbol) {
+          n = partner(n, push_symbol, pop_symbol, &Node::next);
+          if (n != none) onward();
+        }
+      }
+      if (!fits(n, pattern[i])) return false;
+      seen[offset + i] = n;
+      onward();
+    }
+    return true;
+  }
+
+  // Whether the production fits at the node; then its formal parameters have their values.
+  bool matches(const Production& p, std::uint32_t n) {
+    if (nodes[n].count != p.predecessor.count) return false;
+    if (p.left.empty() && p.right.empty()) {
+      std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
+      return true;
+    }
+    seen.resize(p.left.size() + 1 + p.right.size());
+    if (!left_matches(n, p.left) || !right_matches(n, p.right, p.left.size() + 1)) return false;
+    seen[p.left.size()] = n;
+    auto slot = slots.begin();
+    for (const std::uint32_t s : seen)
+      slot = std::copy_n(parameters.begin() + nodes[s].first, nodes[s].count, slot);
+    return true;
+  }
+
+  // The production that rewrites the node; its parameters are in the slots. Null when the node stays as it
+  // is.
+  const Production* choose(std::uint32_t n, Random& random) {
+    const Production *certain = nullptr, *last = nullptr;
+    candidates.clear();
+    double total = 0.;
+    for (const std::uint32_t index : grammar.productions_of[nodes[n].symbol]) {
+      const Production& p = grammar.productions[index];
+      if ((certain && p.weight.empty()) || !matches(p, n)) continue;
+      if (!p.condition.empty() && evaluate(p.condition, random)[-1] == 0.) continue;
+      last = &p;
+      if (p.weight.empty()) {
+        certain = &p;
+        continue;
+      }
+      const double weight = evaluate(p.weight, random)[-1];
+      if (!(weight >= 0. && std::isfinite(weight)))
+        fail(p, fmt::format("has probability {}; keep it between 0 and 1", weight));
+      candidates.push_back({&p, weight});
+      total += weight;
+    }
+    const Production* chosen = certain;
+    if (!candidates.empty()) {
+      constexpr double rounding = 1e-12;
+      double left = random.uniform() * (total > 1. - rounding ? total : 1.);
+      const auto c =
+          std::ranges::find_if(candidates, [&](const Candidate& one) { return (left -= one.weight) < 0.; });
+      if (c != candidates.end()) chosen = c->production;
+    }
+    if (chosen && chosen != last) matches(*chosen, n);  // its own parameters again
+    return chosen;
+  }
+
+  void step(Random& random) {
+    changes.clear(), later.clear();
+    std::size_t will_live = live;
+    for (const std::uint32_t n : active) {
+      const Production* p = choose(n, random);
+      if (!p) {
+        changes.push_back({n, none, 0});
+        continue;
+      }
+      if (!p->bindings.empty()) evaluate(p->bindings, random);
+      if (!p->values.empty()) evaluate(p->values, random);
+      const auto begin = std::uint32_t(nodes.size()), count = std::uint32_t(p->successor.size());
+      if (!append(p->successor))
+        fail(*p, fmt::format(
+                     "gives {} a parameter that is not a finite number; keep its expressions in their domain",
+                     grammar.symbols[nodes.back().symbol]));
+      changes.push_back({n, begin, count});
+      written[std::size_t(p - grammar.productions.data())] += count;
+      will_live = will_live + count - 1;
+      if (will_live > grammar.limit) runaway();
+    }
+    for (const Change& c : changes) link(c);
+    live = will_live;
+    active.swap(later);
+    if (nodes.size() > 100'000 && nodes.size() > 4 * live) compact();
+  }
+
+  [[noreturn]] void runaway() const {
+    const auto most = std::size_t(std::ranges::max_element(written) - written.begin());
+    const Production& p = grammar.productions[most];
+    throw LimitError(
+        fmt::format("{}:{}: the word has more than {} modules, most of them written by production {}; "
+                    "let it branch less, stop it by a condition, or raise limit:",
+                    grammar.file, p.line, grammar.limit, p.id));
+  }
+
+  void link(const Change& c) {
+    if (c.begin == none) return later.push_back(c.node);
+    if (c.count == 0) {
+      nodes[c.node].symbol = blank, nodes[c.node].count = 0;
+      return;
+    }
+    const auto take = [&](std::uint32_t n) {
+      if (rewritten(nodes[n].symbol)) later.push_back(n);
+    };
+    Node& old = nodes[c.node];
+    const Node& head = nodes[c.begin];
+    const std::uint32_t after = old.next;
+    old.symbol = head.symbol, old.count = head.count, old.first = head.first;
+    take(c.node);
+    std::uint32_t at = c.node;
+    for (std::uint32_t n = c.begin + 1; n < c.begin + c.count; ++n) {
+      nodes[at].next = n, nodes[n].previous = at;
+      take(at = n);
+    }
+    nodes[at].next = after;
+    if (after != none) nodes[after].previous = at;
+  }
+
+  void flatten() {
+    word.modules.clear(), word.parameters.clear();
+    word.modules.reserve(live);
+    for (std::uint32_t n = nodes.empty() ? none : 0; n != none; n = nodes[n].next) {
+      if (nodes[n].symbol == blank) continue;
+      word.modules.push_back({nodes[n].symbol, nodes[n].count, std::uint32_t(word.parameters.size())});
+      const auto values = parameters.begin() + nodes[n].first;
+      word.parameters.insert(word.parameters.end(), values, values + nodes[n].count);
+    }
+  }
+
+  // Drops what the word no longer holds.
+  void compact() {
+    flatten();
+    nodes.clear(), active.clear();
+    parameters = word.parameters;
+    for (const Module& m : word.modules) {
+      const auto i = std::uint32_t(nodes.size());
+      nodes.push_back(
+          {m.symbol, m.count, m.first, i == 0 ? none : i - 1, i + 1 == word.modules.size() ? none : i + 1});
+      if (rewritten(m.symbol)) active.push_back(i);
+    }
+  }
+};
+
+Deriver::Deriver(const Grammar& grammar) : state_(std::make_unique<State>(grammar)) {}
+Deriver::~Deriver() = default;
+Deriver::Deriver(Deriver&&) noexcept = default;
+
+const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
+  Random random(seed, index);
+  state_->begin(random);
+  const int count = steps.value_or(state_->grammar.steps);
+  for (int i = 0; i < count && !state_->active.empty(); ++i) state_->step(random);
+  state_->flatten();
+  return state_->word;
+}
+
+Word derive(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
+  return Deriver(grammar).derive(seed, index, steps);
+}
+
+}  // namespace forest::lsystem

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Derivation: in each step all modules of the word are rewritten at once, by what the word was before the
+// step. A word is a pure function of (grammar, seed, index, steps).
+#pragma once
+
+#include <memory>
+#include <optional>
+
+#include "forest/lsystem/grammar.h"
+
+namespace forest::lsystem {
+
+/// Derives words of one grammar, keeping its memory between them. One object a thread; the grammar must
+/// outlive it.
+class Deriver {
+ public:
+  explicit Deriver(const Grammar& grammar);
+  ~Deriver();
+  Deriver(Deriver&&) noexcept;
+
+  /// Derives a new word from the axiom. Throws LimitError, naming the production that wrote most, when the
+  /// word would have more modules than the grammar's limit; Error when a number is not finite or a weight is
+  /// negative.
+  /// @param steps  of derivation; the grammar's own when not given. Ends before when nothing is left to
+  /// rewrite.
+  const Word& derive(std::uint64_t seed = 0, std::uint64_t index = 0, std::optional<int> steps = {});
+
+ private:
+  struct State;
+  std::unique_ptr<State> state_;
+};
+
+Word derive(const Grammar& grammar, std::uint64_t seed = 0, std::uint64_t index = 0,
+            std::optional<int> steps = {});
+
+}  // namespace forest::lsystem

@@ -1,0 +1,722 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/grammar.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <map>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/lsystem/turtle.h"
+
+namespace forest::lsystem {
+namespace {
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool is_digit(char c) { return c >= '0' && c <= '9'; }
+bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
+bool is_name(char c) { return is_letter(c) || is_digit(c) || c == '_'; }
+
+constexpr std::string_view symbol_marks = "+-&^\\/|$[]!';,.{}~%@?\"`";  // besides letters and digits
+constexpr int deepest = 100;                                            // nested parentheses
+constexpr std::size_t most_parameters = 64;                             // of one module
+
+// A place in the text that moves on, within one statement.
+class Cursor {
+ public:
+  Cursor(std::string_view text, const std::string& file) : text_(text), file_(file), end_(text.size()) {}
+
+  void enter(std::size_t begin, std::size_t end) { at_ = begin, end_ = end; }
+  std::size_t at() const { return at_; }
+  void back_to(std::size_t place) { at_ = place; }
+  bool more() {
+    while (at_ < end_ && is_space(text_[at_])) ++at_;
+    return at_ < end_;
+  }
+  bool sees(std::string_view token) { return more() && text_.substr(at_, end_ - at_).starts_with(token); }
+  bool takes(std::string_view token) {
+    if (!sees(token)) return false;
+    at_ += token.size();
+    return true;
+  }
+  void expect(std::string_view token, std::string_view purpose) {
+    if (!takes(token)) fail(fmt::format("a '{}' is missing here, {}", token, purpose));
+  }
+  char peek() { return more() ? text_[at_] : '\0'; }
+  std::string_view rest() { return more() ? text_.substr(at_, end_ - at_) : std::string_view{}; }
+  void skip(std::size_t count) { at_ += count; }
+
+  std::string name(std::string_view purpose) {
+    more();
+    std::size_t stop = at_;
+    while (stop < end_ && is_name(text_[stop])) ++stop;
+    if (stop == at_ || is_digit(text_[at_])) fail(fmt::format("a name is missing here, {}", purpose));
+    const std::string found(text_.substr(at_, stop - at_));
+    at_ = stop;
+    return found;
+  }
+  double number() {
+    double value = 0.;
+    more();
+    const auto [stop, error] = std::from_chars(text_.data() + at_, text_.data() + end_, value);
+    if (error != std::errc() || !std::isfinite(value)) fail("a number is missing here");
+    at_ = std::size_t(stop - text_.data());
+    return value;
+  }
+  double signed_number() { return takes("-") ? -number() : number(); }
+
+  [[noreturn]] void fail(const std::string& sentence) const { fail_at(at_, sentence); }
+  [[noreturn]] void fail_at(std::size_t place, const std::string& sentence) const {
+    const std::string_view before = text_.substr(0, place);
+    const auto line = std::size_t(std::ranges::count(before, '\n')) + 1;
+    const std::size_t start = before.rfind('\n') + 1;  // npos + 1 is 0
+    const auto column =
+        std::ranges::count_if(before.substr(start), [](char c) { return (c & 0xc0) != 0x80; }) + 1;
+    throw InputError(file_, line, fmt::format("column {}: {}", column, sentence));
+  }
+  std::size_t line() const { return std::size_t(std::ranges::count(text_.substr(0, at_), '\n')) + 1; }
+
+ private:
+  std::string_view text_;
+  const std::string& file_;
+  std::size_t at_ = 0, end_;
+};
+
+// What a name in an expression stands for.
+struct Meaning {
+  enum { constant, cell, table, function } kind = constant;
+  double value = 0.;       // of a constant
+  std::int32_t index = 0;  // of a cell value or a table
+  Program body = {};       // of a function: finds its arguments in slots 0 to parameters - 1
+  std::int32_t parameters = 0, slots = 0;
+  bool draws = false;
+};
+using Meanings = std::map<std::string, Meaning, std::less<>>;
+
+struct Binary {
+  std::string_view token;
+  Op op;
+  int level;  // the higher the tighter
+};
+// Longer tokens before their beginnings. & and | are the book's, && and || C's.
+constexpr std::array binaries{
+    Binary{"||", Op::logical_or, 1},  Binary{"|", Op::logical_or, 1},
+    Binary{"&&", Op::logical_and, 2}, Binary{"&", Op::logical_and, 2},
+    Binary{"==", Op::equal, 3},       Binary{"!=", Op::not_equal, 3},
+    Binary{"<=", Op::less_equal, 4},  Binary{">=", Op::greater_equal, 4},
+    Binary{"<", Op::less, 4},         Binary{">", Op::greater, 4},
+    Binary{"+", Op::add, 5},          Binary{"-", Op::subtract, 5},
+    Binary{"*", Op::multiply, 6},     Binary{"/", Op::divide, 6},
+    Binary{"%", Op::modulo, 6},       Binary{"^", Op::power, 8},
+};
+constexpr int unary_level = 7;
+
+// Compiles expressions at a cursor; knows the slots of the production (or function) it works for.
+class Compiler {
+ public:
+  Compiler(Cursor& text, const Meanings& meanings) : text_(text), meanings_(meanings) {}
+
+  void add_slot(const std::string& name) {
+    if (std::ranges::find(names_, name) != names_.end())
+      text_.fail(fmt::format("'{}' has a meaning already; choose another name", name));
+    names_.resize(std::size_t(slots_));
+    names_.push_back(name);
+    ++slots_;
+  }
+  std::int32_t slots() const { return slots_; }
+  bool draws() const { return draws_; }
+
+  void expression(Program& out) { binary(out, 0); }
+
+  /// `name = expression` as a store.
+  void binding(Program& out) {
+    const std::string name = text_.name("of a value to be used in the successor");
+    text_.expect("=", "between a name and its value");
+    expression(out);
+    out.push_back({Op::store, slots_, 0.});
+    add_slot(name);
+  }
+
+ private:
+  void binary(Program& out, int least) {
+    if (++depth_ > deepest) text_.fail("the expression is nested too deeply; use bindings for its parts");
+    unary(out);
+    for (;;) {
+      if (!text_.more() || text_.sees("->")) break;
+      if (text_.sees("=") && !text_.sees("==")) text_.fail("write == to compare");
+      const auto row = std::ranges::find_if(binaries, [&](const Binary& b) { return text_.sees(b.token); });
+      if (row == binaries.end() || row->level < least) break;
+      text_.takes(row->token);
+      binary(out, row->op == Op::power ? row->level : row->level + 1);  // 2^3^2 = 2^9
+      emit(out, {row->op, 0, 0.}, 2);
+    }
+    --depth_;
+  }
+
+  void unary(Program& out) {
+    if (text_.sees("-") && !text_.sees("->")) {
+      text_.takes("-");
+      operand(out);
+      emit(out, {Op::negate, 0, 0.}, 1);
+    } else if (text_.sees("!") && !text_.sees("!=")) {
+      text_.takes("!");
+      operand(out);
+      emit(out, {Op::logical_not, 0, 0.}, 1);
+    } else if (text_.takes("+")) {
+      operand(out);
+    } else {
+      primary(out);
+    }
+  }
+  void operand(Program& out) { binary(out, unary_level); }
+
+  void primary(Program& out) {
+    const char c = text_.peek();
+    if (text_.takes("(")) {
+      expression(out);
+      text_.expect(")", "to close the parenthesis");
+    } else if (is_digit(c) || c == '.') {
+      out.push_back({Op::constant, 0, text_.number()});
+    } else if (is_letter(c) || c == '_') {
+      named(out);
+    } else {
+      text_.fail("a number, a name or a parenthesis is missing here");
+    }
+  }
+
+  void named(Program& out) {
+    const std::size_t place = text_.at();
+    const std::string name = text_.name("in an expression");
+    if (text_.takes("(")) return call(out, name, place);
+    for (std::size_t i = 0; i < names_.size(); ++i)
+      if (names_[i] == name) return out.push_back({Op::slot, std::int32_t(i), 0.});
+    const auto found = meanings_.find(name);
+    if (found == meanings_.end())
+      text_.fail_at(
+          place,
+          fmt::format("'{}' is not known here; make it a parameter or a binding, or #define it above", name));
+    const Meaning& m = found->second;
+    if (m.kind == Meaning::constant) return out.push_back({Op::constant, 0, m.value});
+    if (m.kind == Meaning::cell) return out.push_back({Op::cell, m.index, 0.});
+    text_.fail_at(place, fmt::format("'{}' wants its arguments; write {}(…)", name, name));
+  }
+
+  void call(Program& out, const std::string& name, std::size_t place) {
+    const auto close = [&](int taken, int wanted) {
+      if (taken != wanted)
+        text_.fail_at(place, fmt::format("{} takes {} argument{}, {} given", name, wanted,
+                                         wanted == 1 ? "" : "s", taken));
+    };
+    if (name == "if") return choose(out);
+    const auto found = meanings_.find(name);
+    if (found != meanings_.end() && found->second.kind == Meaning::function) {
+      const Meaning& f = found->second;
+      const std::int32_t base = slots_;
+      slots_ += f.slots;
+      const int taken = arguments(out);
+      close(taken, f.parameters);
+      for (int i = f.parameters; i-- > 0;) out.push_back({Op::store, base + i, 0.});
+      for (Instruction i : f.body) {
+        if (i.op == Op::slot || i.op == Op::store) i.index += base;
+        out.push_back(i);
+      }
+      barrier_ = out.size();
+      draws_ |= f.draws;
+    } else if (found != meanings_.end() && found->second.kind == Meaning::table) {
+      close(arguments(out), 1);
+      out.push_back({Op::table, found->second.index, 0.});
+      barrier_ = out.size();
+    } else {
+      const auto row = std::ranges::find(functions(), name, &Function::name);
+      if (row == functions().end())
+        text_.fail_at(
+            place,
+            fmt::format("there is no function '{}'; declare it as function, distribution or table above",
+                        name));
+      close(arguments(out), row->parameters);
+      draws_ |= row->draws;
+      emit(out, {row->op, 0, 0.}, row->draws ? 0 : row->parameters);
+    }
+  }
+
+  int arguments(Program& out) {
+    int count = 0;
+    if (text_.takes(")")) return 0;
+    do {
+      expression(out);
+      ++count;
+    } while (text_.takes(","));
+    text_.expect(")", "after the arguments");
+    return count;
+  }
+
+  // if(condition, then, otherwise): only one of the two is evaluated.
+  void choose(Program& out) {
+    expression(out);
+    const std::size_t test = out.size();
+    out.push_back({Op::jump_if_zero, 0, 0.});
+    barrier_ = out.size();
+    text_.expect(",", "after the condition of if(condition, then, otherwise)");
+    expression(out);
+    const std::size_t skip = out.size();
+    out.push_back({Op::jump, 0, 0.});
+    out[test].index = std::int32_t(skip - test);
+    barrier_ = out.size();
+    text_.expect(",", "before the last part of if(condition, then, otherwise)");
+    expression(out);
+    text_.expect(")", "after the arguments");
+    out[skip].index = std::int32_t(out.size() - skip - 1);
+    barrier_ = out.size();
+  }
+
+  // Adds an instruction; when its operands are constants, their result instead. No jump may lead into what is
+  // folded.
+  void emit(Program& out, const Instruction& instruction, int operands) {
+    out.push_back(instruction);
+    const auto count = std::size_t(operands);
+    if (operands == 0 || out.size() < barrier_ + count + 1) return;
+    const auto first = out.end() - operands - 1;
+    if (!std::all_of(first, out.end() - 1, [](const Instruction& i) { return i.op == Op::constant; })) return;
+    Random none(0);
+    double stack[8] = {};
+    run({first, out.end()}, nullptr, {}, {}, none, stack);
+    out.erase(first, out.end());
+    out.push_back({Op::constant, 0, stack[0]});
+  }
+
+  Cursor& text_;
+  const Meanings& meanings_;
+  std::vector<std::string> names_;  // of slots; those of inlined functions have none
+  std::int32_t slots_ = 0;
+  std::size_t barrier_ = 0;
+  int depth_ = 0;
+  bool draws_ = false;
+};
+
+// Comments become blanks, so that every place keeps its line and column.
+std::string without_comments(std::string_view text, const Cursor& place) {
+  std::string out(text);
+  const auto blank = [&](std::size_t i) {
+    if (out[i] != '\n') out[i] = ' ';
+  };
+  for (std::size_t i = 0; i < out.size(); ++i) {
+    if (out[i] == '#' &&
+        (i + 1 == out.size() || is_space(out[i + 1]) || out[i + 1] == '#' || out[i + 1] == '!')) {
+      while (i < out.size() && out[i] != '\n') blank(i++);
+    } else if (out[i] == '/' && i + 1 < out.size() && out[i + 1] == '*') {
+      const std::size_t close = out.find("*/", i + 2);
+      if (close == std::string::npos) place.fail_at(i, "the comment is not closed; write */ where it ends");
+      while (i < close + 2) blank(i++);
+      --i;
+    }
+  }
+  return out;
+}
+
+class Parser {
+ public:
+  Parser(std::string_view text, const std::string& file)
+      : clean_(without_comments(text, Cursor(text, file))), text_(clean_, file) {
+    grammar_.file = file;
+    for (const TurtleSymbol& s : turtle_symbols()) {
+      grammar_.symbols.emplace_back(s.symbol);
+      arities_.push_back({s.least, s.most});
+    }
+    for (const auto& [name, number] :
+         {std::pair{"pi", 3.141592653589793}, {"axon", 2.}, {"basal", 3.}, {"apical", 4.}, {"glia", 7.}})
+      meanings_[name] = {.kind = Meaning::constant, .value = number};
+  }
+  // Continues with the symbols of a grammar that exists, to read a word.
+  Parser(std::string_view text, const Grammar& grammar)
+      : clean_(text), text_(clean_, grammar.file), grammar_(grammar) {
+    arities_.resize(grammar_.symbols.size());
+    closed_ = true;
+  }
+
+  Grammar grammar() {
+    for (std::size_t begin = 0; begin < clean_.size();) {
+      // A statement goes on over lines that begin with a blank.
+      std::size_t end = clean_.find('\n', begin);
+      while (end != std::string::npos && end + 1 < clean_.size() && is_space(clean_[end + 1]))
+        end = clean_.find('\n', end + 1);
+      if (end == std::string::npos) end = clean_.size();
+      text_.enter(begin, end);
+      if (text_.more()) statement();
+      begin = end + 1;
+    }
+    text_.enter(clean_.size(), clean_.size());
+    if (grammar_.axiom.empty()) text_.fail("the grammar has no axiom; write one, for example axiom: A(1)");
+    if (grammar_.productions.empty())
+      text_.fail("the grammar has no production; write one, for example grow: A -> F(1) A");
+    finish();
+    return std::move(grammar_);
+  }
+
+  Word word() {
+    Compiler compiler(text_, meanings_);
+    std::vector<Shape> shapes;
+    Program values;
+    successor(compiler, shapes, values);
+    if (text_.more()) text_.fail("this is no module");
+    if (compiler.draws()) text_.fail("a word has constant parameters; leave the draws to the grammar");
+    Word word;
+    std::vector<double> stack(stack_depth(values));
+    Random none(0);
+    run(values, nullptr, {}, {}, none, stack.data());
+    for (const Shape& s : shapes) {
+      const auto first = std::uint32_t(word.parameters.size());
+      word.modules.push_back({s.symbol, s.count, first});
+      word.parameters.insert(word.parameters.end(), stack.data() + first, stack.data() + first + s.count);
+    }
+    return word;
+  }
+
+ private:
+  struct Arity {
+    int least = 0, most = int(most_parameters);
+  };
+
+  void statement() {
+    struct Row {
+      std::string_view word;
+      void (Parser::*read)();
+    };
+    static constexpr Row declarations[] = {
+        {"#define", &Parser::define},    {"#ignore", &Parser::ignore},
+        {"module", &Parser::modules},    {"cell", &Parser::cell_value},
+        {"function", &Parser::function}, {"distribution", &Parser::distribution},
+        {"table", &Parser::table},
+    };
+    static constexpr Row settings[] = {
+        {"axiom", &Parser::axiom}, {"title", &Parser::title}, {"steps", &Parser::steps},
+        {"limit", &Parser::limit}, {"angle", &Parser::angle}, {"step", &Parser::step},
+    };
+    const std::size_t place = text_.at();
+    const std::string first =
+        text_.takes("#") ? "#" + text_.name("after #") : text_.name("that begins a statement");
+    if (text_.takes(":") && first[0] != '#') {
+      for (const Row& row : settings)
+        if (row.word == first) return (this->*row.read)(), finished();
+      return production(first, place), finished();
+    }
+    for (const Row& row : declarations)
+      if (row.word == first) return (this->*row.read)(), finished();
+    text_.fail_at(
+        place,
+        fmt::format("a statement cannot begin with '{}'; productions begin with a name and a colon", first));
+  }
+  void finished() {
+    if (text_.more())
+      text_.fail("the statement should end here; begin the next one at the left margin of a new line");
+  }
+
+  void title() {
+    const std::string_view all = text_.rest();
+    grammar_.title = all.substr(0, all.find_last_not_of(" \t\r\n") + 1);
+    text_.skip(all.size());
+  }
+  double positive(std::string_view what, double most, bool whole) {
+    const std::size_t place = (text_.more(), text_.at());
+    const double value = constant();
+    if (!(value > 0. && value <= most) || (whole && value != std::floor(value)))
+      text_.fail_at(place, fmt::format("{} must be {}number from above 0 to {}", what,
+                                       whole ? "a whole " : "a ", most));
+    return value;
+  }
+  void steps() { grammar_.steps = int(positive("the number of steps", 1e6, true)); }
+  void limit() { grammar_.limit = std::size_t(positive("the limit", 1e8, true)); }
+  void angle() { grammar_.angle = positive("the angle", 360., false); }
+  void step() { grammar_.step = positive("the step", 1e6, false); }
+
+  double constant() {
+    Compiler compiler(text_, meanings_);
+    Program program;
+    const std::size_t place = text_.at();
+    compiler.expression(program);
+    if (program.size() != 1 || program[0].op != Op::constant)
+      text_.fail_at(
+          place,
+          "this must be a constant; for what is drawn write a distribution, or cell for once a neuron");
+    if (!std::isfinite(program[0].value)) text_.fail_at(place, "the constant is not a finite number");
+    return program[0].value;
+  }
+
+  std::string new_name(std::string_view purpose) {
+    const std::size_t place = (text_.more(), text_.at());
+    std::string name = text_.name(purpose);
+    if (meanings_.contains(name) || name == "if" ||
+        std::ranges::find(functions(), name, &Function::name) != functions().end())
+      text_.fail_at(place, fmt::format("'{}' has a meaning already; choose another name", name));
+    return name;
+  }
+
+  void define() {
+    const std::string name = new_name("of the constant");
+    meanings_[name] = {.kind = Meaning::constant, .value = constant()};
+  }
+
+  void cell_value() {
+    const std::string name = new_name("of the value that is drawn once a neuron");
+    text_.expect("=", "between a name and its value");
+    Compiler compiler(text_, meanings_);
+    Program program;
+    compiler.expression(program);
+    note(program, compiler);
+    const auto index = std::int32_t(grammar_.cell_values++);
+    program.push_back({Op::store, index, 0.});
+    cells_.push_back(std::move(program));
+    meanings_[name] = {.kind = Meaning::cell, .index = index};
+  }
+
+  void distribution() { callable(true); }
+  void function() { callable(false); }
+  void callable(bool may_draw) {
+    const std::size_t place = text_.at();
+    const std::string name = new_name("of the function");
+    Compiler compiler(text_, meanings_);
+    Meaning meaning{.kind = Meaning::function};
+    if (text_.takes("(") && !text_.takes(")")) {
+      do compiler.add_slot(text_.name("of a parameter"));
+      while (text_.takes(","));
+      text_.expect(")", "after the parameters");
+    }
+    meaning.parameters = compiler.slots();
+    text_.expect("=", "between a function and its expression");
+    compiler.expression(meaning.body);
+    meaning.slots = compiler.slots();
+    meaning.draws = compiler.draws();
+    if (meaning.draws && !may_draw)
+      text_.fail_at(place, fmt::format("a function may not draw; write distribution {} instead", name));
+    if (!meaning.draws && may_draw)
+      text_.fail_at(place, fmt::format("the distribution does not draw; write function {} instead", name));
+    meanings_[name] = std::move(meaning);
+  }
+
+  void table() {
+    const std::string name = new_name("of the table");
+    Table table{.name = name, .edges = {}, .values = {}};
+    text_.expect("=", "before the rows of a table");
+    do {
+      const std::size_t place = (text_.more(), text_.at());
+      table.edges.push_back(text_.signed_number());
+      text_.expect(":", "between the upper edge of a bin and its value");
+      table.values.push_back(text_.signed_number());
+      if (table.edges.size() > 1 && !(table.edges.back() > *(table.edges.end() - 2)))
+        text_.fail_at(place, "the upper edges of the bins must increase");
+    } while (text_.takes(","));
+    meanings_[name] = {.kind = Meaning::table, .index = std::int32_t(grammar_.tables.size())};
+    grammar_.tables.push_back(std::move(table));
+  }
+
+  void modules() {
+    do {
+      const std::size_t place = (text_.more(), text_.at());
+      const std::string name = text_.name("of a module");
+      if (std::ranges::find(grammar_.symbols, name) != grammar_.symbols.end())
+        text_.fail_at(place, fmt::format("module {} is there already", name));
+      int count = 0;
+      if (text_.takes("(") && !text_.takes(")")) {
+        do text_.name("of a parameter"), ++count;
+        while (text_.takes(","));
+        text_.expect(")", "after the parameters");
+      }
+      add_symbol(name, {count, count});
+    } while (text_.takes(","));
+  }
+
+  void ignore() {
+    text_.takes(":");
+    while (text_.more()) ignored_.push_back(symbol());
+  }
+
+  void axiom() {
+    if (!grammar_.axiom.empty()) text_.fail("there is an axiom already; a grammar has one");
+    Compiler compiler(text_, meanings_);
+    successor(compiler, grammar_.axiom, grammar_.axiom_values);
+    note(grammar_.axiom_values, compiler);
+    if (grammar_.axiom.empty()) text_.fail("the axiom is empty; give at least one module");
+  }
+
+  void production(const std::string& id, std::size_t place) {
+    if (std::ranges::find(grammar_.productions, id, &Production::id) != grammar_.productions.end())
+      text_.fail_at(place, fmt::format("there is a production {} already; give each its own name", id));
+    Production p;
+    p.id = id, p.line = text_.line();
+    Compiler compiler(text_, meanings_);
+    std::vector<Shape> middle = context(compiler);
+    if (text_.takes("<")) {
+      p.left = std::move(middle);
+      middle = context(compiler);
+    }
+    if (middle.size() != 1)
+      text_.fail_at(place,
+                    "the predecessor must be one module; its neighbours are written left < module > right");
+    p.predecessor = middle[0];
+    if (text_.takes(">")) p.right = context(compiler);
+    const auto bracketed = [&](const Shape& s) { return is(s, Action::push) || is(s, Action::pop); };
+    if (bracketed(p.predecessor) || std::ranges::any_of(p.left, bracketed))
+      text_.fail_at(place, "a bracket can neither be rewritten nor stand in a left context");
+    grammar_.context |= !p.left.empty() || !p.right.empty();
+
+    if (text_.takes(":") && !text_.takes("*") && !text_.sees("{") && !text_.sees("->"))
+      compiler.expression(p.condition);
+    if (text_.takes("{")) {
+      if (!text_.takes("}")) {
+        do compiler.binding(p.bindings);
+        while (text_.takes(","));
+        text_.expect("}", "after the bindings");
+      }
+    }
+    text_.expect("->", "before the successor");
+    successor(compiler, p.successor, p.values);
+    if (text_.takes(":")) compiler.expression(p.weight);
+    for (const Program* program : {&p.condition, &p.bindings, &p.values, &p.weight}) note(*program, compiler);
+    grammar_.productions.push_back(std::move(p));
+  }
+
+  // Modules with formal parameters: "A(x, y)". A lone * stands for none.
+  std::vector<Shape> context(Compiler& compiler) {
+    std::vector<Shape> shapes;
+    if (text_.takes("*")) return shapes;
+    while (text_.more() && !text_.sees("<") && !text_.sees(">") && !text_.sees(":") && !text_.sees("->") &&
+           !text_.sees("{")) {
+      const std::size_t place = text_.at();
+      Shape s{symbol(), 0};
+      if (text_.takes("(") && !text_.takes(")")) {
+        do compiler.add_slot(text_.name("of a parameter")), ++s.count;
+        while (text_.takes(","));
+        text_.expect(")", "after the parameters");
+      }
+      check_arity(s, place);
+      shapes.push_back(s);
+    }
+    check_brackets(shapes);
+    return shapes;
+  }
+
+  // Modules with expressions for parameters: "A(x*2, 1)", up to a colon or the end.
+  void successor(Compiler& compiler, std::vector<Shape>& shapes, Program& values) {
+    if (text_.takes("ε") || text_.takes("*")) return;
+    while (text_.more() && !text_.sees(":")) {
+      const std::size_t place = text_.at();
+      Shape s{symbol(), 0};
+      if (text_.takes("(") && !text_.takes(")")) {
+        do compiler.expression(values), ++s.count;
+        while (text_.takes(",") && s.count < most_parameters);
+        text_.expect(")", "after the parameters");
+      }
+      check_arity(s, place);
+      shapes.push_back(s);
+    }
+    check_brackets(shapes);
+  }
+
+  bool is(const Shape& s, Action action) const {
+    return s.symbol < turtle_symbols().size() && turtle_symbols()[s.symbol].action == action;
+  }
+  void check_brackets(const std::vector<Shape>& shapes) const {
+    int open = 0;
+    for (const Shape& s : shapes) {
+      open += int(is(s, Action::push)) - int(is(s, Action::pop));
+      if (open < 0) break;
+    }
+    if (open)
+      text_.fail(open > 0 ? "a [ is not closed; write ] where the branch ends"
+                          : "a ] closes nothing; write [ where the branch begins");
+  }
+  void check_arity(const Shape& s, std::size_t place) const {
+    const Arity a = arities_[s.symbol];
+    if (s.count >= a.least && s.count <= a.most) return;
+    const std::string wanted =
+        a.least == a.most ? fmt::format("{}", a.least) : fmt::format("{} to {}", a.least, a.most);
+    text_.fail_at(place, fmt::format("module {} has {} parameter{}, {} given", grammar_.symbols[s.symbol],
+                                     wanted, wanted == "1" ? "" : "s", s.count));
+  }
+
+  Symbol add_symbol(const std::string& name, Arity arity) {
+    if (closed_) text_.fail(fmt::format("the grammar has no module {}", name));
+    if (grammar_.symbols.size() >= 4096)
+      text_.fail("there are more than 4096 modules; use parameters to tell them apart");
+    grammar_.symbols.push_back(name);
+    arities_.push_back(arity);
+    return Symbol(grammar_.symbols.size() - 1);
+  }
+
+  // The longest declared name that stands here, else one letter (with _ and one more: a_r), digit or mark.
+  Symbol symbol() {
+    const std::string_view rest = text_.rest();
+    std::size_t best = grammar_.symbols.size(), length = 0;
+    for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
+      if (const std::string& name = grammar_.symbols[i]; name.size() > length && rest.starts_with(name))
+        best = i, length = name.size();
+    std::size_t own = 0;
+    if (!rest.empty() && is_letter(rest[0]))
+      own = rest.size() > 2 && rest[1] == '_' && (is_letter(rest[2]) || is_digit(rest[2])) ? 3 : 1;
+    else if (!rest.empty() && (is_digit(rest[0]) || symbol_marks.find(rest[0]) != std::string_view::npos))
+      own = 1;
+    if (own == 0 && length == 0)
+      text_.fail(rest.empty() ? "a module is missing here" : "this character is no module");
+    if (own > length) {
+      best = add_symbol(std::string(rest.substr(0, own)), {});
+      length = own;
+    }
+    text_.skip(length);
+    return Symbol(best);
+  }
+
+  void note(const Program& program, const Compiler& compiler) {
+    grammar_.stack = std::max(grammar_.stack, stack_depth(program));
+    grammar_.slots = std::max(grammar_.slots, std::size_t(compiler.slots()));
+  }
+
+  void finish() {
+    grammar_.productions_of.resize(grammar_.symbols.size());
+    for (std::size_t i = 0; i < grammar_.productions.size(); ++i)
+      grammar_.productions_of[grammar_.productions[i].predecessor.symbol].push_back(std::uint32_t(i));
+    grammar_.ignored.assign(grammar_.symbols.size(), false);
+    for (const Symbol s : ignored_) grammar_.ignored[s] = true;
+    // Cell values live in slots 0 to n - 1 while they are drawn; what their functions need lies above.
+    const auto shift = std::int32_t(grammar_.cell_values);
+    for (Program& program : cells_) {
+      for (std::size_t i = 0; i + 1 < program.size(); ++i) {
+        if (program[i].op == Op::slot || program[i].op == Op::store) program[i].index += shift;
+        if (program[i].op == Op::cell) program[i].op = Op::slot;
+      }
+      grammar_.cell.insert(grammar_.cell.end(), program.begin(), program.end());
+    }
+    grammar_.slots += grammar_.cell_values;
+  }
+
+  std::string clean_;
+  Cursor text_;
+  Grammar grammar_;
+  std::vector<Arity> arities_;  // by symbol
+  std::vector<Symbol> ignored_;
+  std::vector<Program> cells_;
+  Meanings meanings_;
+  bool closed_ = false;  // no new symbols
+};
+
+}  // namespace
+
+Grammar parse(std::string_view text, const std::string& file) { return Parser(text, file).grammar(); }
+
+Grammar parse_file(const std::string& path) { return parse(MappedFile(path).text(), path); }
+
+Word parse_word(std::string_view text, const Grammar& grammar) { return Parser(text, grammar).word(); }
+
+std::string to_string(const Word& word, const Grammar& grammar) {
+  std::string out;
+  for (const Module& m : word.modules) {
+    out += grammar.symbols[m.symbol];
+    const auto values = word.of(m);
+    if (!values.empty()) out += fmt::format("({})", fmt::join(values, ","));
+  }
+  return out;
+}
+
+}  // namespace forest::lsystem

@@ -1,0 +1,92 @@
+// SPDX-License-Identifier: Apache-2.0
+// Parametric, stochastic, context-sensitive, bracketed L-systems in the notation of Prusinkiewicz &
+// Lindenmayer, The Algorithmic Beauty of Plants (1990), with draws from named distributions.
+// docs/lsystem/notation.md teaches it.
+//
+//   distribution ratio = truncnormal(0.83, 0.21, 0.2, 1.8)
+//   axiom:  Soma(20) A(1, 4)
+//   branch: A(l, d) : d > 0.5 { r = ratio() } -> F(l, d) [+(30) A(l, d*r)] -(30) A(l, d*(1 - r)) : 0.3
+//   extend: A(l, d) -> F(l, d) A(l, 0.99*d) : 0.7
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <optional>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "forest/lsystem/program.h"
+
+namespace forest::lsystem {
+
+using Symbol = std::uint16_t;  // index in Grammar::symbols
+
+/// A module of a word: a symbol and `count` numbers from Word::parameters[first].
+struct Module {
+  Symbol symbol = 0;
+  std::uint16_t count = 0;
+  std::uint32_t first = 0;
+};
+
+/// A string of modules.
+struct Word {
+  std::vector<Module> modules;
+  std::vector<double> parameters;
+
+  std::span<const double> of(const Module& m) const {
+    return std::span(parameters).subspan(m.first, m.count);
+  }
+};
+
+/// What stands in a predecessor, a context or a successor: a symbol and how many parameters it has.
+struct Shape {
+  Symbol symbol = 0;
+  std::uint16_t count = 0;
+};
+
+struct Production {
+  std::string id;
+  std::size_t line = 0;
+  Shape predecessor;
+  std::vector<Shape> left, right;  // contexts, in the order of the text; `right` may hold brackets
+  Program condition;               // empty: always
+  Program bindings;                // stores
+  Program weight;                  // its probability; empty: what the others leave to 1
+  std::vector<Shape> successor;
+  Program values;  // of all parameters of the successor, in order
+};
+
+/// An L-system, compiled. A plain value; not changed after parse().
+struct Grammar {
+  std::string file, title;
+  std::vector<std::string> symbols;     // the turtle's own first (turtle.h), then those of the text
+  std::vector<Production> productions;  // those of one predecessor keep their order
+  std::vector<std::vector<std::uint32_t>> productions_of;  // by symbol
+  std::vector<bool> ignored;                               // by symbol: not seen by contexts
+  std::vector<Table> tables;
+  Program cell;  // one store a value that is drawn once a neuron
+  std::size_t cell_values = 0;
+  std::vector<Shape> axiom;
+  Program axiom_values;
+  std::size_t slots = 0, stack = 0;  // what the largest program needs
+  bool context = false;              // some production looks at its neighbours
+
+  int steps = 0;                  // of derivation, when nothing else is said
+  std::size_t limit = 1'000'000;  // modules a word may have
+  double angle = 90., step = 1.;  // of turtle symbols without a parameter: degrees, µm
+};
+
+/// Throws InputError with line and column when the text is no grammar.
+/// @param file  named in errors
+Grammar parse(std::string_view text, const std::string& file);
+Grammar parse_file(const std::string& path);
+
+/// Reads a word of the grammar's symbols with constant parameters, "B(2)A(4,4)". Throws InputError.
+Word parse_word(std::string_view text, const Grammar& grammar);
+
+/// "B(2)A(4,4)": read back by parse_word with every number the same.
+std::string to_string(const Word& word, const Grammar& grammar);
+
+}  // namespace forest::lsystem

@@ -1,0 +1,278 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/program.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+
+namespace forest::lsystem {
+namespace {
+
+constexpr double degree = std::numbers::pi / 180.;
+
+constexpr Function function_table[] = {
+    {"sin", 1, Op::sin, false, "sine of an angle in degrees"},
+    {"cos", 1, Op::cos, false, "cosine of an angle in degrees"},
+    {"tan", 1, Op::tan, false, "tangent of an angle in degrees"},
+    {"asin", 1, Op::asin, false, "angle in degrees"},
+    {"acos", 1, Op::acos, false, "angle in degrees"},
+    {"atan", 1, Op::atan, false, "angle in degrees"},
+    {"atan2", 2, Op::atan2, false, "angle of (x, y) in degrees: atan2(y, x)"},
+    {"exp", 1, Op::exp, false, "e to the power of x"},
+    {"log", 1, Op::log, false, "natural logarithm"},
+    {"sqrt", 1, Op::sqrt, false, "square root"},
+    {"abs", 1, Op::abs, false, "absolute value"},
+    {"floor", 1, Op::floor, false, "greatest whole number not above x"},
+    {"ceil", 1, Op::ceil, false, "least whole number not below x"},
+    {"round", 1, Op::round, false, "nearest whole number"},
+    {"sign", 1, Op::sign, false, "-1, 0 or 1"},
+    {"min", 2, Op::min, false, "the lesser"},
+    {"max", 2, Op::max, false, "the greater"},
+    {"pow", 2, Op::power, false, "x to the power of y, as x^y"},
+    {"mod", 2, Op::modulo, false, "remainder of x / y, with the sign of y"},
+    {"uniform", 2, Op::uniform, true, "from a to b, evenly"},
+    {"normal", 2, Op::normal, true, "mean, standard deviation"},
+    {"truncnormal", 4, Op::truncnormal, true, "mean, standard deviation, lowest, highest"},
+    {"lognormal", 2, Op::lognormal, true, "mean and standard deviation of the logarithm"},
+    {"gamma", 2, Op::gamma, true, "shape, scale: mean shape * scale"},
+    {"exponential", 1, Op::exponential, true, "mean"},
+    {"poisson", 1, Op::poisson, true, "mean"},
+    {"chance", 1, Op::chance, true, "1 with probability p, else 0"},
+};
+
+constexpr double nonsense =
+    std::numeric_limits<double>::quiet_NaN();  // of impossible parameters; noticed where it is used
+
+// The normal distribution kept to [low, high]: by rejection where most draws fall inside, else by inversion.
+double truncated_normal(Random& random, double mean, double sd, double low, double high) {
+  if (!(low <= high && sd >= 0.)) return nonsense;
+  if (low <= mean - 0.5 * sd && high >= mean + 0.5 * sd)
+    for (;;)
+      if (const double x = random.normal(mean, sd); x >= low && x <= high) return x;
+  return random.truncated_normal(mean, sd, low, high);
+}
+
+double gamma(Random& random, double shape, double scale) {
+  return shape > 0. && std::isfinite(shape) ? random.gamma(shape, scale) : nonsense;
+}
+
+// Knuth 1969, in pieces of at most 32 so that the product does not vanish.
+double poisson(Random& random, double mean) {
+  double count = 0.;
+  for (double left = std::min(mean, 1e6); left > 0.; left -= 32.) {
+    const double bound = std::exp(-std::min(left, 32.));
+    for (double product = random.uniform(); product > bound; product *= random.uniform()) ++count;
+  }
+  return count;
+}
+
+double modulo(double x, double y) { return x - y * std::floor(x / y); }
+
+// How many operands an instruction takes from the stack and how many results it leaves.
+struct Effect {
+  int taken, left;
+};
+Effect effect(Op op) {
+  switch (op) {
+    case Op::constant:
+    case Op::slot:
+    case Op::cell:
+      return {0, 1};
+    case Op::store:
+    case Op::jump_if_zero:
+      return {1, 0};
+    case Op::jump:
+      return {0, 0};
+    case Op::negate:
+    case Op::logical_not:
+    case Op::table:
+      return {1, 1};
+    default:
+      break;
+  }
+  const auto row = std::ranges::find(function_table, op, &Function::op);
+  return {row == std::end(function_table) ? 2 : row->parameters, 1};
+}
+
+}  // namespace
+
+std::span<const Function> functions() { return function_table; }
+
+double Table::lookup(double x) const {
+  const auto bin = std::size_t(std::ranges::lower_bound(edges, x) - edges.begin());
+  return values[std::min(bin, values.size() - 1)];
+}
+
+std::size_t stack_depth(const Program& program) {
+  // Counted as if no jump were taken, which is never too little: a branch that is jumped over only leaves
+  // less.
+  std::ptrdiff_t depth = 0, most = 0;
+  for (const Instruction& i : program) {
+    const Effect e = effect(i.op);
+    most = std::max(most, depth);
+    depth += e.left - e.taken;
+    most = std::max(most, depth);
+  }
+  return std::size_t(most) + 1;
+}
+
+double* run(std::span<const Instruction> program, double* slots, std::span<const double> cell,
+            std::span<const Table> tables, Random& random, double* stack) {
+  double* top = stack;  // one past the last value
+  const auto unary = [&](auto f) { top[-1] = f(top[-1]); };
+  const auto binary = [&](auto f) { --top, top[-1] = f(top[-1], top[0]); };
+  const Instruction* const end = program.data() + program.size();
+  for (const Instruction* i = program.data(); i < end; ++i) {
+    switch (i->op) {
+      case Op::constant:
+        *top++ = i->value;
+        break;
+      case Op::slot:
+        *top++ = slots[i->index];
+        break;
+      case Op::cell:
+        *top++ = cell[std::size_t(i->index)];
+        break;
+      case Op::store:
+        slots[i->index] = *--top;
+        break;
+      case Op::jump:
+        i += i->index;
+        break;
+      case Op::jump_if_zero:
+        if (*--top == 0.) i += i->index;
+        break;
+      case Op::table:
+        unary([&](double x) { return tables[std::size_t(i->index)].lookup(x); });
+        break;
+      case Op::add:
+        binary([](double a, double b) { return a + b; });
+        break;
+      case Op::subtract:
+        binary([](double a, double b) { return a - b; });
+        break;
+      case Op::multiply:
+        binary([](double a, double b) { return a * b; });
+        break;
+      case Op::divide:
+        binary([](double a, double b) { return a / b; });
+        break;
+      case Op::power:
+        binary([](double a, double b) { return std::pow(a, b); });
+        break;
+      case Op::modulo:
+        binary(modulo);
+        break;
+      case Op::negate:
+        unary([](double a) { return -a; });
+        break;
+      case Op::less:
+        binary([](double a, double b) { return double(a < b); });
+        break;
+      case Op::less_equal:
+        binary([](double a, double b) { return double(a <= b); });
+        break;
+      case Op::greater:
+        binary([](double a, double b) { return double(a > b); });
+        break;
+      case Op::greater_equal:
+        binary([](double a, double b) { return double(a >= b); });
+        break;
+      case Op::equal:
+        binary([](double a, double b) { return double(a == b); });
+        break;
+      case Op::not_equal:
+        binary([](double a, double b) { return double(a != b); });
+        break;
+      case Op::logical_and:
+        binary([](double a, double b) { return double(a != 0. && b != 0.); });
+        break;
+      case Op::logical_or:
+        binary([](double a, double b) { return double(a != 0. || b != 0.); });
+        break;
+      case Op::logical_not:
+        unary([](double a) { return double(a == 0.); });
+        break;
+      case Op::sin:
+        unary([](double a) { return std::sin(a * degree); });
+        break;
+      case Op::cos:
+        unary([](double a) { return std::cos(a * degree); });
+        break;
+      case Op::tan:
+        unary([](double a) { return std::tan(a * degree); });
+        break;
+      case Op::asin:
+        unary([](double a) { return std::asin(a) / degree; });
+        break;
+      case Op::acos:
+        unary([](double a) { return std::acos(a) / degree; });
+        break;
+      case Op::atan:
+        unary([](double a) { return std::atan(a) / degree; });
+        break;
+      case Op::atan2:
+        binary([](double a, double b) { return std::atan2(a, b) / degree; });
+        break;
+      case Op::exp:
+        unary([](double a) { return std::exp(a); });
+        break;
+      case Op::log:
+        unary([](double a) { return std::log(a); });
+        break;
+      case Op::sqrt:
+        unary([](double a) { return std::sqrt(a); });
+        break;
+      case Op::abs:
+        unary([](double a) { return std::abs(a); });
+        break;
+      case Op::floor:
+        unary([](double a) { return std::floor(a); });
+        break;
+      case Op::ceil:
+        unary([](double a) { return std::ceil(a); });
+        break;
+      case Op::round:
+        unary([](double a) { return std::round(a); });
+        break;
+      case Op::sign:
+        unary([](double a) { return double(a > 0.) - double(a < 0.); });
+        break;
+      case Op::min:
+        binary([](double a, double b) { return std::min(a, b); });
+        break;
+      case Op::max:
+        binary([](double a, double b) { return std::max(a, b); });
+        break;
+      case Op::uniform:
+        binary([&](double a, double b) { return random.uniform(a, b); });
+        break;
+      case Op::normal:
+        binary([&](double a, double b) { return random.normal(a, b); });
+        break;
+      case Op::lognormal:
+        binary([&](double a, double b) { return std::exp(random.normal(a, b)); });
+        break;
+      case Op::gamma:
+        binary([&](double a, double b) { return gamma(random, a, b); });
+        break;
+      case Op::exponential:
+        unary([&](double a) { return random.exponential(a); });
+        break;
+      case Op::poisson:
+        unary([&](double a) { return poisson(random, a); });
+        break;
+      case Op::chance:
+        unary([&](double a) { return double(random.uniform() < a); });
+        break;
+      case Op::truncnormal:
+        top -= 3;
+        top[-1] = truncated_normal(random, top[-1], top[0], top[1], top[2]);
+        break;
+    }
+  }
+  return top;
+}
+
+}  // namespace forest::lsystem

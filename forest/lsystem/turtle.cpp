@@ -1,0 +1,279 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/turtle.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+
+namespace forest::lsystem {
+namespace {
+
+constexpr TurtleSymbol symbol_table[] = {
+    {"F", "length, diameter", "draw a segment; it tapers to the diameter, when given", Action::draw, 0, 2},
+    {"f", "length", "move without drawing", Action::move, 0, 1},
+    {"+", "angle", "turn left", Action::turn_left, 0, 1},
+    {"-", "angle", "turn right", Action::turn_right, 0, 1},
+    {"&", "angle", "pitch down", Action::pitch_down, 0, 1},
+    {"^", "angle", "pitch up", Action::pitch_up, 0, 1},
+    {"\\", "angle", "roll left", Action::roll_left, 0, 1},
+    {"/", "angle", "roll right", Action::roll_right, 0, 1},
+    {"|", "", "turn around", Action::turn_around, 0, 0},
+    {"$", "", "roll until the left is horizontal", Action::level, 0, 0},
+    {"[", "", "begin a branch: remember everything", Action::push, 0, 0},
+    {"]", "", "end a branch: be as at its beginning", Action::pop, 0, 0},
+    {"!", "diameter", "set the diameter; alone, divide it by the square root of 2", Action::diameter, 0, 1},
+    {"T", "strength, x, y, z",
+     "from here on bend by strength towards a direction, (0, 1, 0) when not given; 0 ends it",
+     Action::tropism, 1, 4},
+    {"Soma", "diameter", "a soma here", Action::soma, 1, 1},
+    {"Axon", "", "what follows is axon", Action::axon, 0, 0},
+    {"Basal", "", "what follows is basal dendrite", Action::basal, 0, 0},
+    {"Apical", "", "what follows is apical dendrite", Action::apical, 0, 0},
+    {"Glia", "", "what follows is a glial process", Action::glia, 0, 0},
+    {"Kind", "number", "what follows is of this SWC type", Action::kind, 1, 1},
+    {"Outward", "strength", "from here on bend away from the soma by strength; 0 ends it", Action::outward, 1,
+     1},
+};
+
+static_assert([] {
+  for (std::size_t i = 0; i < std::size(symbol_table); ++i)
+    if (std::size_t(symbol_table[i].action) != i) return false;
+  return true;
+}());
+
+constexpr std::uint32_t none = 0xffffffffu;
+
+// A drawn point; its segment begins at `parent` (none: at `from`).
+struct Drawn {
+  Eigen::Vector3d position;
+  float radius, start_radius;
+  std::uint32_t parent;
+  std::uint32_t children;
+  std::int32_t tag;
+  SectionKind kind;
+};
+
+struct State {
+  Eigen::Vector3d position = Eigen::Vector3d::Zero();
+  Eigen::Matrix3d frame;  // columns: heading, left, up
+  double diameter = 1., tropism = 0., outward = 0.;
+  Eigen::Vector3d towards = Eigen::Vector3d::UnitY();
+  std::uint32_t node = none;  // the drawn point the turtle stands on
+  SectionKind kind = SectionKind::undefined;
+  std::int32_t tag = 0;
+};
+
+class Turtle {
+ public:
+  Turtle(const Word& word, const Grammar& grammar) : word_(word), grammar_(grammar) {
+    state_.frame.col(0) = Eigen::Vector3d::UnitY();
+    state_.frame.col(1) = -Eigen::Vector3d::UnitX();
+    state_.frame.col(2) = Eigen::Vector3d::UnitZ();
+  }
+
+  Morphology run() {
+    drawn_.reserve(word_.modules.size() / 2);
+    for (const Module& m : word_.modules)
+      if (m.symbol < std::size(symbol_table)) act(m);
+    if (!stack_.empty()) fail("a branch is not closed");
+    return build();
+  }
+
+ private:
+  [[noreturn]] void fail(std::string_view what) const {
+    throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
+  }
+
+  void act(const Module& m) {
+    const std::span<const double> values = word_.of(m);
+    const auto parameter = [&](std::size_t i, double otherwise) {
+      if (i >= values.size()) return otherwise;
+      if (!std::isfinite(values[i]))
+        fail(fmt::format("module {} has a parameter that is not finite", symbol_table[m.symbol].symbol));
+      return values[i];
+    };
+    const auto angle = [&] { return parameter(0, grammar_.angle) * (std::numbers::pi / 180.); };
+    switch (symbol_table[m.symbol].action) {
+      case Action::draw:
+        return draw(parameter(0, grammar_.step), parameter(1, state_.diameter));
+      case Action::move:
+        return move(parameter(0, grammar_.step));
+      case Action::turn_left:
+        return rotate(0, 1, angle());
+      case Action::turn_right:
+        return rotate(0, 1, -angle());
+      case Action::pitch_down:
+        return rotate(0, 2, -angle());
+      case Action::pitch_up:
+        return rotate(0, 2, angle());
+      case Action::roll_left:
+        return rotate(1, 2, -angle());
+      case Action::roll_right:
+        return rotate(1, 2, angle());
+      case Action::turn_around:
+        state_.frame.leftCols<2>() *= -1.;
+        return;
+      case Action::level:
+        return level();
+      case Action::push:
+        stack_.push_back(state_);
+        return;
+      case Action::pop:
+        if (stack_.empty()) fail("a ] closes nothing");
+        state_ = stack_.back();
+        stack_.pop_back();
+        return;
+      case Action::diameter:
+        state_.diameter = std::max(0., parameter(0, state_.diameter / std::numbers::sqrt2));
+        return;
+      case Action::tropism:
+        state_.tropism = parameter(0, 0.);
+        if (values.size() > 1) {
+          state_.towards = {parameter(1, 0.), parameter(2, 0.), parameter(3, 0.)};
+          if (state_.towards.norm() > 0.) state_.towards.normalize();
+        }
+        return;
+      case Action::outward:
+        state_.outward = parameter(0, 0.);
+        return;
+      case Action::soma:
+        return soma(parameter(0, 0.));
+      case Action::axon:
+        return become(SectionKind::axon);
+      case Action::basal:
+        return become(SectionKind::basal);
+      case Action::apical:
+        return become(SectionKind::apical);
+      case Action::glia:
+        return become(SectionKind::glia);
+      case Action::kind:
+        return become_numbered(parameter(0, 0.));
+    }
+  }
+
+  void rotate(int a, int b, double angle) {  // column a towards column b
+    const double c = std::cos(angle), s = std::sin(angle);
+    const Eigen::Vector3d from = state_.frame.col(a), to = state_.frame.col(b);
+    state_.frame.col(a) = c * from + s * to;
+    state_.frame.col(b) = c * to - s * from;
+  }
+
+  void level() {
+    const Eigen::Vector3d heading = state_.frame.col(0), left = Eigen::Vector3d::UnitY().cross(heading);
+    if (left.norm() < 1e-9) return;
+    state_.frame.col(1) = left.normalized();
+    state_.frame.col(2) = heading.cross(state_.frame.col(1));
+  }
+
+  // Prusinkiewicz & Lindenmayer, section 2.1: turn about heading × direction by strength * |heading ×
+  // direction|.
+  void bend(const Eigen::Vector3d& direction, double strength) {
+    const Eigen::Vector3d axis = state_.frame.col(0).cross(direction);
+    const double size = axis.norm();
+    if (size < 1e-9) return;
+    state_.frame =
+        Eigen::AngleAxisd(std::clamp(strength * size, -std::numbers::pi, std::numbers::pi), axis / size) *
+        state_.frame;
+  }
+
+  void draw(double length, double diameter) {
+    diameter = std::max(0., diameter);
+    const auto start = float(0.5 * state_.diameter);
+    state_.diameter = diameter;
+    if (length == 0.) return;
+    if (state_.node == none) {
+      drawn_.push_back({state_.position, start, start, none, 0, state_.tag, state_.kind});
+      state_.node = std::uint32_t(drawn_.size() - 1);
+    }
+    state_.position += length * state_.frame.col(0);
+    if (!state_.position.allFinite()) fail("the turtle has left the world");
+    ++drawn_[state_.node].children;
+    drawn_.push_back(
+        {state_.position, float(0.5 * diameter), start, state_.node, 0, state_.tag, state_.kind});
+    state_.node = std::uint32_t(drawn_.size() - 1);
+    if (state_.tropism != 0.) bend(state_.towards, state_.tropism);
+    if (state_.outward != 0.) {
+      const Eigen::Vector3d out = state_.position - soma_place_;
+      if (const double distance = out.norm(); distance > 0.) bend(out / distance, state_.outward);
+    }
+  }
+
+  void move(double length) {
+    if (length == 0.) return;
+    state_.position += length * state_.frame.col(0);
+    state_.node = none;
+  }
+
+  void soma(double diameter) {
+    if (soma_) fail("there are two somata; a neuron has one");
+    if (!(diameter >= 0.)) fail("the soma has a negative diameter");
+    soma_ = Point{float(state_.position.x()), float(state_.position.y()), float(state_.position.z()),
+                  float(0.5 * diameter)};
+    soma_place_ = state_.position;
+  }
+
+  void become(SectionKind kind) { state_.kind = kind, state_.tag = std::int32_t(kind); }
+  void become_numbered(double number) {
+    const auto tag = std::int32_t(std::clamp(number, 0., 1e6));
+    constexpr SectionKind known[] = {SectionKind::axon,     SectionKind::basal, SectionKind::apical,
+                                     SectionKind::custom,   SectionKind::glia,  SectionKind::unspecified,
+                                     SectionKind::undefined};
+    const auto kind = std::ranges::find(known, tag, [](SectionKind k) { return std::int32_t(k); });
+    state_.kind = kind == std::end(known) ? SectionKind::custom : *kind;
+    state_.tag = tag;
+  }
+
+  // A section runs on while a point has one drawn daughter, which is the next point, of the same kind.
+  Morphology build() const {
+    MorphologyBuilder builder;
+    if (soma_)
+      builder.set_soma({.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}});
+    const auto point = [](const Drawn& d, float radius) {
+      return Point{float(d.position.x()), float(d.position.y()), float(d.position.z()), radius};
+    };
+    builder.reserve(drawn_.size() / 4, drawn_.size() + drawn_.size() / 4);
+    std::vector<SectionId> section_of(drawn_.size());
+    std::vector<Point> points;
+    for (std::uint32_t i = 0; i < drawn_.size();) {
+      points.clear();
+      SectionId parent;
+      const std::uint32_t begin = i;
+      if (const Drawn& first = drawn_[i]; first.parent != none) {
+        parent = section_of[first.parent];
+        points.push_back(point(drawn_[first.parent], first.start_radius));
+      }
+      for (;; ++i) {
+        points.push_back(point(drawn_[i], drawn_[i].radius));
+        const bool goes_on = i + 1 < drawn_.size() && drawn_[i + 1].parent == i && drawn_[i].children == 1 &&
+                             drawn_[i + 1].kind == drawn_[i].kind && drawn_[i + 1].tag == drawn_[i].tag;
+        if (!goes_on) break;
+      }
+      const SectionId id = builder.add_section(parent, drawn_[begin].kind, points, drawn_[begin].tag,
+                                               parent.valid() || !soma_ ? -1 : 0);
+      for (std::uint32_t k = begin; k <= i; ++k) section_of[k] = id;
+      ++i;
+    }
+    return builder.build();
+  }
+
+  const Word& word_;
+  const Grammar& grammar_;
+  State state_;
+  std::vector<State> stack_;
+  std::vector<Drawn> drawn_;
+  std::optional<Point> soma_;
+  Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
+};
+
+}  // namespace
+
+std::span<const TurtleSymbol> turtle_symbols() { return symbol_table; }
+
+Morphology interpret(const Word& word, const Grammar& grammar) { return Turtle(word, grammar).run(); }
+
+}  // namespace forest::lsystem
