@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "apps/cli/verb.h"
-
 #include <array>
+
+#include "apps/cli/verb.h"
 
 namespace forest::cli {
 
