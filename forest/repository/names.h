@@ -1,0 +1,27 @@
+// SPDX-License-Identifier: Apache-2.0
+// Names as the repository keeps them. A database wants text in UTF-8; files and their comments hold any
+// bytes.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+namespace forest::repository {
+
+/// A name: 1 to 1000 bytes of UTF-8 without control characters. Everything else is allowed, quotes and
+/// semicolons too.
+bool is_name(std::string_view text);
+
+/// Bytes as text that can be stored and read by a person: what is no UTF-8 and control characters become
+/// \xHH, and a backslash becomes \\ so that nothing is lost.
+std::string escaped(std::string_view bytes);
+std::string unescaped(std::string_view text);  // the inverse
+
+/// The start of a long or strange text, to be quoted in a sentence.
+std::string shown(std::string_view text);
+
+/// A file name (without folder) that is different for different names: what a file system or shell dislikes
+/// becomes %HH, names too long for a file are cut and end on their hash.
+std::string file_name(std::string_view name);
+
+}  // namespace forest::repository

@@ -1,0 +1,647 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/repository/repository.h"
+
+#include <algorithm>
+#include <array>
+#include <bit>
+#include <cassert>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+#include <soci/soci.h>
+
+#include "forest/core/error.h"
+#include "forest/core/hash.h"
+#include "forest/repository/connection.h"
+#include "forest/repository/names.h"
+#include "forest/repository/rows.h"
+
+namespace forest::repository {
+namespace {
+
+using soci::into;
+using soci::use;
+using Ints = std::vector<int>;
+using Reals = std::vector<double>;
+
+/// How long the vectors must be that receive `count` rows. SOCI 4.0 leaves a vector of length 1 unfilled when
+/// the question has a parameter; it shortens longer ones to the number of rows that came.
+std::size_t room(std::size_t count) { return count + 2; }
+
+int number_of(NeuronId id) { return int(id.value()); }
+
+std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
+
+/// Two neurons of a population with the same fingerprint came from the same source.
+std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
+  if (const auto* grown = std::get_if<Grown>(&provenance))
+    return hash_of(fmt::format("{} {} {} {}", grown->grammar_hash, grown->seed, grown->index, checksum));
+  const std::string& hash = std::get<Traced>(provenance).hash;
+  return hash.empty() ? hash_of(fmt::format("{}", checksum)) : hash;
+}
+
+/// The statements that store one neuron, prepared once, with the variables they are bound to.
+class Insert {
+ public:
+  explicit Insert(soci::session& sql)
+      : soma_points_(sql),
+        soma_links_(sql),
+        points_(sql),
+        neuron_((sql.prepare << "insert into neurons (id, population, name, fingerprint, species, region, "
+                                "layer, type, stems, "
+                                "sections, points, spines, length, checksum) values (:id, :population, "
+                                ":name, :fingerprint, "
+                                ":species, :region, :layer, :type, :stems, :sections, :points, :spines, "
+                                ":length, :checksum)",
+                 use(id), use(population), use(name), use(fingerprint), use(about.species), use(about.region),
+                 use(about.layer), use(about.type), use(stems_), use(section_count_), use(point_count_),
+                 use(spine_count_), use(length_), use(checksum))),
+        provenance_((
+            sql.prepare
+                << "insert into provenance (neuron, origin, source_file, source_hash, grammar, seed, number, "
+                   "program) values (:neuron, :origin, :file, :hash, :grammar, :seed, :number, :program)",
+            use(id), use(origin_), use(file_, if_traced_), use(hash_, if_traced_), use(grammar, if_grown_),
+            use(seed_, if_grown_), use(index_, if_grown_), use(program_))),
+        soma_((sql.prepare << "insert into somata (neuron, kind, x, y, z, radius, area, points, links) "
+                              "values (:neuron, :kind, "
+                              ":x, :y, :z, :radius, :area, :points, :links)",
+               use(id), use(soma_kind_), use(sphere_[0]), use(sphere_[1]), use(sphere_[2]), use(sphere_[3]),
+               use(area_), use(soma_points_, if_soma_), use(soma_links_, if_links_))),
+        data_((sql.prepare << "insert into points (neuron, data) values (:neuron, :data)", use(id),
+               use(points_))),
+        arbors_((
+            sql.prepare << "insert into arbors (neuron, number, root, kind, sections, terminals, max_order, "
+                           "length) values "
+                           "(:neuron, :number, :root, :kind, :sections, :terminals, :max_order, :length)",
+            use(ids_), use(numbers_), use(rows.arbors.root), use(rows.arbors.kind), use(rows.arbors.sections),
+            use(rows.arbors.terminals), use(rows.arbors.order), use(rows.arbors.length))),
+        sections_(
+            (sql.prepare
+                 << "insert into sections (neuron, number, parent, arbor, branch_order, length, kind, tag, "
+                    "soma_point, first_point, point_count) values (:neuron, :number, :parent, :arbor, "
+                    ":branch_order, :length, :kind, :tag, :soma_point, :first_point, :point_count)",
+             use(ids_), use(numbers_), use(rows.sections.parent, if_parent_), use(rows.sections.arbor),
+             use(rows.sections.order), use(rows.sections.length), use(rows.sections.kind),
+             use(rows.sections.tag), use(rows.sections.soma_point), use(rows.sections.first_point),
+             use(rows.sections.point_count))),
+        spines_((sql.prepare << "insert into spines (neuron, number, section, position, head_x, head_y, "
+                                "head_z, head_diameter, "
+                                "neck_diameter, shape) values (:neuron, :number, :section, :position, :x, "
+                                ":y, :z, :head, :neck, "
+                                ":shape)",
+                 use(ids_), use(numbers_), use(spine_section_), use(spine_[0]), use(spine_[1]),
+                 use(spine_[2]), use(spine_[3]), use(spine_[4]), use(spine_[5]), use(spine_shape_))),
+        annotations_(
+            (sql.prepare
+                 << "insert into annotations (neuron, number, name, value) values (:neuron, :number, :name, "
+                    ":value)",
+             use(ids_), use(numbers_), use(key_), use(value_))) {}
+
+  // What the caller sets before run().
+  int id = 0, population = 0, grammar = 0;
+  std::string name, fingerprint;
+  NewNeuron about;
+  Rows rows;
+  long long checksum = 0;
+
+  void run(const Morphology& m) {
+    stems_ = int(m.roots().size());
+    section_count_ = int(m.sections().size());
+    point_count_ = int(m.points().size());
+    spine_count_ = int(m.spines().size());
+    length_ = 0.;
+    for (const double length : rows.arbors.length) length_ += length;
+    neuron_.execute(true);
+
+    const auto* traced = std::get_if<Traced>(&about.provenance);
+    const auto* grown = std::get_if<Grown>(&about.provenance);
+    origin_ = traced ? "traced" : "grown";
+    if_traced_ = traced ? soci::i_ok : soci::i_null;
+    if_grown_ = grown ? soci::i_ok : soci::i_null;
+    if (traced) file_ = escaped(traced->file), hash_ = escaped(traced->hash);
+    if (grown) seed_ = std::bit_cast<long long>(grown->seed), index_ = std::bit_cast<long long>(grown->index);
+    provenance_.execute(true);
+
+    const Point sphere = m.soma().sphere();
+    soma_kind_ = name_of(rows.soma_kind);
+    sphere_ = {sphere.x, sphere.y, sphere.z, sphere.radius};
+    area_ = m.soma().area();
+    if_soma_ = fill(soma_points_, rows.soma_points);
+    if_links_ = fill(soma_links_, rows.soma_links);
+    soma_.execute(true);
+    if (fill(points_, rows.points) == soci::i_ok) data_.execute(true);
+
+    run(arbors_, rows.arbors.size());
+    if_parent_.assign(rows.sections.size(), soci::i_ok);
+    for (std::size_t i = 0; i < rows.sections.size(); ++i)
+      if (rows.sections.parent[i] < 0) if_parent_[i] = soci::i_null;
+    run(sections_, rows.sections.size());
+
+    spine_section_.clear(), spine_shape_.clear();
+    for (Reals& column : spine_) column.clear();
+    for (const Spine& s : rows.spines) {
+      const std::array<float, 6> numbers{s.position, s.head.x(),      s.head.y(),
+                                         s.head.z(), s.head_diameter, s.neck_diameter};
+      for (std::size_t i = 0; i < 6; ++i) spine_[i].push_back(numbers[i]);
+      spine_section_.push_back(int(s.section.value()));
+      spine_shape_.push_back(int(s.shape));
+    }
+    run(spines_, rows.spines.size());
+
+    key_.clear(), value_.clear();
+    for (const auto& [key, value] : rows.annotations)
+      key_.push_back(escaped(key)), value_.push_back(escaped(value));
+    run(annotations_, rows.annotations.size());
+  }
+
+ private:
+  /// A table with `count` rows of this neuron.
+  void run(soci::statement& statement, std::size_t count) {
+    if (count == 0) return;
+    ids_.assign(count, id);
+    for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(int(i));
+    numbers_.resize(count);
+    statement.execute(true);
+  }
+
+  static soci::indicator fill(soci::blob& blob, const std::string& bytes) {
+    blob.trim(0);
+    if (bytes.empty()) return soci::i_null;
+    blob.append(bytes.data(), bytes.size());
+    return soci::i_ok;
+  }
+
+  int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0;
+  double length_ = 0., area_ = 0.;
+  std::string origin_, file_, hash_, program_ = FOREST_VERSION, soma_kind_;
+  soci::indicator if_traced_ = soci::i_ok, if_grown_ = soci::i_ok, if_soma_ = soci::i_ok,
+                  if_links_ = soci::i_ok;
+  long long seed_ = 0, index_ = 0;
+  std::array<double, 4> sphere_{};
+  soci::blob soma_points_, soma_links_, points_;
+  Ints ids_, numbers_, spine_section_, spine_shape_;
+  std::vector<soci::indicator> if_parent_;
+  std::array<Reals, 6> spine_;
+  std::vector<std::string> key_, value_;
+  soci::statement neuron_, provenance_, soma_, data_, arbors_, sections_, spines_,
+      annotations_;  // after what they use
+};
+
+}  // namespace
+
+struct Repository::Impl {
+  std::string place;
+  mutable soci::session sql;
+  std::unique_ptr<Insert> insert;  // prepared on first use
+  bool writing = false;            // a transaction is open
+  bool failed = false;             // and cannot be committed any more
+
+  /// Calls `body`; errors of the database become sentences.
+  template <class Body>
+  auto guarded(Body&& body) const {
+    try {
+      return body();
+    } catch (...) {
+      rethrow(place);
+    }
+  }
+
+  void undo() noexcept {
+    insert.reset();  // a statement that failed is not used again
+    try {
+      sql << "rollback";
+    } catch (const std::exception&) {  // the database has done so already
+    }
+    writing = failed = false;
+  }
+
+  /// Calls `body` in the open transaction or one of its own; one of its own is committed, or undone when
+  /// `body` throws.
+  template <class Body>
+  auto write(Body&& body) {
+    return guarded([&] {
+      if (writing) {
+        if (failed) throw Error(place + ": the open transaction has failed before; begin another");
+        try {
+          return body();
+        } catch (const soci::soci_error&) {
+          failed = true;
+          throw;
+        }
+      }
+      begin_writing(sql);
+      writing = true;
+      try {
+        auto result = body();
+        sql << "commit";
+        writing = false;
+        return result;
+      } catch (...) {
+        undo();
+        throw;
+      }
+    });
+  }
+
+  /// Calls `body`, whose questions all see the same state of the database.
+  template <class Body>
+  auto read(Body&& body) const {
+    return guarded([&] {
+      struct End {
+        soci::session* sql;
+        ~End() {
+          try {
+            if (sql) *sql << "commit";
+          } catch (const std::exception&) {
+          }
+        }
+      };
+      if (!writing) begin_reading(sql);
+      const End end{writing ? nullptr : &sql};
+      return body();
+    });
+  }
+
+  template <class T, class... Values>
+  std::optional<T> ask(const std::string& query, const Values&... values) const {
+    T result{};
+    soci::indicator filled = soci::i_ok;
+    soci::statement statement(sql);
+    statement.exchange(into(result, filled));
+    (statement.exchange(use(values)), ...);
+    statement.alloc();
+    statement.prepare(query);
+    statement.define_and_bind();
+    if (!statement.execute(true) || filled == soci::i_null) return std::nullopt;
+    return result;
+  }
+
+  int next_id(const std::string& table) const {
+    return ask<int>(fmt::format("select max(id) from {}", table)).value_or(0) + 1;
+  }
+
+  std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
+                              int id) const;
+  Rows stored(NeuronId id) const;
+};
+
+Repository::Repository(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Repository::~Repository() = default;
+Repository::Repository(Repository&&) noexcept = default;
+Repository& Repository::operator=(Repository&&) noexcept = default;
+
+Repository Repository::open(const std::string& place, Access access) {
+  auto impl = std::make_unique<Impl>();
+  impl->place = place;
+  impl->guarded([&] { connect(impl->sql, place, access == Access::write); });
+  return Repository(std::move(impl));
+}
+
+Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
+  Impl& impl = *impl_;
+  for (const auto& [what, name] :
+       {std::pair{"neuron", &neuron.name}, std::pair{"population", &neuron.population}})
+    if (!is_name(*name))
+      throw Error(
+          fmt::format("{} is no name for a {}; take 1 to 1000 bytes of UTF-8 without control characters",
+                      shown(*name), what));
+  Rows rows = rows_of(morphology);
+  const std::uint64_t sum = checksum(rows);
+
+  return impl.write([&] {
+    if (!impl.insert) impl.insert = std::make_unique<Insert>(impl.sql);
+    Insert& insert = *impl.insert;
+    insert.fingerprint = fingerprint(neuron.provenance, sum);
+    insert.name = neuron.name;
+    const auto population = impl.ask<int>("select id from populations where name = :name", neuron.population);
+    if (population) {
+      const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
+      if (const auto there = impl.ask<int>("select id " + same, *population, insert.fingerprint))
+        return Added{NeuronId(std::size_t(*there)),
+                     *impl.ask<std::string>("select name " + same, *population, insert.fingerprint), true};
+      const auto taken = [&] {
+        return impl.ask<int>("select id from neurons where population = :population and name = :name",
+                             *population, insert.name);
+      };
+      for (int number = 2; taken(); ++number) {
+        if (!neuron.number_if_taken)
+          throw Error(
+              fmt::format("another neuron of population {} is called {}; choose another name or population",
+                          shown(neuron.population), shown(neuron.name)));
+        insert.name = fmt::format("{}-{}", neuron.name, number);
+      }
+    }
+    if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
+      const auto grammar = impl.ask<int>("select id from grammars where hash = :hash and name = :name",
+                                         grown->grammar_hash, grown->grammar);
+      if (!grammar)
+        throw Error(fmt::format(
+            "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
+            shown(grown->grammar), shown(neuron.name)));
+      insert.grammar = *grammar;
+    }
+    insert.population = population.value_or(0);
+    if (!population) {
+      insert.population = impl.next_id("populations");
+      impl.sql << "insert into populations (id, name) values (:id, :name)", use(insert.population),
+          use(neuron.population);
+    }
+    insert.id = impl.next_id("neurons");
+    insert.about = neuron;
+    for (std::string* text :
+         {&insert.about.species, &insert.about.region, &insert.about.layer, &insert.about.type})
+      *text = escaped(*text);
+    insert.rows = std::move(rows);
+    insert.checksum = std::bit_cast<long long>(sum);
+    insert.run(morphology);
+    return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
+  });
+}
+
+std::string Repository::add_grammar(std::string_view name, std::string_view text) {
+  if (!is_name(name))
+    throw Error(shown(name) +
+                " is no name for a grammar; take 1 to 1000 bytes of UTF-8 without control characters");
+  return impl_->write([&] {
+    const std::string hash = hash_of(text), kept_name(name), kept_text = escaped(text);
+    if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {
+      const int id = impl_->next_id("grammars");
+      impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text)", use(id),
+          use(kept_name), use(hash), use(kept_text);
+    }
+    return hash;
+  });
+}
+
+std::optional<std::string> Repository::grammar(std::string_view hash) const {
+  return impl_->guarded([&] {
+    auto text = impl_->ask<std::string>("select text from grammars where hash = :hash order by id",
+                                        std::string(hash));
+    return text ? std::optional(unescaped(*text)) : std::nullopt;
+  });
+}
+
+Repository::Transaction Repository::begin() {
+  if (impl_->writing) throw Error(impl_->place + ": a transaction is open already; commit it first");
+  impl_->guarded([&] { begin_writing(impl_->sql); });
+  impl_->writing = true;
+  return Transaction(*impl_);
+}
+
+Repository::Transaction::Transaction(Impl& impl) : impl_(&impl) {}
+Repository::Transaction::Transaction(Transaction&& other) noexcept
+    : impl_(std::exchange(other.impl_, nullptr)) {}
+
+Repository::Transaction::~Transaction() {
+  if (impl_) impl_->undo();
+}
+
+void Repository::Transaction::commit() {
+  assert(impl_);
+  Impl& impl = *impl_;
+  impl.guarded([&] {
+    if (impl.failed) throw Error(impl.place + ": the transaction has failed and is undone; begin another");
+    impl.sql << "commit";  // when this throws, the destructor undoes
+  });
+  impl.writing = false;
+  impl_ = nullptr;
+}
+
+std::vector<PopulationRow> Repository::populations() const {
+  return impl_->read([&] {
+    const std::size_t count = std::size_t(impl_->ask<int>("select count(*) from populations").value_or(0));
+    std::vector<PopulationRow> populations;
+    std::vector<std::string> name(room(count));
+    std::vector<long long> neurons(room(count)), sections(room(count));
+    Reals length(room(count));
+    impl_->sql << "select p.name, count(n.id), coalesce(sum(n.sections), 0), coalesce(sum(n.length), 0) from "
+                  "populations p left "
+                  "join neurons n on n.population = p.id group by p.id, p.name order by p.name",
+        into(name), into(neurons), into(sections), into(length);
+    for (std::size_t i = 0; i < name.size(); ++i)
+      populations.push_back(
+          {std::move(name[i]), std::size_t(neurons[i]), std::size_t(sections[i]), length[i]});
+    return populations;
+  });
+}
+
+/// `where` may use :name and :population (texts) and :id, each of them once.
+std::vector<NeuronRow> Repository::Impl::rows(const std::string& where, const std::string& text1,
+                                              const std::string& text2, int id) const {
+  return read([&] {
+    const std::string from =
+        " from neurons n join populations p on p.id = n.population left join provenance o on o.neuron = n.id "
+        "left join grammars g on g.id = o.grammar where " +
+        where;
+    const std::size_t count = std::size_t(ask<int>("select count(*)" + from, text1, text2, id).value_or(0));
+    Ints ids(room(count)), stems(room(count)), sections(room(count)), points(room(count)),
+        spines(room(count));
+    std::vector<long long> seed(room(count)), index(room(count));
+    Reals length(room(count));
+    std::array<std::vector<std::string>, 12> t;
+    for (auto& column : t) column.resize(room(count));
+    sql << "select n.id, n.name, p.name, n.species, n.region, n.layer, n.type, n.stems, n.sections, "
+           "n.points, n.spines, n.length, "
+           "coalesce(o.origin, ''), coalesce(o.source_file, ''), coalesce(o.source_hash, ''), "
+           "coalesce(g.name, ''), "
+           "coalesce(g.hash, ''), coalesce(o.seed, 0), coalesce(o.number, 0), coalesce(o.program, '')" +
+               from + " order by n.id",
+        into(ids), into(t[0]), into(t[1]), into(t[2]), into(t[3]), into(t[4]), into(t[5]), into(stems),
+        into(sections), into(points), into(spines), into(length), into(t[6]), into(t[7]), into(t[8]),
+        into(t[9]), into(t[10]), into(seed), into(index), into(t[11]), use(text1), use(text2), use(id);
+    std::vector<NeuronRow> rows(ids.size());
+    for (std::size_t i = 0; i < rows.size(); ++i) {
+      NeuronRow& row = rows[i];
+      row = {.id = NeuronId(std::size_t(ids[i])),
+             .name = std::move(t[0][i]),
+             .population = std::move(t[1][i]),
+             .species = unescaped(t[2][i]),
+             .region = unescaped(t[3][i]),
+             .layer = unescaped(t[4][i]),
+             .type = unescaped(t[5][i]),
+             .stems = std::size_t(stems[i]),
+             .sections = std::size_t(sections[i]),
+             .points = std::size_t(points[i]),
+             .spines = std::size_t(spines[i]),
+             .length = length[i],
+             .provenance = {},
+             .program = std::move(t[11][i])};
+      if (t[6][i] == "grown")
+        row.provenance = Grown{t[9][i], t[10][i], std::bit_cast<std::uint64_t>(seed[i]),
+                               std::bit_cast<std::uint64_t>(index[i])};
+      else
+        row.provenance = Traced{unescaped(t[7][i]), unescaped(t[8][i])};
+    }
+    return rows;
+  });
+}
+
+std::vector<NeuronRow> Repository::neurons(std::string_view population) const {
+  const std::string name(population);
+  return impl_->rows("(p.name = :population or :every = '') and :unused = 0", name, name, 0);
+}
+
+std::vector<NeuronRow> Repository::find(std::string_view name, std::string_view population) const {
+  const std::string where =
+      population.empty() ? "n.name = :name and :population = ''" : "n.name = :name and p.name = :population";
+  return impl_->rows(where + " and :unused = 0", std::string(name), std::string(population), 0);
+}
+
+std::optional<NeuronRow> Repository::neuron(NeuronId id) const {
+  auto rows = impl_->rows(":one = '' and :two = '' and n.id = :id", "", "", number_of(id));
+  return rows.empty() ? std::nullopt : std::optional(std::move(rows[0]));
+}
+
+std::vector<ArborRow> Repository::arbors(NeuronId id) const {
+  return impl_->read([&] {
+    const int neuron = number_of(id);
+    const std::size_t count =
+        std::size_t(impl_->ask<int>("select count(*) from arbors where neuron = :id", neuron).value_or(0));
+    std::vector<ArborRow> arbors;
+    Ints root(room(count)), kind(room(count)), sections(room(count)), terminals(room(count)),
+        order(room(count));
+    Reals length(room(count));
+    impl_->sql << "select root, kind, sections, terminals, max_order, length from arbors where neuron = :id "
+                  "order by number",
+        into(root), into(kind), into(sections), into(terminals), into(order), into(length), use(neuron);
+    for (std::size_t i = 0; i < root.size(); ++i)
+      arbors.push_back({.root = SectionId(std::size_t(root[i])),
+                        .kind = SectionKind(kind[i]),
+                        .sections = std::size_t(sections[i]),
+                        .terminals = std::size_t(terminals[i]),
+                        .order = order[i],
+                        .length = length[i]});
+    return arbors;
+  });
+}
+
+Rows Repository::Impl::stored(NeuronId id) const {
+  const int neuron = number_of(id);
+  const auto count = [&](const char* table) {
+    return std::size_t(
+        ask<int>(fmt::format("select count(*) from {} where neuron = :id", table), neuron).value_or(0));
+  };
+  const auto text = [](soci::blob& blob, soci::indicator filled) {
+    std::string bytes(filled == soci::i_ok ? blob.get_len() : 0, '\0');
+    if (!bytes.empty()) blob.read(0, bytes.data(), bytes.size());
+    return bytes;
+  };
+  Rows rows;
+  std::string kind;
+  soci::blob points(sql), soma_points(sql), soma_links(sql);
+  soci::indicator has_points = soci::i_null, has_soma = soci::i_null, has_links = soci::i_null;
+  sql << "select kind, points, links from somata where neuron = :id", into(kind), into(soma_points, has_soma),
+      into(soma_links, has_links), use(neuron);
+  sql << "select data from points where neuron = :id", into(points, has_points), use(neuron);
+  const auto known = soma_kind(kind);
+  if (!known) throw Error("its soma is of no known kind");
+  rows.soma_kind = *known;
+  rows.points = text(points, has_points);
+  rows.soma_points = text(soma_points, has_soma);
+  rows.soma_links = text(soma_links, has_links);
+
+  if (const std::size_t n = count("sections")) {
+    auto& s = rows.sections;
+    for (auto* column : {&s.parent, &s.kind, &s.tag, &s.soma_point, &s.first_point, &s.point_count})
+      column->resize(room(n));
+    sql << "select coalesce(parent, -1), kind, tag, soma_point, first_point, point_count from sections where "
+           "neuron = :id order by "
+           "number",
+        into(s.parent), into(s.kind), into(s.tag), into(s.soma_point), into(s.first_point),
+        into(s.point_count), use(neuron);
+  }
+  if (const std::size_t n = count("spines")) {
+    Ints section(room(n)), shape(room(n));
+    std::array<Reals, 6> v;
+    for (Reals& column : v) column.resize(room(n));
+    sql << "select section, position, head_x, head_y, head_z, head_diameter, neck_diameter, shape from "
+           "spines where neuron = :id "
+           "order by number",
+        into(section), into(v[0]), into(v[1]), into(v[2]), into(v[3]), into(v[4]), into(v[5]), into(shape),
+        use(neuron);
+    for (std::size_t i = 0; i < section.size(); ++i)
+      rows.spines.push_back({.section = SectionId(std::size_t(section[i])),
+                             .position = float(v[0][i]),
+                             .head = {float(v[1][i]), float(v[2][i]), float(v[3][i])},
+                             .head_diameter = float(v[4][i]),
+                             .neck_diameter = float(v[5][i]),
+                             .shape = SpineShape(shape[i])});
+  }
+  if (const std::size_t n = count("annotations")) {
+    std::vector<std::string> name(room(n)), value(room(n));
+    sql << "select name, value from annotations where neuron = :id order by number", into(name), into(value),
+        use(neuron);
+    for (std::size_t i = 0; i < name.size(); ++i)
+      rows.annotations.emplace_back(unescaped(name[i]), unescaped(value[i]));
+  }
+  return rows;
+}
+
+Morphology Repository::morphology(NeuronId id) const {
+  const int neuron = number_of(id);
+  const auto damaged = [&](std::string_view why) {
+    return InputError(impl_->place, 0,
+                      fmt::format("neuron {} is damaged ({}); remove it and import it again", neuron, why));
+  };
+  std::optional<long long> sum;
+  const Rows rows = impl_->read([&] {
+    sum = impl_->ask<long long>("select checksum from neurons where id = :id", neuron);
+    if (!sum)
+      throw Error(fmt::format("{}: there is no neuron {}; brainforest list shows those that are there",
+                              impl_->place, neuron));
+    try {
+      return impl_->stored(id);
+    } catch (const InputError&) {
+      throw;
+    } catch (const Error& error) {
+      throw damaged(error.what());
+    }
+  });
+  if (std::bit_cast<std::uint64_t>(*sum) != checksum(rows))
+    throw damaged("its checksum is not that of its points and sections");
+  try {
+    return morphology_of(rows);
+  } catch (const Error& error) {
+    throw damaged(error.what());
+  }
+}
+
+bool Repository::remove(NeuronId id) {
+  return impl_->write([&] {
+    const int neuron = number_of(id);
+    if (!impl_->ask<int>("select id from neurons where id = :id", neuron)) return false;
+    impl_->sql << "delete from neurons where id = :id", use(neuron);
+    return true;
+  });
+}
+
+std::vector<std::string> Repository::check(Progress& progress) const {
+  std::vector<std::string> findings;
+  try {
+    impl_->guarded([&] {
+      soci::rowset<std::string> lines = (impl_->sql.prepare << "pragma integrity_check");
+      for (const std::string& line : lines)
+        if (line != "ok") findings.push_back(fmt::format("{}: is damaged ({})", impl_->place, line));
+      const int strays = impl_->ask<int>("select count(*) from pragma_foreign_key_check").value_or(0);
+      if (strays)
+        findings.push_back(fmt::format("{}: is damaged ({} rows belong to nothing)", impl_->place, strays));
+    });
+    const auto rows = neurons();
+    progress.begin("checking", rows.size());
+    for (const NeuronRow& row : rows) {
+      try {
+        morphology(row.id);
+      } catch (const Error& error) {
+        findings.emplace_back(error.what());
+      }
+      progress.advance();
+    }
+    progress.end();
+  } catch (const Error& error) {
+    findings.emplace_back(error.what());
+  }
+  return findings;
+}
+
+}  // namespace forest::repository

@@ -1,0 +1,156 @@
+// SPDX-License-Identifier: Apache-2.0
+// Neurons in a SQL database: who they are, what they look like, where they come from. Today the database is
+// one SQLite file; docs/repository/schema.md draws its tables, for people who want to ask it in SQL.
+//
+//   auto repository = Repository::open("cells.db", Access::write);
+//   repository.add(morphology, {.name = "cell7", .population = "L5", .provenance = Traced{"cell7.swc",
+//   hash}}); for (const NeuronRow& row : repository.neurons("L5")) use(repository.morphology(row.id));
+//
+// A neuron is stored whole or not at all, whatever happens to the program, and read back exactly as it was
+// stored. The same calls in the same order give the same bytes of the file; storing what is already there
+// changes none of them. An object belongs to one thread at a time. Several programs may have the same file
+// open: who writes waits for the other.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <string_view>
+#include <variant>
+#include <vector>
+
+#include "forest/core/progress.h"
+#include "forest/morphology/morphology.h"
+
+namespace forest::repository {
+
+using NeuronId = Id<struct NeuronTag>;  // counted from 1, in the order of storing
+
+/// Read out of a file somebody traced.
+struct Traced {
+  std::string file;  // as the person named it; any bytes
+  std::string hash;  // of the file's bytes: hash_hex, core/hash.h; empty when there was no file
+
+  bool operator==(const Traced&) const = default;
+};
+
+/// Grown from a grammar: the same grammar, seed and index grow the same neuron again.
+struct Grown {
+  std::string grammar;       // its name
+  std::string grammar_hash;  // what Repository::add_grammar returned
+  std::uint64_t seed = 0, index = 0;
+
+  bool operator==(const Grown&) const = default;
+};
+
+using Provenance = std::variant<Traced, Grown>;
+
+struct NewNeuron {
+  std::string name = {};                                         // unique in its population; see is_name
+  std::string population = "default";                            // made on first use; see is_name
+  std::string species = {}, region = {}, layer = {}, type = {};  // empty: not known
+  Provenance provenance = {};
+  /// When another neuron has the name: call this one "name-2", "name-3", … instead of throwing.
+  bool number_if_taken = false;
+};
+
+struct Added {
+  NeuronId id;
+  std::string name;
+  /// The same source is in the population, perhaps under another name: nothing was changed.
+  bool already_there = false;
+};
+
+/// One neuron without its points: what `list` shows.
+struct NeuronRow {
+  NeuronId id;
+  std::string name, population, species, region, layer, type;
+  std::size_t stems = 0, sections = 0, points = 0, spines = 0;
+  double length = 0.;  // µm, of all sections
+  Provenance provenance;
+  std::string program;  // version of Brain Forest that stored it
+};
+
+struct PopulationRow {
+  std::string name;
+  std::size_t neurons = 0, sections = 0;
+  double length = 0.;  // µm
+};
+
+/// One tree of a neuron: a root section and everything below it.
+struct ArborRow {
+  SectionId root;
+  SectionKind kind = SectionKind::undefined;
+  std::size_t sections = 0, terminals = 0;
+  int order = 0;       // the highest centrifugal order in it
+  double length = 0.;  // µm
+};
+
+enum class Access : std::uint8_t { read, write };
+
+class Repository {
+ public:
+  /// Opens the repository at `place`: a path, or later a `postgresql://…` address. With Access::write it is
+  /// made on first use. Throws InputError when there is none, when the file is something else, newer than
+  /// this program, cut off or damaged.
+  static Repository open(const std::string& place, Access access);
+  ~Repository();
+  Repository(Repository&&) noexcept;
+  Repository& operator=(Repository&&) noexcept;
+
+  /// Stores one neuron, in a transaction of its own unless one is open. Throws Error when the name is taken
+  /// by another neuron, is no name, or the disk is full; then nothing has changed.
+  Added add(const Morphology& morphology, const NewNeuron& neuron);
+
+  /// Keeps the text of a grammar (once, however often it is given) and returns the hash Grown::grammar_hash
+  /// asks for.
+  std::string add_grammar(std::string_view name, std::string_view text);
+  std::optional<std::string> grammar(std::string_view hash) const;
+
+  /// Many calls as one transaction, which is what makes thousands of neurons a second:
+  ///   auto transaction = repository.begin(); …add…; transaction.commit();
+  /// What was not committed when the object goes is undone. Throws Error when another program writes for over
+  /// a minute.
+  class Transaction;
+  [[nodiscard]] Transaction begin();
+
+  std::vector<PopulationRow> populations() const;  // by name
+  std::vector<NeuronRow> neurons(
+      std::string_view population = "") const;  // in the order of storing; "": of all populations
+  std::vector<NeuronRow> find(std::string_view name,
+                              std::string_view population = "") const;  // every neuron of that name
+  std::optional<NeuronRow> neuron(NeuronId id) const;
+  std::vector<ArborRow> arbors(NeuronId id) const;
+
+  /// Equal, bit for bit and with its annotations, to what was stored. Throws Error when there is no such
+  /// neuron or its checksum says that it was damaged.
+  Morphology morphology(NeuronId id) const;
+
+  bool remove(NeuronId id);  // false when there was none
+
+  /// Looks at every byte that matters: the database's own structure and the checksum of every neuron. Returns
+  /// one sentence for each thing found; empty when all is well.
+  std::vector<std::string> check(Progress& progress = Progress::none()) const;
+
+ private:
+  struct Impl;
+  explicit Repository(std::unique_ptr<Impl> impl);
+  std::unique_ptr<Impl> impl_;
+};
+
+class Repository::Transaction {
+ public:
+  ~Transaction();
+  Transaction(Transaction&& other) noexcept;
+  Transaction& operator=(Transaction&&) = delete;
+  void commit();  // throws Error when the disk is full; then nothing of the transaction is stored
+
+ private:
+  friend class Repository;
+  explicit Transaction(Impl& impl);
+  Impl* impl_;
+};
+
+}  // namespace forest::repository

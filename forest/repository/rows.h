@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// A neuron as columns of the tables sections, arbors, somata, spines and annotations, and back. No database
+// here.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "forest/morphology/morphology.h"
+
+namespace forest::repository {
+
+/// Bytes are little-endian, as on every machine this runs on: a blob is the array itself.
+struct Rows {
+  std::string points;                   // blob: x, y, z, radius as float32, section after section
+  std::string soma_points, soma_links;  // blobs
+  SomaKind soma_kind = SomaKind::none;
+
+  struct {  // one entry a section
+    std::vector<std::int32_t> parent, arbor, order, kind, tag, soma_point, first_point,
+        point_count;  // parent: -1 for a root
+    std::vector<double> length;
+    std::size_t size() const { return parent.size(); }
+  } sections;
+  struct {  // one entry a root
+    std::vector<std::int32_t> root, kind, sections, terminals, order;
+    std::vector<double> length;
+    std::size_t size() const { return root.size(); }
+  } arbors;
+  std::vector<Spine> spines;
+  Annotations annotations;
+};
+
+Rows rows_of(const Morphology& morphology);
+
+/// The inverse; reads no length, arbor or order, which follow from the rest. Throws Error when the rows fit
+/// no neuron.
+Morphology morphology_of(const Rows& rows);
+
+/// Of everything the inverse reads.
+std::uint64_t checksum(const Rows& rows);
+
+std::string_view name_of(SomaKind kind);  // "none", "sphere", "cylinders", "contours"
+std::optional<SomaKind> soma_kind(std::string_view name);
+
+}  // namespace forest::repository
