@@ -3,10 +3,12 @@
 // white matter and grows towards the pia; its layers are flat slabs, given from the pia downwards as
 // anatomists list them.
 //
-//        ╭───────╮ ── height()        Real cortex is curved; a column stands for a piece small enough (a few
-//        hundred │  L1   │                    µm across) to be taken as flat. ├───────┤ ── layer(0).bottom │
-//        L2   │ ╰───────╯ ── 0
-//         ◄──┼──► radius()
+//        ╭───────╮ ── height()
+//        │  L1   │                Real cortex is curved; a column stands for a piece small enough
+//        ├───────┤ ── layer bottom   (a few hundred µm across) to be taken as flat.
+//        │  L2   │
+//        ╰───────╯ ── 0
+//         ◄──┼──►  radius()
 #pragma once
 
 #include <cstddef>
