@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The table of file formats for neurons. A format is one pair of files and one row here; command line, documentation
-// and the shared hostile test (format_test.cpp) walk over the rows.
+// The table of file formats for neurons. A format is one pair of files and one row here; command line,
+// documentation and the shared hostile test (format_test.cpp) walk over the rows.
 #pragma once
 
 #include <cstddef>
@@ -27,9 +27,9 @@ struct ReadResult {
 };
 
 struct Format {
-  std::string_view name;                          // "swc"
-  std::string_view title;                         // "SWC (INCF v1 and dialects)"
-  std::span<const std::string_view> extensions;   // with the dot, lower case
+  std::string_view name;                         // "swc"
+  std::string_view title;                        // "SWC (INCF v1 and dialects)"
+  std::span<const std::string_view> extensions;  // with the dot, lower case
   /// Throws InputError (file `name`, line, remedy) when nothing sensible can be read.
   ReadResult (*read)(std::string_view bytes, const std::string& name);
   /// The same neuron gives the same bytes. Null when the format is only read.
@@ -37,8 +37,9 @@ struct Format {
 };
 
 std::span<const Format> formats();
-const Format* find_format(std::string_view name);                    // null when unknown
-const Format& format_of(const std::filesystem::path& path);          // by extension; throws InputError naming the known ones
+const Format* find_format(std::string_view name);  // null when unknown
+const Format& format_of(
+    const std::filesystem::path& path);  // by extension; throws InputError naming the known ones
 
 ReadResult read(const std::filesystem::path& path);                  // throws InputError
 void write(const std::filesystem::path& path, const Morphology& m);  // whole or not at all

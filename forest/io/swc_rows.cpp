@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/swc_rows.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/io/numbers.h"
+
+namespace forest::io {
+namespace {
+
+constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
+constexpr std::string_view blanks = " \t\v\f";
+
+// Header keys of Cannon et al. 1998 that are plain words; any KEY_WITH_UNDERSCORE or KEY/SLASH counts too.
+constexpr std::array<std::string_view, 8> plain_keys{"CREATURE",  "REGION", "TYPE",   "CONTRIBUTOR",
+                                                     "REFERENCE", "RAW",    "EXTRAS", "SCALE"};
+
+constexpr std::array<std::string_view, 7> columns{"id", "type", "x", "y", "z", "radius", "parent"};
+constexpr std::string_view layout = "a row is: id type x y z radius parent";
+
+std::string_view trim(std::string_view text) {
+  const auto first = text.find_first_not_of(blanks);
+  return first == text.npos ? std::string_view{}
+                            : text.substr(first, text.find_last_not_of(blanks) - first + 1);
+}
+
+/// For a message: at most 40 characters, only printable ASCII.
+std::string shown(std::string_view text) {
+  std::string result(text.substr(0, 40));
+  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
+  return text.size() > 40 ? result + "…" : result;
+}
+
+bool same_word(std::string_view text, std::string_view lower) {
+  return std::ranges::equal(text, lower,
+                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
+}
+
+bool means_unknown(std::string_view token) {
+  if (!token.empty() && (token[0] == '-' || token[0] == '+')) token.remove_prefix(1);
+  constexpr std::array<std::string_view, 8> words{"nan", "na", "n/a", "null", "none", "inf", "infinity", "?"};
+  return std::ranges::any_of(words, [&](std::string_view word) { return same_word(token, word); });
+}
+
+class Scanner {
+ public:
+  Scanner(const std::string& name, OddityList<SwcOddity>& oddities) : name_(name), oddities_(oddities) {}
+
+  SwcRows scan(std::string_view text) {
+    if (text.starts_with("\xef\xbb\xbf")) {
+      oddities_.add(SwcOddity::byte_order_mark, 1, "the file begins with a byte order mark");
+      text.remove_prefix(3);
+    }
+    if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
+      throw InputError(name_, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+    const std::size_t rows = text.size() / 16;
+    rows_.ids.reserve(rows), rows_.parents.reserve(rows), rows_.types.reserve(rows),
+        rows_.points.reserve(rows);
+
+    // Every line that the scanner sees ends in a line end, so that reading a number needs no other bound.
+    const std::size_t whole = text.find_last_of("\r\n") + 1;  // npos + 1 == 0
+    lines(text.data(), text.data() + whole);
+    if (whole < text.size()) {
+      const std::string last = std::string(text.substr(whole)) + '\n';
+      lines(last.data(), last.data() + last.size());
+    }
+    return std::move(rows_);
+  }
+
+ private:
+  void lines(const char* p, const char* const end) {
+    while (p < end) {
+      ++line_;
+      const char* const begin = p;
+      if (footer_ || !row(p)) {
+        p = begin;
+        while (!is_line_end(*p)) ++p;
+        odd_line({begin, p});
+      }
+      if (*p == '\r') {
+        oddities_.add(SwcOddity::line_ends, line_, "lines end in a carriage return");
+        ++p;
+        if (p < end && *p == '\n') ++p;
+      } else {
+        ++p;
+      }
+    }
+  }
+
+  /// The common row: seven plain numbers. Leaves p at the line end; false when the line is anything else.
+  bool row(const char*& p) {
+    bool tabs = false, exponent = false;
+    const auto skip = [&] {
+      for (; is_blank(*p); ++p) tabs |= *p == '\t';
+    };
+    std::int64_t id = 0, type = 0, parent = 0;
+    Point point;
+    skip();
+    if (!read_integer(p, id)) return false;
+    skip();
+    if (!read_integer(p, type)) return false;
+    skip();
+    if (!read_real(p, point.x, exponent)) return false;
+    skip();
+    if (!read_real(p, point.y, exponent)) return false;
+    skip();
+    if (!read_real(p, point.z, exponent)) return false;
+    skip();
+    if (!read_real(p, point.radius, exponent)) return false;
+    skip();
+    if (!read_integer(p, parent)) return false;
+    skip();
+    if (!is_line_end(*p)) return false;
+    add(id, type, point, parent);
+    if (tabs) oddities_.add(SwcOddity::tabs, line_, "columns are separated by tabs");
+    if (exponent) oddities_.add(SwcOddity::exponent, line_, "a number has an exponent");
+    return true;
+  }
+
+  void add(std::int64_t id, std::int64_t type, Point point, std::int64_t parent) {
+    SwcRows& rows = rows_;
+    const std::size_t row = rows.ids.size();
+    if (line_ != row + lines_before_ + 1) {
+      lines_before_ = line_ - row - 1;
+      rows.jumps.push_back({row, lines_before_});
+    }
+    if (row != 0) {
+      rows.consecutive = rows.consecutive && id == rows.ids.back() + 1;
+      if (blank_line_) {
+        oddities_.add(SwcOddity::blank_line, blank_line_,
+                      "a blank line among the rows, where some programs stop reading");
+        blank_line_ = 0;
+      }
+      if (late_comment_) {
+        oddities_.add(SwcOddity::late_comment, late_comment_, "a comment line among the rows");
+        late_comment_ = 0;
+      }
+    }
+    if (type < std::numeric_limits<std::int32_t>::min() || type > std::numeric_limits<std::int32_t>::max())
+      throw InputError(
+          name_, line_,
+          fmt::format("the type {} is too large; types 0 to 7 are standard, others custom", type));
+    const float sum = point.x + point.y + point.z;
+    if (!(std::abs(sum) < std::numeric_limits<float>::infinity()) ||
+        !(point.radius < std::numeric_limits<float>::infinity()) || point.radius < 0.f) [[unlikely]]
+      unknowns(point);
+    rows.ids.push_back(id);
+    rows.parents.push_back(parent);
+    rows.types.push_back(static_cast<std::int32_t>(type));
+    rows.points.push_back(point);
+  }
+
+  void unknowns(Point& point) {
+    for (float* const number : {&point.x, &point.y, &point.z})
+      if (!std::isfinite(*number)) {
+        *number = unknown;
+        rows_.unknown_numbers = true;
+        oddities_.add(SwcOddity::unknown_place, line_, "a coordinate is not known or not finite");
+      }
+    if (point.radius < 0.f) {
+      oddities_.add(SwcOddity::negative_radius, line_,
+                    [&] { return fmt::format("the radius is {}", point.radius); });
+      point.radius = unknown;
+      rows_.unknown_numbers = true;
+    } else if (!std::isfinite(point.radius)) {
+      oddities_.add(SwcOddity::unknown_radius, line_, "the radius is not known or not finite");
+      point.radius = unknown;
+      rows_.unknown_numbers = true;
+    }
+  }
+
+  // Everything that is no common row
+  // ---------------------------------------------------------------------------
+
+  void odd_line(std::string_view line) {
+    const std::string_view text = trim(line);
+    if (footer_) return footer(text);
+    if (text.empty()) {
+      if (rows_.size() && !blank_line_) blank_line_ = line_;
+    } else if (text[0] == '#') {
+      comment(trim(text.substr(1)));
+    } else {
+      odd_row(text);
+    }
+  }
+
+  void footer(std::string_view text) {
+    if (text.starts_with('#')) text = trim(text.substr(1));
+    if (text == "end synapse")
+      footer_ = false;
+    else if (!text.empty())
+      rows_.annotations.emplace_back("synapse", text);
+  }
+
+  void comment(std::string_view text) {
+    if (rows_.size() && !late_comment_) late_comment_ = line_;
+    if (text == "start synapse") {
+      footer_ = true;
+      late_comment_ = 0;
+    } else if (text == swc_marker) {
+      if (line_ == 1) rows_.to_the_letter = true;
+    } else if (!rows_.to_the_letter || !own_comment(text)) {
+      const auto [key, value] = swc_comment(text);
+      rows_.annotations.emplace_back(key, value);
+    }
+  }
+
+  /// What write_swc put into comments.
+  bool own_comment(std::string_view text) {
+    const auto [key, value] = swc_comment(text);
+    if (key != swc_node_key && key != swc_outline_key) return false;
+    const std::string numbers = std::string(value) + '\n';
+    const char* p = numbers.data();
+    const auto skip = [&] {
+      while (is_blank(*p)) ++p;
+    };
+    std::int64_t id = 0;
+    bool good = read_integer(p, id), exponent = false;
+    if (key == swc_node_key && good) {
+      rows_.nodes.push_back(id);
+    } else if (good) {
+      Point point;
+      for (float* const number : {&point.x, &point.y, &point.z, &point.radius}) {
+        skip();
+        good = good && read_real(p, *number, exponent) && std::isfinite(*number);
+      }
+      good = good && point.radius >= 0.f && (id == 0 || !rows_.outline.empty());
+      if (good && (rows_.outline.empty() || static_cast<std::size_t>(id) == rows_.outline_starts.size()))
+        rows_.outline_starts.push_back(static_cast<std::uint32_t>(rows_.outline.size()));
+      good = good && static_cast<std::size_t>(id) + 1 == rows_.outline_starts.size();
+      if (good) rows_.outline.push_back(point);
+    }
+    skip();
+    if (!good || !is_line_end(*p))
+      throw InputError(
+          name_, line_,
+          fmt::format("the comment {} does not hold the numbers it should; remove the line", key));
+    return true;
+  }
+
+  void odd_row(std::string_view text) {
+    const std::size_t hash = text.find('#');
+    const std::string_view data = trim(text.substr(0, hash));
+    std::vector<std::string> tokens = split(data);
+    const char first = data[0];
+    if (rows_.size() == 0 && tokens.size() != 1 &&
+        ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z'))) {
+      oddities_.add(SwcOddity::text_header, line_, "a line of words");
+      rows_.annotations.emplace_back("comment", text);
+      return;
+    }
+    if (tokens.size() < columns.size())
+      throw InputError(name_, line_,
+                       fmt::format("\"{}\" has {} of 7 columns; {}", shown(data), tokens.size(), layout));
+    const std::int64_t id = integer(tokens, 0), type = integer(tokens, 1);
+    Point point;
+    point.x = real(tokens, 2), point.y = real(tokens, 3), point.z = real(tokens, 4),
+    point.radius = real(tokens, 5);
+    add(id, type, point, integer(tokens, 6));
+    if (data.find('\t') != data.npos) oddities_.add(SwcOddity::tabs, line_, "columns are separated by tabs");
+    if (tokens.size() > columns.size())
+      oddities_.add(SwcOddity::extra_columns, line_,
+                    [&] { return fmt::format("there are {} columns", tokens.size()); });
+    if (hash != text.npos) oddities_.add(SwcOddity::trailing_comment, line_, "a comment follows the row");
+  }
+
+  /// At blanks and commas; but commas inside numbers, of a row that has its columns without them, are decimal
+  /// points.
+  std::vector<std::string> split(std::string_view data) {
+    const auto at = [&](std::string_view separators) {
+      std::vector<std::string> tokens;
+      for (std::size_t begin = data.find_first_not_of(separators); begin != data.npos;) {
+        const std::size_t end = std::min(data.find_first_of(separators, begin), data.size());
+        tokens.emplace_back(data.substr(begin, end - begin));
+        begin = data.find_first_not_of(separators, end);
+      }
+      return tokens;
+    };
+    std::vector<std::string> tokens = at(blanks);
+    if (data.find(',') == data.npos) return tokens;
+    const auto inside = [](const std::string& token) { return token.find(',') < token.size() - 1; };
+    if (tokens.size() >= columns.size() && std::ranges::any_of(tokens, inside)) {
+      oddities_.add(SwcOddity::decimal_commas, line_, "numbers have a decimal comma");
+      for (std::string& token : tokens) std::ranges::replace(token, ',', '.');
+      return tokens;
+    }
+    oddities_.add(SwcOddity::commas, line_, "columns are separated by commas");
+    return at(" \t\v\f,");
+  }
+
+  std::int64_t integer(const std::vector<std::string>& tokens, std::size_t column) {
+    const std::string text = tokens[column] + '\n';
+    const char* p = text.data() + (text[0] == '+');
+    std::int64_t value = 0;
+    if (read_integer(p, value)) return value;
+    double decimal = 0.;
+    const char* const end = text.data() + text.size() - 1;
+    const auto [stop, error] = std::from_chars(text.data(), end, decimal);
+    if (error != std::errc() || stop != end || decimal != std::floor(decimal) || std::abs(decimal) > 9e15)
+      throw InputError(name_, line_,
+                       fmt::format("column {} ({}) is \"{}\", not a whole number; {}", column + 1,
+                                   columns[column], shown(tokens[column]), layout));
+    oddities_.add(SwcOddity::decimal_integer, line_, [&] {
+      return fmt::format("the {} is written \"{}\"", columns[column], shown(tokens[column]));
+    });
+    return static_cast<std::int64_t>(decimal);
+  }
+
+  float real(const std::vector<std::string>& tokens, std::size_t column) {
+    const std::string text = tokens[column] + '\n';
+    const char* p = text.data();
+    float value = 0.f;
+    bool exponent = false;
+    if (read_real(p, value, exponent) && *p == '\n') {
+      if (exponent) oddities_.add(SwcOddity::exponent, line_, "a number has an exponent");
+      return value;
+    }
+    if (!means_unknown(tokens[column]))
+      throw InputError(name_, line_,
+                       fmt::format("column {} ({}) is \"{}\", not a number; {}", column + 1, columns[column],
+                                   shown(tokens[column]), layout));
+    return unknown;
+  }
+
+  const std::string& name_;
+  OddityList<SwcOddity>& oddities_;
+  SwcRows rows_;
+  std::size_t line_ = 0, lines_before_ = 0, blank_line_ = 0, late_comment_ = 0;
+  bool footer_ = false;
+};
+
+}  // namespace
+
+std::size_t SwcRows::line(std::size_t row) const {
+  const auto after = std::ranges::upper_bound(jumps, row, {}, &Jump::row);
+  return row + 1 + (after == jumps.begin() ? 0 : std::prev(after)->lines_before);
+}
+
+std::pair<std::string_view, std::string_view> swc_comment(std::string_view text) {
+  text = trim(text);
+  const std::string_view word = text.substr(0, text.find_first_of(blanks));
+  const bool capital =
+      !word.empty() && word[0] >= 'A' && word[0] <= 'Z' && std::ranges::all_of(word, [](char c) {
+        return (c >= 'A' && c <= 'Z') || is_digit(c) || c == '_' || c == '/';
+      });
+  const bool key =
+      std::ranges::find(plain_keys, word) != plain_keys.end() || word.find_first_of("_/") != word.npos;
+  if (!capital || !key) return {"comment", text};
+  return {word, trim(text.substr(word.size()))};
+}
+
+SwcRows scan_swc(std::string_view bytes, const std::string& name, OddityList<SwcOddity>& oddities) {
+  return Scanner(name, oddities).scan(bytes);
+}
+
+}  // namespace forest::io
