@@ -303,6 +303,44 @@ class Assembler {
   // The soma
   // ---------------------------------------------------------------------------------------------------
 
+  /// Files of the CNIC and of navis call every branch point 5 and every tip 6, whatever they belong to; but a
+  /// root may have any type. Such points get the type of the point before, or after where there is none
+  /// before.
+  void look_for_cnic() {
+    const auto& types = rows_.types;
+    const auto marked = [](std::int32_t type) { return type == 5 || type == 6; };
+    if (rows_.to_the_letter || std::ranges::none_of(types, marked)) return;
+    std::vector<std::uint8_t> below(rows_.size(), 0);
+    for (const std::int32_t parent : parents_)
+      if (parent != none && below[std::size_t(parent)] < 2) ++below[std::size_t(parent)];
+    bool other = false;
+    for (std::size_t i = 0; i < types.size(); ++i) {
+      if (types[i] == soma_type) continue;
+      const std::int32_t expected = below[i] == 0 ? 6 : below[i] == 1 ? none : 5;
+      const bool root = parents_[i] == none;
+      if (expected == none ? marked(types[i]) : types[i] != expected && !root) return;
+      other = other || expected == none;
+    }
+    if (!other) return;
+    oddities_.add(SwcOddity::cnic_types, 0, "every branch point is of type 5 and every tip of type 6");
+    std::vector<std::int32_t> unresolved;
+    parents_first([&](std::int32_t row) {
+      std::int32_t& type = rows_.types[std::size_t(row)];
+      const std::int32_t parent = parents_[std::size_t(row)];
+      if (!marked(type)) {
+        for (std::int32_t at = parent; type != soma_type && at != none && marked(types[std::size_t(at)]);
+             at = parents_[std::size_t(at)])
+          rows_.types[std::size_t(at)] = type;
+      } else if (parent != none && !is_soma(parent) && !marked(types[std::size_t(parent)])) {
+        type = types[std::size_t(parent)];
+      } else {
+        unresolved.push_back(row);
+      }
+    });
+    for (const std::int32_t row : unresolved)
+      if (marked(types[std::size_t(row)])) rows_.types[std::size_t(row)] = 0;
+  }
+
   bool hangs_on_neurite(std::int32_t row) const {
     const std::int32_t parent = parents_[std::size_t(row)];
     return is_soma(row) && parent != none && !is_soma(parent);
