@@ -6,9 +6,13 @@
 namespace forest::cli {
 
 // One declaration and one row a verb, in the order of --help.
+std::function<void()> measure(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
-  static constexpr std::array<Verb, 0> table{};
+  static constexpr auto table = std::to_array<Verb>({
+      {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
+       "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
+  });
   return table;
 }
 

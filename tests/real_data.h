@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Where real data is: $BRAINFOREST_DATA, else the folder shared/data beside the project.
+#pragma once
+
+#include <cstdlib>
+#include <filesystem>
+#include <optional>
+#include <string_view>
+
+#include <gtest/gtest.h>
+
+namespace forest {
+
+inline std::optional<std::filesystem::path> real_data(const std::filesystem::path& sub) {
+  const char* chosen = std::getenv("BRAINFOREST_DATA");
+  const std::filesystem::path root = chosen ? chosen : FOREST_SOURCE_DIR "/../shared/data";
+  if (std::filesystem::exists(root / sub)) return root / sub;
+  return std::nullopt;
+}
+
+inline bool real_data_required() {
+  const char* required = std::getenv("BRAINFOREST_REQUIRE_DATA");
+  return required && std::string_view(required) == "1";
+}
+
+}  // namespace forest
+
+/// `name`, its path, for the rest of the test; without the data it is skipped, or fails where
+/// BRAINFOREST_REQUIRE_DATA=1.
+#define FOREST_REAL_DATA(name, sub)                                                               \
+  const auto name##_found = forest::real_data(sub);                                               \
+  if (!name##_found && forest::real_data_required()) FAIL() << "there is no real data " << (sub); \
+  if (!name##_found) GTEST_SKIP() << "there is no real data " << (sub);                           \
+  const std::filesystem::path name = *name##_found
