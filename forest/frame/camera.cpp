@@ -21,18 +21,21 @@ float Camera::focal(float height) const { return .5f * height / std::tan(.5f * r
 Vec3 project(const Camera& camera, const Viewport& viewport, const Vec3& point) {
   const Vec3 seen = camera.axes().transpose() * (point - camera.eye);
   const float depth = -seen.z(), focal = camera.focal(viewport.height);
-  return {.5f * viewport.width + focal * seen.x() / depth, .5f * viewport.height - focal * seen.y() / depth, depth};
+  return {.5f * viewport.width + focal * seen.x() / depth, .5f * viewport.height - focal * seen.y() / depth,
+          depth};
 }
 
 Ray ray_through(const Camera& camera, const Viewport& viewport, const Vec2& pixel) {
   const float focal = camera.focal(viewport.height);
-  const Vec3 seen((pixel.x() - .5f * viewport.width) / focal, (.5f * viewport.height - pixel.y()) / focal, -1.f);
+  const Vec3 seen((pixel.x() - .5f * viewport.width) / focal, (.5f * viewport.height - pixel.y()) / focal,
+                  -1.f);
   return {camera.eye, (camera.axes() * seen).normalized()};
 }
 
 Frustum::Frustum(const Camera& camera, const Viewport& viewport) {
   const Mat3 axes = camera.axes();
-  const float x = .5f * viewport.width / camera.focal(viewport.height), y = .5f * viewport.height / camera.focal(viewport.height);
+  const float x = .5f * viewport.width / camera.focal(viewport.height),
+              y = .5f * viewport.height / camera.focal(viewport.height);
   const Vec3 normals[] = {{1, 0, -x}, {-1, 0, -x}, {0, 1, -y}, {0, -1, -y}, {0, 0, -1}};
   for (int i = 0; i < 5; ++i) {
     const Vec3 normal = axes * normals[i].normalized();

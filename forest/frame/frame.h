@@ -31,9 +31,9 @@ struct Style {
   Vec3 background_top{.010f, .014f, .024f};
   Vec3 background_bottom{.004f, .005f, .008f};
   Vec3 fog_colour{.006f, .009f, .016f};
-  float fog_start = 0.f;      // depth where fog begins, µm
-  float fog_length = 1e9f;    // depth over which light falls to 1 / e, µm
-  float halo = 1.f;           // strength of the dark rim around nearer branches; 0 for none
+  float fog_start = 0.f;    // depth where fog begins, µm
+  float fog_length = 1e9f;  // depth over which light falls to 1 / e, µm
+  float halo = 1.f;         // strength of the dark rim around nearer branches; 0 for none
   float exposure = 1.f;
 };
 
@@ -57,10 +57,10 @@ struct Frame {
   Style style;
   Palette palette = black_palette();
   std::span<const std::uint8_t> colour_class;  // one an instance, 0–15
-  std::span<const Item> dots;      // small spheres: one segment an item
-  std::span<const Item> lines;     // thin runs
-  std::span<const Item> capsules;  // runs near enough to have a surface
-  std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
+  std::span<const Item> dots;                  // small spheres: one segment an item
+  std::span<const Item> lines;                 // thin runs
+  std::span<const Item> capsules;              // runs near enough to have a surface
+  std::span<const Band> bands;  // the last one ends at the ends of the lists; none: all is one band
   std::span<const Overlay> overlays;
 };
 

@@ -14,7 +14,8 @@ TEST(Camera, ARayThroughAProjectedPixelMeetsThePoint) {
   const Viewport viewport{640, 480};
   Random random(1);
   for (int i = 0; i < 1000; ++i) {
-    const Vec3 point(float(random.uniform(-90, 90)), float(random.uniform(-90, 90)), float(random.uniform(-90, 90)));
+    const Vec3 point(float(random.uniform(-90, 90)), float(random.uniform(-90, 90)),
+                     float(random.uniform(-90, 90)));
     const Vec3 pixel = project(camera, viewport, point);
     const Ray ray = ray_through(camera, viewport, pixel.head<2>());
     EXPECT_LT((point - ray.origin).cross(ray.direction).norm(), .01f);
@@ -35,7 +36,8 @@ TEST(Frustum, NeverCullsWhatProjectsIntoThePicture) {
   Random random(2);
   int seen = 0;
   for (int i = 0; i < 5000; ++i) {
-    const Vec3 p(float(random.uniform(-150, 150)), float(random.uniform(-150, 150)), float(random.uniform(-100, 150)));
+    const Vec3 p(float(random.uniform(-150, 150)), float(random.uniform(-150, 150)),
+                 float(random.uniform(-100, 150)));
     const Vec3 pixel = project(camera, viewport, p);
     const bool inside = pixel.z() > 0 && pixel.x() > 0 && pixel.x() < 200 && pixel.y() > 0 && pixel.y() < 100;
     seen += inside;
@@ -53,7 +55,8 @@ TEST(Frame, ContractRefusesWhatIsOutOfRange) {
   Frame frame;
   frame.colour_class = classes;
   EXPECT_NO_THROW(check(frame, geometry));
-  const std::vector<Item> good{{1, 0, 10, 0, 0, 0, 0, 1}}, no_instance{{2, 0, 1, 0, 0, 0, 0, 1}}, no_segments{{0, 5, 6, 0, 0, 0, 0, 1}};
+  const std::vector<Item> good{{1, 0, 10, 0, 0, 0, 0, 1}}, no_instance{{2, 0, 1, 0, 0, 0, 0, 1}},
+      no_segments{{0, 5, 6, 0, 0, 0, 0, 1}};
   frame.lines = good;
   EXPECT_NO_THROW(check(frame, geometry));
   frame.lines = no_instance;

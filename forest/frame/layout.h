@@ -13,7 +13,8 @@ struct Segment {
   float ax, ay, az;
   uint radii;  // two half floats: radius at a (low), at b (high), µm
   float bx, by, bz;
-  uint meta;  // bits 0–2 section kind (1 soma, else as SectionKind), 8–15 rank: which share of thin branches goes first
+  uint
+      meta;  // bits 0–2 section kind (1 soma, else as SectionKind), 8–15 rank: which share of thin branches goes first
 };
 
 /// Where a neuron stands: position + rotation by the unit quaternion.
@@ -39,10 +40,10 @@ struct Constants {
   float up_x, up_y, up_z, centre_y;  // centre: pixel that `forward` meets (jitter included)
   float forward_x, forward_y, forward_z, near;
   uint width, height, subframe, first_item;
-  float light_x, light_y, light_z, halo;                   // light: in camera axes
-  float fog_red, fog_green, fog_blue, fog_start;           // linear light; µm
-  float top_red, top_green, top_blue, fog_length;          // background above; µm
-  float bottom_red, bottom_green, bottom_blue, exposure;   // background below
+  float light_x, light_y, light_z, halo;                  // light: in camera axes
+  float fog_red, fog_green, fog_blue, fog_start;          // linear light; µm
+  float top_red, top_green, top_blue, fog_length;         // background above; µm
+  float bottom_red, bottom_green, bottom_blue, exposure;  // background below
   uint subframes, item_count, flags, padding;  // the items first_item … first_item + item_count are drawn
 };
 
@@ -56,16 +57,17 @@ struct Constants {
 #define FOREST_CLUSTER_SIZE 64u
 
 // Constants::flags
-#define FOREST_OVERLAY 1u  // segments lie in the world and name their palette entry
-#define FOREST_DOTS 2u     // the queue will be read by one thread an item, not one workgroup
-#define FOREST_COARSE 4u   // tiles of tiles
+#define FOREST_OVERLAY 1u     // segments lie in the world and name their palette entry
+#define FOREST_DOTS 2u        // the queue will be read by one thread an item, not one workgroup
+#define FOREST_COARSE 4u      // tiles of tiles
 #define FOREST_FIRST_BAND 8u  // nothing is hidden yet
 
 // Occlusion: the farthest key of every square of 8 × 8 pixels, then of every 8 × 8 of those.
 #define FOREST_TILE 8u
 
 #ifdef __cplusplus
-static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 && sizeof(Constants) == 160);
+static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 &&
+              sizeof(Constants) == 160);
 inline constexpr uint cluster_size = FOREST_CLUSTER_SIZE;
 }  // namespace forest::frame
 #endif

@@ -50,8 +50,8 @@ struct Draft {
   std::vector<Strip> strips;
   Sphere sphere;
   float error = 0.f;
-  std::uint32_t leaf_first = 0, leaf_count = 0;          // original segments
-  std::size_t first_leaf = 0, last_leaf = 0;             // leaf drafts below, [first, last)
+  std::uint32_t leaf_first = 0, leaf_count = 0;  // original segments
+  std::size_t first_leaf = 0, last_leaf = 0;     // leaf drafts below, [first, last)
   std::int64_t children[2] = {-1, -1};
 };
 
@@ -70,7 +70,8 @@ Sphere around(const std::vector<Strip>& strips) {
     for (const Vec4& v : s.vertices) bounds.add(v.head<3>());
   Sphere sphere{bounds.centre(), 0.f};
   for (const Strip& s : strips)
-    for (const Vec4& v : s.vertices) sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
+    for (const Vec4& v : s.vertices)
+      sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
   return sphere;
 }
 
@@ -85,7 +86,8 @@ void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_
   std::ranges::sort(begins);
   std::ranges::sort(ends);
   const auto only = [](const auto& list, std::uint32_t node) -> std::int64_t {
-    const auto [low, high] = std::ranges::equal_range(list, node, {}, &std::pair<std::uint32_t, std::uint32_t>::first);
+    const auto [low, high] =
+        std::ranges::equal_range(list, node, {}, &std::pair<std::uint32_t, std::uint32_t>::first);
     return high - low == 1 ? std::int64_t(low->second) : -1;
   };
   std::vector<std::uint32_t> into(strips.size());  // the strip that swallowed this one
@@ -108,7 +110,8 @@ void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_
 }
 
 // One coarser version of `strips` within `tolerance` of them.
-std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::uint32_t>& outside_degree, float tolerance) {
+std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::uint32_t>& outside_degree,
+                             float tolerance) {
   // Tips first: a strip that nothing follows, within the draft or outside, and that reaches no further than the
   // tolerance, whatever was dropped at its end before included.
   const auto area_of = [](float sum, const Strip& s) { return sum + s.area(); };
@@ -122,7 +125,8 @@ std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::u
       if (s.kind == 1 || outside_degree[s.end] || std::ranges::binary_search(begun, s.end)) continue;
       const Vec3 start = s.vertices.front().head<3>();
       const auto below = dropped_reach.find(s.end);
-      float reach = below == dropped_reach.end() ? 0.f : below->second + (s.vertices.back().head<3>() - start).norm();
+      float reach =
+          below == dropped_reach.end() ? 0.f : below->second + (s.vertices.back().head<3>() - start).norm();
       for (const Vec4& v : s.vertices) reach = std::max(reach, (v.head<3>() - start).norm());
       if (!(s.dropped = reach <= tolerance)) continue;
       float& here = dropped_reach[s.begin];
@@ -157,8 +161,8 @@ Draft parent_of(const Draft& a, const Draft& b, const std::vector<std::uint32_t>
   parent.first_leaf = a.first_leaf;
   parent.last_leaf = b.last_leaf;
   join(parent.strips, outside_degree);
-  for (float tolerance = std::max(first_tolerance, .5f * std::max(a.error, b.error)); segment_count(parent.strips) > limit;
-       tolerance *= tolerance_step) {
+  for (float tolerance = std::max(first_tolerance, .5f * std::max(a.error, b.error));
+       segment_count(parent.strips) > limit; tolerance *= tolerance_step) {
     std::vector<Strip> candidate = coarsened(parent.strips, outside_degree, tolerance);
     if (segment_count(candidate) > limit) continue;
     parent.strips = std::move(candidate);
@@ -177,14 +181,17 @@ float measured_error(const std::vector<Strip>& strips, std::span<const Draft> le
         float nearest = INFINITY;
         for (const Strip& s : strips)
           for (std::size_t i = 1; i < s.vertices.size() && nearest > worst; ++i)
-            nearest = std::min(nearest, distance_to_segment(point, s.vertices[i - 1].head<3>(), s.vertices[i].head<3>()));
+            nearest = std::min(
+                nearest, distance_to_segment(point, s.vertices[i - 1].head<3>(), s.vertices[i].head<3>()));
         worst = std::max(worst, nearest);
       }
   return worst;
 }
 
 std::uint32_t half_pair(float a, float b) {
-  const auto half = [](float value) { return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value))); };
+  const auto half = [](float value) {
+    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
+  };
   return half(a) | half(b) << 16;
 }
 
@@ -199,8 +206,10 @@ Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
   for (const Strip& s : strips)
     for (std::size_t i = 1; i < s.vertices.size(); ++i) {
       const Vec4 &a = s.vertices[i - 1], &b = s.vertices[i];
-      out.push_back({a.x(), a.y(), a.z(), half_pair(a.w(), b.w()), b.x(), b.y(), b.z(), s.kind | s.rank << 8});
-      if (a != b) drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
+      out.push_back(
+          {a.x(), a.y(), a.z(), half_pair(a.w(), b.w()), b.x(), b.y(), b.z(), s.kind | s.rank << 8});
+      if (a != b)
+        drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
       if (a != b) drawn.lowest_rank = std::min(drawn.lowest_rank, s.rank);
     }
   return drawn;
@@ -224,7 +233,8 @@ std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
     bool continues = false;
     if (parent.valid()) {
       const auto siblings = m.children(parent);
-      const auto longest = std::ranges::max_element(siblings, {}, [&](SectionId s) { return below[s.value()]; });
+      const auto longest =
+          std::ranges::max_element(siblings, {}, [&](SectionId s) { return below[s.value()]; });
       continues = longest->value() == i;
     }
     branch_start[i] = continues ? branch_start[parent.value()] : std::uint32_t(i);
@@ -242,7 +252,9 @@ ClusterTree build_clusters(const Morphology& m) {
   const Point soma = m.soma().sphere();
   Vec3 origin = soma.position();
   if (m.soma().kind == SomaKind::none && !m.points().empty()) origin = m.points()[0].position();
-  const auto vertex = [&](const Point& p) { return Vec4(p.x - origin.x(), p.y - origin.y(), p.z - origin.z(), p.radius); };
+  const auto vertex = [&](const Point& p) {
+    return Vec4(p.x - origin.x(), p.y - origin.y(), p.z - origin.z(), p.radius);
+  };
 
   ClusterTree tree;
   tree.soma_radius = soma.radius;
@@ -253,7 +265,9 @@ ClusterTree build_clusters(const Morphology& m) {
   for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += section_length(m, SectionId(i));
   std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
   const double total = std::max(lengths.back(), 1e-9);
-  const auto rank_of = [&](std::size_t i) { return std::uint32_t(std::min(255., 256. * lengths[numbers[i]] / total)); };
+  const auto rank_of = [&](std::size_t i) {
+    return std::uint32_t(std::min(255., 256. * lengths[numbers[i]] / total));
+  };
 
   // Depth first, the longest path first, so that a run of segments follows a branch. Node 0 is the soma, node s + 1
   // the end of section s; nodes beyond are where a run is cut inside a section.
@@ -270,8 +284,11 @@ ClusterTree build_clusters(const Morphology& m) {
     open.pop_back();
     const auto points = m.points(id);
     const Section& section = m.section(id);
-    Strip strip{.vertices = {}, .kind = std::uint32_t(section.kind), .rank = rank_of(id.value()),
-                .begin = section.parent.valid() ? section.parent.value() + 1 : 0, .end = id.value() + 1};
+    Strip strip{.vertices = {},
+                .kind = std::uint32_t(section.kind),
+                .rank = rank_of(id.value()),
+                .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
+                .end = id.value() + 1};
     for (const Point& p : points) strip.vertices.push_back(vertex(p));
     if (!section.parent.valid() && soma.radius > 0.f) {
       // A cone from inside the soma to the stem, when it begins near enough to belong there.
@@ -296,7 +313,8 @@ ClusterTree build_clusters(const Morphology& m) {
       run_section.push_back(id.value());
     }
     std::vector<SectionId> next(m.children(id).begin(), m.children(id).end());
-    std::ranges::stable_sort(next, [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
+    std::ranges::stable_sort(
+        next, [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
     open.insert(open.end(), next.begin(), next.end());
   }
   if (runs.empty()) return tree;
@@ -317,8 +335,12 @@ ClusterTree build_clusters(const Morphology& m) {
       }
       const std::size_t take = std::min(limit - filled, run.vertices.size() - 1 - at);
       const bool last = at + take + 1 == run.vertices.size();
-      Strip piece{.vertices = {run.vertices.begin() + std::ptrdiff_t(at), run.vertices.begin() + std::ptrdiff_t(at + take + 1)},
-                  .kind = run.kind, .rank = run.rank, .begin = begin, .end = last ? run.end : nodes++};
+      Strip piece{.vertices = {run.vertices.begin() + std::ptrdiff_t(at),
+                               run.vertices.begin() + std::ptrdiff_t(at + take + 1)},
+                  .kind = run.kind,
+                  .rank = run.rank,
+                  .begin = begin,
+                  .end = last ? run.end : nodes++};
       begin = piece.end;
       drafts.back().strips.push_back(std::move(piece));
       drafts.back().leaf_count += std::uint32_t(take);
@@ -370,12 +392,23 @@ ClusterTree build_clusters(const Morphology& m) {
     drawn[i] = emit(drafts[i].strips, tree.segments);
   }
   const std::size_t count = drafts.size();
-  const auto index = [&](std::int64_t draft) { return draft < 0 ? 0u : std::uint32_t(count - 1 - std::size_t(draft)); };
+  const auto index = [&](std::int64_t draft) {
+    return draft < 0 ? 0u : std::uint32_t(count - 1 - std::size_t(draft));
+  };
   for (std::size_t i = count; i-- > 0;) {
     const Draft& d = drafts[i];
-    tree.clusters.push_back({d.sphere.centre.x(), d.sphere.centre.y(), d.sphere.centre.z(), d.sphere.radius + d.error, d.error,
-                             drawn[i].thickness, first[i], std::uint32_t(segment_count(d.strips)),
-                             {index(d.children[0]), index(d.children[1])}, d.leaf_first, d.leaf_count, drawn[i].lowest_rank});
+    tree.clusters.push_back({d.sphere.centre.x(),
+                             d.sphere.centre.y(),
+                             d.sphere.centre.z(),
+                             d.sphere.radius + d.error,
+                             d.error,
+                             drawn[i].thickness,
+                             first[i],
+                             std::uint32_t(segment_count(d.strips)),
+                             {index(d.children[0]), index(d.children[1])},
+                             d.leaf_first,
+                             d.leaf_count,
+                             drawn[i].lowest_rank});
   }
   return tree;
 }

@@ -23,7 +23,7 @@ namespace forest::scene {
 struct Cluster {
   float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // bounding sphere of all that is below, µm
   float error = 0.f;                              // µm; 0 for a leaf, never less than a child's
-  float thickness = 0.f;                          // largest radius of a segment drawn, the soma's sphere aside, µm
+  float thickness = 0.f;  // largest radius of a segment drawn, the soma's sphere aside, µm
   std::uint32_t first_segment = 0, segment_count = 0;
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
@@ -35,11 +35,11 @@ struct Cluster {
 static_assert(sizeof(Cluster) == 52);
 
 struct ClusterTree {
-  std::vector<frame::Segment> segments;      // the leaves' first (original_count), then the coarser ones
-  std::vector<Cluster> clusters;             // [0] is the root
-  std::vector<std::uint32_t> section;        // of every original segment: the section it shows, or soma_section
+  std::vector<frame::Segment> segments;  // the leaves' first (original_count), then the coarser ones
+  std::vector<Cluster> clusters;         // [0] is the root
+  std::vector<std::uint32_t> section;    // of every original segment: the section it shows, or soma_section
   std::uint32_t original_count = 0;
-  float soma_radius = 0.f;                   // 0 when there is none
+  float soma_radius = 0.f;  // 0 when there is none
 };
 
 inline constexpr std::uint32_t soma_section = 0xffffffffu;

@@ -1,52 +1,31 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/cluster.h"
 
-#include <gtest/gtest.h>
-
 #include <algorithm>
 #include <cmath>
 #include <functional>
 #include <map>
 #include <set>
 
+#include <gtest/gtest.h>
+
 #include "forest/core/random.h"
 #include "forest/geometry/polyline.h"
 #include "forest/morphology/measure.h"
 
+#include "tests/sample_forest.h"
+
 namespace forest::scene {
 namespace {
 
-// A random binary tree with meandering branches: enough to need several levels.
-Morphology random_tree(std::uint64_t seed, int sections = 150) {
-  Random random(seed);
-  MorphologyBuilder builder;
-  builder.set_soma({.kind = SomaKind::sphere, .points = {{10, 20, 30, 8}}, .parents = {}, .contour_starts = {}});
-  struct Tip { SectionId id; Point at; };
-  std::vector<Tip> tips;
-  for (int i = 0; i < 4; ++i) tips.push_back({{}, {10, 28, 30, 2}});
-  for (int i = 0; i < sections; ++i) {
-    const std::size_t pick = random.below(std::uint32_t(tips.size()));
-    const Tip tip = tips[pick];
-    tips.erase(tips.begin() + std::ptrdiff_t(pick));
-    std::vector<Point> points{tip.at};
-    const Vec3 way = Vec3(float(random.normal()), float(random.normal()), float(random.normal())).normalized() * 4.f;
-    for (int k = int(random.below(12)) + 1; k > 0; --k) {
-      const Point& p = points.back();
-      points.push_back({p.x + way.x() + float(random.normal()), p.y + way.y() + float(random.normal()),
-                        p.z + way.z() + float(random.normal()), std::max(.2f, p.radius * .97f)});
-    }
-    const SectionId id = builder.add_section(tip.id, i % 5 ? SectionKind::basal : SectionKind::apical, points);
-    tips.push_back({id, points.back()});
-    tips.push_back({id, points.back()});
-  }
-  return builder.build();
-}
+using testing::random_tree;
 
 Vec3 start(const frame::Segment& s) { return {s.ax, s.ay, s.az}; }
 Vec3 finish(const frame::Segment& s) { return {s.bx, s.by, s.bz}; }
 
 // Calls `visit` for random cuts of the tree: lists of clusters that draw every leaf once.
-void random_cuts(const ClusterTree& tree, int count, const std::function<void(const std::vector<const Cluster*>&)>& visit) {
+void random_cuts(const ClusterTree& tree, int count,
+                 const std::function<void(const std::vector<const Cluster*>&)>& visit) {
   Random random(77);
   for (int i = 0; i < count; ++i) {
     const double deepen = random.uniform();
@@ -105,7 +84,8 @@ TEST(Cluster, NoOriginalPointIsFurtherThanTheStatedError) {
         for (const Vec3& point : {start(tree.segments[i]), finish(tree.segments[i])}) {
           float nearest = 1e9f;
           for (std::uint32_t k = c.first_segment; k < c.first_segment + c.segment_count; ++k)
-            nearest = std::min(nearest, distance_to_segment(point, start(tree.segments[k]), finish(tree.segments[k])));
+            nearest = std::min(nearest,
+                               distance_to_segment(point, start(tree.segments[k]), finish(tree.segments[k])));
           EXPECT_LE(nearest, c.error + 1e-3f);
         }
   }

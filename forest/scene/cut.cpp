@@ -24,11 +24,13 @@ frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t coun
   return {instance, first, count, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
 }
 
-void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& frustum, std::uint32_t index, Cut& cut) {
+void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& frustum, std::uint32_t index,
+                   Cut& cut) {
   const frame::Instance& instance = forest.instances()[index];
   const Neuron& neuron = forest.neurons()[instance.morphology];
   if (!neuron.cluster_count) return;
-  const Placed placed{{instance.x, instance.y, instance.z}, Quat(instance.qw, instance.qx, instance.qy, instance.qz)};
+  const Placed placed{{instance.x, instance.y, instance.z},
+                      Quat(instance.qw, instance.qx, instance.qy, instance.qz)};
   const auto clusters = forest.clusters();
   const Detail& detail = eye.detail();
   std::uint32_t open[64];
@@ -46,7 +48,8 @@ void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& f
     }
     const float width = 2.f * c.thickness * eye.magnification(sphere);
     if (detail.thin && width * 256.f < float(c.lowest_rank)) continue;
-    (width <= detail.surface_width ? cut.lines : cut.capsules).push_back(item(index, c.first_segment, c.segment_count, sphere));
+    (width <= detail.surface_width ? cut.lines : cut.capsules)
+        .push_back(item(index, c.first_segment, c.segment_count, sphere));
     cut.segments += c.segment_count;
   }
   if (neuron.soma_radius > 0.f) {
@@ -60,7 +63,9 @@ void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& f
   cut.neurons += cut.segments > before;
 }
 
-void append(std::vector<frame::Item>& to, const std::vector<frame::Item>& from) { to.insert(to.end(), from.begin(), from.end()); }
+void append(std::vector<frame::Item>& to, const std::vector<frame::Item>& from) {
+  to.insert(to.end(), from.begin(), from.end());
+}
 
 // Sorts a list from near to far, in steps of a 1/64 octave, and returns where each step begins.
 constexpr std::size_t steps = 64 * 24;

@@ -13,8 +13,8 @@ namespace forest::scene {
 struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
-  std::uint64_t segments = 0;                      // drawn
-  std::uint32_t neurons = 0;                       // in sight
+  std::uint64_t segments = 0;  // drawn
+  std::uint32_t neurons = 0;   // in sight
 };
 
 /// Pure: depends on its arguments alone, and is the same at any number of threads.

@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/forest.h"
 
-#include <fmt/format.h>
-
+#include <algorithm>
 #include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
@@ -18,16 +19,35 @@
 namespace forest::scene {
 namespace {
 
-static_assert(std::endian::native == std::endian::little, "the forest file is little-endian, as the graphics card is");
+static_assert(std::endian::native == std::endian::little,
+              "the forest file is little-endian, as the graphics card is");
 
 constexpr std::array<char, 8> magic{'B', 'F', 'O', 'R', 'E', 'S', 'T', '\n'};
 constexpr std::uint32_t version = 1;
 constexpr std::size_t alignment = 64;
 
 // In the order of the file.
-enum Part : std::uint32_t { segments, instances, clusters, neurons, section_of_segment, sections, types, layers, text, part_count };
-constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment), sizeof(frame::Instance), sizeof(Cluster),
-                                                              sizeof(Neuron), 4, sizeof(SectionFacts), 4, 4, 1};
+enum Part : std::uint32_t {
+  segments,
+  instances,
+  clusters,
+  neurons,
+  section_of_segment,
+  sections,
+  types,
+  layers,
+  text,
+  part_count
+};
+constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment),
+                                                              sizeof(frame::Instance),
+                                                              sizeof(Cluster),
+                                                              sizeof(Neuron),
+                                                              4,
+                                                              sizeof(SectionFacts),
+                                                              4,
+                                                              4,
+                                                              1};
 
 struct Entry {
   std::uint32_t part, element_size;
@@ -45,9 +65,11 @@ using Json = nlohmann::ordered_json;
 
 std::string describe(const circuit::Circuit& c) {
   Json json{{"name", c.name}, {"radius", c.radius}, {"morphologies", c.morphologies}};
-  for (const auto& layer : c.layers) json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
+  for (const auto& layer : c.layers)
+    json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
   for (const auto& type : c.types)
-    json["types"].push_back({{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
+    json["types"].push_back(
+        {{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -60,7 +82,8 @@ circuit::Circuit understand(std::string_view text) {
   if (json.contains("layers"))
     for (const auto& l : json["layers"]) c.layers.push_back({l.at("name"), l.at("bottom"), l.at("top")});
   if (json.contains("types"))
-    for (const auto& t : json["types"]) c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory")});
+    for (const auto& t : json["types"])
+      c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory")});
   return c;
 }
 
@@ -71,19 +94,22 @@ std::vector<SectionFacts> facts_of(const Morphology& m) {
     const SectionId id(i);
     const auto points = m.points(id);
     const Section& s = m.section(id);
-    facts.push_back({s.parent.valid() ? s.parent.value() : 0xffffffffu, std::uint32_t(s.kind), std::uint32_t(m.order(id)),
-                     std::uint32_t(m.children(id).size()), float(section_length(m, id)), 2.f * points.front().radius,
-                     2.f * points.back().radius, float(distances[i])});
+    facts.push_back({s.parent.valid() ? s.parent.value() : 0xffffffffu, std::uint32_t(s.kind),
+                     std::uint32_t(m.order(id)), std::uint32_t(m.children(id).size()),
+                     float(section_length(m, id)), 2.f * points.front().radius, 2.f * points.back().radius,
+                     float(distances[i])});
   }
   return facts;
 }
 
 }  // namespace
 
-std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morphology> morphologies, Progress& progress) {
+std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morphology> morphologies,
+                            Progress& progress) {
   circuit::check(c);
   if (morphologies.size() != c.morphologies.size())
-    throw Error(fmt::format("the circuit names {} morphologies and {} came with it", c.morphologies.size(), morphologies.size()));
+    throw Error(fmt::format("the circuit names {} morphologies and {} came with it", c.morphologies.size(),
+                            morphologies.size()));
   progress.begin("packing", morphologies.size());
   std::vector<ClusterTree> trees(morphologies.size());
   parallel_for(trees.size(), 1, [&](std::size_t i) {
@@ -119,22 +145,30 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
     all_sections.insert(all_sections.end(), facts.begin(), facts.end());
     all_neurons.push_back(n);
   }
-  if (all_segments.size() > 0xffffffffull) throw LimitError("a forest file holds at most 4,294,967,295 distinct segments; plant fewer distinct neurons");
+  if (all_segments.size() > 0xffffffffull)
+    throw LimitError(
+        "a forest file holds at most 4,294,967,295 distinct segments; plant fewer distinct neurons");
   std::vector<frame::Instance> all_instances;
   for (const circuit::Instance& i : c.instances) {
     const Quat q = i.orientation;
-    all_instances.push_back({i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()});
+    all_instances.push_back(
+        {i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()});
     all_types.push_back(i.type);
     all_layers.push_back(i.layer);
   }
   const std::string description = describe(c);
   const std::array<std::span<const std::byte>, part_count> parts{
-      std::as_bytes(std::span(all_segments)),           std::as_bytes(std::span(all_instances)),
-      std::as_bytes(std::span(all_clusters)),           std::as_bytes(std::span(all_neurons)),
-      std::as_bytes(std::span(all_section_of_segment)), std::as_bytes(std::span(all_sections)),
-      std::as_bytes(std::span(all_types)),              std::as_bytes(std::span(all_layers)),
+      std::as_bytes(std::span(all_segments)),
+      std::as_bytes(std::span(all_instances)),
+      std::as_bytes(std::span(all_clusters)),
+      std::as_bytes(std::span(all_neurons)),
+      std::as_bytes(std::span(all_section_of_segment)),
+      std::as_bytes(std::span(all_sections)),
+      std::as_bytes(std::span(all_types)),
+      std::as_bytes(std::span(all_layers)),
       std::as_bytes(std::span(description))};
-  Header header{.magic = magic, .version = version, .parts = part_count, .file_size = 0, .table_hash = 0, .table = {}};
+  Header header{
+      .magic = magic, .version = version, .parts = part_count, .file_size = 0, .table_hash = 0, .table = {}};
   std::uint64_t at = sizeof(Header);
   for (std::uint32_t p = 0; p < part_count; ++p) {
     at = (at + alignment - 1) / alignment * alignment;
@@ -146,7 +180,8 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
   std::vector<std::byte> bytes(at);
   std::memcpy(bytes.data(), &header, sizeof header);
   for (std::uint32_t p = 0; p < part_count; ++p)
-    if (!parts[p].empty()) std::memcpy(bytes.data() + header.table[p].offset, parts[p].data(), parts[p].size());
+    if (!parts[p].empty())
+      std::memcpy(bytes.data() + header.table[p].offset, parts[p].data(), parts[p].size());
   progress.end();
   return bytes;
 }
@@ -166,10 +201,14 @@ struct Forest::Data {
 };
 
 std::span<const frame::Segment> Forest::segments() const { return data_->as<frame::Segment>(Part::segments); }
-std::span<const frame::Instance> Forest::instances() const { return data_->as<frame::Instance>(Part::instances); }
+std::span<const frame::Instance> Forest::instances() const {
+  return data_->as<frame::Instance>(Part::instances);
+}
 std::span<const Cluster> Forest::clusters() const { return data_->as<Cluster>(Part::clusters); }
 std::span<const Neuron> Forest::neurons() const { return data_->as<Neuron>(Part::neurons); }
-std::span<const std::uint32_t> Forest::section_of_segment() const { return data_->as<std::uint32_t>(Part::section_of_segment); }
+std::span<const std::uint32_t> Forest::section_of_segment() const {
+  return data_->as<std::uint32_t>(Part::section_of_segment);
+}
 std::span<const SectionFacts> Forest::sections() const { return data_->as<SectionFacts>(Part::sections); }
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
@@ -202,20 +241,33 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
   std::memcpy(&header, bytes.data(), sizeof header);
   require(header.magic == magic, "is not a forest file; make one with 'brainforest pack'");
   require(header.version == version && header.parts == part_count,
-          fmt::format("has version {} of the forest file and this program reads version {}", header.version, version) + again);
-  require(header.file_size == bytes.size(), fmt::format("is cut short or has grown: {} bytes instead of {}", bytes.size(), header.file_size) + again);
-  require(hash64(std::as_bytes(std::span(header.table)), header.file_size) == header.table_hash, "has a damaged table of contents" + again);
+          fmt::format("has version {} of the forest file and this program reads version {}", header.version,
+                      version) +
+              again);
+  require(header.file_size == bytes.size(),
+          fmt::format("is cut short or has grown: {} bytes instead of {}", bytes.size(), header.file_size) +
+              again);
+  require(hash64(std::as_bytes(std::span(header.table)), header.file_size) == header.table_hash,
+          "has a damaged table of contents" + again);
+  std::uint64_t end = sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
   for (std::uint32_t p = 0; p < part_count; ++p) {
     const Entry& e = header.table[p];
-    require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 && e.offset <= bytes.size() &&
-                e.count <= (bytes.size() - e.offset) / e.element_size,
+    require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
+                e.offset <= bytes.size() && e.count <= (bytes.size() - e.offset) / e.element_size,
             "has a wrong table of contents" + again);
+    require(e.offset >= end && e.offset - end < alignment &&
+                std::ranges::all_of(bytes.subspan(end, e.offset - end), [](std::byte b) { return b == std::byte{0}; }),
+            "is damaged between its parts" + again);
+    end = e.offset + e.count * e.element_size;
     data->parts[p] = bytes.subspan(e.offset, e.count * e.element_size);
-    require(hash64(data->parts[p]) == e.hash, fmt::format("is damaged: part {} does not match its checksum", p) + again);
+    require(hash64(data->parts[p]) == e.hash,
+            fmt::format("is damaged: part {} does not match its checksum", p) + again);
   }
   // A right checksum over wrong numbers is possible too: every index is looked at before it is used.
   const std::string wrong = "names things that are not in it" + again;
-  const auto within = [](std::uint64_t first, std::uint64_t count, std::size_t size) { return first + count <= size; };
+  const auto within = [](std::uint64_t first, std::uint64_t count, std::size_t size) {
+    return first + count <= size;
+  };
   const Forest f(data);
   try {
     const auto text = data->parts[Part::text];
@@ -223,11 +275,12 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
   } catch (const nlohmann::json::exception&) {
     throw InputError(name, 0, "has a damaged description" + again);
   }
-  require(f.neurons().size() == data->circuit.morphologies.size() && f.types().size() == f.instances().size() &&
-              f.layers().size() == f.instances().size(),
+  require(f.neurons().size() == data->circuit.morphologies.size() &&
+              f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
           wrong);
   for (const Cluster& c : f.clusters()) {
-    require(c.segment_count <= frame::cluster_size && within(c.first_segment, c.segment_count, f.segments().size()) &&
+    require(c.segment_count <= frame::cluster_size &&
+                within(c.first_segment, c.segment_count, f.segments().size()) &&
                 within(c.leaf_first, c.leaf_count, f.segments().size()),
             wrong);
     const std::size_t own = std::size_t(&c - f.clusters().data());
@@ -236,13 +289,15 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     require(std::isfinite(c.x + c.y + c.z + c.radius + c.error) && c.radius >= 0.f, wrong);
   }
   for (const Neuron& n : f.neurons())
-    require(within(n.first_cluster, n.cluster_count, f.clusters().size()) && within(n.first_segment, n.original_count, f.segments().size()) &&
+    require(within(n.first_cluster, n.cluster_count, f.clusters().size()) &&
+                within(n.first_segment, n.original_count, f.segments().size()) &&
                 within(n.first_original, n.original_count, f.section_of_segment().size()) &&
                 within(n.first_section, n.section_count, f.sections().size()) && std::isfinite(n.soma_radius),
             wrong);
   for (const Neuron& n : f.neurons())
     for (std::uint32_t i = n.first_original; i < n.first_original + n.original_count; ++i)
-      require(f.section_of_segment()[i] == soma_section || f.section_of_segment()[i] < n.section_count, wrong);
+      require(f.section_of_segment()[i] == soma_section || f.section_of_segment()[i] < n.section_count,
+              wrong);
   for (const Neuron& n : f.neurons())
     for (std::uint32_t i = 0; i < n.section_count; ++i) {
       const std::uint32_t parent = f.sections()[n.first_section + i].parent;
@@ -251,7 +306,8 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
   for (std::size_t i = 0; i < f.instances().size(); ++i) {
     const frame::Instance& instance = f.instances()[i];
     require(instance.morphology < f.neurons().size() && f.types()[i] < data->circuit.types.size() &&
-                f.layers()[i] < data->circuit.layers.size() && std::isfinite(instance.x + instance.y + instance.z) &&
+                f.layers()[i] < data->circuit.layers.size() &&
+                std::isfinite(instance.x + instance.y + instance.z) &&
                 std::isfinite(instance.qx + instance.qy + instance.qz + instance.qw),
             wrong);
     data->soma_bounds.add({instance.x, instance.y, instance.z});

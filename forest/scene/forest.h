@@ -21,8 +21,9 @@ namespace forest::scene {
 /// One distinct neuron. Indices are into the arrays of the whole forest.
 struct Neuron {
   std::uint32_t first_cluster = 0, cluster_count = 0;
-  std::uint32_t first_segment = 0, original_count = 0;  // the original segments; segment 0 of a neuron with soma is it
-  std::uint32_t first_original = 0;                     // of them, in section_of_segment
+  std::uint32_t first_segment = 0,
+                original_count = 0;  // the original segments; segment 0 of a neuron with soma is it
+  std::uint32_t first_original = 0;  // of them, in section_of_segment
   std::uint32_t first_section = 0, section_count = 0;
   float soma_radius = 0.f;  // µm
 };
@@ -33,9 +34,9 @@ struct SectionFacts {
   std::uint32_t kind = 0;              // as SectionKind
   std::uint32_t order = 0;
   std::uint32_t daughters = 0;
-  float length = 0.f;         // µm
+  float length = 0.f;                              // µm
   float diameter_start = 0.f, diameter_end = 0.f;  // µm
-  float path_distance = 0.f;  // from the soma to its end, µm
+  float path_distance = 0.f;                       // from the soma to its end, µm
 };
 
 static_assert(sizeof(Neuron) == 32 && sizeof(SectionFacts) == 32);
@@ -63,7 +64,7 @@ class Forest {
 
   /// Names, types, layers and radius; its instances are left empty, they are above.
   const circuit::Circuit& circuit() const;
-  const Bounds& soma_bounds() const;  // of all soma centres
+  const Bounds& soma_bounds() const;    // of all soma centres
   std::uint64_t segment_total() const;  // original segments of all instances, as if each were stored
   std::uint64_t bytes() const;          // of the file
   frame::Geometry geometry() const { return {segments(), instances()}; }

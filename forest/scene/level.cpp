@@ -7,7 +7,10 @@
 namespace forest::scene {
 
 Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Detail& detail)
-    : camera_(camera), detail_(detail), axes_(camera.axes()), focal_(camera.focal(viewport.height)),
+    : camera_(camera),
+      detail_(detail),
+      axes_(camera.axes()),
+      focal_(camera.focal(viewport.height)),
       pixel_degrees_(degrees(1.f / focal_)) {
   if (detail.gaze) gaze_ray_ = frame::ray_through(camera, viewport, *detail.gaze).direction;
 }

@@ -10,12 +10,14 @@ namespace forest::scene {
 
 /// What the choice of detail depends on.
 struct Detail {
-  float error = 1.f;           // acceptable error at the gaze (or everywhere), pixels
-  std::optional<Vec2> gaze;    // pixel looked at; none: the whole picture is looked at
-  float acuity_slope = 1.5f;   // minimum angle of resolution grows by this many arc minutes a degree of eccentricity
-                               // (Guenter et al. 2012 measured 1.32–1.65)
-  float surface_width = 3.f;   // branches wider than this many pixels are drawn as capsules, thinner ones as lines
-  bool thin = false;           // leave out runs whose branches are all too thin for their rank: right for one subframe
+  float error = 1.f;         // acceptable error at the gaze (or everywhere), pixels
+  std::optional<Vec2> gaze;  // pixel looked at; none: the whole picture is looked at
+  float acuity_slope =
+      1.5f;  // minimum angle of resolution grows by this many arc minutes a degree of eccentricity
+             // (Guenter et al. 2012 measured 1.32–1.65)
+  float surface_width =
+      3.f;            // branches wider than this many pixels are drawn as capsules, thinner ones as lines
+  bool thin = false;  // leave out runs whose branches are all too thin for their rank: right for one subframe
 };
 
 /// A camera with what the functions below need precomputed.

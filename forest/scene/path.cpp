@@ -16,8 +16,11 @@ float eased(float t) {
 
 // Barry & Goldman (1988): a Catmull–Rom curve with knots k0 < k1 < k2 < k3, between p1 and p2.
 Vec3 barry_goldman(const Vec3 p[4], const float k[4], float t) {
-  const auto mix = [t](const Vec3& a, const Vec3& b, float from, float to) -> Vec3 { return a + (b - a) * ((t - from) / (to - from)); };
-  const Vec3 a1 = mix(p[0], p[1], k[0], k[1]), a2 = mix(p[1], p[2], k[1], k[2]), a3 = mix(p[2], p[3], k[2], k[3]);
+  const auto mix = [t](const Vec3& a, const Vec3& b, float from, float to) -> Vec3 {
+    return a + (b - a) * ((t - from) / (to - from));
+  };
+  const Vec3 a1 = mix(p[0], p[1], k[0], k[1]), a2 = mix(p[1], p[2], k[1], k[2]),
+             a3 = mix(p[2], p[3], k[2], k[3]);
   const Vec3 b1 = mix(a1, a2, k[0], k[2]), b2 = mix(a2, a3, k[1], k[3]);
   return mix(b1, b2, k[1], k[2]);
 }
@@ -44,7 +47,8 @@ View CameraPath::at(float t) const {
   const auto key = [&](std::ptrdiff_t index) -> Vec3 {
     const auto last = std::ptrdiff_t(keys_.size()) - 1;
     if (index < 0) return 2.f * keys_[0].camera.eye - keys_[1].camera.eye;
-    if (index > last) return 2.f * keys_[std::size_t(last)].camera.eye - keys_[std::size_t(last - 1)].camera.eye;
+    if (index > last)
+      return 2.f * keys_[std::size_t(last)].camera.eye - keys_[std::size_t(last - 1)].camera.eye;
     return keys_[std::size_t(index)].camera.eye;
   };
   const auto knot = [&](std::ptrdiff_t index) {
@@ -75,7 +79,8 @@ View CameraPath::at(float t) const {
 float soma_clearance(const Forest& forest, const Vec3& point) {
   float nearest = INFINITY;
   for (const frame::Instance& i : forest.instances())
-    nearest = std::min(nearest, (Vec3(i.x, i.y, i.z) - point).norm() - forest.neurons()[i.morphology].soma_radius);
+    nearest =
+        std::min(nearest, (Vec3(i.x, i.y, i.z) - point).norm() - forest.neurons()[i.morphology].soma_radius);
   return nearest;
 }
 
@@ -92,7 +97,8 @@ CameraPath walk(const Forest& forest) {
     float most = -INFINITY;
     for (int i = 0; i < 64; ++i) {
       const float turn = 2.3999632f * float(i), out = spread * std::sqrt(float(i) / 64.f);
-      const Vec3 place = wish + Vec3(out * std::cos(turn), .5f * out * std::sin(1.7f * turn), out * std::sin(turn));
+      const Vec3 place =
+          wish + Vec3(out * std::cos(turn), .5f * out * std::sin(1.7f * turn), out * std::sin(turn));
       const float clearance = soma_clearance(forest, place);
       if (clearance > most) most = clearance, best = place;
     }
@@ -104,15 +110,19 @@ CameraPath walk(const Forest& forest) {
     view.camera.near = .5f;
     return view;
   };
-  const Vec3 inward = Vec3(centre.x() - start.camera.eye.x(), 0.f, centre.z() - start.camera.eye.z()).normalized();
+  const Vec3 inward =
+      Vec3(centre.x() - start.camera.eye.x(), 0.f, centre.z() - start.camera.eye.z()).normalized();
   const Vec3 side = Vec3::UnitY().cross(inward);
   const float y = bounds.low.y() + .62f * height;
   const Vec3 level(centre.x(), y, centre.z());
   const Vec3 edge = clear_place(level - inward * (1.15f * radius) + side * (.35f * radius), .1f * radius);
   const Vec3 inside = clear_place(level - inward * (.45f * radius) + side * (.15f * radius), .2f * radius);
-  const Vec3 deep = clear_place(level - inward * (.05f * radius) - Vec3(0.f, .06f * height, 0.f), .2f * radius);
-  return CameraPath({start, look(level - inward * (2.2f * radius) + side * (.8f * radius), level, 44.f), look(edge, level, 52.f),
-                     look(inside, level + inward * radius, 58.f), look(deep, level + inward * radius + side * (.5f * radius) + Vec3(0.f, .1f * height, 0.f), 60.f)});
+  const Vec3 deep =
+      clear_place(level - inward * (.05f * radius) - Vec3(0.f, .06f * height, 0.f), .2f * radius);
+  return CameraPath(
+      {start, look(level - inward * (2.2f * radius) + side * (.8f * radius), level, 44.f),
+       look(edge, level, 52.f), look(inside, level + inward * radius, 58.f),
+       look(deep, level + inward * radius + side * (.5f * radius) + Vec3(0.f, .1f * height, 0.f), 60.f)});
 }
 
 }  // namespace forest::scene

@@ -2,13 +2,16 @@
 #include "forest/scene/pick.h"
 
 #include <cmath>
+#include <tuple>
 
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
 namespace {
 
-float half_to_float(std::uint32_t bits) { return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits))); }
+float half_to_float(std::uint32_t bits) {
+  return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
+}
 
 // Whether the ray, a cone of half angle `tolerance`, comes within the sphere before `limit`.
 bool meets(const Ray& ray, const Sphere& sphere, float tolerance, float limit) {
@@ -26,8 +29,8 @@ RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t s
   const frame::Segment& s = forest.segments()[segment];
   const Quat turn(i.qw, i.qx, i.qy, i.qz);
   const Vec3 at(i.x, i.y, i.z);
-  return {at + turn * Vec3(s.ax, s.ay, s.az), at + turn * Vec3(s.bx, s.by, s.bz), half_to_float(s.radii & 0xffff),
-          half_to_float(s.radii >> 16)};
+  return {at + turn * Vec3(s.ax, s.ay, s.az), at + turn * Vec3(s.bx, s.by, s.bz),
+          half_to_float(s.radii & 0xffff), half_to_float(s.radii >> 16)};
 }
 
 std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, float near) {
@@ -43,7 +46,9 @@ std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, 
     while (!open.empty()) {
       const Cluster& c = forest.clusters()[open.back()];
       open.pop_back();
-      if (!meets(ray, {at + turn * Vec3(c.x, c.y, c.z), c.radius}, tolerance, best ? best->distance : INFINITY)) continue;
+      if (!meets(ray, {at + turn * Vec3(c.x, c.y, c.z), c.radius}, tolerance,
+                 best ? best->distance : INFINITY))
+        continue;
       if (!c.is_leaf()) {
         open.insert(open.end(), std::begin(c.children), std::end(c.children));
         continue;
@@ -54,8 +59,11 @@ std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, 
         cone.radius_a += tolerance * std::max(0.f, depth);
         cone.radius_b += tolerance * std::max(0.f, depth);
         const auto t = intersect(ray, cone);
-        if (!t || *t < near || (best && *t >= best->distance)) continue;
-        best = Pick{index, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
+        if (!t || *t < near) continue;
+        // At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
+        if (best && std::tuple(*t, index, s) >= std::tuple(best->distance, best->instance, best->segment)) continue;
+        best =
+            Pick{index, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
       }
     }
   }
@@ -72,7 +80,8 @@ std::vector<std::uint32_t> subarbor(const Forest& forest, std::uint32_t instance
   std::vector<std::uint32_t> segments;
   for (std::uint32_t i = 0; i < neuron.original_count; ++i) {
     const std::uint32_t of = forest.section_of_segment()[neuron.first_original + i];
-    if (of == soma_section ? section == soma_section : inside[of]) segments.push_back(neuron.first_segment + i);
+    if (of == soma_section ? section == soma_section : inside[of])
+      segments.push_back(neuron.first_segment + i);
   }
   return segments;
 }

@@ -11,9 +11,9 @@ namespace forest::scene {
 
 struct Pick {
   std::uint32_t instance = 0;
-  std::uint32_t segment = 0;   // in Forest::segments()
-  std::uint32_t section = 0;   // within its neuron, or soma_section
-  float distance = 0.f;        // from the eye, µm
+  std::uint32_t segment = 0;  // in Forest::segments()
+  std::uint32_t section = 0;  // within its neuron, or soma_section
+  float distance = 0.f;       // from the eye, µm
 };
 
 /// @param tolerance  radius of the ray at unit distance (µm a µm): half a pixel's slope makes thin branches pickable

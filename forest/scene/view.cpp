@@ -1,11 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/view.h"
 
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <array>
 #include <cmath>
+
+#include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
@@ -20,30 +20,40 @@ constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 
 float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
 Vec3 hex(std::uint32_t rgb) {
-  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f), linear(float(rgb & 255) / 255.f)};
+  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f),
+          linear(float(rgb & 255) / 255.f)};
 }
 
 // Okabe & Ito (2008), safe for colour-blind eyes, ordered so that neighbours contrast; then lighter companions.
-constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7, 0x0072B2, 0xD55E00,
-                                                    0xFFD180, 0xA6DCFF, 0x7FD8B8, 0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
+constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
+                                                    0x0072B2, 0xD55E00, 0xFFD180, 0xA6DCFF, 0x7FD8B8,
+                                                    0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
 // Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
-constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C, 0x31688E, 0x5A5AA8, 0x8E4A9E};
+constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
+                                               0x31688E, 0x5A5AA8, 0x8E4A9E};
 
 // How a section kind changes the colour of its neuron: somata brighter, axons cooler and dimmer.
 Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
   switch (kind) {
-    case 1: return (base * 1.35f + Vec3::Constant(.10f * lift)).cwiseMin(1.f);
-    case std::uint32_t(SectionKind::axon): return .55f * (.6f * base + .4f * hex(0x6C9BD2));
-    case std::uint32_t(SectionKind::apical): return base;
-    default: return .85f * base;
+    case 1:
+      return (base * 1.35f + Vec3::Constant(.10f * lift)).cwiseMin(1.f);
+    case std::uint32_t(SectionKind::axon):
+      return .55f * (.6f * base + .4f * hex(0x6C9BD2));
+    case std::uint32_t(SectionKind::apical):
+      return base;
+    default:
+      return .85f * base;
   }
 }
 
 Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
-  if (!json.is_array() || json.size() != 3) throw InputError(name, 0, fmt::format("'{}' must be three numbers in µm, for example [0, 800, 1500]", key));
+  if (!json.is_array() || json.size() != 3)
+    throw InputError(name, 0,
+                     fmt::format("'{}' must be three numbers in µm, for example [0, 800, 1500]", key));
   Vec3 v;
   for (int i = 0; i < 3; ++i) {
-    if (!json[std::size_t(i)].is_number()) throw InputError(name, 0, fmt::format("'{}' must hold numbers only", key));
+    if (!json[std::size_t(i)].is_number())
+      throw InputError(name, 0, fmt::format("'{}' must hold numbers only", key));
     v[i] = json[std::size_t(i)].get<float>();
   }
   if (!v.allFinite()) throw InputError(name, 0, fmt::format("'{}' must be finite", key));
@@ -57,9 +67,11 @@ float number_of(const Json& json, const std::string& name, std::string_view key,
 }
 
 template <std::size_t N>
-std::uint8_t word_of(const Json& json, const std::string& name, std::string_view key, const std::array<std::string_view, N>& words) {
+std::uint8_t word_of(const Json& json, const std::string& name, std::string_view key,
+                     const std::array<std::string_view, N>& words) {
   const auto found = json.is_string() ? std::ranges::find(words, json.get<std::string>()) : words.end();
-  if (found == words.end()) throw InputError(name, 0, fmt::format("'{}' must be one of: {}", key, fmt::join(words, ", ")));
+  if (found == words.end())
+    throw InputError(name, 0, fmt::format("'{}' must be one of: {}", key, fmt::join(words, ", ")));
   return std::uint8_t(found - words.begin());
 }
 
@@ -72,32 +84,48 @@ View parse_view(std::string_view text, const std::string& name) {
   } catch (const nlohmann::json::exception& e) {
     throw InputError(name, 0, fmt::format("is no view: {}; see docs/scene/view.md", e.what()));
   }
-  if (!json.is_object()) throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
+  if (!json.is_object())
+    throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
   for (const char* needed : {"eye", "target"})
-    if (!json.contains(needed)) throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
+    if (!json.contains(needed))
+      throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
   View v;
   for (const auto& [key, value] : json.items()) {
-    if (key == "eye") v.camera.eye = vector_of(value, name, key);
-    else if (key == "target") v.camera.target = vector_of(value, name, key);
-    else if (key == "up") v.camera.up = vector_of(value, name, key);
-    else if (key == "field_of_view") v.camera.field_of_view = number_of(value, name, key, 1.f, 170.f);
-    else if (key == "near") v.camera.near = number_of(value, name, key, .05f, 1e5f);
-    else if (key == "error") v.detail.error = number_of(value, name, key, .05f, 100.f);
-    else if (key == "acuity_slope") v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
-    else if (key == "samples") v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
-    else if (key == "fog") v.fog = number_of(value, name, key, 0.f, 100.f);
-    else if (key == "halo") v.halo = number_of(value, name, key, 0.f, 10.f);
-    else if (key == "colour_by") v.colour_by = ColourBy(word_of(value, name, key, colour_names));
-    else if (key == "background") v.background = Background(word_of(value, name, key, background_names));
+    if (key == "eye")
+      v.camera.eye = vector_of(value, name, key);
+    else if (key == "target")
+      v.camera.target = vector_of(value, name, key);
+    else if (key == "up")
+      v.camera.up = vector_of(value, name, key);
+    else if (key == "field_of_view")
+      v.camera.field_of_view = number_of(value, name, key, 1.f, 170.f);
+    else if (key == "near")
+      v.camera.near = number_of(value, name, key, .05f, 1e5f);
+    else if (key == "error")
+      v.detail.error = number_of(value, name, key, .05f, 100.f);
+    else if (key == "acuity_slope")
+      v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
+    else if (key == "samples")
+      v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
+    else if (key == "fog")
+      v.fog = number_of(value, name, key, 0.f, 100.f);
+    else if (key == "halo")
+      v.halo = number_of(value, name, key, 0.f, 10.f);
+    else if (key == "colour_by")
+      v.colour_by = ColourBy(word_of(value, name, key, colour_names));
+    else if (key == "background")
+      v.background = Background(word_of(value, name, key, background_names));
     else if (key == "gaze") {
       if (!value.is_array() || value.size() != 2 || !value[0].is_number() || !value[1].is_number())
-        throw InputError(name, 0, "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
+        throw InputError(
+            name, 0, "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
       v.detail.gaze = Vec2(value[0].get<float>(), value[1].get<float>());
     } else {
       throw InputError(name, 0, fmt::format("'{}' is no key of a view; see docs/scene/view.md", key));
     }
   }
-  if (v.camera.eye == v.camera.target) throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
+  if (v.camera.eye == v.camera.target)
+    throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
   return v;
 }
 
@@ -129,7 +157,8 @@ View overview(const Forest& forest) {
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, .5f * bounds.extent().norm() * .5f);
   const float height = std::max(bounds.extent().y(), radius) + 120.f;
-  const float distance = std::max(.5f * height, radius) / std::tan(.5f * radians(view.camera.field_of_view)) * 1.08f + radius;
+  const float distance =
+      std::max(.5f * height, radius) / std::tan(.5f * radians(view.camera.field_of_view)) * 1.08f + radius;
   view.camera.target = bounds.centre();
   view.camera.eye = bounds.centre() + distance * Vec3(.42f, .16f, 1.f).normalized();
   view.camera.near = 2.f;
@@ -137,7 +166,9 @@ View overview(const Forest& forest) {
 }
 
 Colouring colour(const Forest& forest, ColourBy by, Background background) {
-  Colouring result{.palette = frame::black_palette(), .classes = std::vector<std::uint8_t>(forest.instances().size()), .legend = {}};
+  Colouring result{.palette = frame::black_palette(),
+                   .classes = std::vector<std::uint8_t>(forest.instances().size()),
+                   .legend = {}};
   const bool light = background == Background::light;
   std::array<Vec3, 16> base;
   base.fill(hex(0xBBBBBB));
@@ -152,28 +183,36 @@ Colouring colour(const Forest& forest, ColourBy by, Background background) {
   switch (by) {
     case ColourBy::type:
       fill(circuit.types.size(), from_categories, [&](std::size_t i) { return circuit.types[i].name; });
-      for (std::size_t i = 0; i < result.classes.size(); ++i) result.classes[i] = std::uint8_t(forest.types()[i] % 16);
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(forest.types()[i] % 16);
       break;
     case ColourBy::layer:
-      fill(circuit.layers.size(), [&](std::size_t i) { return layered[i % layered.size()]; },
-           [&](std::size_t i) { return circuit.layers[i].name; });
-      for (std::size_t i = 0; i < result.classes.size(); ++i) result.classes[i] = std::uint8_t(forest.layers()[i] % 16);
+      fill(
+          circuit.layers.size(), [&](std::size_t i) { return layered[i % layered.size()]; },
+          [&](std::size_t i) { return circuit.layers[i].name; });
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(forest.layers()[i] % 16);
       break;
     case ColourBy::neuron:
       for (std::size_t i = 0; i < 14; ++i) base[i] = hex(categorical[i]) * (light ? .7f : 1.f);
-      for (std::size_t i = 0; i < result.classes.size(); ++i) result.classes[i] = std::uint8_t(i * 2654435761u >> 16 & 0xffff) % 14;
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(i * 2654435761u >> 16 & 0xffff) % 14;
       break;
-    case ColourBy::kind: break;
+    case ColourBy::kind:
+      break;
   }
   for (std::uint32_t c = 0; c < 16; ++c)
-    for (std::uint32_t kind = 0; kind < 8; ++kind) result.palette[8 * c + kind] = of_kind(base[c], kind, light ? 0.f : 1.f);
+    for (std::uint32_t kind = 0; kind < 8; ++kind)
+      result.palette[8 * c + kind] = of_kind(base[c], kind, light ? 0.f : 1.f);
   if (by == ColourBy::kind) {
     // The colours neuroanatomists know: soma black or white, axon blue, basal red, apical magenta.
-    const std::array<std::uint32_t, 8> kinds{0x999999, 0xF0E442, 0x0072B2, 0xD55E00, 0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
+    const std::array<std::uint32_t, 8> kinds{0x999999, 0xF0E442, 0x0072B2, 0xD55E00,
+                                             0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
     for (std::uint32_t i = 0; i < 128; ++i) result.palette[i] = hex(kinds[i % 8]) * (light ? .7f : 1.f);
     const std::array<std::uint32_t, 4> shown{1, 2, 3, 4};
     for (const auto kind : shown)
-      result.legend.push_back({kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), result.palette[kind]});
+      result.legend.push_back(
+          {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), result.palette[kind]});
   }
   result.palette[highlight_entry] = light ? hex(0xC00040) : Vec3(1.f, 1.f, 1.f);
   result.palette[outline_entry] = light ? hex(0x8090A0) : hex(0x5A6B80);
@@ -187,8 +226,8 @@ Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   return detail;
 }
 
-frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut, std::uint32_t width,
-                     std::uint32_t height, std::span<const frame::Overlay> overlays) {
+frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
+                     std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays) {
   frame::Frame f;
   f.camera = view.camera;
   f.width = width, f.height = height, f.subframes = view.samples;
@@ -233,10 +272,12 @@ std::vector<frame::Overlay> outline(const Forest& forest) {
     low = std::min(low, layer.bottom), high = std::max(high, layer.top);
   }
   std::ranges::sort(heights);
-  heights.erase(std::unique(heights.begin(), heights.end(), [](float a, float b) { return b - a < .01f; }), heights.end());
+  heights.erase(std::unique(heights.begin(), heights.end(), [](float a, float b) { return b - a < .01f; }),
+                heights.end());
   for (const float y : heights)
     for (int i = 0; i < sides; ++i) lines.push_back({corner(i, y), corner(i + 1, y), .5f, outline_entry});
-  for (int i = 0; i < sides; i += sides / 8) lines.push_back({corner(i, low), corner(i, high), .5f, outline_entry});
+  for (int i = 0; i < sides; i += sides / 8)
+    lines.push_back({corner(i, low), corner(i, high), .5f, outline_entry});
   return lines;
 }
 

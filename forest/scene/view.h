@@ -53,7 +53,8 @@ inline constexpr std::uint32_t outline_entry = 126;
 
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
-                     std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays = {});
+                     std::uint32_t width, std::uint32_t height,
+                     std::span<const frame::Overlay> overlays = {});
 
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);

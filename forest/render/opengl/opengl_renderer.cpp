@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/opengl/opengl_renderer.h"
 
-#include <epoxy/gl.h>
-#include <fmt/format.h>
-
 #include <algorithm>
 #include <chrono>
 #include <cmath>
 #include <cstring>
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/render/opengl/shaders.h"
@@ -83,7 +83,9 @@ float halton(unsigned index, unsigned base) {
 }
 
 std::uint32_t half_pair(float a, float b) {
-  const auto half = [](float value) { return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value))); };
+  const auto half = [](float value) {
+    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
+  };
   return half(a) | half(b) << 16;
 }
 
@@ -99,9 +101,11 @@ Constants constants_of(const frame::Frame& f) {
   c.forward_x = forward.x(), c.forward_y = forward.y(), c.forward_z = forward.z(), c.near = f.camera.near;
   c.width = f.width, c.height = f.height, c.subframes = f.subframes;
   c.light_x = light.x(), c.light_y = light.y(), c.light_z = light.z(), c.halo = s.halo;
-  c.fog_red = s.fog_colour.x(), c.fog_green = s.fog_colour.y(), c.fog_blue = s.fog_colour.z(), c.fog_start = s.fog_start;
+  c.fog_red = s.fog_colour.x(), c.fog_green = s.fog_colour.y(), c.fog_blue = s.fog_colour.z(),
+  c.fog_start = s.fog_start;
   c.top_red = s.background_top.x(), c.top_green = s.background_top.y(), c.top_blue = s.background_top.z();
-  c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(), c.bottom_blue = s.background_bottom.z();
+  c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(),
+  c.bottom_blue = s.background_bottom.z();
   c.fog_length = s.fog_length, c.exposure = s.exposure;
   return c;
 }
@@ -123,9 +127,11 @@ struct OpenGLRenderer::Device {
   static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
 
   Program dots{"dots", shaders::dots}, lines{"lines", shaders::lines},
-      capsules{"capsules", shaders::capsules, shaders::capsule}, close_ups{"close_ups", shaders::close_ups, shaders::capsule},
-      cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue, large_queue, tiles;
+      capsules{"capsules", shaders::capsules, shaders::capsule},
+      close_ups{"close_ups", shaders::close_ups, shaders::capsule}, cull{"cull", shaders::cull},
+      tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
+  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
+      large_queue, tiles;
   std::array<List, list_count> lists{
       {{&capsules, 0, {}}, {&dots, FOREST_DOTS, {}}, {&lines, 0, {}}, {&capsules, FOREST_OVERLAY, {}}}};
   frame::Geometry geometry;
@@ -146,9 +152,12 @@ struct OpenGLRenderer::Device {
     std::vector<Segment> marks;
     std::vector<Item> mark_items;
     for (const frame::Overlay& o : f.overlays)
-      marks.push_back({o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius), o.b.x(), o.b.y(), o.b.z(), o.colour << 16});
+      marks.push_back({o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius), o.b.x(), o.b.y(), o.b.z(),
+                       o.colour << 16});
     for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
-      mark_items.push_back({0, std::uint32_t(i), std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0, 0, 0, 0});
+      mark_items.push_back({0, std::uint32_t(i),
+                            std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
+                            0, 0, 0});
     overlay_segments.upload(std::span<const Segment>(marks));
     set(lists[overlay_list], mark_items);
 
@@ -215,7 +224,8 @@ struct OpenGLRenderer::Device {
   void find_tiles() {
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
     tile.use();
-    std::uint32_t count = ((width + FOREST_TILE - 1) / FOREST_TILE) * ((height + FOREST_TILE - 1) / FOREST_TILE);
+    std::uint32_t count =
+        ((width + FOREST_TILE - 1) / FOREST_TILE) * ((height + FOREST_TILE - 1) / FOREST_TILE);
     for (const std::uint32_t flags : {0u, FOREST_COARSE}) {
       constants.flags = flags;
       set_constants();
@@ -250,15 +260,17 @@ struct OpenGLRenderer::Device {
     glMemoryBarrier(GL_PIXEL_BUFFER_BARRIER_BIT);
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, image.name());
     glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
-    glTextureSubImage2D(texture, 0, 0, 0, GLsizei(width), GLsizei(height), GL_RGBA, GL_UNSIGNED_BYTE, nullptr);
+    glTextureSubImage2D(texture, 0, 0, 0, GLsizei(width), GLsizei(height), GL_RGBA, GL_UNSIGNED_BYTE,
+                        nullptr);
     glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
   }
 };
 
 OpenGLRenderer::OpenGLRenderer() {
   if (epoxy_gl_version() < 45)
-    throw Error(fmt::format("OpenGL 4.5 is needed and this driver has {}.{}; install a newer driver or use Mesa's llvmpipe",
-                            epoxy_gl_version() / 10, epoxy_gl_version() % 10));
+    throw Error(fmt::format(
+        "OpenGL 4.5 is needed and this driver has {}.{}; install a newer driver or use Mesa's llvmpipe",
+        epoxy_gl_version() / 10, epoxy_gl_version() % 10));
   device_ = std::make_unique<Device>();
 }
 
@@ -280,7 +292,8 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
   frame::check(f, d.geometry);
   d.upload(f);
   d.prepare(f);
-  const frame::Band whole{std::uint32_t(f.dots.size()), std::uint32_t(f.lines.size()), std::uint32_t(f.capsules.size())};
+  const frame::Band whole{std::uint32_t(f.dots.size()), std::uint32_t(f.lines.size()),
+                          std::uint32_t(f.capsules.size())};
   const std::span<const frame::Band> bands = f.bands.empty() ? std::span(&whole, 1) : f.bands;
 
   frame::Timing timing;
@@ -292,8 +305,8 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
     d.constants.centre_x = .5f * float(f.width) + (still ? 0.f : halton(subframe, 2) - .5f);
     d.constants.centre_y = .5f * float(f.height) + (still ? 0.f : halton(subframe, 3) - .5f);
     const std::uint32_t empty = FOREST_KEY_EMPTY;
-    glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4), GL_RED_INTEGER,
-                              GL_UNSIGNED_INT, &empty);
+    glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4),
+                              GL_RED_INTEGER, GL_UNSIGNED_INT, &empty);
     d.draw_bands(bands);
     glFinish();
     timing.draw += milliseconds_since(start);
@@ -304,7 +317,9 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
     glFinish();
     timing.resolve += milliseconds_since(start);
   }
-  if (const GLenum error = glGetError()) throw Error(fmt::format("OpenGL reports error 0x{:x} after drawing; there may be too little memory", error));
+  if (const GLenum error = glGetError())
+    throw Error(
+        fmt::format("OpenGL reports error 0x{:x} after drawing; there may be too little memory", error));
   return timing;
 }
 
