@@ -50,7 +50,7 @@ void attach(soci::session& sql, const std::string& path, int flags) {
   sql.open(soci::sqlite3, ":memory:");
   auto& backend = static_cast<soci::sqlite3_session_backend&>(*sql.get_backend());
   sqlite::sqlite3* file = nullptr;
-  const int result = sqlite::sqlite3_open_v2(path.c_str(), &file, flags, nullptr);
+  const int result = sqlite::sqlite3_open_v2(path.c_str(), &file, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   if (result != SQLITE_OK) {
     sqlite::sqlite3_close(file);
     throw soci::sqlite3_soci_error("open", result);
@@ -73,6 +73,7 @@ void create(const std::string& path) {
   try {
     soci::session sql;
     attach(sql, part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+    sql << "pragma page_size = 4096";  // not whatever this SQLite was built with
     begin_writing(sql);
     sql << fmt::format("pragma application_id = {}", application_id);
     sql << fmt::format("pragma user_version = {}", schema_version);
