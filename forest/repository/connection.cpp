@@ -171,8 +171,9 @@ void rethrow(const std::string& place) {
     if (code == SQLITE_NOMEM) throw std::bad_alloc();
     const auto row = std::ranges::find(sentences, code, &Sentence::code);
     if (row != sentences.end()) throw InputError(place, 0, row->text);
-    throw InputError(place, 0,
-                     fmt::format("the database refuses ({}); check it with brainforest check", error.what()));
+    throw InputError(
+        place, 0,
+        fmt::format("the database refuses ({}); restore it from a backup if this comes again", error.what()));
   } catch (const soci::soci_error& error) {
     throw InputError(
         place, 0,

@@ -221,7 +221,7 @@ TEST_F(RepositoryTest, HostileNamesAreJustNames) {
                                        "naïve μ 神経",
                                        " ",
                                        "null",
-                                       std::string(1000, 'x')};
+                                       std::string(max_name, 'x')};
   for (std::size_t i = 0; i < names.size(); ++i)
     repository.add(neuron(i), called(names[i], names[names.size() - 1 - i]));
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -234,7 +234,7 @@ TEST_F(RepositoryTest, HostileNamesAreJustNames) {
   const std::size_t before = repository.neurons().size();
   for (const std::string& name :
        {std::string(), std::string("\xff"), "a\0b"s, std::string("a\nb"), std::string("\xed\xa0\x80"),
-        std::string(1001, 'x'), std::string(10'000'000, 'x')}) {
+        std::string(max_name + 1, 'x'), std::string(10'000'000, 'x')}) {
     const std::string sentence = message([&] { repository.add(neuron(1), called(name)); });
     EXPECT_THAT(sentence, HasSubstr("is no name for a neuron"));
     EXPECT_LT(sentence.size(), 500u);
