@@ -18,6 +18,7 @@
 #include <string_view>
 
 #include "forest/io/format.h"
+#include "forest/io/oddity.h"
 
 namespace forest::io {
 

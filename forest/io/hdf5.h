@@ -1,0 +1,74 @@
+// SPDX-License-Identifier: Apache-2.0
+// The part of HDF5 that circuits and reports need: groups, one-dimensional arrays of numbers and texts, and
+// attributes. For the formats of this room; no type of the HDF5 library is seen here. Objects are named by their
+// path, "/nodes/column/0/x". The library is not safe in several threads: calls take turns.
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+namespace forest::io::hdf5 {
+
+enum class Kind : std::uint8_t { none, group, integers, reals, texts, other };
+
+/// A file being read. Every function throws InputError (file, sentence that names the object) when the object is
+/// missing, is of another kind or larger than the file can hold.
+class File {
+ public:
+  /// Throws InputError when the file is missing, is no HDF5 file or was cut off.
+  explicit File(const std::filesystem::path& path);
+  ~File();
+  File(const File&) = delete;
+  File& operator=(const File&) = delete;
+
+  Kind kind(const std::string& object) const;                        // none when there is no such object
+  std::vector<std::string> members(const std::string& group) const;  // names, sorted
+  std::size_t size(const std::string& array) const;
+
+  std::vector<float> reals(const std::string& array) const;  // of whole numbers, too
+  std::vector<std::int64_t> integers(const std::string& array) const;
+  std::vector<std::string> texts(const std::string& array) const;
+  std::vector<std::int64_t> attribute(const std::string& object,
+                                      const std::string& name) const;  // empty: none
+
+  [[noreturn]] void refuse(const std::string& sentence) const;  // throws InputError about this file
+
+ private:
+  std::string path_;
+  std::uintmax_t bytes_ = 0;
+  std::int64_t file_ = -1;
+};
+
+/// A file being written. The same calls give the same bytes: no times are stored. Groups above an object are made
+/// on the way. Throws Error when the disk is full.
+class NewFile {
+ public:
+  explicit NewFile(const std::filesystem::path& path);
+  ~NewFile();
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  void group(const std::string& path);
+  void write(const std::string& path, std::span<const float> values);
+  void write(const std::string& path, std::span<const std::uint32_t> values);
+  void write(const std::string& path, std::span<const std::uint64_t> values);
+  void write(const std::string& path, std::span<const std::string> values);  // UTF-8, of variable length
+  void attribute(const std::string& object, const std::string& name, std::uint32_t value);
+  void attribute(const std::string& object, const std::string& name, std::span<const std::uint32_t> values);
+
+  /// Must be the last call; the destructor throws nothing and so cannot say that the disk was full.
+  void close();
+
+ private:
+  void write(const std::string& path, std::int64_t file_type, std::int64_t memory_type, const void* values,
+             std::size_t count);
+  void check(bool good, const std::string& what) const;
+
+  std::string path_;
+  std::int64_t file_ = -1;
+};
+
+}  // namespace forest::io::hdf5

@@ -1,0 +1,55 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/new_folder.h"
+
+#include <cerrno>
+#include <cstdio>
+#include <cstring>
+#include <fcntl.h>
+#include <fstream>
+#include <stdlib.h>
+#include <string>
+
+#include <sys/stat.h>
+
+#include "forest/core/error.h"
+
+namespace forest::io {
+
+namespace fs = std::filesystem;
+
+NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
+  if (!wanted_.has_filename()) wanted_ = wanted_.parent_path();  // "circuit/"
+  std::string name = (wanted_.parent_path() / ("." + wanted_.filename().string() + ".XXXXXX")).string();
+  if (!::mkdtemp(name.data())) fail("created");
+  part_ = name;
+  ::chmod(name.c_str(), 0755);
+}
+
+NewFolder::~NewFolder() {
+  std::error_code ignored;
+  if (!part_.empty()) fs::remove_all(part_, ignored);
+}
+
+void NewFolder::write(const fs::path& name, std::string_view bytes) const {
+  std::ofstream file(part_ / name, std::ios::binary);
+  file.write(bytes.data(), std::streamsize(bytes.size()));
+  file.close();
+  if (!file) throw Error((wanted_ / name).string() + ": cannot be written; check that the disk has room");
+}
+
+void NewFolder::commit() {
+  if (::rename(part_.c_str(), wanted_.c_str()) == 0) {  // there was none, or an empty one
+    part_.clear();
+    return;
+  }
+  // Swapped in one step, so that a whole folder is there at every moment; the destructor removes the old one.
+  if (::renameat2(AT_FDCWD, part_.c_str(), AT_FDCWD, wanted_.c_str(), RENAME_EXCHANGE) != 0) fail("replaced");
+}
+
+void NewFolder::fail(const char* what) const {
+  const int reason = errno;
+  throw Error(wanted_.string() + ": cannot be " + what + " (" + std::strerror(reason) +
+              "); check that the folder above it exists and can be written");
+}
+
+}  // namespace forest::io

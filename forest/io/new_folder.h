@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// A folder that is written whole or not at all, as core/file.h does for a single file.
+#pragma once
+
+#include <filesystem>
+#include <string_view>
+
+namespace forest::io {
+
+/// Collects files in a hidden folder beside the one that is wanted. commit() puts it in its place at once; without it
+/// (an exception) the hidden folder goes away and what was there before stays.
+class NewFolder {
+ public:
+  /// Throws Error when the folder above is missing or cannot be written.
+  explicit NewFolder(const std::filesystem::path& wanted);
+  ~NewFolder();
+  NewFolder(const NewFolder&) = delete;
+  NewFolder& operator=(const NewFolder&) = delete;
+
+  const std::filesystem::path& path() const { return part_; }  // where to write until then
+
+  /// Writes one file. Throws Error when the disk is full.
+  void write(const std::filesystem::path& name, std::string_view bytes) const;
+
+  /// Takes the place of the wanted folder; one that was there is removed with all it holds, so look at it before.
+  void commit();
+
+ private:
+  [[noreturn]] void fail(const char* what) const;
+
+  std::filesystem::path wanted_, part_;
+};
+
+}  // namespace forest::io

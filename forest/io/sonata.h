@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// Circuits as SONATA (Dai et al. 2020, PLoS Comput Biol 16:e1007696), the format of the Allen Institute and the Blue
+// Brain Project: circuit_config.json, nodes.h5, node_types.csv and a folder of morphologies. docs/formats/sonata.md
+// shows the layout that is written. What SONATA has no place for (the radius of the column, the limits of layers)
+// stands under the key "brainforest" of the configuration, which other programs pass over.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <vector>
+
+#include "forest/circuit/circuit.h"
+#include "forest/core/progress.h"
+#include "forest/io/format.h"
+
+namespace forest::io {
+
+/// Writes a circuit as a folder, whole or not at all. The same circuit gives the same bytes.
+/// @param morphologies  one for each of circuit.morphologies; each is written once, as SWC, with its centre at the
+///                      origin (forest/morphology/transform.h)
+/// A circuit that Brain Forest wrote before is replaced; throws Error when the folder holds anything else, when a name
+/// of a morphology is no file name, or when the circuit is not sound (circuit::check).
+void write_sonata(const std::filesystem::path& folder, const circuit::Circuit& circuit,
+                  std::span<const Morphology> morphologies, Progress& progress = Progress::none());
+
+struct SonataCircuit {
+  circuit::Circuit circuit;
+  std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
+  std::vector<Warning> warnings;         // neurons left out, oddities of morphology files
+};
+
+/// Reads a circuit: one of ours comes back equal. Of others' circuits every population of neurons with a shape is read;
+/// virtual and point neurons are left out, and said so. Layers of such a circuit reach as far as their somata.
+/// @param place  the folder with circuit_config.json, or a configuration file of another name
+/// Throws InputError (file, line where there is one, remedy).
+SonataCircuit read_sonata(const std::filesystem::path& place, Progress& progress = Progress::none());
+
+}  // namespace forest::io

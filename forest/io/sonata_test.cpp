@@ -1,0 +1,362 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/sonata.h"
+
+#include <cmath>
+#include <fstream>
+#include <map>
+#include <numbers>
+#include <sstream>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/circuit/plant.h"
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/io/hdf5.h"
+#include "forest/morphology/measure.h"
+#include "forest/morphology/transform.h"
+
+#include "tests/real_data.h"
+
+namespace forest::io {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+Morphology neuron(float size) {
+  MorphologyBuilder builder;
+  builder.set_soma(
+      {.kind = SomaKind::sphere, .points = {{3, 4, 5, size}}, .parents = {}, .contour_starts = {}});
+  const SectionId stem = builder.add_section({}, SectionKind::apical,
+                                             std::vector<Point>{{3, 4 + size, 5, 1.5f}, {3, 40, 5, 1}}, 4, 0);
+  builder.add_section(stem, SectionKind::apical, std::vector<Point>{{3, 40, 5, 1}, {20, 60.125f, 5, .5f}});
+  builder.add_section(stem, SectionKind::apical, std::vector<Point>{{3, 40, 5, 1}, {-20, 70, 9, .1f}});
+  return builder.build();
+}
+
+class Sonata : public testing::Test {
+ protected:
+  Sonata() {
+    std::string root = (fs::temp_directory_path() / "forest-sonata.XXXXXX").string();
+    root_ = ::mkdtemp(root.data());
+    const circuit::Recipe recipe{
+        .name = "two layers",
+        .radius = 100.f,
+        .types = {{"L5 \"tall\" cell", "tall", true}, {"small", "small", false}, {"nobody", "absent", true}},
+        .layers = {{"L1", 100.3f, 0., 11, {.25, .75, 0.}},
+                   {"empty", 20.f, 0., 0, {1., 0., 0.}},
+                   {"L5", 77.7f, 0., 20, {.5, .5, 0.}}},
+        .neurons = {},
+        .soma_gap = 0.f,
+        .rotate = true};
+    circuit_ =
+        circuit::plant(recipe,
+                       std::vector<circuit::Candidate>{
+                           {"tall-1", "tall", 5.f}, {"tall 2", "tall", 7.f}, {"small-1", "small", 2.f}},
+                       3);
+    for (const std::string& name : circuit_.morphologies)
+      morphologies_.push_back(neuron(name == "tall-1" ? 5.f : name == "tall 2" ? 7.f : 2.f));
+  }
+  ~Sonata() override { fs::remove_all(root_); }
+
+  fs::path folder() const { return root_ / "circuit"; }
+  void write() const { write_sonata(folder(), circuit_, morphologies_); }
+  void replace(const char* file, const std::string& from, const std::string& to) const {
+    std::string text(MappedFile(folder() / file).text());
+    const auto at = text.find(from);
+    ASSERT_NE(at, std::string::npos) << from;
+    write_file(folder() / file, text.replace(at, from.size(), to));
+  }
+  static std::string complaint(const auto& act) {
+    try {
+      act();
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), testing::Not(HasSubstr("\n")));
+      return error.what();
+    }
+    return "accepted";
+  }
+  std::string reading() const {
+    return complaint([&] { read_sonata(folder()); });
+  }
+  // Every file of a folder with its bytes.
+  static std::map<std::string, std::string> bytes(const fs::path& folder) {
+    std::map<std::string, std::string> all;
+    for (const auto& entry : fs::recursive_directory_iterator(folder))
+      if (entry.is_regular_file())
+        all[entry.path().lexically_relative(folder).string()] = MappedFile(entry.path()).text();
+    return all;
+  }
+
+  fs::path root_;
+  circuit::Circuit circuit_;
+  std::vector<Morphology> morphologies_;
+};
+
+TEST_F(Sonata, ACircuitComesBackEqual) {
+  write();
+  const SonataCircuit back = read_sonata(folder());
+  EXPECT_EQ(back.circuit, circuit_);
+  EXPECT_TRUE(back.warnings.empty()) << back.warnings[0].sentence;
+  ASSERT_EQ(back.morphologies.size(), morphologies_.size());
+  for (std::size_t i = 0; i < morphologies_.size(); ++i)
+    EXPECT_EQ(back.morphologies[i], centred(morphologies_[i]));
+}
+
+TEST_F(Sonata, WhatNoNeuronUsesAndTiltedNeuronsComeBackToo) {
+  circuit_.morphologies.insert(circuit_.morphologies.begin(), "unused");
+  morphologies_.insert(morphologies_.begin(), neuron(1.f));
+  for (auto& instance : circuit_.instances) ++instance.morphology;
+  circuit_.instances[5].orientation = Quat(.5f, .5f, -.5f, .5f);
+  circuit_.radius = 0.f;
+  write();
+  EXPECT_EQ(read_sonata(folder()).circuit, circuit_);
+}
+
+TEST_F(Sonata, AnEmptyCircuitComesBackEqual) {
+  circuit_.instances.clear();
+  write();
+  EXPECT_EQ(read_sonata(folder() / "circuit_config.json").circuit, circuit_);
+}
+
+TEST_F(Sonata, TheSameCircuitGivesTheSameBytes) {
+  write();
+  const auto first = bytes(folder());
+  EXPECT_EQ(first.size(), 3 + morphologies_.size());
+  EXPECT_TRUE(first.contains("morphologies/tall 2.swc"));
+  ::sleep(1);  // a time in a file would show
+  write();     // replaces its own
+  EXPECT_EQ(bytes(folder()), first);
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "something was left behind";
+}
+
+TEST_F(Sonata, AFolderWithAnythingElseIsNotReplaced) {
+  const auto writing = [&] { return complaint([&] { write(); }); };
+  fs::create_directory(folder());
+  write_file(folder() / "thesis.txt", "years of work");
+  EXPECT_THAT(writing(), HasSubstr("something other than a circuit"));
+  EXPECT_EQ(MappedFile(folder() / "thesis.txt").text(), "years of work");
+
+  fs::remove(folder() / "thesis.txt");
+  write();
+  write_file(folder() / "thesis.txt", "years of work");
+  EXPECT_THAT(writing(), HasSubstr("thesis.txt"));
+  fs::remove(folder() / "thesis.txt");
+  write_file(folder() / "circuit_config.json", R"({"networks": {"nodes": []}})");
+  EXPECT_THAT(writing(), HasSubstr("something other than a circuit"));
+
+  fs::remove_all(folder());
+  write_file(folder(), "a file");
+  EXPECT_THAT(writing(), HasSubstr("is no folder"));
+  EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "something was left behind";
+}
+
+TEST_F(Sonata, WhatCannotBeWrittenLeavesTheOldCircuit) {
+  write();
+  const auto before = bytes(folder());
+  circuit_.morphologies[0] = "../evil";
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("file name"));
+  circuit_.morphologies[0] = "tall-1";
+  circuit_.instances[0].type = 77;
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("cell type number 77"));
+  circuit_.instances[0].type = 0;
+  morphologies_.pop_back();
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("give one for each name"));
+  EXPECT_EQ(bytes(folder()), before);
+  EXPECT_THAT(complaint([&] { write_sonata(root_ / "no" / "where", {}, {}); }), HasSubstr("folder above"));
+}
+
+TEST_F(Sonata, MissingFilesAreNamed) {
+  for (const char* name : {"circuit_config.json", "nodes.h5", "node_types.csv", "morphologies/tall-1.swc"}) {
+    write();
+    fs::remove(folder() / name);
+    EXPECT_THAT(reading(), HasSubstr(fs::path(name).stem().string())) << name;
+    write_file(folder() / "circuit_config.json", R"({"brainforest": {}})");  // so that it may be replaced
+  }
+  EXPECT_THAT(complaint([&] { read_sonata(root_ / "nothing"); }), HasSubstr("nothing"));
+}
+
+TEST_F(Sonata, CutOffAnywhereItIsAnErrorNeverACrash) {
+  for (const char* name : {"nodes.h5", "circuit_config.json"}) {
+    write();
+    const std::string whole(MappedFile(folder() / name).text());
+    const std::size_t step = std::max<std::size_t>(1, whole.size() / 300);
+    for (std::size_t length = whole.size() - 2; length < whole.size(); length -= step) {
+      fs::resize_file(folder() / name, length);
+      EXPECT_THROW(read_sonata(folder()), InputError)
+          << name << " cut to " << length << " of " << whole.size();
+    }
+    write_file(folder() / name, whole);
+  }
+}
+
+TEST_F(Sonata, ATableOfTypesCutOffIsAnErrorUntilTheUsedTypesAreWhole) {
+  write();
+  const std::string whole(MappedFile(folder() / "node_types.csv").text());
+  const std::size_t used = whole.find(" small\n2 ");  // the last cell may lose letters and still be one
+  for (std::size_t length = whole.size() - 1; length > 0; --length) {
+    fs::resize_file(folder() / "node_types.csv", length);
+    const std::string says = reading();
+    if (length <= used) {
+      EXPECT_NE(says, "accepted") << "cut to " << length;
+    }
+  }
+}
+
+TEST_F(Sonata, WrongValuesAreNamed) {
+  const auto base = std::string("/nodes/two_layers");
+  // Writes nodes.h5 anew, with one array replaced.
+  const auto spoil = [&](const std::string& array, const auto& values) {
+    write();
+    std::map<std::string, std::vector<float>> reals;
+    std::map<std::string, std::vector<std::uint64_t>> wholes;
+    std::map<std::string, std::vector<std::string>> texts;
+    {
+      const hdf5::File file(folder() / "nodes.h5");
+      for (const std::string& group : {base, base + "/0", base + "/0/@library"})
+        for (const std::string& name : file.members(group)) {
+          const std::string path = group + "/" + name;
+          if (path == array) continue;
+          if (file.kind(path) == hdf5::Kind::reals) reals[path] = file.reals(path);
+          if (file.kind(path) == hdf5::Kind::texts) texts[path] = file.texts(path);
+          if (file.kind(path) == hdf5::Kind::integers)
+            for (const std::int64_t value : file.integers(path)) wholes[path].push_back(std::uint64_t(value));
+        }
+    }
+    hdf5::NewFile file(folder() / "nodes.h5");
+    for (const auto& [path, row] : reals) file.write(path, std::span(row));
+    for (const auto& [path, row] : wholes) file.write(path, std::span(row));
+    for (const auto& [path, row] : texts) file.write(path, std::span(row));
+    if (!values.empty()) file.write(array, std::span(values));
+    file.close();
+    return reading();
+  };
+  using Reals = const std::vector<float>;
+  using Texts = const std::vector<std::string>;
+  using Wholes = const std::vector<std::uint64_t>;
+  const std::size_t count = circuit_.instances.size();
+  EXPECT_EQ(spoil("/nothing", Reals{1.f}), "accepted");
+  EXPECT_THAT(spoil(base + "/node_type_id", Texts{"a"}), HasSubstr("whole numbers are expected"));
+  EXPECT_THAT(spoil(base + "/node_type_id", Wholes{}), HasSubstr("no array /nodes/two_layers/node_type_id"));
+  EXPECT_THAT(spoil(base + "/node_type_id", Wholes(count, 9)), HasSubstr("of type 9, which has no row"));
+  EXPECT_THAT(spoil(base + "/node_group_index", Wholes(count, 99)), HasSubstr("entry 99"));
+  EXPECT_THAT(spoil(base + "/node_group_index", Wholes(count, ~0ull)),
+              HasSubstr("must be an entry of its group"));
+  EXPECT_THAT(spoil(base + "/node_group_index", Wholes{1, 2}), HasSubstr("must be as many"));
+  EXPECT_THAT(spoil(base + "/node_group_id", Wholes(count, 5)), HasSubstr("group /nodes/two_layers/5"));
+  EXPECT_THAT(spoil(base + "/0/x", Texts(count, "left")), HasSubstr("numbers are expected"));
+  EXPECT_THAT(spoil(base + "/0/x", Reals(count - 1, 1.f)), HasSubstr("not complete"));
+  EXPECT_THAT(spoil(base + "/0/x", Reals(count, NAN)), HasSubstr("position of neuron 0 is not finite"));
+  EXPECT_THAT(spoil(base + "/0/orientation_w", Reals(count, 0.f)),
+              testing::AnyOf("accepted", HasSubstr("orientation")));
+  EXPECT_THAT(spoil(base + "/0/morphology", Wholes(count, 1000)), HasSubstr("its library has"));
+  EXPECT_THAT(spoil(base + "/0/morphology", Reals(count, 0.f)), HasSubstr("texts are expected"));
+  EXPECT_THAT(spoil(base + "/0/@library/morphology", Texts{"../../etc/passwd", "a", "b"}),
+              HasSubstr("outside"));
+  EXPECT_THAT(spoil(base + "/0/@library/layer", Texts{"a", "b", "c"}), HasSubstr("layer a"));
+}
+
+TEST_F(Sonata, AWrongConfigurationIsNamed) {
+  const auto spoil = [&](const char* from, const char* to) {
+    write();
+    replace("circuit_config.json", from, to);
+    const std::string says = reading();
+    write_file(folder() / "circuit_config.json", R"({"brainforest": {}})");
+    return says;
+  };
+  EXPECT_THAT(spoil("\"version\"", "version"), HasSubstr("circuit_config.json:2: this is not JSON"));
+  EXPECT_THAT(spoil("\"networks\"", "\"network\""), HasSubstr("has no \"networks\""));
+  EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR\""), HasSubstr("not define"));
+  EXPECT_THAT(spoil("\".\"", "\"$BASE_DIR/$BASE_DIR\""), HasSubstr("without end"));
+  EXPECT_THAT(spoil("\"$BASE_DIR/nodes.h5\"", "\"$HERE/nodes.h5\""), HasSubstr("manifest does not define"));
+  EXPECT_THAT(spoil("\"$BASE_DIR/nodes.h5\"", "5"), HasSubstr("\"nodes_file\" must be a text"));
+  EXPECT_THAT(spoil("\"two_layers\"", "\"elsewhere\""), HasSubstr("/nodes/elsewhere"));
+  EXPECT_THAT(spoil("\"radius\": 100.0", "\"radius\": \"wide\""), HasSubstr("\"radius\" must be a number"));
+  EXPECT_THAT(spoil("\"biophysical\"", "\"virtual\""),
+              "accepted");  // and its neurons are left out, with a warning
+}
+
+TEST(Hdf5, ArraysComeBackAndOtherKindsAreRefused) {
+  const fs::path path = fs::temp_directory_path() / ("forest-hdf5." + std::to_string(::getpid()));
+  const std::vector<float> reals{1.5f, -2.f};
+  const std::vector<std::uint64_t> wholes{3, 4, 5};
+  const std::vector<std::string> texts{"", "pyramidal", "Ω"};
+  {
+    hdf5::NewFile file(path);
+    file.write("/a/b/reals", std::span(reals));
+    file.write("/a/wholes", std::span(wholes));
+    file.write("/a/texts", std::span(texts));
+    file.write("/a/none", std::span(texts).first(0));
+    file.attribute("/a", "version", 7u);
+    file.close();
+  }
+  const hdf5::File file(path);
+  EXPECT_EQ(file.reals("/a/b/reals"), reals);
+  EXPECT_EQ(file.reals("/a/wholes"), (std::vector<float>{3, 4, 5}));
+  EXPECT_EQ(file.integers("/a/wholes"), (std::vector<std::int64_t>{3, 4, 5}));
+  EXPECT_EQ(file.texts("/a/texts"), texts);
+  EXPECT_TRUE(file.texts("/a/none").empty());
+  EXPECT_EQ(file.attribute("/a", "version"), std::vector<std::int64_t>{7});
+  EXPECT_TRUE(file.attribute("/a", "none").empty());
+  EXPECT_THAT(file.members("/a"), testing::ElementsAre("b", "none", "texts", "wholes"));
+  EXPECT_EQ(file.kind("/a/b"), hdf5::Kind::group);
+  EXPECT_EQ(file.kind("/x/y/z"), hdf5::Kind::none);
+  EXPECT_THROW(file.texts("/a/wholes"), InputError);
+  EXPECT_THROW(file.integers("/a/b/reals"), InputError);
+  EXPECT_THROW(file.reals("/a/b"), InputError);
+  EXPECT_THROW(file.reals("/a/x"), InputError);
+  EXPECT_THROW(file.members("/a/texts"), InputError);
+  fs::remove(path);
+}
+
+// ── Circuits of other programs ──
+
+TEST(PublishedCircuits, OfTheAllenInstituteHaveTheirTypesInATable) {
+  FOREST_REAL_DATA(folder, "sonata/allen_sonata_examples/300_cells");
+  const SonataCircuit read = read_sonata(folder);
+  EXPECT_EQ(read.circuit.instances.size(), 300u);
+  EXPECT_EQ(read.circuit.morphologies.size(), 5u);
+  EXPECT_EQ(read.circuit.types.size(), 5u);
+  std::size_t inhibitory = 0;
+  for (const auto& instance : read.circuit.instances)
+    inhibitory += !read.circuit.types[instance.type].excitatory;
+  EXPECT_EQ(inhibitory, 60u);
+  const auto& first = read.circuit.instances[0];
+  EXPECT_FLOAT_EQ(first.position.x(), -39.36520608835683f);
+  const Vec3 east = first.orientation * Vec3::UnitX();  // turned by 5.4278 about y
+  EXPECT_NEAR(std::atan2(-east.z(), east.x()), 5.427764850661566 - 2. * std::numbers::pi, 1e-5);
+  for (const Morphology& m : read.morphologies) EXPECT_LT(centre(m).norm(), 2e-3f);
+  EXPECT_THAT(read.warnings,
+              testing::Contains(testing::Field(&Warning::code, "not-biophysical")));  // the external spikes
+}
+
+TEST(PublishedCircuits, OfTheBlueBrainProjectHaveTheirTypesInLibraries) {
+  FOREST_REAL_DATA(folder, "sonata/sonata_extension/source/usecases/usecase3");
+  const SonataCircuit read = read_sonata(folder / "circuit_sonata.json");
+  EXPECT_EQ(read.circuit.instances.size(), 5u);  // three of one population and two of the other
+  EXPECT_EQ(read.morphologies.size(), 4u);
+  for (const Morphology& m : read.morphologies) EXPECT_GT(total_length(m), 100.);
+}
+
+TEST(PublishedCircuits, WithoutShapesOrMorphologiesAreRefusedInASentence) {
+  FOREST_REAL_DATA(folder, "sonata");
+  const auto says = [&](const char* place) {
+    try {
+      read_sonata(folder / place);
+      return std::string("accepted");
+    } catch (const InputError& error) {
+      return std::string(error.what());
+    }
+  };
+  EXPECT_THAT(says("allen_sonata_examples/300_intfire"), HasSubstr("no neuron of the circuit has a shape"));
+  EXPECT_THAT(says("bluecellulab_quick_scx/circuit_sonata_quick_scx_multi_circuit/circuit_sonata.json"),
+              HasSubstr(".swc there"));
+  EXPECT_THAT(says("libsonata_tests/config"), testing::Not("accepted"));
+  EXPECT_THAT(says("obi_tiny_circuits/blueetl_data/circuit/sonata"), testing::Not("accepted"));
+}
+
+}  // namespace
+}  // namespace forest::io

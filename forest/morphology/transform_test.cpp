@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/morphology/transform.h"
+
+#include <gtest/gtest.h>
+
+#include "forest/morphology/measure.h"
+
+namespace forest {
+namespace {
+
+Morphology tree(bool soma) {
+  MorphologyBuilder builder;
+  if (soma)
+    builder.set_soma(
+        {.kind = SomaKind::sphere, .points = {{10, 20, 30, 5}}, .parents = {}, .contour_starts = {}});
+  const SectionId stem = builder.add_section({}, SectionKind::apical,
+                                             std::vector<Point>{{12, 25, 30, 2}, {12, 60, 30, 1}}, 17, 0);
+  builder.add_section(stem, SectionKind::apical, std::vector<Point>{{12, 60, 30, 1}, {30, 90, 28, .5f}});
+  builder.add_section(stem, SectionKind::apical, std::vector<Point>{{12, 60, 30, .8f}, {-3, 80, 31, .25f}});
+  builder.add_spine({.section = stem, .position = 3.f, .head = {1, 0, 0}, .head_diameter = .5f});
+  builder.annotate("species", "rat");
+  return builder.build();
+}
+
+TEST(Translated, MovesEveryPointAndChangesNothingElse) {
+  const Morphology before = tree(true), after = translated(before, {1, 2, 3});
+  ASSERT_EQ(after.points().size(), before.points().size());
+  for (std::size_t i = 0; i < before.points().size(); ++i) {
+    EXPECT_EQ(after.points()[i].position(), before.points()[i].position() + Vec3(1, 2, 3));
+    EXPECT_EQ(after.points()[i].radius, before.points()[i].radius);
+  }
+  EXPECT_EQ(std::vector(after.sections().begin(), after.sections().end()),
+            std::vector(before.sections().begin(), before.sections().end()));
+  EXPECT_EQ(after.soma().points[0].position(), Vec3(11, 22, 33));
+  EXPECT_EQ(after.spines()[0], before.spines()[0]);
+  EXPECT_EQ(after.annotations(), before.annotations());
+  EXPECT_NEAR(total_length(after), total_length(before), 1e-4);
+  EXPECT_EQ(translated(after, {-1, -2, -3}), before);  // whole numbers: exact
+}
+
+TEST(Centred, PutsTheSomaAtTheOriginOnceAndForAll) {
+  const Morphology once = centred(tree(true));
+  EXPECT_EQ(centre(once), Vec3(0, 0, 0));
+  EXPECT_EQ(centred(once), once);
+}
+
+TEST(Centred, ANeuronWithoutSomaIsHeldByItsFirstRoot) {
+  EXPECT_EQ(centre(tree(false)), Vec3(12, 25, 30));
+  EXPECT_EQ(centred(tree(false)).points()[0].position(), Vec3(0, 0, 0));
+  EXPECT_EQ(centred(Morphology()), Morphology());
+}
+
+}  // namespace
+}  // namespace forest
