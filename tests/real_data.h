@@ -2,10 +2,12 @@
 // Where real data is: $BRAINFOREST_DATA, else the folder shared/data beside the project.
 #pragma once
 
+#include <algorithm>
 #include <cstdlib>
 #include <filesystem>
 #include <optional>
 #include <string_view>
+#include <vector>
 
 #include <gtest/gtest.h>
 
@@ -21,6 +23,16 @@ inline std::optional<std::filesystem::path> real_data(const std::filesystem::pat
 inline bool real_data_required() {
   const char* required = std::getenv("BRAINFOREST_REQUIRE_DATA");
   return required && std::string_view(required) == "1";
+}
+
+/// All files below `folder` with this extension, sorted.
+inline std::vector<std::filesystem::path> files_below(const std::filesystem::path& folder,
+                                                      std::string_view extension) {
+  std::vector<std::filesystem::path> files;
+  for (const auto& entry : std::filesystem::recursive_directory_iterator(folder))
+    if (entry.is_regular_file() && entry.path().extension() == extension) files.push_back(entry.path());
+  std::ranges::sort(files);
+  return files;
 }
 
 }  // namespace forest

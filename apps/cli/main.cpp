@@ -1,4 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
+#include <csignal>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -12,6 +13,7 @@
 
 int main(int argc, char** argv) {
   using namespace forest;
+  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a full disk: an error with a sentence
   cli::Console console;
   CLI::App app{"Brain Forest: from traced neurons to a forest one can walk through.", "brainforest"};
   app.set_version_flag("--version", FOREST_VERSION);

@@ -6,10 +6,22 @@
 namespace forest::cli {
 
 // One declaration and one row a verb, in the order of --help.
+std::function<void()> import_files(CLI::App&, Console&);
+std::function<void()> list(CLI::App&, Console&);
+std::function<void()> show(CLI::App&, Console&);
+std::function<void()> export_files(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
   static constexpr auto table = std::to_array<Verb>({
+      {"import", "Store traced neurons in a repository",
+       "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
+      {"list", "List the populations and neurons of a repository",
+       "brainforest list --repo cells.db --population traced", list},
+      {"show", "Show all that is known of a neuron: soma, arbors, sections, where it comes from",
+       "brainforest show cell7 --repo cells.db", show},
+      {"export", "Write neurons of a repository as files",
+       "brainforest export --repo cells.db --population traced --format swc --out exported/", export_files},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
        "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
   });

@@ -21,6 +21,13 @@ struct Warning {
   std::string sentence;   // what stands there and how it was read
 };
 
+/// A kind of deviation: a format that reads dialects has a table of these.
+struct Oddity {
+  std::string_view code;
+  bool every_line = true;    // each line is told (up to a limit, then counted), or only the first one
+  std::string_view reading;  // how it is read, the second half of the sentence
+};
+
 struct ReadResult {
   Morphology morphology;
   std::vector<Warning> warnings;  // in the order of lines

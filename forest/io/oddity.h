@@ -20,12 +20,6 @@
 
 namespace forest::io {
 
-struct Oddity {
-  std::string_view code;     // a stable word
-  bool every_line = true;    // each line is told (the first `told_lines` of them), or only the first one
-  std::string_view reading;  // how it is read, the second half of the sentence
-};
-
 template <class Code>  // an enum that ends in `count`
 class OddityList {
  public:

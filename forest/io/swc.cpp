@@ -11,6 +11,7 @@
 
 #include "forest/core/error.h"
 #include "forest/io/numbers.h"
+#include "forest/io/oddity.h"
 #include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
 
@@ -160,6 +161,7 @@ class Assembler {
     look_at_types();
     build_soma();
     build_sections();
+    for (const Spine& spine : rows_.spines) builder_.add_spine(spine);
     for (auto& [key, value] : rows_.annotations) builder_.annotate(std::move(key), std::move(value));
     return builder_.build();
   }
@@ -299,9 +301,6 @@ class Assembler {
                       fmt::format("the point is its own ancestor ({}{}); correct one of these parents",
                                   rows_.ids[std::size_t(row)], ids));
   }
-
-  // The soma
-  // ---------------------------------------------------------------------------------------------------
 
   /// Files of the CNIC and of navis call every branch point 5 and every tip 6, whatever they belong to; but a
   /// root may have any type. Such points get the type of the point before, or after where there is none
@@ -513,9 +512,6 @@ class Assembler {
     return starts;
   }
 
-  // The neurites
-  // -----------------------------------------------------------------------------------------------
-
   void fill_unknown_numbers() {
     parents_first([&](std::int32_t row) {
       Point& point = rows_.points[std::size_t(row)];
@@ -548,11 +544,15 @@ class Assembler {
         oddities_.add(type < 0 ? SwcOddity::type_negative : SwcOddity::type_custom, where,
                       [&] { return fmt::format("the type is {}", type); });
     }
-    float sum = 0.f;
-    const std::size_t step = n / 256 + 1;
-    for (std::size_t i = 0; i < n; i += step) sum += rows_.points[i].radius / float(n / step + 1);
+    look_at_units();
+  }
+
+  void look_at_units() {
+    const std::size_t n = rows_.size(), step = n / 256 + 1;
+    float mean = 0.f;
+    for (std::size_t i = 0; i < n; i += step) mean += rows_.points[i].radius / float(n / step + 1);
     const bool giant = !soma_rows_.empty() && radius(soma_rows_[0]) > 150.f;
-    if (sum > 30.f || giant)
+    if ((n > 100 && mean > 30.f) || giant)
       oddities_.add(SwcOddity::units, 0, "the radii are far larger than those of neurons in µm");
   }
 
@@ -642,9 +642,6 @@ class Assembler {
   bool forward_ = false;
 };
 
-// Writing
-// ------------------------------------------------------------------------------------------------------
-
 std::int32_t type_of(const Section& section) {
   const bool fits = kind_of(section.tag) == section.kind && section.tag != soma_type;
   return fits ? section.tag : std::int32_t(section.kind);
@@ -663,6 +660,13 @@ class Writer {
     for (const auto& [key, value] : m_.annotations())
       if (key != "synapse") comment(text, key == "comment" ? value : key + ' ' + value);
     text += header_;
+    for (const Spine& spine : m_.spines()) {
+      text += fmt::format("# {} {}", swc_spine_key, spine.section.value());
+      for (const float number : {spine.position, spine.head.x(), spine.head.y(), spine.head.z(),
+                                 spine.head_diameter, spine.neck_diameter, float(spine.shape)})
+        text += ' ', append_number(text, number);
+      text += '\n';
+    }
     text += rows_;
     footer(text);
     return text;
@@ -748,8 +752,7 @@ class Writer {
     while (true) {
       const std::size_t end = std::min(value.find_first_of("\r\n"), value.size());
       const auto [key, rest] = swc_comment(value.substr(0, end));
-      const bool ours =
-          rest == swc_marker || rest == "start synapse" || key == swc_node_key || key == swc_outline_key;
+      const bool ours = rest == swc_marker || rest == "start synapse" || swc_own_key(key);
       if (!ours) {
         text += '#';
         if (key != "comment") text += ' ', text += key;

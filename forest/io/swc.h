@@ -18,7 +18,6 @@
 #include <string_view>
 
 #include "forest/io/format.h"
-#include "forest/io/oddity.h"
 
 namespace forest::io {
 

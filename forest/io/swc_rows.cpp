@@ -10,6 +10,7 @@
 
 #include "forest/core/error.h"
 #include "forest/io/numbers.h"
+#include "forest/io/oddity.h"
 
 namespace forest::io {
 namespace {
@@ -211,33 +212,41 @@ class Scanner {
     }
   }
 
-  /// What write_swc put into comments.
+  /// What write_swc put into comments: a key, a whole number, and as many others as the key has.
   bool own_comment(std::string_view text) {
     const auto [key, value] = swc_comment(text);
-    if (key != swc_node_key && key != swc_outline_key) return false;
+    if (!swc_own_key(key)) return false;
     const std::string numbers = std::string(value) + '\n';
     const char* p = numbers.data();
     const auto skip = [&] {
       while (is_blank(*p)) ++p;
     };
     std::int64_t id = 0;
-    bool good = read_integer(p, id), exponent = false;
-    if (key == swc_node_key && good) {
-      rows_.nodes.push_back(id);
-    } else if (good) {
-      Point point;
-      for (float* const number : {&point.x, &point.y, &point.z, &point.radius}) {
-        skip();
-        good = good && read_real(p, *number, exponent) && std::isfinite(*number);
-      }
-      good = good && point.radius >= 0.f && (id == 0 || !rows_.outline.empty());
-      if (good && (rows_.outline.empty() || static_cast<std::size_t>(id) == rows_.outline_starts.size()))
-        rows_.outline_starts.push_back(static_cast<std::uint32_t>(rows_.outline.size()));
-      good = good && static_cast<std::size_t>(id) + 1 == rows_.outline_starts.size();
-      if (good) rows_.outline.push_back(point);
+    std::array<float, 7> values{};
+    const std::size_t count = key == swc_node_key ? 0 : key == swc_outline_key ? 4 : values.size();
+    bool good = read_integer(p, id) && id >= 0, exponent = false;
+    for (std::size_t i = 0; i < count; ++i) {
+      skip();
+      good = good && read_real(p, values[i], exponent) && std::isfinite(values[i]);
     }
     skip();
-    if (!good || !is_line_end(*p))
+    good = good && is_line_end(*p);
+    if (key == swc_node_key) {
+      rows_.nodes.push_back(id);
+    } else if (key == swc_outline_key) {
+      auto& starts = rows_.outline_starts;
+      if (static_cast<std::size_t>(id) == starts.size())
+        starts.push_back(static_cast<std::uint32_t>(rows_.outline.size()));
+      good = good && static_cast<std::size_t>(id) + 1 == starts.size() && values[3] >= 0.f;
+      rows_.outline.push_back({values[0], values[1], values[2], values[3]});
+    } else {
+      good = good && id < 0xffffffff && values[6] >= 0.f && values[6] <= float(SpineShape::branched);
+      if (good)
+        rows_.spines.push_back({SectionId(static_cast<std::size_t>(id)), values[0],
+                                Vec3(values[1], values[2], values[3]), values[4], values[5],
+                                static_cast<SpineShape>(values[6])});
+    }
+    if (!good)
       throw InputError(
           name_, line_,
           fmt::format("the comment {} does not hold the numbers it should; remove the line", key));

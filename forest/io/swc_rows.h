@@ -66,6 +66,11 @@ inline constexpr std::string_view swc_marker = "Brain Forest SWC 1 (INCF v1)";
 /// What SWC has no word for, as comment lines of such a file.
 inline constexpr std::string_view swc_node_key = "FOREST_NODE";        // id: this row begins a section
 inline constexpr std::string_view swc_outline_key = "FOREST_OUTLINE";  // contour x y z r: of the soma
+inline constexpr std::string_view swc_spine_key =
+    "FOREST_SPINE";  // section position head xyz, diameters, shape
+inline bool swc_own_key(std::string_view key) {
+  return key == swc_node_key || key == swc_outline_key || key == swc_spine_key;
+}
 
 struct SwcRows {
   // One entry a row. An unknown radius or coordinate is NaN.
@@ -79,6 +84,7 @@ struct SwcRows {
   std::vector<std::int64_t> nodes;  // ids of rows that begin a section
   std::vector<Point> outline;       // of the soma
   std::vector<std::uint32_t> outline_starts;
+  std::vector<Spine> spines;
 
   bool consecutive = true;  // ids are first, first + 1, …
   bool unknown_numbers = false;

@@ -50,7 +50,7 @@ void attach(soci::session& sql, const std::string& path, int flags) {
   sql.open(soci::sqlite3, ":memory:");
   auto& backend = static_cast<soci::sqlite3_session_backend&>(*sql.get_backend());
   sqlite::sqlite3* file = nullptr;
-  const int result = sqlite::sqlite3_open_v2(path.c_str(), &file, flags, nullptr);
+  const int result = sqlite::sqlite3_open_v2(path.c_str(), &file, flags | SQLITE_OPEN_NOMUTEX, nullptr);
   if (result != SQLITE_OK) {
     sqlite::sqlite3_close(file);
     throw soci::sqlite3_soci_error("open", result);
@@ -73,6 +73,7 @@ void create(const std::string& path) {
   try {
     soci::session sql;
     attach(sql, part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+    sql << "pragma page_size = 4096";  // not whatever this SQLite was built with
     begin_writing(sql);
     sql << fmt::format("pragma application_id = {}", application_id);
     sql << fmt::format("pragma user_version = {}", schema_version);
@@ -170,8 +171,9 @@ void rethrow(const std::string& place) {
     if (code == SQLITE_NOMEM) throw std::bad_alloc();
     const auto row = std::ranges::find(sentences, code, &Sentence::code);
     if (row != sentences.end()) throw InputError(place, 0, row->text);
-    throw InputError(place, 0,
-                     fmt::format("the database refuses ({}); check it with brainforest check", error.what()));
+    throw InputError(
+        place, 0,
+        fmt::format("the database refuses ({}); restore it from a backup if this comes again", error.what()));
   } catch (const soci::soci_error& error) {
     throw InputError(
         place, 0,

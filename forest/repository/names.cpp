@@ -62,7 +62,7 @@ int hex(char c) { return c >= '0' && c <= '9' ? c - '0' : c >= 'A' && c <= 'F' ?
 }  // namespace
 
 bool is_name(std::string_view text) {
-  if (text.empty() || text.size() > 1000) return false;
+  if (text.empty() || text.size() > max_name) return false;
   for (std::size_t length; !text.empty(); text.remove_prefix(length)) {
     length = character(text);
     if (!length || is_control(text)) return false;

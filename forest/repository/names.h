@@ -3,12 +3,15 @@
 // bytes.
 #pragma once
 
+#include <cstddef>
 #include <string>
 #include <string_view>
 
 namespace forest::repository {
 
-/// A name: 1 to 1000 bytes of UTF-8 without control characters. Everything else is allowed, quotes and
+inline constexpr std::size_t max_name = 1100;  // bytes; the longest file name, escaped, is one
+
+/// A name: 1 to max_name bytes of UTF-8 without control characters. Everything else is allowed, quotes and
 /// semicolons too.
 bool is_name(std::string_view text);
 

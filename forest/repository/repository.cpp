@@ -33,6 +33,12 @@ int number_of(NeuronId id) { return int(id.value()); }
 
 std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
 
+void check_name(std::string_view what, std::string_view name) {
+  if (!is_name(name))
+    throw Error(fmt::format("{} is no name for a {}; take 1 to {} bytes of UTF-8 without control characters",
+                            shown(name), what, max_name));
+}
+
 /// Two neurons of a population with the same fingerprint came from the same source.
 std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
   if (const auto* grown = std::get_if<Grown>(&provenance))
@@ -300,12 +306,8 @@ Repository Repository::open(const std::string& place, Access access) {
 
 Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
   Impl& impl = *impl_;
-  for (const auto& [what, name] :
-       {std::pair{"neuron", &neuron.name}, std::pair{"population", &neuron.population}})
-    if (!is_name(*name))
-      throw Error(
-          fmt::format("{} is no name for a {}; take 1 to 1000 bytes of UTF-8 without control characters",
-                      shown(*name), what));
+  check_name("neuron", neuron.name);
+  check_name("population", neuron.population);
   Rows rows = rows_of(morphology);
   const std::uint64_t sum = checksum(rows);
 
@@ -360,9 +362,7 @@ Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
 }
 
 std::string Repository::add_grammar(std::string_view name, std::string_view text) {
-  if (!is_name(name))
-    throw Error(shown(name) +
-                " is no name for a grammar; take 1 to 1000 bytes of UTF-8 without control characters");
+  check_name("grammar", name);
   return impl_->write([&] {
     const std::string hash = hash_of(text), kept_name(name), kept_text = escaped(text);
     if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {

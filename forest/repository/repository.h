@@ -48,8 +48,8 @@ struct Grown {
 using Provenance = std::variant<Traced, Grown>;
 
 struct NewNeuron {
-  std::string name = {};                                         // unique in its population; see is_name
-  std::string population = "default";                            // made on first use; see is_name
+  std::string name = {};                                         // unique in its population; see names.h
+  std::string population = "default";                            // made on first use; see names.h
   std::string species = {}, region = {}, layer = {}, type = {};  // empty: not known
   Provenance provenance = {};
   /// When another neuron has the name: call this one "name-2", "name-3", … instead of throwing.

@@ -221,7 +221,7 @@ TEST_F(RepositoryTest, HostileNamesAreJustNames) {
                                        "naïve μ 神経",
                                        " ",
                                        "null",
-                                       std::string(1000, 'x')};
+                                       std::string(max_name, 'x')};
   for (std::size_t i = 0; i < names.size(); ++i)
     repository.add(neuron(i), called(names[i], names[names.size() - 1 - i]));
   for (std::size_t i = 0; i < names.size(); ++i) {
@@ -234,7 +234,7 @@ TEST_F(RepositoryTest, HostileNamesAreJustNames) {
   const std::size_t before = repository.neurons().size();
   for (const std::string& name :
        {std::string(), std::string("\xff"), "a\0b"s, std::string("a\nb"), std::string("\xed\xa0\x80"),
-        std::string(1001, 'x'), std::string(10'000'000, 'x')}) {
+        std::string(max_name + 1, 'x'), std::string(10'000'000, 'x')}) {
     const std::string sentence = message([&] { repository.add(neuron(1), called(name)); });
     EXPECT_THAT(sentence, HasSubstr("is no name for a neuron"));
     EXPECT_LT(sentence.size(), 500u);
@@ -291,6 +291,236 @@ TEST_F(RepositoryTest, PopulationsAreSummedUp) {
   EXPECT_EQ(populations[1].sections, sections);
   EXPECT_DOUBLE_EQ(populations[1].length, length);
   EXPECT_TRUE(repository.neurons("none").empty());
+}
+
+/// Runs `body` in another process and returns its pid.
+pid_t in_child(const std::function<void()>& body) {
+  const pid_t pid = ::fork();
+  if (pid != 0) return pid;
+  try {
+    body();
+  } catch (const std::exception& error) {
+    fmt::print(stderr, "child: {}\n", error.what());
+    ::_exit(1);
+  }
+  ::_exit(0);
+}
+
+/// The exit status of a child; -1 when a signal ended it.
+int wait_for(pid_t pid) {
+  int status = 0;
+  ::waitpid(pid, &status, 0);
+  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+}
+
+/// Every neuron in the file is whole and the one its name says; returns how many there are.
+std::size_t whole_neurons(const std::string& file, const std::vector<Morphology>& source) {
+  const Repository repository = Repository::open(file, Access::read);
+  EXPECT_THAT(repository.check(), testing::IsEmpty());
+  const auto rows = repository.neurons();
+  for (const NeuronRow& row : rows) EXPECT_EQ(repository.morphology(row.id), source.at(std::stoul(row.name)));
+  return rows.size();
+}
+
+TEST_F(RepositoryTest, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 150; ++i) source.push_back(neuron(i, 50 + i % 7 * 100));
+  Random random(1);
+  std::size_t before = 0;
+  for (int round = 0; round < 60; ++round) {
+    int pipe[2];
+    ASSERT_EQ(::pipe(pipe), 0);
+    const pid_t child = in_child([&] {
+      Repository repository = Repository::open(file_, Access::write);
+      for (std::size_t i = 0; i < source.size(); ++i) {
+        repository.add(source[i], called(std::to_string(i)));
+        if (::write(pipe[1], "+", 1) != 1) ::_exit(1);
+      }
+    });
+    ::close(pipe[1]);
+    ::usleep(std::uint32_t(random.exponential(20'000.)));
+    ::kill(child, SIGKILL);
+    wait_for(child);
+    std::size_t said = 0;
+    for (char byte; ::read(pipe[0], &byte, 1) == 1;) ++said;
+    ::close(pipe[0]);
+    if (!fs::exists(file_)) {
+      EXPECT_EQ(said, 0u);
+      continue;
+    }
+    const std::size_t now = whole_neurons(file_, source);
+    EXPECT_GE(now, said);
+    EXPECT_GE(now, before);
+    before = now;
+  }
+  EXPECT_GT(before, 0u);
+}
+
+TEST_F(RepositoryTest, AFullDiskIsASentenceAndLosesNothing) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 60; ++i) source.push_back(neuron(i, 100));
+  for (const std::size_t limit : {0u, 4000u, 60'000u, 150'000u, 200'000u, 222'222u, 400'000u}) {
+    fs::remove(file_);
+    const pid_t child = in_child([&] {
+      std::signal(SIGXFSZ, SIG_IGN);
+      const rlimit bytes{limit, limit};
+      ::setrlimit(RLIMIT_FSIZE, &bytes);
+      std::size_t stored = 0;
+      const std::string sentence = message([&] {
+        Repository repository = Repository::open(file_, Access::write);
+        for (; stored < source.size(); ++stored)
+          repository.add(source[stored], called(std::to_string(stored)));
+      });
+      if (sentence.find("disk is full") == std::string::npos) throw Error("not the sentence: " + sentence);
+      if (stored && whole_neurons(file_, source) != stored) throw Error("lost a neuron");
+      const std::string again = message([&] {  // a batch that does not fit leaves what was there
+        Repository repository = Repository::open(file_, Access::write);
+        auto transaction = repository.begin();
+        for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+        transaction.commit();
+      });
+      if (again.find("disk is full") == std::string::npos)
+        throw Error("not the sentence of a batch: " + again);
+      if (stored && whole_neurons(file_, source) != stored) throw Error("lost a neuron to a batch");
+      if (!stored && fs::exists(file_) && whole_neurons(file_, source) != 0)
+        throw Error("stored a part of a batch");
+    });
+    EXPECT_EQ(wait_for(child), 0) << limit;
+    EXPECT_TRUE(testing::Test::HasFailure() || fs::exists(file_) || limit < 150'000) << limit;
+    for (const auto& entry : fs::directory_iterator(folder_)) EXPECT_EQ(entry.path(), file_) << limit;
+  }
+}
+
+TEST_F(RepositoryTest, TwoProgramsStoreAtOnce) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 80; ++i) source.push_back(neuron(i));
+  std::array<pid_t, 3> children{};
+  for (std::size_t c = 0; c < children.size(); ++c)
+    children[c] = in_child([&] {
+      Repository repository = Repository::open(file_, Access::write);  // all three make the file
+      for (std::size_t i = 0; i < source.size(); ++i)
+        if (c == 2 || i % 2 == c)
+          repository.add(source[i], called(std::to_string(i)));  // the third stores what the others do
+    });
+  for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
+  EXPECT_EQ(whole_neurons(file_, source), source.size());
+}
+
+TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
+  Repository::open(file_, Access::write).add(neuron(1), called("n"));
+  const std::string good = bytes_of(file_);
+  const auto patched = [&](std::size_t at, std::string_view bytes) {
+    std::string changed = good;
+    changed.replace(at, bytes.size(), bytes);
+    return changed;
+  };
+  const std::vector<std::pair<std::string, std::string>> wrong{
+      {"", "is no repository"},
+      {"n", "is no repository"},
+      {"# a cell\n1 1 0 0 0 1 -1\n", "is no repository"},
+      {std::string(100'000, '\0'), "is no repository"},
+      {patched(0, "SQLite format 4"), "is no repository"},
+      {patched(68, "\0\0\0\0"s), "another SQLite database"},
+      {patched(60, "\0\0\0\x02"s),
+       "was made by a newer Brain Forest (its tables are of version 2, this program knows 1)"},
+      {patched(60, "\0\0\0\0"s), "damaged"},
+  };
+  for (const auto& [bytes, sentence] : wrong)
+    for (const Access access : {Access::read, Access::write}) {
+      write_file(file_, bytes);
+      const std::string said = message([&] { Repository::open(file_, access); });
+      EXPECT_THAT(said, HasSubstr(sentence));
+      EXPECT_THAT(said, testing::StartsWith(file_ + ": "));
+      EXPECT_TRUE(bytes_of(file_) == bytes);
+    }
+  for (const Access access : {Access::read, Access::write}) {
+    EXPECT_THAT(message([&] { Repository::open(folder_.string(), access); }),
+                HasSubstr("is not a regular file"));
+    EXPECT_THAT(message([&] { Repository::open("", access); }), HasSubstr("is no path"));
+    EXPECT_THAT(message([&] { Repository::open(std::string(10'000'000, 'x'), access); }).size(),
+                testing::Lt(300u));
+    EXPECT_THAT(message([&] { Repository::open("postgresql://host/cells", access); }),
+                HasSubstr("is a server"));
+  }
+  EXPECT_THAT(message([&] { Repository::open(file_ + "x", Access::read); }),
+              HasSubstr("there is no such repository"));
+  EXPECT_FALSE(fs::exists(file_ + "x"));
+  EXPECT_THAT(message([&] { Repository::open(folder_ / "none" / "x", Access::write); }),
+              HasSubstr("cannot be opened"));
+}
+
+TEST_F(RepositoryTest, ReadingAccessDoesNotWrite) {
+  Repository::open(file_, Access::write).add(neuron(1), called("n"));
+  const std::string before = bytes_of(file_);
+  Repository repository = Repository::open(file_, Access::read);
+  EXPECT_THAT(message([&] { repository.add(neuron(2), called("m")); }), HasSubstr("opened for writing"));
+  EXPECT_THAT(message([&] { repository.remove(NeuronId(1)); }), HasSubstr("opened for writing"));
+  EXPECT_EQ(repository.neurons().size(), 1u);
+  EXPECT_EQ(bytes_of(file_), before);
+}
+
+TEST_F(RepositoryTest, APathMayHoldAnything) {
+  for (const char* name : {"with space.db", "two  spaces = '\"quotes\".db", ":memory:", "file:x?mode=memory",
+                           "a=b.db", "-rf", "db=x timeout=1", "%20", "\xff.db", "; drop"}) {
+    const std::string path = (folder_ / name).string();
+    Repository::open(path, Access::write).add(neuron(5), called("n"));
+    EXPECT_TRUE(fs::is_regular_file(path)) << name;
+    EXPECT_EQ(Repository::open(path, Access::read).morphology(NeuronId(1)), neuron(5)) << name;
+  }
+}
+
+TEST_F(RepositoryTest, ACutOffFileIsRefusedAtEveryLength) {
+  {
+    Repository repository = Repository::open(file_, Access::write);
+    for (std::size_t i = 0; i < 4; ++i) repository.add(neuron(i), called(std::to_string(i)));
+  }
+  const std::string whole = bytes_of(file_);
+  std::vector<std::size_t> lengths;
+  for (std::size_t n = 0; n < whole.size(); n += n < 200 ? 1 : 211) lengths.push_back(n);
+  for (std::size_t n = 4096; n <= whole.size(); n += 4096)
+    lengths.push_back(n - 1), lengths.push_back(n - 4096);
+  for (const std::size_t length : lengths) {
+    std::ofstream(file_, std::ios::binary | std::ios::trunc).write(whole.data(), std::streamsize(length));
+    EXPECT_THAT(message([&] { Repository::open(file_, Access::read); }), HasSubstr(file_ + ": is "))
+        << length;
+  }
+}
+
+TEST_F(RepositoryTest, ADamagedFileNeverGivesAWrongNeuron) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 4; ++i) source.push_back(neuron(i, 12));
+  {
+    Repository repository = Repository::open(file_, Access::write);
+    for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+  }
+  const std::string whole = bytes_of(file_);
+  Random random(3);
+  std::size_t noticed = 0;
+  for (int round = 0; round < 1500; ++round) {
+    std::string damaged = whole;
+    for (std::uint32_t flips = 1 + random.below(3); flips; --flips)
+      damaged[random.below(std::uint32_t(whole.size()))] = char(random.below(256));
+    std::ofstream(file_, std::ios::binary | std::ios::trunc)
+        .write(damaged.data(), std::streamsize(damaged.size()));
+    try {
+      const Repository repository = Repository::open(file_, Access::read);
+      repository.populations();
+      for (std::size_t i = 0; i < source.size(); ++i) {
+        try {
+          const Morphology back = repository.morphology(NeuronId(i + 1));
+          EXPECT_EQ(back, source[i]) << round;
+          EXPECT_EQ(back.annotations(), source[i].annotations()) << round;
+          repository.arbors(NeuronId(i + 1));
+        } catch (const Error&) {
+          ++noticed;
+        }
+      }
+      for (const NeuronRow& row : repository.neurons()) repository.find(row.name, row.population);
+    } catch (const Error&) {
+      ++noticed;
+    }
+  }
+  EXPECT_GT(noticed, 0u);
 }
 
 }  // namespace

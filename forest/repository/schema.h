@@ -70,7 +70,7 @@ create table arbors (
   neuron    integer not null references neurons (id) on delete cascade,
   number    integer not null,
   root      integer not null,             -- section
-  kind      integer not null references section_kinds (id),
+  kind      integer not null,             -- as section_kinds.id
   sections  integer not null,
   terminals integer not null,
   max_order integer not null,
@@ -84,13 +84,12 @@ create table sections (
   arbor       integer not null,
   branch_order integer not null,          -- 0 for a stem, one more at every branch point
   length      double precision not null,  -- micrometres
-  kind        integer not null references section_kinds (id),
+  kind        integer not null,           -- as section_kinds.id
   tag         integer not null,           -- the number the file gave
   soma_point  integer not null,           -- a root: index of the soma point it leaves from, -1 when not known
   first_point integer not null,           -- into points.data
   point_count integer not null,
-  primary key (neuron, number),
-  foreign key (neuron, arbor) references arbors (neuron, number) on delete cascade
+  primary key (neuron, number)
 ) without rowid;
 create table points (
   neuron integer primary key references neurons (id) on delete cascade,

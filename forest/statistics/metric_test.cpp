@@ -158,6 +158,9 @@ TEST(Metrics, GiveOneFiniteValueAnElement) {
   b.add_section(stub, SectionKind::basal, Points{{1, 2, 3, 0}, {1, 2, 3, 0}});  // no length, no radius
   b.add_section(stub, SectionKind::basal, Points{{1, 2, 3, 0}, {9, 2, 3, 1}, {1, 2, 3, 0}});  // a loop
   all.push_back(b.build());
+  b.add_section({}, SectionKind::axon,
+                Points{{-3e38f, 3e38f, 0, 1e38f}, {3e38f, 3e38f, 1, 1}, {0, -3e38f, 0, 1}});
+  all.push_back(b.build());  // as far as a number goes
   for (const Morphology& m : all) {
     const Arbors arbors(m);
     const std::map<Level, std::size_t> elements{{Level::neuron, 1},

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest export: neurons of a repository as files. The same neurons give the same bytes.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <set>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/parallel.h"
+#include "forest/io/format.h"
+#include "forest/repository/names.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/neurons.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace repository;
+
+struct Options {
+  std::vector<std::string> names;
+  std::string repo, population, format = "swc";
+  fs::path out;
+};
+
+void run(const Options& options, Console& console) {
+  const io::Format& format = *io::find_format(options.format);
+  const auto rows =
+      pick_neurons(Repository::open(options.repo, Access::read), options.names, options.population);
+  if (rows.empty())
+    throw Error(fmt::format("{} holds no neuron to export; import or grow some first", options.repo));
+
+  // Names are unique in a population only, so several populations get a folder each.
+  std::set<std::string> populations;
+  for (const NeuronRow& row : rows) populations.insert(row.population);
+  std::vector<fs::path> files;
+  for (const NeuronRow& row : rows) {
+    const fs::path folder = populations.size() > 1 ? options.out / file_name(row.population) : options.out;
+    files.push_back(folder / (file_name(row.name) + std::string(format.extensions[0])));
+  }
+  std::error_code error;
+  for (const std::string& population : populations)
+    if (fs::create_directories(populations.size() > 1 ? options.out / file_name(population) : options.out,
+                               error);
+        error)
+      throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written",
+                              options.out.string(), error.message()));
+
+  console.progress().begin("exporting", rows.size());
+  parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
+    const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
+    for (std::size_t i = begin; i < end; ++i) {
+      write_file(files[i], std::string_view(format.write(repository.morphology(rows[i].id))));
+      console.progress().advance();
+    }
+  });
+  console.progress().end();
+
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < rows.size(); ++i)
+    list.push_back({{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}});
+  console.print({{"format", options.format}, {"files", list}});
+  console.say(fmt::format("{} neurons are written to {}", rows.size(), options.out.string()));
+}
+
+}  // namespace
+
+std::function<void()> export_files(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  std::vector<std::string> formats;
+  for (const io::Format& format : io::formats())
+    if (format.write) formats.emplace_back(format.name);
+  command.add_option("neurons", options->names,
+                     "Neurons, by name or by the id that list shows; all when none is named");
+  command.add_option("--repo", options->repo, "The repository")->required()->type_name("FILE");
+  must_be_name(*command.add_option("--population", options->population, "Only those of this population"));
+  command.add_option("--format", options->format, "Format of the files")
+      ->capture_default_str()
+      ->check(CLI::IsMember(formats));
+  command.add_option("--out", options->out, "Folder the files are written to; made when there is none")
+      ->required()
+      ->type_name("DIR");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,201 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest import: files into a repository. Files are read on all cores and stored in the order of their names, each in
+// a transaction of its own, so the bytes of the repository do not depend on the number of threads.
+#include <algorithm>
+#include <filesystem>
+#include <memory>
+#include <optional>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/hash.h"
+#include "forest/core/parallel.h"
+#include "forest/io/format.h"
+#include "forest/repository/names.h"
+#include "forest/repository/repository.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/neurons.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using namespace repository;
+
+struct Options {
+  std::vector<std::string> files;
+  std::string repo;
+  NewNeuron about;  // what all of them share
+  bool verbose = false;
+};
+
+/// A file on its way into the repository.
+struct Arrival {
+  fs::path path;
+  io::ReadResult read;
+  std::string hash;
+  std::string error;  // why it could not be read; empty when it could
+  std::optional<Added> added;
+  std::size_t sections = 0, warnings = 0;
+};
+
+bool known(const fs::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
+    return std::ranges::find(f.extensions, extension) != f.extensions.end();
+  });
+}
+
+/// Files as they were named, folders as the files of a known format anywhere below them, sorted.
+std::vector<Arrival> arrivals(const std::vector<std::string>& names) {
+  std::vector<Arrival> arrivals;
+  const auto add = [&](const fs::path& path) { arrivals.emplace_back().path = path; };
+  for (const std::string& name : names) {
+    if (!fs::is_directory(name)) {
+      add(name);
+      continue;
+    }
+    std::vector<fs::path> below;
+    for (const auto& entry : fs::recursive_directory_iterator(name))
+      if (known(entry.path()) && !entry.is_directory()) below.push_back(entry.path());
+    if (below.empty())
+      throw InputError(name, 0, "holds no file of a known format; name the files themselves");
+    std::ranges::sort(below);
+    std::ranges::for_each(below, add);
+  }
+  return arrivals;
+}
+
+void read(Arrival& file) {
+  try {
+    const MappedFile bytes(file.path);
+    file.hash = hash_hex(bytes.bytes());
+    file.read = io::format_of(file.path).read(bytes.text(), escaped(file.path.string()));
+    file.sections = file.read.morphology.sections().size();
+    file.warnings = file.read.warnings.size();
+  } catch (const Error& error) {
+    file.error = error.what();
+  }
+}
+
+const char* outcome(const Arrival& file) {
+  return !file.added ? "not read" : file.added->already_there ? "already there" : "stored";
+}
+
+void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
+  std::vector<std::vector<std::string>> lines;
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  std::size_t stored = 0, there = 0, failed = 0, warnings = 0;
+  for (const Arrival& file : files) {
+    const std::string path = escaped(file.path.string());
+    nlohmann::ordered_json entry{{"file", path}, {"outcome", outcome(file)}};
+    if (file.added) {
+      entry.update({{"id", file.added->id.value()},
+                    {"name", file.added->name},
+                    {"sections", file.sections},
+                    {"warnings", file.warnings}});
+      (file.added->already_there ? there : stored) += 1;
+      lines.push_back({path, file.added->name, std::to_string(file.sections), std::to_string(file.warnings),
+                       outcome(file)});
+    } else {
+      entry["error"] = file.error;
+      ++failed;
+      lines.push_back({path, "-", "-", "-", outcome(file)});
+    }
+    warnings += file.warnings;
+    list.push_back(std::move(entry));
+  }
+  console.table({"file", "neuron", "sections", "warnings", ""}, lines);
+  console.say(fmt::format(
+      "{} stored, {} already there, {} not read{}", stored, there, failed,
+      warnings ? fmt::format("; {} warnings{}", warnings, options.verbose ? "" : ", shown by --verbose")
+               : ""));
+  console.print({{"repository", options.repo},
+                 {"population", options.about.population},
+                 {"stored", stored},
+                 {"already_there", there},
+                 {"failed", failed},
+                 {"warnings", warnings},
+                 {"files", list}});
+  if (failed)
+    throw Error(
+        fmt::format("{} of {} files could not be read; the sentences above say why", failed, files.size()));
+}
+
+void run(const Options& options, Console& console) {
+  std::vector<Arrival> files = arrivals(options.files);
+  std::optional<Repository> repository;  // made when there is something to store
+  if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
+  const std::size_t window = 64;  // neurons in memory at a time
+  std::size_t done = 0;
+  console.progress().begin("importing", files.size());
+  for (std::size_t first = 0; first < files.size(); first += window) {
+    const std::size_t count = std::min(window, files.size() - first);
+    parallel_for(count, 1, [&](std::size_t i) { read(files[first + i]); });
+    for (Arrival& file : std::span(files).subspan(first, count)) {
+      console.progress().advance();
+      if (!file.error.empty()) {
+        console.warn(file.error);
+        continue;
+      }
+      if (options.verbose)
+        for (const io::Warning& w : file.read.warnings) {
+          const std::string place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
+          console.warn(fmt::format("{}: {}: {}", place, w.code, w.sentence));
+        }
+      NewNeuron neuron = options.about;
+      neuron.name = escaped(file.path.stem().string());
+      neuron.number_if_taken = true;
+      neuron.provenance = Traced{file.path.string(), file.hash};
+      try {
+        if (!repository) repository = Repository::open(options.repo, Access::write);
+        file.added = repository->add(file.read.morphology, neuron);
+      } catch (const Error& error) {  // the repository's trouble, not the file's
+        throw Error(fmt::format("{} ({} of {} files are stored)", error.what(), done, files.size()));
+      }
+      ++done;
+      if (file.added->name != neuron.name)
+        console.warn(file.added->already_there
+                         ? fmt::format("{}: is the same file as that of neuron '{}', which is already there",
+                                       escaped(file.path.string()), file.added->name)
+                         : fmt::format("{}: another neuron is called '{}', so this one is stored as '{}'",
+                                       escaped(file.path.string()), neuron.name, file.added->name));
+      file.read = {};
+    }
+  }
+  console.progress().end();
+  report(files, options, console);
+}
+
+}  // namespace
+
+std::function<void()> import_files(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command
+      .add_option("files", options->files, "Files of traced neurons, or folders with such files below them")
+      ->required()
+      ->check(CLI::ExistingPath)
+      ->type_name("FILES");
+  command.add_option("--repo", options->repo, "The repository; made when there is none")
+      ->required()
+      ->type_name("FILE");
+  must_be_name(
+      *command.add_option("--population", options->about.population, "The population they are to belong to")
+           ->capture_default_str());
+  command.add_option("--species", options->about.species, "Their species, for example \"Rattus norvegicus\"");
+  command.add_option("--region", options->about.region, "Their brain region");
+  command.add_option("--layer", options->about.layer, "Their layer");
+  command.add_option("--type", options->about.type, "Their cell type");
+  command.add_flag("--verbose", options->verbose,
+                   "Show every oddity: file, line, what stands there and how it was read");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

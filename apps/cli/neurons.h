@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Which neurons of a repository a command line means, and how they are shown.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "forest/repository/repository.h"
+
+namespace CLI {
+class Option;
+}
+
+namespace forest::cli {
+
+/// The neurons called `names` (a name, or the id that `list` shows), in that order; all when there are none. Only those
+/// of `population` unless that is empty. Throws Error when there is no such neuron or population, or when a name is that
+/// of neurons in several populations.
+std::vector<repository::NeuronRow> pick_neurons(const repository::Repository& repository,
+                                                const std::vector<std::string>& names,
+                                                const std::string& population);
+
+/// What `list` and `show` print of a neuron.
+nlohmann::ordered_json json_of(const repository::NeuronRow& row);
+std::string source_of(const repository::NeuronRow& row);  // "cell7.swc", "purkinje, seed 1, index 7"
+
+std::string micrometres(double value);  // with one decimal
+
+/// An option's value must be a name (repository/names.h), or the usage is wrong.
+void must_be_name(CLI::Option& option);
+
+}  // namespace forest::cli

@@ -1,0 +1,59 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/frame/frame.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+
+namespace forest::frame {
+namespace {
+
+void require(bool good, std::string_view sentence) {
+  if (!good) throw Error(fmt::format("frame: {}", sentence));
+}
+
+}  // namespace
+
+void check(const Frame& frame, const Geometry& geometry) {
+  const Camera& c = frame.camera;
+  require(c.eye.allFinite() && c.target.allFinite() && c.up.allFinite(), "the camera must be finite");
+  require(c.eye != c.target, "the camera must not look at its own eye");
+  require(c.field_of_view > 0.f && c.field_of_view < 180.f,
+          "the field of view must lie between 0 and 180 degrees");
+  require(c.near > 0.f, "the near distance must be positive");
+  require(frame.width > 0 && frame.height > 0 && frame.width <= 16384 && frame.height <= 16384,
+          "a picture must be 1 to 16384 pixels wide and high");
+  require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");
+  require(frame.style.fog_length > 0.f, "the length of the fog must be positive");
+  for (const Vec3& colour : frame.palette)
+    require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");
+  require(frame.colour_class.size() == geometry.instances.size(), "every instance needs a colour class");
+  for (const std::uint8_t colour : frame.colour_class)
+    require(colour < 16, "a colour class must be below 16");
+  for (const auto list : {frame.dots, frame.lines, frame.capsules})
+    for (const Item& item : list) {
+      require(item.instance < geometry.instances.size(), "an item names an instance that is not there");
+      require(item.segment_count <= cluster_size, "an item has more segments than a cluster");
+      require(item.first_segment + std::size_t(item.segment_count) <= geometry.segments.size(),
+              "an item names segments that are not there");
+      require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
+              "an item's sphere must be finite");
+    }
+  for (const Item& item : frame.dots) require(item.segment_count == 1, "a dot is one segment");
+  Band before;
+  for (const Band& b : frame.bands) {
+    require(b.dots >= before.dots && b.lines >= before.lines && b.capsules >= before.capsules,
+            "bands must follow one another");
+    before = b;
+  }
+  require(frame.bands.empty() || (before.dots == frame.dots.size() && before.lines == frame.lines.size() &&
+                                  before.capsules == frame.capsules.size()),
+          "the last band must end where the lists end");
+  for (const Overlay& o : frame.overlays)
+    require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
+            "an overlay must be finite and its colour a palette entry");
+}
+
+}  // namespace forest::frame

@@ -1,0 +1,81 @@
+// SPDX-License-Identifier: Apache-2.0
+// One picture as plain data. The scene decides what is in it, a renderer draws it; neither knows the other.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forest/frame/camera.h"
+#include "forest/frame/layout.h"
+
+namespace forest::frame {
+
+/// What stays from picture to picture; loaded once into a renderer. The memory must outlive the renderer's use of it.
+struct Geometry {
+  std::span<const Segment> segments;
+  std::span<const Instance> instances;
+};
+
+/// Colours are linear light, 0–1. An instance of colour class c (0–15) shows its sections of kind k as entry 8 c + k.
+using Palette = std::array<Vec3, 128>;
+inline Palette black_palette() {
+  Palette palette;
+  palette.fill(Vec3::Zero());
+  return palette;
+}
+
+struct Style {
+  Vec3 background_top{.010f, .014f, .024f};
+  Vec3 background_bottom{.004f, .005f, .008f};
+  Vec3 fog_colour{.006f, .009f, .016f};
+  float fog_start = 0.f;    // depth where fog begins, µm
+  float fog_length = 1e9f;  // depth over which light falls to 1 / e, µm
+  float halo = 1.f;         // strength of the dark rim around nearer branches; 0 for none
+  float exposure = 1.f;
+};
+
+/// A capsule in world coordinates beside the forest: a highlighted branch, an outline.
+struct Overlay {
+  Vec3 a = Vec3::Zero(), b = Vec3::Zero();
+  float radius = 1.f;        // µm; never thinner than two pixels on screen
+  std::uint32_t colour = 0;  // palette entry
+};
+
+/// Where a band of a frame's lists ends. Bands follow one another from near to far; what the earlier ones hide
+/// is not drawn in the later ones.
+struct Band {
+  std::uint32_t dots = 0, lines = 0, capsules = 0;
+};
+
+struct Frame {
+  Camera camera;
+  std::uint32_t width = 1280, height = 720;  // pixels
+  std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  Style style;
+  Palette palette = black_palette();
+  std::span<const std::uint8_t> colour_class;  // one an instance, 0–15
+  std::span<const Item> dots;                  // small spheres: one segment an item
+  std::span<const Item> lines;                 // thin runs
+  std::span<const Item> capsules;              // runs near enough to have a surface
+  std::span<const Band> bands;  // the last one ends at the ends of the lists; none: all is one band
+  std::span<const Overlay> overlays;
+};
+
+/// 8-bit sRGB, rows from the top, 4 bytes a pixel (alpha 255).
+struct Image {
+  std::uint32_t width = 0, height = 0;
+  std::vector<std::uint8_t> pixels;
+  double covered = 0.;  // share of pixels that show something of the forest
+};
+
+struct Timing {
+  double draw = 0., resolve = 0.;  // milliseconds of one picture, all subframes
+};
+
+/// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
+void check(const Frame& frame, const Geometry& geometry);
+
+}  // namespace forest::frame

@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+// Laws that hold for every row of the table of formats; a new format meets all of them by being a row.
+#include "forest/io/format.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/random.h"
+#include "forest/io/swc.h"
+#include "forest/morphology/measure.h"
+#include "forest/morphology/validate.h"
+
+#include "tests/zoo.h"
+
+namespace forest::io {
+namespace {
+
+class EveryFormat : public testing::TestWithParam<Format> {};
+
+/// Reads whatever is in `bytes`. A value must be one that can be used; an error must name the file and say something.
+bool reads(const Format& format, std::string_view bytes) {
+  try {
+    const ReadResult result = format.read(bytes, "cell");
+    const Morphology& m = result.morphology;
+    for (std::size_t i = 0; i < m.sections().size(); ++i) {
+      const Section& section = m.sections()[i];
+      if (section.parent.valid() && section.parent.value() >= i)
+        ADD_FAILURE() << "a child precedes its parent";
+    }
+    EXPECT_GE(total_length(m), 0.);
+    (void)validate(m);
+    for (const Warning& warning : result.warnings)
+      EXPECT_FALSE(warning.code.empty() || warning.sentence.empty());
+    EXPECT_TRUE(std::ranges::is_sorted(result.warnings, {}, &Warning::line));
+    if (format.write) {
+      const std::string written = format.write(m);
+      EXPECT_EQ(format.write(format.read(written, "again").morphology), written);
+    }
+    return true;
+  } catch (const InputError& error) {
+    EXPECT_EQ(error.file(), "cell");
+    EXPECT_GT(error.sentence().size(), 10u);
+    return false;
+  }
+}
+
+void expect_same_neuron(const Morphology& read, const Morphology& written) {
+  ASSERT_EQ(read.sections().size(), written.sections().size());
+  for (std::size_t i = 0; i < read.sections().size(); ++i) {
+    const Section &a = read.sections()[i], &b = written.sections()[i];
+    ASSERT_EQ(a.parent, b.parent);
+    ASSERT_EQ(a.kind, b.kind);
+    ASSERT_EQ(a.tag, b.tag);
+  }
+  EXPECT_NEAR(total_length(read), total_length(written), 1e-6 * total_length(written));
+  EXPECT_NEAR(total_area(read), total_area(written), 1e-6 * total_area(written));
+  EXPECT_NEAR(read.soma().area(), written.soma().area(), 1e-6 * written.soma().area());
+}
+
+TEST_P(EveryFormat, IsFoundByItsNameAndItsExtensions) {
+  const Format& format = GetParam();
+  EXPECT_EQ(find_format(format.name)->title, format.title);
+  for (const std::string_view extension : format.extensions)
+    EXPECT_EQ(format_of("a folder.swc/cell" + std::string(extension)).name, format.name);
+}
+
+TEST_P(EveryFormat, ReadsBackWhatItWrote) {
+  const Format& format = GetParam();
+  if (!format.write) GTEST_SKIP() << "is only read";
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    const std::string bytes = format.write(specimen.morphology);
+    const Morphology read = format.read(bytes, specimen.name).morphology;
+    expect_same_neuron(read, specimen.morphology);
+    EXPECT_EQ(format.write(specimen.morphology), bytes) << "writing is not deterministic";
+    EXPECT_EQ(format.write(read), bytes) << "written again, the bytes differ";
+  }
+}
+
+TEST_P(EveryFormat, AFileIsWrittenWholeAndReadBack) {
+  const Format& format = GetParam();
+  if (!format.write) GTEST_SKIP() << "is only read";
+  const auto folder =
+      std::filesystem::path(testing::TempDir()) / ("forest_format_" + std::string(format.name));
+  std::filesystem::create_directories(folder);
+  const auto path = folder / ("tree" + std::string(format.extensions[0]));
+  const Morphology tree = zoo_parts::binary_tree(3);
+  write(path, tree);
+  expect_same_neuron(read(path).morphology, tree);
+  EXPECT_EQ(std::distance(std::filesystem::directory_iterator(folder), {}), 1);
+  std::filesystem::remove_all(folder);
+}
+
+TEST_P(EveryFormat, CutAtAnyByteItIsAnErrorOrANeuron) {
+  const Format& format = GetParam();
+  if (!format.write) GTEST_SKIP() << "is only read";
+  for (const Specimen& specimen : zoo()) {
+    const std::string bytes = format.write(specimen.morphology);
+    if (bytes.size() > 3000) continue;
+    SCOPED_TRACE(specimen.name);
+    for (std::size_t size = 0; size < bytes.size(); ++size) reads(format, std::string(bytes, 0, size));
+  }
+}
+
+TEST_P(EveryFormat, WithAnyBytesChangedItIsAnErrorOrANeuron) {
+  const Format& format = GetParam();
+  if (!format.write) GTEST_SKIP() << "is only read";
+  constexpr std::string_view telling = "0123456789-+.eE#, \t\r\n\0\xff(){}<>\"n";
+  Random random(2024, 0, 5);
+  std::size_t read = 0, refused = 0;
+  for (const Specimen& specimen : zoo()) {
+    const std::string bytes = format.write(specimen.morphology);
+    if (bytes.size() > 20000) continue;
+    SCOPED_TRACE(specimen.name);
+    for (int trial = 0; trial < 150; ++trial) {
+      std::string changed = bytes;
+      for (std::uint32_t change = 0, changes = 1 + random.below(4); change < changes && !changed.empty();
+           ++change) {
+        const std::size_t at = random.below(std::uint32_t(changed.size()));
+        const char byte =
+            random.below(2) ? telling[random.below(std::uint32_t(telling.size()))] : char(random.below(256));
+        switch (random.below(4)) {
+          case 0:
+            changed.erase(at, 1 + random.below(8));
+            break;
+          case 1:
+            changed.insert(at, 1, byte);
+            break;
+          case 2:
+            changed.insert(at, changed.substr(random.below(std::uint32_t(changed.size())), random.below(60)));
+            break;
+          default:
+            changed[at] = byte;
+        }
+      }
+      ++(reads(format, changed) ? read : refused);
+    }
+  }
+  EXPECT_GT(read, 0u);
+  EXPECT_GT(refused, 0u);
+}
+
+TEST_P(EveryFormat, OddNumbersAnywhereAreAnErrorOrANeuron) {
+  const Format& format = GetParam();
+  if (!format.write) GTEST_SKIP() << "is only read";
+  const std::vector<std::string> odd{"nan",
+                                     "-nan",
+                                     "inf",
+                                     "-inf",
+                                     "1e999",
+                                     "-1e999",
+                                     "1e-999",
+                                     "99999999999999999999",
+                                     "-99999999999999999999",
+                                     "2147483647",
+                                     "2147483648",
+                                     "-2147483648",
+                                     "9223372036854775807",
+                                     "4294967295",
+                                     "18446744073709551616",
+                                     "1e38",
+                                     "3.5e38",
+                                     "-0",
+                                     "1e",
+                                     ".",
+                                     "-",
+                                     "+",
+                                     "",
+                                     std::string(5000, '9'),
+                                     "0." + std::string(5000, '0') + "1"};
+  for (const Specimen& specimen : zoo()) {
+    const std::string bytes = format.write(specimen.morphology);
+    if (bytes.size() > 400) continue;
+    SCOPED_TRACE(specimen.name);
+    const auto part_of_number = [](char c) { return (c >= '0' && c <= '9') || c == '-' || c == '.'; };
+    for (std::size_t begin = 0; begin < bytes.size();) {
+      std::size_t end = begin;
+      while (end < bytes.size() && part_of_number(bytes[end])) ++end;
+      if (end == begin) {
+        ++begin;
+        continue;
+      }
+      for (const std::string& number : odd)
+        reads(format, bytes.substr(0, begin) + number + bytes.substr(end));
+      begin = end;
+    }
+  }
+}
+
+TEST_P(EveryFormat, AnEmptyFileIsRefusedWithASentence) {
+  EXPECT_FALSE(reads(GetParam(), ""));
+  EXPECT_FALSE(reads(GetParam(), "\n"));
+  EXPECT_FALSE(reads(GetParam(), std::string(1000, '\0')));
+}
+
+/// Kept inputs of the fuzzer (fuzz/corpus/<format>): each once crashed a reader or leads far into one.
+TEST_P(EveryFormat, TheFuzzersCorpusIsReadOrRefused) {
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(
+           std::filesystem::path(FOREST_SOURCE_DIR "/fuzz/corpus") / GetParam().name)) {
+    SCOPED_TRACE(entry.path().filename().string());
+    reads(GetParam(), MappedFile(entry.path()).text());
+    ++files;
+  }
+  EXPECT_GT(files, 0u);
+}
+
+INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(formats().begin(), formats().end()),
+                         [](const auto& row) { return std::string(row.param.name); });
+
+TEST(Formats, HaveDifferentNamesAndExtensions) {
+  std::set<std::string_view> names, extensions;
+  for (const Format& format : formats()) {
+    EXPECT_TRUE(names.insert(format.name).second);
+    for (const std::string_view extension : format.extensions)
+      EXPECT_TRUE(extensions.insert(extension).second);
+  }
+}
+
+TEST(Formats, AnUnknownExtensionIsRefusedWithTheKnownOnes) {
+  EXPECT_EQ(find_format("wordstar"), nullptr);
+  EXPECT_EQ(format_of("CELL.SWC").name, "swc");
+  try {
+    format_of("cell.doc");
+    FAIL();
+  } catch (const InputError& error) {
+    EXPECT_NE(error.sentence().find(".swc"), std::string::npos);
+  }
+}
+
+TEST(Zoo, IsWhatItsLabelsSay) {
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    const Morphology& m = specimen.morphology;
+    EXPECT_EQ(m.sections().size(), specimen.sections);
+    std::size_t tips = 0;
+    for (std::size_t i = 0; i < m.sections().size(); ++i) tips += m.is_terminal(SectionId(i));
+    EXPECT_EQ(tips, specimen.tips);
+    if (specimen.length) {
+      EXPECT_NEAR(total_length(m), *specimen.length, 1e-9 * *specimen.length);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace forest::io

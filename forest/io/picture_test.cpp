@@ -1,0 +1,65 @@
+// SPDX-License-Identifier: Apache-2.0
+#include <filesystem>
+#include <unistd.h>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/random.h"
+#include "forest/io/film.h"
+#include "forest/io/png.h"
+
+namespace forest::io {
+namespace {
+
+std::filesystem::path folder() {
+  const auto path =
+      std::filesystem::temp_directory_path() / ("forest_picture_test_" + std::to_string(::getpid()));
+  std::filesystem::create_directories(path);
+  return path;
+}
+
+TEST(Png, IsReadBackPixelForPixel) {
+  Random random(1);
+  std::vector<std::uint8_t> pixels(33 * 17 * 4);
+  for (auto& p : pixels) p = std::uint8_t(random());
+  write_png(folder() / "a.png", 33, 17, pixels);
+  const Picture back = read_png(folder() / "a.png");
+  EXPECT_EQ(back.width, 33u);
+  EXPECT_EQ(back.pixels, pixels);
+  const std::string whole(MappedFile(folder() / "a.png").text());
+  for (std::size_t size = 0; size < whole.size(); size += 7) {
+    write_file(folder() / "b.png", whole.substr(0, size));
+    try {
+      read_png(folder() / "b.png");  // an error or a value, never a crash
+    } catch (const InputError&) {
+    }
+  }
+  EXPECT_THROW(write_png("/nowhere/a.png", 33, 17, pixels), Error);
+  EXPECT_THROW(write_png(folder() / "c.png", 34, 17, pixels), Error);
+}
+
+TEST(Film, IsAFileOnlyWhenFinishedAndTheSameEachTime) {
+  const auto make = [](const std::filesystem::path& path, bool finish) {
+    Film film(path, 64, 48, 25);
+    std::vector<std::uint8_t> pixels(64 * 48 * 4);
+    for (int f = 0; f < 12; ++f) {
+      for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = std::uint8_t(i * 3 + std::size_t(f) * 5);
+      film.add(pixels);
+    }
+    if (finish) film.finish();
+  };
+  make(folder() / "unfinished.mp4", false);
+  EXPECT_FALSE(std::filesystem::exists(folder() / "unfinished.mp4"));
+  EXPECT_FALSE(std::filesystem::exists(folder() / "unfinished.mp4.part"));
+  make(folder() / "one.mp4", true);
+  make(folder() / "two.mp4", true);
+  EXPECT_GT(std::filesystem::file_size(folder() / "one.mp4"), 500u);
+  EXPECT_EQ(MappedFile(folder() / "one.mp4").text(), MappedFile(folder() / "two.mp4").text());
+  EXPECT_THROW(Film(folder() / "odd.mp4", 63, 48, 25), Error);
+  EXPECT_THROW(Film("/nowhere/a.mp4", 64, 48, 25), Error);
+}
+
+}  // namespace
+}  // namespace forest::io

@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// An OpenGL 4.5 core context without a window (EGL, surfaceless), on a graphics card or on Mesa's llvmpipe.
+#pragma once
+
+#include <memory>
+
+namespace forest::render {
+
+/// Current on the thread that made it, for as long as it lives. Throws Error, with what to install, when there is none.
+class OffscreenContext {
+ public:
+  OffscreenContext();
+  ~OffscreenContext();
+
+ private:
+  struct Handles;
+  std::unique_ptr<Handles> handles_;
+};
+
+}  // namespace forest::render

@@ -1,0 +1,347 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/render/opengl/opengl_renderer.h"
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <cstring>
+
+#include <epoxy/gl.h>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/render/opengl/shaders.h"
+
+namespace forest::render {
+namespace {
+
+using frame::Constants;
+using frame::Item;
+using frame::Segment;
+
+// A buffer on the device that grows and never shrinks.
+class Buffer {
+ public:
+  Buffer() { glCreateBuffers(1, &name_); }
+  ~Buffer() { glDeleteBuffers(1, &name_); }
+  Buffer(const Buffer&) = delete;
+  Buffer& operator=(const Buffer&) = delete;
+
+  void reserve(std::size_t bytes) {
+    if (bytes <= size_) return;
+    size_ = bytes;
+    glNamedBufferData(name_, GLsizeiptr(bytes), nullptr, GL_DYNAMIC_DRAW);
+  }
+  template <class T>
+  void upload(std::span<const T> values) {
+    reserve(std::max<std::size_t>(values.size_bytes(), 16));
+    if (!values.empty()) glNamedBufferSubData(name_, 0, GLsizeiptr(values.size_bytes()), values.data());
+  }
+  void bind(GLuint slot) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, slot, name_); }
+  GLuint name() const { return name_; }
+
+ private:
+  GLuint name_ = 0;
+  std::size_t size_ = 0;
+};
+
+class Program {
+ public:
+  Program(const char* title, const char* body, const char* before = "") {
+    const GLuint shader = glCreateShader(GL_COMPUTE_SHADER);
+    const char* texts[] = {"#version 450 core\n", shaders::layout, shaders::common, before, body};
+    glShaderSource(shader, 5, texts, nullptr);
+    glCompileShader(shader);
+    name_ = glCreateProgram();
+    glAttachShader(name_, shader);
+    glLinkProgram(name_);
+    glDeleteShader(shader);
+    GLint good = 0;
+    glGetProgramiv(name_, GL_LINK_STATUS, &good);
+    if (good) return;
+    char log[4096] = "";
+    glGetShaderInfoLog(shader, sizeof log, nullptr, log);
+    if (!log[0]) glGetProgramInfoLog(name_, sizeof log, nullptr, log);
+    throw Error(fmt::format("the shader '{}' was not accepted by this OpenGL driver ({}): {}", title,
+                            reinterpret_cast<const char*>(glGetString(GL_RENDERER)), log));
+  }
+  ~Program() { glDeleteProgram(name_); }
+  Program(const Program&) = delete;
+  Program& operator=(const Program&) = delete;
+
+  void use() const { glUseProgram(name_); }
+
+ private:
+  GLuint name_ = 0;
+};
+
+// The 2, 3 sequence of Halton: where in the pixel the subframe is sampled.
+float halton(unsigned index, unsigned base) {
+  float result = 0.f, share = 1.f;
+  for (unsigned i = index + 1; i; i /= base) share /= float(base), result += share * float(i % base);
+  return result;
+}
+
+std::uint32_t half_pair(float a, float b) {
+  const auto half = [](float value) {
+    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
+  };
+  return half(a) | half(b) << 16;
+}
+
+Constants constants_of(const frame::Frame& f) {
+  const Mat3 axes = f.camera.axes();
+  const Vec3 right = axes.col(0), up = axes.col(1), forward = -axes.col(2), eye = f.camera.eye;
+  const Vec3 light = Vec3(-.35f, .75f, -.55f).normalized();
+  const frame::Style& s = f.style;
+  Constants c{};
+  c.eye_x = eye.x(), c.eye_y = eye.y(), c.eye_z = eye.z(), c.focal = f.camera.focal(float(f.height));
+  c.right_x = right.x(), c.right_y = right.y(), c.right_z = right.z();
+  c.up_x = up.x(), c.up_y = up.y(), c.up_z = up.z();
+  c.forward_x = forward.x(), c.forward_y = forward.y(), c.forward_z = forward.z(), c.near = f.camera.near;
+  c.width = f.width, c.height = f.height, c.subframes = f.subframes;
+  c.light_x = light.x(), c.light_y = light.y(), c.light_z = light.z(), c.halo = s.halo;
+  c.fog_red = s.fog_colour.x(), c.fog_green = s.fog_colour.y(), c.fog_blue = s.fog_colour.z(),
+  c.fog_start = s.fog_start;
+  c.top_red = s.background_top.x(), c.top_green = s.background_top.y(), c.top_blue = s.background_top.z();
+  c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(),
+  c.bottom_blue = s.background_bottom.z();
+  c.fog_length = s.fog_length, c.exposure = s.exposure;
+  return c;
+}
+
+double milliseconds_since(std::chrono::steady_clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
+}
+
+}  // namespace
+
+struct OpenGLRenderer::Device {
+  struct List {
+    const Program* program;
+    std::uint32_t flags;
+    Buffer items;
+    std::uint32_t count = 0;
+  };
+  enum { capsule_list, dot_list, line_list, overlay_list, list_count };
+  static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
+
+  Program dots{"dots", shaders::dots}, lines{"lines", shaders::lines},
+      capsules{"capsules", shaders::capsules, shaders::capsule},
+      close_ups{"close_ups", shaders::close_ups, shaders::capsule}, cull{"cull", shaders::cull},
+      tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
+  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
+      large_queue, tiles;
+  std::array<List, list_count> lists{
+      {{&capsules, 0, {}}, {&dots, FOREST_DOTS, {}}, {&lines, 0, {}}, {&capsules, FOREST_OVERLAY, {}}}};
+  frame::Geometry geometry;
+  Constants constants{};
+  std::uint32_t width = 0, height = 0;
+  GLuint texture = 0, framebuffer = 0;
+  std::uint32_t texture_width = 0, texture_height = 0;
+
+  void upload(const frame::Frame& f) {
+    const auto set = [](List& list, std::span<const Item> items) {
+      list.items.upload(items);
+      list.count = std::uint32_t(items.size());
+    };
+    set(lists[capsule_list], f.capsules);
+    set(lists[dot_list], f.dots);
+    set(lists[line_list], f.lines);
+
+    std::vector<Segment> marks;
+    std::vector<Item> mark_items;
+    for (const frame::Overlay& o : f.overlays)
+      marks.push_back({o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius), o.b.x(), o.b.y(), o.b.z(),
+                       o.colour << 16});
+    for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
+      mark_items.push_back({0, std::uint32_t(i),
+                            std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
+                            0, 0, 0});
+    overlay_segments.upload(std::span<const Segment>(marks));
+    set(lists[overlay_list], mark_items);
+
+    std::vector<std::uint32_t> classes((f.colour_class.size() + 3) / 4);
+    if (!classes.empty()) std::memcpy(classes.data(), f.colour_class.data(), f.colour_class.size());
+    colour_classes.upload(std::span<const std::uint32_t>(classes));
+    std::array<float, 3 * std::tuple_size_v<frame::Palette>> colours;
+    for (std::size_t i = 0; i < f.palette.size(); ++i) Vec3::Map(&colours[3 * i]) = f.palette[i];
+    palette.upload(std::span<const float>(colours));
+  }
+
+  void prepare(const frame::Frame& f) {
+    width = f.width, height = f.height;
+    const std::size_t pixels = std::size_t(width) * height;
+    keys.reserve(pixels * 4);
+    image.reserve(pixels * 4);
+    sums.reserve(f.subframes > 1 ? pixels * 16 : 16);
+    tiles.reserve((pixels / 32 + width + height + 64) * 4);
+    std::size_t longest = 0;
+    for (const List& list : lists) longest = std::max<std::size_t>(longest, list.count);
+    queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
+    large_queue.reserve(16 + 4 * std::size_t(large_capacity));
+    instances.bind(1);
+    keys.bind(3);
+    colour_classes.bind(4);
+    palette.bind(5);
+    sums.bind(6);
+    image.bind(7);
+    queue.bind(8);
+    large_queue.bind(9);
+    tiles.bind(10);
+  }
+
+  void set_constants() {
+    uniforms.upload(std::span<const Constants>(&constants, 1));
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms.name());
+  }
+
+  // Draws the items [first, last) of a list that earlier bands do not hide.
+  void draw(const List& list, std::uint32_t first, std::uint32_t last, bool first_band) {
+    if (first >= last) return;
+    const std::uint32_t nothing[4] = {0, 1, 1, 0};
+    glNamedBufferSubData(queue.name(), 0, sizeof nothing, nothing);
+    glNamedBufferSubData(large_queue.name(), 0, sizeof nothing, nothing);
+    constants.first_item = first;
+    constants.item_count = last - first;
+    constants.flags = list.flags | (first_band ? FOREST_FIRST_BAND : 0);
+    set_constants();
+    list.items.bind(2);
+    (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind(0);
+    cull.use();
+    glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
+    run_queue(*list.program, queue);
+    if (list.program == &capsules) run_queue(close_ups, large_queue);
+  }
+
+  void run_queue(const Program& program, const Buffer& groups) {
+    glMemoryBarrier(GL_COMMAND_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    program.use();
+    glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups.name());
+    glDispatchComputeIndirect(0);
+  }
+
+  void find_tiles() {
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    tile.use();
+    std::uint32_t count =
+        ((width + FOREST_TILE - 1) / FOREST_TILE) * ((height + FOREST_TILE - 1) / FOREST_TILE);
+    for (const std::uint32_t flags : {0u, FOREST_COARSE}) {
+      constants.flags = flags;
+      set_constants();
+      glDispatchCompute((count + 63) / 64, 1, 1);
+      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    }
+  }
+
+  void draw_bands(std::span<const frame::Band> bands) {
+    frame::Band from;
+    for (const frame::Band& to : bands) {
+      const bool first = &to == &bands.front();
+      if (!first) find_tiles();
+      draw(lists[capsule_list], from.capsules, to.capsules, first);
+      draw(lists[dot_list], from.dots, to.dots, first);
+      draw(lists[line_list], from.lines, to.lines, first);
+      from = to;
+    }
+    draw(lists[overlay_list], 0, lists[overlay_list].count, true);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+  }
+
+  void draw_texture() {
+    if (!texture || texture_width != width || texture_height != height) {
+      glDeleteTextures(1, &texture);
+      glCreateTextures(GL_TEXTURE_2D, 1, &texture);
+      glTextureStorage2D(texture, 1, GL_RGBA8, GLsizei(width), GLsizei(height));
+      if (!framebuffer) glCreateFramebuffers(1, &framebuffer);
+      glNamedFramebufferTexture(framebuffer, GL_COLOR_ATTACHMENT0, texture, 0);
+      texture_width = width, texture_height = height;
+    }
+    glMemoryBarrier(GL_PIXEL_BUFFER_BARRIER_BIT);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, image.name());
+    glPixelStorei(GL_UNPACK_ALIGNMENT, 4);
+    glTextureSubImage2D(texture, 0, 0, 0, GLsizei(width), GLsizei(height), GL_RGBA, GL_UNSIGNED_BYTE,
+                        nullptr);
+    glBindBuffer(GL_PIXEL_UNPACK_BUFFER, 0);
+  }
+};
+
+OpenGLRenderer::OpenGLRenderer() {
+  if (epoxy_gl_version() < 45)
+    throw Error(fmt::format(
+        "OpenGL 4.5 is needed and this driver has {}.{}; install a newer driver or use Mesa's llvmpipe",
+        epoxy_gl_version() / 10, epoxy_gl_version() % 10));
+  device_ = std::make_unique<Device>();
+}
+
+OpenGLRenderer::~OpenGLRenderer() {
+  glDeleteTextures(1, &device_->texture);
+  glDeleteFramebuffers(1, &device_->framebuffer);
+}
+
+std::string OpenGLRenderer::name() const { return reinterpret_cast<const char*>(glGetString(GL_RENDERER)); }
+
+void OpenGLRenderer::load(const frame::Geometry& geometry) {
+  device_->geometry = geometry;
+  device_->segments.upload(geometry.segments);
+  device_->instances.upload(geometry.instances);
+}
+
+frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
+  Device& d = *device_;
+  frame::check(f, d.geometry);
+  d.upload(f);
+  d.prepare(f);
+  const frame::Band whole{std::uint32_t(f.dots.size()), std::uint32_t(f.lines.size()),
+                          std::uint32_t(f.capsules.size())};
+  const std::span<const frame::Band> bands = f.bands.empty() ? std::span(&whole, 1) : f.bands;
+
+  frame::Timing timing;
+  d.constants = constants_of(f);
+  for (std::uint32_t subframe = 0; subframe < f.subframes; ++subframe) {
+    auto start = std::chrono::steady_clock::now();
+    const bool still = f.subframes == 1;
+    d.constants.subframe = subframe;
+    d.constants.centre_x = .5f * float(f.width) + (still ? 0.f : halton(subframe, 2) - .5f);
+    d.constants.centre_y = .5f * float(f.height) + (still ? 0.f : halton(subframe, 3) - .5f);
+    const std::uint32_t empty = FOREST_KEY_EMPTY;
+    glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4),
+                              GL_RED_INTEGER, GL_UNSIGNED_INT, &empty);
+    d.draw_bands(bands);
+    glFinish();
+    timing.draw += milliseconds_since(start);
+    start = std::chrono::steady_clock::now();
+    d.resolve.use();
+    glDispatchCompute((f.width + 63) / 64, f.height, 1);
+    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
+    glFinish();
+    timing.resolve += milliseconds_since(start);
+  }
+  if (const GLenum error = glGetError())
+    throw Error(
+        fmt::format("OpenGL reports error 0x{:x} after drawing; there may be too little memory", error));
+  return timing;
+}
+
+frame::Image OpenGLRenderer::read() {
+  const Device& d = *device_;
+  frame::Image image{d.width, d.height, std::vector<std::uint8_t>(std::size_t(d.width) * d.height * 4)};
+  glGetNamedBufferSubData(d.image.name(), 0, GLsizeiptr(image.pixels.size()), image.pixels.data());
+  double covered = 0.;
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
+    covered += image.pixels[i];
+    image.pixels[i] = 255;
+  }
+  image.covered = covered / 255. / double(std::max<std::size_t>(1, image.pixels.size() / 4));
+  return image;
+}
+
+void OpenGLRenderer::show(unsigned target) {
+  Device& d = *device_;
+  if (!d.width) return;
+  d.draw_texture();
+  const GLint w = GLint(d.width), h = GLint(d.height);
+  glBlitNamedFramebuffer(d.framebuffer, target, 0, 0, w, h, 0, h, w, 0, GL_COLOR_BUFFER_BIT, GL_NEAREST);
+}
+
+}  // namespace forest::render

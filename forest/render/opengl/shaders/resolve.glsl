@@ -1,0 +1,58 @@
+// From keys to colour: palette × shade, a dark rim where something nearer stands beside (after eye-dome lighting,
+// Boucheny 2009), fog, the mean over subframes, sRGB.
+
+layout(local_size_x = 64) in;
+
+layout(std430, binding = 5) readonly buffer PaletteBuffer { float palette[]; };  // three floats an entry, linear
+layout(std430, binding = 6) buffer Sums { float sums[]; };               // four floats a pixel
+layout(std430, binding = 7) writeonly buffer Output { uint image[]; };
+
+float depth_at(int x, int y) {
+  x = clamp(x, 0, int(view.width) - 1);
+  y = clamp(y, 0, int(view.height) - 1);
+  return float(keys[uint(y) * view.width + uint(x)] >> 12) / FOREST_DEPTH_STEPS;  // octaves
+}
+
+float srgb(float c) {
+  c = clamp(c, 0.0, 1.0);
+  return c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055;
+}
+
+void main() {
+  uint x = gl_GlobalInvocationID.x, y = gl_GlobalInvocationID.y;
+  if (x >= view.width) return;
+  uint at = y * view.width + x;
+  uint key = keys[at];
+  vec3 colour = mix(vec3(view.top_red, view.top_green, view.top_blue),
+                    vec3(view.bottom_red, view.bottom_green, view.bottom_blue), (float(y) + 0.5) / float(view.height));
+  float covered = 0.0;
+  if (key != FOREST_KEY_EMPTY) {
+    covered = 1.0;
+    uint entry = (key >> 5) & 127u;
+    float shade = float(key & 31u) / 31.0;
+    float octave = float(key >> 12) / FOREST_DEPTH_STEPS, z = exp2(octave - FOREST_DEPTH_BASE);
+    int ix = int(x), iy = int(y);
+    float rim = 0.0;
+    if (view.halo > 0.0) {
+      const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1), ivec2(2, 2), ivec2(-2, 2), ivec2(2, -2), ivec2(-2, -2));
+      for (int i = 0; i < 8; ++i) rim += clamp((octave - depth_at(ix + ring[i].x, iy + ring[i].y)) * 40.0, 0.0, 1.0);
+      rim *= view.halo / 8.0;
+    }
+    vec3 base = vec3(palette[entry * 3u], palette[entry * 3u + 1u], palette[entry * 3u + 2u]);
+    float fog = 1.0 - exp(-max(0.0, z - view.fog_start) / view.fog_length);
+    colour = mix(base * (0.12 + 0.95 * shade * shade) * exp(-1.4 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
+  }
+  vec4 sum = vec4(colour, covered);
+  if (view.subframe > 0u) sum += vec4(sums[at * 4u], sums[at * 4u + 1u], sums[at * 4u + 2u], sums[at * 4u + 3u]);
+  if (view.subframe + 1u < view.subframes) {
+    sums[at * 4u] = sum.x;
+    sums[at * 4u + 1u] = sum.y;
+    sums[at * 4u + 2u] = sum.z;
+    sums[at * 4u + 3u] = sum.w;
+    return;
+  }
+  sum /= float(view.subframes);
+  vec3 c = sum.xyz * view.exposure;
+  uvec3 b = uvec3(255.0 * vec3(srgb(c.x), srgb(c.y), srgb(c.z)) + 0.5);
+  image[at] = b.x | (b.y << 8) | (b.z << 16) | (uint(255.0 * sum.w + 0.5) << 24);
+}

@@ -1,0 +1,23 @@
+// SPDX-License-Identifier: Apache-2.0
+// The seam between pictures as data and pictures as pixels.
+#pragma once
+
+#include "forest/frame/frame.h"
+
+namespace forest::render {
+
+class Renderer {
+ public:
+  virtual ~Renderer() = default;
+
+  /// Takes the geometry that the following frames speak of.
+  virtual void load(const frame::Geometry& geometry) = 0;
+  /// Draws; throws Error when the frame violates its contract (frame::check) or the device fails.
+  virtual frame::Timing draw(const frame::Frame& frame) = 0;
+  /// The pixels of the last frame.
+  virtual frame::Image read() = 0;
+  /// Who draws, for people ("llvmpipe (LLVM 15.0.6, 256 bits)").
+  virtual std::string name() const = 0;
+};
+
+}  // namespace forest::render

@@ -1,0 +1,416 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cluster tree follows the idea of hierarchical clusters with locked borders (Karis et al. 2021, "Nanite: a deep
+// dive", and meshoptimizer's clusterlod) carried over from triangles to branches.
+#include "forest/scene/cluster.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+
+#include "forest/geometry/polyline.h"
+#include "forest/morphology/measure.h"
+
+namespace forest::scene {
+namespace {
+
+constexpr std::size_t limit = frame::cluster_size;
+constexpr float first_tolerance = .05f;  // µm
+constexpr float tolerance_step = 1.3f;
+constexpr float widest = 3.f;  // a coarse segment is at most this many times as thick as the original
+
+// A run of vertices of one section, or of several joined end to end where nothing else leaves.
+struct Strip {
+  std::vector<Vec4> vertices;  // x, y, z, radius
+  std::uint32_t kind = 0, rank = 0;
+  std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
+  bool dropped = false;
+
+  float length() const {
+    float sum = 0.f;
+    for (std::size_t i = 1; i < vertices.size(); ++i) sum += (vertices[i] - vertices[i - 1]).head<3>().norm();
+    return sum;
+  }
+  float area() const {
+    float sum = 0.f;
+    for (std::size_t i = 1; i < vertices.size(); ++i)
+      sum += (vertices[i] - vertices[i - 1]).head<3>().norm() * (vertices[i].w() + vertices[i - 1].w());
+    return sum;
+  }
+};
+
+std::size_t segment_count(const std::vector<Strip>& strips) {
+  std::size_t count = 0;
+  for (const Strip& s : strips) count += s.vertices.size() - 1;
+  return count;
+}
+
+// A cluster while it is made: its strips and the sphere around all original points below it.
+struct Draft {
+  std::vector<Strip> strips;
+  Sphere sphere;
+  float error = 0.f;
+  std::uint32_t leaf_first = 0, leaf_count = 0;  // original segments
+  std::size_t first_leaf = 0, last_leaf = 0;     // leaf drafts below, [first, last)
+  std::int64_t children[2] = {-1, -1};
+};
+
+Sphere around(const Sphere& a, const Sphere& b) {
+  const Vec3 between = b.centre - a.centre;
+  const float distance = between.norm();
+  if (distance + b.radius <= a.radius) return a;
+  if (distance + a.radius <= b.radius) return b;
+  const float radius = .5f * (distance + a.radius + b.radius);
+  return {a.centre + between * ((radius - a.radius) / distance), radius};
+}
+
+Sphere around(const std::vector<Strip>& strips) {
+  Bounds bounds;
+  for (const Strip& s : strips)
+    for (const Vec4& v : s.vertices) bounds.add(v.head<3>());
+  Sphere sphere{bounds.centre(), 0.f};
+  for (const Strip& s : strips)
+    for (const Vec4& v : s.vertices)
+      sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
+  return sphere;
+}
+
+// Joins strips that follow one another through a node at which nothing else begins or ends, neither among them nor
+// outside: `outside_degree` counts, for every node of the neuron, the strips of other drafts that touch it.
+void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_degree) {
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> begins, ends;  // node, strip
+  for (std::uint32_t i = 0; i < strips.size(); ++i) {
+    begins.emplace_back(strips[i].begin, i);
+    ends.emplace_back(strips[i].end, i);
+  }
+  std::ranges::sort(begins);
+  std::ranges::sort(ends);
+  const auto only = [](const auto& list, std::uint32_t node) -> std::int64_t {
+    const auto [low, high] =
+        std::ranges::equal_range(list, node, {}, &std::pair<std::uint32_t, std::uint32_t>::first);
+    return high - low == 1 ? std::int64_t(low->second) : -1;
+  };
+  std::vector<std::uint32_t> into(strips.size());  // the strip that swallowed this one
+  std::iota(into.begin(), into.end(), 0u);
+  for (std::uint32_t i = 0; i < strips.size(); ++i) {
+    Strip& next = strips[i];
+    const std::int64_t before = only(ends, next.begin);
+    if (outside_degree[next.begin] || before < 0 || only(begins, next.begin) != std::int64_t(i)) continue;
+    std::uint32_t head = std::uint32_t(before);
+    while (into[head] != head) head = into[head];
+    Strip& previous = strips[head];
+    if (head == i || previous.end != next.begin || previous.kind != next.kind) continue;
+    previous.vertices.insert(previous.vertices.end(), next.vertices.begin() + 1, next.vertices.end());
+    previous.end = next.end;
+    previous.rank = std::min(previous.rank, next.rank);
+    next.dropped = true;
+    into[i] = head;
+  }
+  std::erase_if(strips, [](const Strip& s) { return s.dropped; });
+}
+
+// One coarser version of `strips` within `tolerance` of them.
+std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::uint32_t>& outside_degree,
+                             float tolerance) {
+  // Tips first: a strip that nothing follows, within the draft or outside, and that reaches no further than the
+  // tolerance, whatever was dropped at its end before included.
+  const auto area_of = [](float sum, const Strip& s) { return sum + s.area(); };
+  const float before = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
+  std::map<std::uint32_t, float> dropped_reach;  // at a node
+  for (bool again = true; again && strips.size() > 1;) {
+    std::vector<std::uint32_t> begun;
+    for (const Strip& s : strips) begun.push_back(s.begin);
+    std::ranges::sort(begun);
+    for (Strip& s : strips) {
+      if (s.kind == 1 || outside_degree[s.end] || std::ranges::binary_search(begun, s.end)) continue;
+      const Vec3 start = s.vertices.front().head<3>();
+      const auto below = dropped_reach.find(s.end);
+      float reach =
+          below == dropped_reach.end() ? 0.f : below->second + (s.vertices.back().head<3>() - start).norm();
+      for (const Vec4& v : s.vertices) reach = std::max(reach, (v.head<3>() - start).norm());
+      if (!(s.dropped = reach <= tolerance)) continue;
+      float& here = dropped_reach[s.begin];
+      here = std::max(here, reach);
+    }
+    if (std::ranges::all_of(strips, [](const Strip& s) { return s.dropped; })) strips.front().dropped = false;
+    again = std::erase_if(strips, [](const Strip& s) { return s.dropped; }) > 0;
+    if (again) join(strips, outside_degree);
+  }
+  for (Strip& s : strips) {
+    const auto kept = simplify(s.vertices, tolerance);
+    std::vector<Vec4> vertices;
+    for (const std::uint32_t i : kept) vertices.push_back(s.vertices[i]);
+    s.vertices = std::move(vertices);
+  }
+  const float after = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
+  const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
+  for (Strip& s : strips)
+    if (s.kind != 1)
+      for (Vec4& v : s.vertices) v.w() = std::min(v.w() * widening, v.w() + tolerance);
+  return strips;
+}
+
+// `outside_degree`: of what lies outside both drafts.
+Draft parent_of(const Draft& a, const Draft& b, const std::vector<std::uint32_t>& outside_degree) {
+  Draft parent;
+  parent.strips = a.strips;
+  parent.strips.insert(parent.strips.end(), b.strips.begin(), b.strips.end());
+  parent.sphere = around(a.sphere, b.sphere);
+  parent.leaf_first = a.leaf_first;
+  parent.leaf_count = a.leaf_count + b.leaf_count;
+  parent.first_leaf = a.first_leaf;
+  parent.last_leaf = b.last_leaf;
+  join(parent.strips, outside_degree);
+  for (float tolerance = std::max(first_tolerance, .5f * std::max(a.error, b.error));
+       segment_count(parent.strips) > limit; tolerance *= tolerance_step) {
+    std::vector<Strip> candidate = coarsened(parent.strips, outside_degree, tolerance);
+    if (segment_count(candidate) > limit) continue;
+    parent.strips = std::move(candidate);
+  }
+  return parent;
+}
+
+// The greatest distance of an original point below to what is drawn instead of it. Measured, since the sum of the
+// tolerances of all levels would be several times too large.
+float measured_error(const std::vector<Strip>& strips, std::span<const Draft> leaves) {
+  float worst = 0.f;
+  for (const Draft& leaf : leaves)
+    for (const Strip& original : leaf.strips)
+      for (const Vec4& v : original.vertices) {
+        const Vec3 point = v.head<3>();
+        float nearest = INFINITY;
+        for (const Strip& s : strips)
+          for (std::size_t i = 1; i < s.vertices.size() && nearest > worst; ++i)
+            nearest = std::min(
+                nearest, distance_to_segment(point, s.vertices[i - 1].head<3>(), s.vertices[i].head<3>()));
+        worst = std::max(worst, nearest);
+      }
+  return worst;
+}
+
+std::uint32_t half_pair(float a, float b) {
+  const auto half = [](float value) {
+    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
+  };
+  return half(a) | half(b) << 16;
+}
+
+// What a cluster says of the segments it draws.
+struct Drawn {
+  float thickness = 0.f;
+  std::uint32_t lowest_rank = 255;
+};
+
+Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
+  Drawn drawn;
+  for (const Strip& s : strips)
+    for (std::size_t i = 1; i < s.vertices.size(); ++i) {
+      const Vec4 &a = s.vertices[i - 1], &b = s.vertices[i];
+      out.push_back(
+          {a.x(), a.y(), a.z(), half_pair(a.w(), b.w()), b.x(), b.y(), b.z(), s.kind | s.rank << 8});
+      if (a != b)
+        drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
+      if (a != b) drawn.lowest_rank = std::min(drawn.lowest_rank, s.rank);
+    }
+  return drawn;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
+  const std::size_t count = m.sections().size();
+  std::vector<double> below(count);  // longest path from the start of the section to a tip
+  for (std::size_t i = count; i-- > 0;) {
+    const SectionId id(i);
+    double longest = 0.;
+    for (const SectionId child : m.children(id)) longest = std::max(longest, below[child.value()]);
+    below[i] = section_length(m, id) + longest;
+  }
+  // Every section that does not continue its parent's longest path begins a branch of its own.
+  std::vector<std::uint32_t> starts, branch_start(count), numbers(count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const SectionId parent = m.sections()[i].parent;
+    bool continues = false;
+    if (parent.valid()) {
+      const auto siblings = m.children(parent);
+      const auto longest =
+          std::ranges::max_element(siblings, {}, [&](SectionId s) { return below[s.value()]; });
+      continues = longest->value() == i;
+    }
+    branch_start[i] = continues ? branch_start[parent.value()] : std::uint32_t(i);
+    if (!continues) starts.push_back(std::uint32_t(i));
+  }
+  std::ranges::stable_sort(starts, [&](std::uint32_t a, std::uint32_t b) { return below[a] > below[b]; });
+  std::vector<std::uint32_t> number_of(count);
+  for (std::uint32_t n = 0; n < starts.size(); ++n) number_of[starts[n]] = n;
+  for (std::size_t i = 0; i < count; ++i) numbers[i] = number_of[branch_start[i]];
+  return numbers;
+}
+
+ClusterTree build_clusters(const Morphology& m) {
+  const std::size_t sections = m.sections().size();
+  const Point soma = m.soma().sphere();
+  Vec3 origin = soma.position();
+  if (m.soma().kind == SomaKind::none && !m.points().empty()) origin = m.points()[0].position();
+  const auto vertex = [&](const Point& p) {
+    return Vec4(p.x - origin.x(), p.y - origin.y(), p.z - origin.z(), p.radius);
+  };
+
+  ClusterTree tree;
+  tree.soma_radius = soma.radius;
+
+  // Ranks: the share of the neuron's length that lies in branches of smaller number.
+  const std::vector<std::uint32_t> numbers = branch_numbers(m);
+  std::vector<double> lengths(sections + 1);
+  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += section_length(m, SectionId(i));
+  std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
+  const double total = std::max(lengths.back(), 1e-9);
+  const auto rank_of = [&](std::size_t i) {
+    return std::uint32_t(std::min(255., 256. * lengths[numbers[i]] / total));
+  };
+
+  // Depth first, the longest path first, so that a run of segments follows a branch. Node 0 is the soma, node s + 1
+  // the end of section s; nodes beyond are where a run is cut inside a section.
+  std::vector<Strip> runs;
+  if (soma.radius > 0.f) {
+    const Vec4 centre(soma.x - origin.x(), soma.y - origin.y(), soma.z - origin.z(), soma.radius);
+    runs.push_back({.vertices = {centre, centre}, .kind = 1, .rank = 0, .begin = 0, .end = 0});
+    tree.section.push_back(soma_section);
+  }
+  std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
+  std::vector<std::uint32_t> run_section(runs.size(), soma_section);
+  while (!open.empty()) {
+    const SectionId id = open.back();
+    open.pop_back();
+    const auto points = m.points(id);
+    const Section& section = m.section(id);
+    Strip strip{.vertices = {},
+                .kind = std::uint32_t(section.kind),
+                .rank = rank_of(id.value()),
+                .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
+                .end = id.value() + 1};
+    for (const Point& p : points) strip.vertices.push_back(vertex(p));
+    if (!section.parent.valid() && soma.radius > 0.f) {
+      // A cone from inside the soma to the stem, when it begins near enough to belong there.
+      const Vec4 first = strip.vertices.front();
+      const float gap = first.head<3>().norm();
+      if (gap > 0.f && gap < 6.f * soma.radius) {
+        const float inside = std::max(.3f * soma.radius, 0.f);
+        const Vec3 direction = first.head<3>() / gap;
+        const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
+        Strip cone{.vertices = {}, .kind = 1, .rank = 0, .begin = 0, .end = 0};
+        Vec4 start;
+        start << direction * inside, width;
+        cone.vertices = {start, first};
+        if (gap > inside) {
+          runs.push_back(std::move(cone));
+          run_section.push_back(soma_section);
+        }
+      }
+    }
+    if (strip.vertices.size() >= 2) {
+      runs.push_back(std::move(strip));
+      run_section.push_back(id.value());
+    }
+    std::vector<SectionId> next(m.children(id).begin(), m.children(id).end());
+    std::ranges::stable_sort(
+        next, [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
+    open.insert(open.end(), next.begin(), next.end());
+  }
+  if (runs.empty()) return tree;
+
+  // Leaves: runs of at most `limit` segments, sections cut where a leaf is full.
+  std::vector<Draft> drafts;
+  std::uint32_t nodes = std::uint32_t(sections + 1);
+  tree.section.clear();
+  std::size_t filled = limit;
+  for (std::size_t r = 0; r < runs.size(); ++r) {
+    const Strip& run = runs[r];
+    std::uint32_t begin = run.begin;
+    for (std::size_t at = 0; at + 1 < run.vertices.size();) {
+      if (filled == limit) {
+        drafts.push_back({});
+        drafts.back().leaf_first = std::uint32_t(tree.section.size());
+        filled = 0;
+      }
+      const std::size_t take = std::min(limit - filled, run.vertices.size() - 1 - at);
+      const bool last = at + take + 1 == run.vertices.size();
+      Strip piece{.vertices = {run.vertices.begin() + std::ptrdiff_t(at),
+                               run.vertices.begin() + std::ptrdiff_t(at + take + 1)},
+                  .kind = run.kind,
+                  .rank = run.rank,
+                  .begin = begin,
+                  .end = last ? run.end : nodes++};
+      begin = piece.end;
+      drafts.back().strips.push_back(std::move(piece));
+      drafts.back().leaf_count += std::uint32_t(take);
+      tree.section.insert(tree.section.end(), take, run_section[r]);
+      filled += take;
+      at += take;
+    }
+  }
+  std::vector<std::uint32_t> degree(nodes);
+  for (std::size_t i = 0; i < drafts.size(); ++i) {
+    Draft& d = drafts[i];
+    d.first_leaf = i, d.last_leaf = i + 1;
+    d.sphere = around(d.strips);
+    for (const Strip& s : d.strips) ++degree[s.begin], ++degree[s.end];
+  }
+  degree[0] += 1;  // nothing is joined through the soma
+
+  // Merge neighbours in pairs, level by level.
+  std::vector<std::size_t> level(drafts.size());
+  std::iota(level.begin(), level.end(), 0u);
+  while (level.size() > 1) {
+    std::vector<std::size_t> above;
+    for (std::size_t i = 0; i < level.size(); i += 2) {
+      if (i + 1 == level.size()) {
+        above.push_back(level[i]);
+        continue;
+      }
+      const Draft &a = drafts[level[i]], &b = drafts[level[i + 1]];
+      std::vector<std::uint32_t> outside = degree;
+      for (std::size_t leaf = a.first_leaf; leaf < b.last_leaf; ++leaf)
+        for (const Strip& s : drafts[leaf].strips) --outside[s.begin], --outside[s.end];
+      Draft parent = parent_of(a, b, outside);
+      const std::span leaves(&drafts[a.first_leaf], b.last_leaf - a.first_leaf);
+      parent.error = std::max({a.error, b.error, measured_error(parent.strips, leaves)});
+      parent.children[0] = std::int64_t(level[i]);
+      parent.children[1] = std::int64_t(level[i + 1]);
+      above.push_back(drafts.size());
+      drafts.push_back(std::move(parent));
+    }
+    level = std::move(above);
+  }
+
+  // Out: leaf segments first and in order, then the coarser ones; clusters root first.
+  tree.original_count = std::uint32_t(tree.section.size());
+  std::vector<Drawn> drawn(drafts.size());
+  std::vector<std::uint32_t> first(drafts.size());
+  for (std::size_t i = 0; i < drafts.size(); ++i) {
+    first[i] = std::uint32_t(tree.segments.size());
+    drawn[i] = emit(drafts[i].strips, tree.segments);
+  }
+  const std::size_t count = drafts.size();
+  const auto index = [&](std::int64_t draft) {
+    return draft < 0 ? 0u : std::uint32_t(count - 1 - std::size_t(draft));
+  };
+  for (std::size_t i = count; i-- > 0;) {
+    const Draft& d = drafts[i];
+    tree.clusters.push_back({d.sphere.centre.x(),
+                             d.sphere.centre.y(),
+                             d.sphere.centre.z(),
+                             d.sphere.radius + d.error,
+                             d.error,
+                             drawn[i].thickness,
+                             first[i],
+                             std::uint32_t(segment_count(d.strips)),
+                             {index(d.children[0]), index(d.children[1])},
+                             d.leaf_first,
+                             d.leaf_count,
+                             drawn[i].lowest_rank});
+  }
+  return tree;
+}
+
+}  // namespace forest::scene

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/cut.h"
+
+#include <set>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+#include "forest/scene/path.h"
+#include "forest/scene/view.h"
+
+#include "tests/sample_forest.h"
+
+namespace forest::scene {
+namespace {
+
+const frame::Viewport viewport{640, 360};
+
+Forest sample() { return Forest::from_bytes(pack(testing::sample_circuit(), testing::sample_neurons())); }
+
+bool same(const std::vector<frame::Item>& a, const std::vector<frame::Item>& b) {
+  return std::ranges::equal(a, b, [](const frame::Item& x, const frame::Item& y) {
+    return x.instance == y.instance && x.first_segment == y.first_segment &&
+           x.segment_count == y.segment_count;
+  });
+}
+
+// Whether a point is inside the picture.
+bool in_sight(const frame::Camera& camera, const Vec3& point) {
+  const Vec3 pixel = frame::project(camera, viewport, point);
+  return pixel.z() > camera.near && pixel.x() >= 0 && pixel.y() >= 0 && pixel.x() < viewport.width &&
+         pixel.y() < viewport.height;
+}
+
+TEST(Eye, AcceptsMoreTheFurtherAway) {
+  const Eye eye({.eye = {0, 0, 0}, .target = {0, 0, -1}}, viewport, {});
+  for (float z = 10.f; z < 1e5f; z *= 1.5f) {
+    const bool near = eye.good_enough({{0, 0, -z}, 1.f}, .5f),
+               far = eye.good_enough({{0, 0, -z * 1.5f}, 1.f}, .5f);
+    EXPECT_TRUE(!near || far);
+  }
+  EXPECT_TRUE(eye.good_enough({{0, 0, -10}, 1.f}, 0.f));
+}
+
+TEST(Eye, TheGazeIsSharpAndTheRestGrowsWithEccentricity) {
+  Detail detail;
+  detail.gaze = Vec2(320, 180);
+  const Eye eye({.eye = {0, 0, 0}, .target = {0, 0, -1}}, viewport, detail);
+  EXPECT_FLOAT_EQ(eye.acceptable({{0, 0, -100}, 1.f}), detail.error);
+  float before = detail.error;
+  for (float x = 10.f; x < 80.f; x += 10.f) {
+    const float here = eye.acceptable({{x, 0, -100}, 1.f});
+    EXPECT_GE(here, before);
+    before = here;
+  }
+  EXPECT_GT(before, 2.f * detail.error);
+}
+
+TEST(Cut, DrawsEverySegmentInSightOnce) {
+  const Forest forest = sample();
+  const CameraPath path = walk(forest);
+  for (const float t : {0.f, .3f, .6f, 1.f}) {
+    const View view = path.at(t);
+    const Cut cut = choose(forest, Eye(view.camera, viewport, view.detail), viewport);
+    // The leaves below the clusters of the cut, per instance: none twice, and none in sight missing.
+    std::vector<std::set<std::uint32_t>> drawn(forest.instances().size());
+    for (const auto* list : {&cut.lines, &cut.capsules})
+      for (const frame::Item& item : *list)
+        for (const Cluster& c : forest.clusters())
+          if (c.first_segment == item.first_segment && c.segment_count == item.segment_count)
+            for (std::uint32_t s = c.leaf_first; s < c.leaf_first + c.leaf_count; ++s) {
+              EXPECT_TRUE(drawn[item.instance].insert(s).second);
+            }
+    for (std::uint32_t i = 0; i < drawn.size(); ++i) {
+      const frame::Instance& instance = forest.instances()[i];
+      const Neuron& neuron = forest.neurons()[instance.morphology];
+      for (std::uint32_t s = neuron.first_segment; s < neuron.first_segment + neuron.original_count; ++s) {
+        const frame::Segment& segment = forest.segments()[s];
+        const Vec3 place = Vec3(instance.x, instance.y, instance.z) +
+                           Quat(instance.qw, instance.qx, instance.qy, instance.qz) *
+                               Vec3(segment.ax, segment.ay, segment.az);
+        if (in_sight(view.camera, place)) {
+          EXPECT_TRUE(drawn[i].contains(s)) << "neuron " << i << " segment " << s;
+        }
+      }
+    }
+  }
+}
+
+TEST(Cut, ShowsNothingWorseThanAccepted) {
+  const Forest forest = sample();
+  const View view = overview(forest);
+  const Eye eye(view.camera, viewport, view.detail);
+  const Cut cut = choose(forest, eye, viewport);
+  for (const frame::Item& item : cut.lines)
+    for (const Cluster& c : forest.clusters())
+      if (c.first_segment == item.first_segment && !c.is_leaf()) {
+        EXPECT_TRUE(eye.good_enough({{item.x, item.y, item.z}, item.radius}, c.error));
+      }
+}
+
+TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(500), testing::sample_neurons()));
+  const View view = overview(forest);
+  const Eye eye(view.camera, viewport, view.detail);
+  const Cut all = choose(forest, eye, viewport);
+  ASSERT_FALSE(all.lines.empty());
+  EXPECT_GT(all.bands.size(), 1u);
+  for (std::size_t i = 1; i < all.lines.size(); ++i) {
+    const auto depth = [&](const frame::Item& item) {
+      return eye.nearest_depth({{item.x, item.y, item.z}, item.radius});
+    };
+    EXPECT_LE(depth(all.lines[i - 1]), depth(all.lines[i]) * 1.03f);
+  }
+  const ThreadLimit one(1);
+  const Cut single = choose(forest, eye, viewport);
+  EXPECT_TRUE(same(all.lines, single.lines) && same(all.capsules, single.capsules) &&
+              same(all.dots, single.dots));
+}
+
+TEST(Cut, GazeDrawsLess) {
+  const Forest forest = sample();
+  View view = overview(forest);
+  view.camera.eye = view.camera.target + .4f * (view.camera.eye - view.camera.target);
+  const Cut whole = choose(forest, Eye(view.camera, viewport, view.detail), viewport);
+  view.detail.gaze = Vec2(.5f, .5f);
+  const Cut gazed = choose(forest, Eye(view.camera, viewport, detail_for(view, 640, 360)), viewport);
+  EXPECT_LT(gazed.segments, whole.segments);
+}
+
+TEST(CameraPath, GoesThroughItsEndsSmoothlyAndNeverThroughASoma) {
+  const Forest forest = sample();
+  const CameraPath path = walk(forest);
+  Vec3 before = path.at(0.f).camera.eye;
+  EXPECT_LT((before - overview(forest).camera.eye).norm(), 1e-2f);
+  const float whole = (path.at(1.f).camera.eye - before).norm();
+  for (int i = 1; i <= 500; ++i) {
+    const View view = path.at(float(i) / 500.f);
+    EXPECT_LT((view.camera.eye - before).norm(), whole / 50.f);
+    EXPECT_GT(soma_clearance(forest, view.camera.eye), 0.f);
+    before = view.camera.eye;
+  }
+}
+
+}  // namespace
+}  // namespace forest::scene

@@ -1,0 +1,79 @@
+// SPDX-License-Identifier: Apache-2.0
+// The forest file: a planted circuit packed for drawing, mapped into memory and used as it lies there. Distinct neurons
+// are stored once, as cluster trees; planted ones are a place, a turn and a number. Layout: docs/scene/forest_file.md.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forest/circuit/circuit.h"
+#include "forest/core/progress.h"
+#include "forest/frame/frame.h"
+#include "forest/morphology/morphology.h"
+#include "forest/scene/cluster.h"
+
+namespace forest::scene {
+
+/// One distinct neuron. Indices are into the arrays of the whole forest.
+struct Neuron {
+  std::uint32_t first_cluster = 0, cluster_count = 0;
+  std::uint32_t first_segment = 0,
+                original_count = 0;  // the original segments; segment 0 of a neuron with soma is it
+  std::uint32_t first_original = 0;  // of them, in section_of_segment
+  std::uint32_t first_section = 0, section_count = 0;
+  float soma_radius = 0.f;  // µm
+};
+
+/// What is told of a section when it is picked.
+struct SectionFacts {
+  std::uint32_t parent = 0xffffffffu;  // within its neuron; all ones for a stem
+  std::uint32_t kind = 0;              // as SectionKind
+  std::uint32_t order = 0;
+  std::uint32_t daughters = 0;
+  float length = 0.f;                              // µm
+  float diameter_start = 0.f, diameter_end = 0.f;  // µm
+  float path_distance = 0.f;                       // from the soma to its end, µm
+};
+
+static_assert(sizeof(Neuron) == 32 && sizeof(SectionFacts) == 32);
+
+/// Packs a circuit. `neurons[i]` is the one named circuit.morphologies[i]. The same input gives the same bytes.
+std::vector<std::byte> pack(const circuit::Circuit& circuit, std::span<const Morphology> neurons,
+                            Progress& progress = Progress::none());
+
+/// An open forest file; immutable, cheap to copy.
+class Forest {
+ public:
+  /// Checks length, version, checksums and every index; throws InputError with one sentence.
+  static Forest open(const std::filesystem::path& path);
+  /// The same over bytes in memory. `name` stands for the file in errors.
+  static Forest from_bytes(std::vector<std::byte> bytes, const std::string& name = "forest");
+
+  std::span<const frame::Segment> segments() const;
+  std::span<const frame::Instance> instances() const;
+  std::span<const Cluster> clusters() const;
+  std::span<const Neuron> neurons() const;
+  std::span<const std::uint32_t> section_of_segment() const;
+  std::span<const SectionFacts> sections() const;
+  std::span<const std::uint32_t> types() const;   // of every instance: index in circuit().types
+  std::span<const std::uint32_t> layers() const;  // of every instance: index in circuit().layers
+
+  /// Names, types, layers and radius; its instances are left empty, they are above.
+  const circuit::Circuit& circuit() const;
+  const Bounds& soma_bounds() const;    // of all soma centres
+  std::uint64_t segment_total() const;  // original segments of all instances, as if each were stored
+  std::uint64_t bytes() const;          // of the file
+  frame::Geometry geometry() const { return {segments(), instances()}; }
+
+ private:
+  struct Data;
+  explicit Forest(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
+  static Forest check(std::shared_ptr<Data> data, std::span<const std::byte> bytes, const std::string& name);
+  std::shared_ptr<const Data> data_;
+};
+
+}  // namespace forest::scene

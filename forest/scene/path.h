@@ -1,0 +1,30 @@
+// SPDX-License-Identifier: Apache-2.0
+// How the camera moves: through key views on a smooth curve, slow in and slow out.
+#pragma once
+
+#include <vector>
+
+#include "forest/scene/view.h"
+
+namespace forest::scene {
+
+/// A curve through views (centripetal Catmull–Rom for the eye, the direction of view turned evenly).
+class CameraPath {
+ public:
+  /// At least one view; throws Error otherwise.
+  explicit CameraPath(std::vector<View> keys);
+  /// The view at time t in [0, 1], eased at both ends.
+  View at(float t) const;
+
+ private:
+  std::vector<View> keys_;
+  std::vector<float> knots_;  // of each key, in [0, 1]
+};
+
+/// The demo's walk: from outside the column to a clear place inside, between the dendrites, never through a soma.
+CameraPath walk(const Forest& forest);
+
+/// Distance from a point to the nearest soma's surface, µm; infinite when there is none.
+float soma_clearance(const Forest& forest, const Vec3& point);
+
+}  // namespace forest::scene

@@ -1,0 +1,284 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/view.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+
+namespace forest::scene {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+constexpr std::array<std::string_view, 4> colour_names{"type", "layer", "kind", "neuron"};
+constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
+
+float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
+Vec3 hex(std::uint32_t rgb) {
+  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f),
+          linear(float(rgb & 255) / 255.f)};
+}
+
+// Okabe & Ito (2008), safe for colour-blind eyes, ordered so that neighbours contrast; then lighter companions.
+constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
+                                                    0x0072B2, 0xD55E00, 0xFFD180, 0xA6DCFF, 0x7FD8B8,
+                                                    0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
+// Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
+constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
+                                               0x31688E, 0x5A5AA8, 0x8E4A9E};
+
+// How a section kind changes the colour of its neuron: somata brighter, axons cooler and dimmer.
+Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
+  switch (kind) {
+    case 1:
+      return (base * 1.35f + Vec3::Constant(.10f * lift)).cwiseMin(1.f);
+    case std::uint32_t(SectionKind::axon):
+      return .55f * (.6f * base + .4f * hex(0x6C9BD2));
+    case std::uint32_t(SectionKind::apical):
+      return base;
+    default:
+      return .85f * base;
+  }
+}
+
+Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
+  if (!json.is_array() || json.size() != 3)
+    throw InputError(name, 0,
+                     fmt::format("'{}' must be three numbers in µm, for example [0, 800, 1500]", key));
+  Vec3 v;
+  for (int i = 0; i < 3; ++i) {
+    if (!json[std::size_t(i)].is_number())
+      throw InputError(name, 0, fmt::format("'{}' must hold numbers only", key));
+    v[i] = json[std::size_t(i)].get<float>();
+  }
+  if (!v.allFinite()) throw InputError(name, 0, fmt::format("'{}' must be finite", key));
+  return v;
+}
+
+float number_of(const Json& json, const std::string& name, std::string_view key, float low, float high) {
+  if (!json.is_number() || !(json.get<float>() >= low && json.get<float>() <= high))
+    throw InputError(name, 0, fmt::format("'{}' must be a number from {} to {}", key, low, high));
+  return json.get<float>();
+}
+
+template <std::size_t N>
+std::uint8_t word_of(const Json& json, const std::string& name, std::string_view key,
+                     const std::array<std::string_view, N>& words) {
+  const auto found = json.is_string() ? std::ranges::find(words, json.get<std::string>()) : words.end();
+  if (found == words.end())
+    throw InputError(name, 0, fmt::format("'{}' must be one of: {}", key, fmt::join(words, ", ")));
+  return std::uint8_t(found - words.begin());
+}
+
+}  // namespace
+
+View parse_view(std::string_view text, const std::string& name) {
+  Json json;
+  try {
+    json = Json::parse(text);
+  } catch (const nlohmann::json::exception& e) {
+    throw InputError(name, 0, fmt::format("is no view: {}; see docs/scene/view.md", e.what()));
+  }
+  if (!json.is_object())
+    throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
+  for (const char* needed : {"eye", "target"})
+    if (!json.contains(needed))
+      throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
+  View v;
+  for (const auto& [key, value] : json.items()) {
+    if (key == "eye")
+      v.camera.eye = vector_of(value, name, key);
+    else if (key == "target")
+      v.camera.target = vector_of(value, name, key);
+    else if (key == "up")
+      v.camera.up = vector_of(value, name, key);
+    else if (key == "field_of_view")
+      v.camera.field_of_view = number_of(value, name, key, 1.f, 170.f);
+    else if (key == "near")
+      v.camera.near = number_of(value, name, key, .05f, 1e5f);
+    else if (key == "error")
+      v.detail.error = number_of(value, name, key, .05f, 100.f);
+    else if (key == "acuity_slope")
+      v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
+    else if (key == "samples")
+      v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
+    else if (key == "fog")
+      v.fog = number_of(value, name, key, 0.f, 100.f);
+    else if (key == "halo")
+      v.halo = number_of(value, name, key, 0.f, 10.f);
+    else if (key == "colour_by")
+      v.colour_by = ColourBy(word_of(value, name, key, colour_names));
+    else if (key == "background")
+      v.background = Background(word_of(value, name, key, background_names));
+    else if (key == "gaze") {
+      if (!value.is_array() || value.size() != 2 || !value[0].is_number() || !value[1].is_number())
+        throw InputError(
+            name, 0, "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
+      v.detail.gaze = Vec2(value[0].get<float>(), value[1].get<float>());
+    } else {
+      throw InputError(name, 0, fmt::format("'{}' is no key of a view; see docs/scene/view.md", key));
+    }
+  }
+  if (v.camera.eye == v.camera.target)
+    throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
+  return v;
+}
+
+std::string to_json(const View& v) {
+  const auto list = [](const Vec3& p) { return Json{p.x(), p.y(), p.z()}; };
+  Json json{{"eye", list(v.camera.eye)},
+            {"target", list(v.camera.target)},
+            {"up", list(v.camera.up)},
+            {"field_of_view", v.camera.field_of_view},
+            {"near", v.camera.near},
+            {"error", v.detail.error},
+            {"acuity_slope", v.detail.acuity_slope},
+            {"colour_by", colour_names[std::size_t(v.colour_by)]},
+            {"background", background_names[std::size_t(v.background)]},
+            {"samples", v.samples},
+            {"fog", v.fog},
+            {"halo", v.halo}};
+  if (v.detail.gaze) json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+  return json.dump();
+}
+
+View overview(const Forest& forest) {
+  View view;
+  Bounds bounds = forest.soma_bounds();
+  for (const auto& layer : forest.circuit().layers) {
+    bounds.add({0.f, layer.bottom, 0.f});
+    bounds.add({0.f, layer.top, 0.f});
+  }
+  if (bounds.empty()) return view;
+  const float radius = std::max(forest.circuit().radius, .5f * bounds.extent().norm() * .5f);
+  const float height = std::max(bounds.extent().y(), radius) + 120.f;
+  const float distance =
+      std::max(.5f * height, radius) / std::tan(.5f * radians(view.camera.field_of_view)) * 1.08f + radius;
+  view.camera.target = bounds.centre();
+  view.camera.eye = bounds.centre() + distance * Vec3(.42f, .16f, 1.f).normalized();
+  view.camera.near = 2.f;
+  return view;
+}
+
+Colouring colour(const Forest& forest, ColourBy by, Background background) {
+  Colouring result{.palette = frame::black_palette(),
+                   .classes = std::vector<std::uint8_t>(forest.instances().size()),
+                   .legend = {}};
+  const bool light = background == Background::light;
+  std::array<Vec3, 16> base;
+  base.fill(hex(0xBBBBBB));
+  const auto& circuit = forest.circuit();
+  const auto fill = [&](std::size_t count, const auto& rgb, const auto& name_of_class) {
+    for (std::size_t i = 0; i < std::min<std::size_t>(count, base.size()); ++i) {
+      base[i] = hex(rgb(i)) * (light ? .7f : 1.f);
+      result.legend.push_back({name_of_class(i), base[i]});
+    }
+  };
+  const auto from_categories = [](std::size_t i) { return categorical[i % categorical.size()]; };
+  switch (by) {
+    case ColourBy::type:
+      fill(circuit.types.size(), from_categories, [&](std::size_t i) { return circuit.types[i].name; });
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(forest.types()[i] % 16);
+      break;
+    case ColourBy::layer:
+      fill(
+          circuit.layers.size(), [&](std::size_t i) { return layered[i % layered.size()]; },
+          [&](std::size_t i) { return circuit.layers[i].name; });
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(forest.layers()[i] % 16);
+      break;
+    case ColourBy::neuron:
+      for (std::size_t i = 0; i < 14; ++i) base[i] = hex(categorical[i]) * (light ? .7f : 1.f);
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = std::uint8_t(i * 2654435761u >> 16 & 0xffff) % 14;
+      break;
+    case ColourBy::kind:
+      break;
+  }
+  for (std::uint32_t c = 0; c < 16; ++c)
+    for (std::uint32_t kind = 0; kind < 8; ++kind)
+      result.palette[8 * c + kind] = of_kind(base[c], kind, light ? 0.f : 1.f);
+  if (by == ColourBy::kind) {
+    // The colours neuroanatomists know: soma black or white, axon blue, basal red, apical magenta.
+    const std::array<std::uint32_t, 8> kinds{0x999999, 0xF0E442, 0x0072B2, 0xD55E00,
+                                             0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
+    for (std::uint32_t i = 0; i < 128; ++i) result.palette[i] = hex(kinds[i % 8]) * (light ? .7f : 1.f);
+    const std::array<std::uint32_t, 4> shown{1, 2, 3, 4};
+    for (const auto kind : shown)
+      result.legend.push_back(
+          {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), result.palette[kind]});
+  }
+  result.palette[highlight_entry] = light ? hex(0xC00040) : Vec3(1.f, 1.f, 1.f);
+  result.palette[outline_entry] = light ? hex(0x8090A0) : hex(0x5A6B80);
+  return result;
+}
+
+Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
+  Detail detail = view.detail;
+  detail.thin = view.samples == 1;
+  if (detail.gaze) detail.gaze = Vec2(detail.gaze->x() * float(width), detail.gaze->y() * float(height));
+  return detail;
+}
+
+frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,
+                     std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays) {
+  frame::Frame f;
+  f.camera = view.camera;
+  f.width = width, f.height = height, f.subframes = view.samples;
+  f.palette = colouring.palette;
+  f.colour_class = colouring.classes;
+  f.dots = cut.dots, f.lines = cut.lines, f.capsules = cut.capsules, f.bands = cut.bands;
+  f.overlays = overlays;
+  frame::Style& s = f.style;
+  s.halo = view.halo;
+  if (view.background == Background::light) {
+    s.background_top = hex(0xF7F9FC), s.background_bottom = hex(0xE6EBF2), s.fog_colour = hex(0xEDF1F7);
+  } else {
+    s.background_top = hex(0x0E1420), s.background_bottom = hex(0x05070C), s.fog_colour = hex(0x0A0F1A);
+  }
+  // Fog begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
+  const Bounds& bounds = forest.soma_bounds();
+  if (view.fog > 0.f && !bounds.empty()) {
+    const Mat3 axes = view.camera.axes();
+    const float extent = .5f * bounds.extent().norm() + 100.f;
+    const float depth = -axes.col(2).dot(bounds.centre() - view.camera.eye);
+    const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
+    s.fog_start = std::max(20.f, depth - size);
+    s.fog_length = std::max(60.f, std::min(2.f * size, extent) * .9f) / view.fog;
+  }
+  return f;
+}
+
+std::vector<frame::Overlay> outline(const Forest& forest) {
+  std::vector<frame::Overlay> lines;
+  const float radius = forest.circuit().radius;
+  const auto& layers = forest.circuit().layers;
+  if (!(radius > 0.f) || layers.empty()) return lines;
+  constexpr int sides = 96;
+  const auto corner = [&](int i, float y) {
+    const float angle = 2.f * pi * float(i) / sides;
+    return Vec3(radius * std::cos(angle), y, radius * std::sin(angle));
+  };
+  float low = INFINITY, high = -INFINITY;
+  std::vector<float> heights;
+  for (const auto& layer : layers) {
+    heights.push_back(layer.top), heights.push_back(layer.bottom);
+    low = std::min(low, layer.bottom), high = std::max(high, layer.top);
+  }
+  std::ranges::sort(heights);
+  heights.erase(std::unique(heights.begin(), heights.end(), [](float a, float b) { return b - a < .01f; }),
+                heights.end());
+  for (const float y : heights)
+    for (int i = 0; i < sides; ++i) lines.push_back({corner(i, y), corner(i + 1, y), .5f, outline_entry});
+  for (int i = 0; i < sides; i += sides / 8)
+    lines.push_back({corner(i, low), corner(i, high), .5f, outline_entry});
+  return lines;
+}
+
+}  // namespace forest::scene

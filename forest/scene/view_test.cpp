@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/view.h"
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/scene/pick.h"
+
+#include "tests/sample_forest.h"
+
+namespace forest::scene {
+namespace {
+
+Forest sample() { return Forest::from_bytes(pack(testing::sample_circuit(), testing::sample_neurons())); }
+
+TEST(View, IsTextAndBack) {
+  View view;
+  view.camera.eye = {1.5f, -2, 3e3f};
+  view.camera.field_of_view = 55;
+  view.detail.gaze = Vec2(.25f, .75f);
+  view.colour_by = ColourBy::layer;
+  view.background = Background::light;
+  const View back = parse_view(to_json(view));
+  EXPECT_EQ(to_json(back), to_json(view));
+  EXPECT_EQ(back.camera.eye, view.camera.eye);
+  EXPECT_EQ(*back.detail.gaze, *view.detail.gaze);
+}
+
+TEST(View, SaysWhichKeyIsWrong) {
+  const auto error_of = [](const char* text) -> std::string {
+    try {
+      parse_view(text, "v.json");
+    } catch (const InputError& e) {
+      return e.what();
+    }
+    return "";
+  };
+  EXPECT_NE(error_of("{").find("v.json"), std::string::npos);
+  EXPECT_NE(error_of("[]").find("object"), std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1]})").find("target"), std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0],"target":[0,0,0]})").find("eye"), std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,1]})").find("same point"), std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"field_of_view":900})").find("field_of_view"),
+            std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":"mood"})").find("layer"),
+            std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"fovv":4})").find("fovv"), std::string::npos);
+}
+
+TEST(View, EveryFrameKeepsTheContract) {
+  const Forest forest = sample();
+  const auto lines = outline(forest);
+  for (const ColourBy by : {ColourBy::type, ColourBy::layer, ColourBy::kind, ColourBy::neuron})
+    for (const Background background : {Background::dark, Background::light}) {
+      View view = overview(forest);
+      view.colour_by = by, view.background = background;
+      const Colouring colouring = colour(forest, by, background);
+      const Cut cut = choose(forest, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+      EXPECT_NO_THROW(
+          frame::check(compose(forest, view, colouring, cut, 320, 200, lines), forest.geometry()));
+    }
+}
+
+TEST(Pick, FindsWhatBruteForceFinds) {
+  const Forest forest = sample();
+  const View view = overview(forest);
+  Random random(4);
+  int hits = 0;
+  for (int i = 0; i < 400; ++i) {
+    const Ray ray = frame::ray_through(view.camera, {320, 200},
+                                       {float(random.uniform(100, 220)), float(random.uniform(20, 180))});
+    std::optional<Pick> expected;
+    for (std::uint32_t n = 0; n < forest.instances().size(); ++n) {
+      const Neuron& neuron = forest.neurons()[forest.instances()[n].morphology];
+      for (std::uint32_t s = neuron.first_segment; s < neuron.first_segment + neuron.original_count; ++s)
+        if (const auto t = intersect(ray, in_world(forest, n, s));
+            t && (!expected || *t < expected->distance))
+          expected =
+              Pick{n, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
+    }
+    const auto found = pick(forest, ray);
+    ASSERT_EQ(found.has_value(), expected.has_value());
+    if (!found) continue;
+    ++hits;
+    EXPECT_FLOAT_EQ(found->distance, expected->distance);
+    EXPECT_EQ(found->instance, expected->instance);
+    EXPECT_EQ(found->section, expected->section);
+  }
+  EXPECT_GT(hits, 10);
+}
+
+TEST(Pick, TheSubarborOfTheSomaIsTheNeuronAndOfATipIsItself) {
+  const Forest forest = sample();
+  const Neuron& neuron = forest.neurons()[forest.instances()[0].morphology];
+  EXPECT_EQ(subarbor(forest, 0, soma_section).size(), neuron.original_count);
+  for (std::uint32_t s = 0; s < neuron.section_count; ++s) {
+    const auto segments = subarbor(forest, 0, s);
+    std::uint32_t own = 0;
+    for (std::uint32_t i = 0; i < neuron.original_count; ++i)
+      own += forest.section_of_segment()[neuron.first_original + i] == s;
+    if (forest.sections()[neuron.first_section + s].daughters == 0) {
+      EXPECT_EQ(segments.size(), own);
+    } else {
+      EXPECT_GT(segments.size(), own);
+    }
+  }
+}
+
+}  // namespace
+}  // namespace forest::scene
