@@ -3,88 +3,23 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
+#include <filesystem>
 #include <map>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/lsystem/cursor.h"
 #include "forest/lsystem/turtle.h"
 
 namespace forest::lsystem {
 namespace {
 
-bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
-bool is_digit(char c) { return c >= '0' && c <= '9'; }
-bool is_space(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
-bool is_name(char c) { return is_letter(c) || is_digit(c) || c == '_'; }
-
 constexpr std::string_view symbol_marks = "+-&^\\/|$[]!';,.{}~%@?\"`";  // besides letters and digits
 constexpr int deepest = 100;                                            // nested parentheses
 constexpr std::size_t most_parameters = 64;                             // of one module
-
-// A place in the text that moves on, within one statement.
-class Cursor {
- public:
-  Cursor(std::string_view text, const std::string& file) : text_(text), file_(file), end_(text.size()) {}
-
-  void enter(std::size_t begin, std::size_t end) { at_ = begin, end_ = end; }
-  std::size_t at() const { return at_; }
-  void back_to(std::size_t place) { at_ = place; }
-  bool more() {
-    while (at_ < end_ && is_space(text_[at_])) ++at_;
-    return at_ < end_;
-  }
-  bool sees(std::string_view token) { return more() && text_.substr(at_, end_ - at_).starts_with(token); }
-  bool takes(std::string_view token) {
-    if (!sees(token)) return false;
-    at_ += token.size();
-    return true;
-  }
-  void expect(std::string_view token, std::string_view purpose) {
-    if (!takes(token)) fail(fmt::format("a '{}' is missing here, {}", token, purpose));
-  }
-  char peek() { return more() ? text_[at_] : '\0'; }
-  std::string_view rest() { return more() ? text_.substr(at_, end_ - at_) : std::string_view{}; }
-  void skip(std::size_t count) { at_ += count; }
-
-  std::string name(std::string_view purpose) {
-    more();
-    std::size_t stop = at_;
-    while (stop < end_ && is_name(text_[stop])) ++stop;
-    if (stop == at_ || is_digit(text_[at_])) fail(fmt::format("a name is missing here, {}", purpose));
-    const std::string found(text_.substr(at_, stop - at_));
-    at_ = stop;
-    return found;
-  }
-  double number() {
-    double value = 0.;
-    more();
-    const auto [stop, error] = std::from_chars(text_.data() + at_, text_.data() + end_, value);
-    if (error != std::errc() || !std::isfinite(value)) fail("a number is missing here");
-    at_ = std::size_t(stop - text_.data());
-    return value;
-  }
-  double signed_number() { return takes("-") ? -number() : number(); }
-
-  [[noreturn]] void fail(const std::string& sentence) const { fail_at(at_, sentence); }
-  [[noreturn]] void fail_at(std::size_t place, const std::string& sentence) const {
-    const std::string_view before = text_.substr(0, place);
-    const auto line = std::size_t(std::ranges::count(before, '\n')) + 1;
-    const std::size_t start = before.rfind('\n') + 1;  // npos + 1 is 0
-    const auto column =
-        std::ranges::count_if(before.substr(start), [](char c) { return (c & 0xc0) != 0x80; }) + 1;
-    throw InputError(file_, line, fmt::format("column {}: {}", column, sentence));
-  }
-  std::size_t line() const { return std::size_t(std::ranges::count(text_.substr(0, at_), '\n')) + 1; }
-
- private:
-  std::string_view text_;
-  const std::string& file_;
-  std::size_t at_ = 0, end_;
-};
 
 // What a name in an expression stands for.
 struct Meaning {
@@ -322,6 +257,8 @@ class Parser {
   Parser(std::string_view text, const std::string& file)
       : clean_(without_comments(text, Cursor(text, file))), text_(clean_, file) {
     grammar_.file = file;
+    grammar_.name = std::filesystem::path(file).stem().string();
+    grammar_.text = text;
     for (const TurtleSymbol& s : turtle_symbols()) {
       grammar_.symbols.emplace_back(s.symbol);
       arities_.push_back({s.least, s.most});
@@ -560,6 +497,7 @@ class Parser {
     const auto bracketed = [&](const Shape& s) { return is(s, Action::push) || is(s, Action::pop); };
     if (bracketed(p.predecessor) || std::ranges::any_of(p.left, bracketed))
       text_.fail_at(place, "a bracket can neither be rewritten nor stand in a left context");
+    check_brackets(p.right);
     grammar_.context |= !p.left.empty() || !p.right.empty();
 
     if (text_.takes(":") && !text_.takes("*") && !text_.sees("{") && !text_.sees("->"))
@@ -594,7 +532,6 @@ class Parser {
       check_arity(s, place);
       shapes.push_back(s);
     }
-    check_brackets(shapes);
     return shapes;
   }
 
@@ -679,6 +616,8 @@ class Parser {
       grammar_.productions_of[grammar_.productions[i].predecessor.symbol].push_back(std::uint32_t(i));
     grammar_.ignored.assign(grammar_.symbols.size(), false);
     for (const Symbol s : ignored_) grammar_.ignored[s] = true;
+    for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
+      grammar_.drawn_as.push_back(grammar_.symbols[i].starts_with("F_") ? Symbol(Action::draw) : Symbol(i));
     // Cell values live in slots 0 to n - 1 while they are drawn; what their functions need lies above.
     const auto shift = std::int32_t(grammar_.cell_values);
     for (Program& program : cells_) {
@@ -705,7 +644,9 @@ class Parser {
 
 Grammar parse(std::string_view text, const std::string& file) { return Parser(text, file).grammar(); }
 
-Grammar parse_file(const std::string& path) { return parse(MappedFile(path).text(), path); }
+Grammar parse_file(const std::filesystem::path& path) {
+  return parse(MappedFile(path).text(), path.string());
+}
 
 Word parse_word(std::string_view text, const Grammar& grammar) { return Parser(text, grammar).word(); }
 

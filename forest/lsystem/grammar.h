@@ -10,6 +10,7 @@
 #pragma once
 
 #include <cstdint>
+#include <filesystem>
 #include <memory>
 #include <optional>
 #include <span>
@@ -60,11 +61,13 @@ struct Production {
 
 /// An L-system, compiled. A plain value; not changed after parse().
 struct Grammar {
-  std::string file, title;
+  std::string file, name, title;        // name: the file's, without folder and extension
+  std::string text;                     // as it was parsed
   std::vector<std::string> symbols;     // the turtle's own first (turtle.h), then those of the text
   std::vector<Production> productions;  // those of one predecessor keep their order
   std::vector<std::vector<std::uint32_t>> productions_of;  // by symbol
   std::vector<bool> ignored;                               // by symbol: not seen by contexts
+  std::vector<Symbol> drawn_as;  // by symbol: the turtle's that it stands for; F_l and its like are F
   std::vector<Table> tables;
   Program cell;  // one store a value that is drawn once a neuron
   std::size_t cell_values = 0;
@@ -81,7 +84,7 @@ struct Grammar {
 /// Throws InputError with line and column when the text is no grammar.
 /// @param file  named in errors
 Grammar parse(std::string_view text, const std::string& file);
-Grammar parse_file(const std::string& path);
+Grammar parse_file(const std::filesystem::path& path);
 
 /// Reads a word of the grammar's symbols with constant parameters, "B(2)A(4,4)". Throws InputError.
 Word parse_word(std::string_view text, const Grammar& grammar);

@@ -79,7 +79,7 @@ class Turtle {
   Morphology run() {
     drawn_.reserve(word_.modules.size() / 2);
     for (const Module& m : word_.modules)
-      if (m.symbol < std::size(symbol_table)) act(m);
+      if (const Symbol s = grammar_.drawn_as[m.symbol]; s < std::size(symbol_table)) act(symbol_table[s], m);
     if (!stack_.empty()) fail("a branch is not closed");
     return build();
   }
@@ -89,16 +89,16 @@ class Turtle {
     throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
   }
 
-  void act(const Module& m) {
+  void act(const TurtleSymbol& symbol, const Module& m) {
     const std::span<const double> values = word_.of(m);
     const auto parameter = [&](std::size_t i, double otherwise) {
       if (i >= values.size()) return otherwise;
       if (!std::isfinite(values[i]))
-        fail(fmt::format("module {} has a parameter that is not finite", symbol_table[m.symbol].symbol));
+        fail(fmt::format("module {} has a parameter that is not finite", symbol.symbol));
       return values[i];
     };
     const auto angle = [&] { return parameter(0, grammar_.angle) * (std::numbers::pi / 180.); };
-    switch (symbol_table[m.symbol].action) {
+    switch (symbol.action) {
       case Action::draw:
         return draw(parameter(0, grammar_.step), parameter(1, state_.diameter));
       case Action::move:

@@ -1,0 +1,217 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/grammar.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/derive.h"
+
+namespace forest::lsystem {
+namespace {
+
+// The value of an expression, by way of a production.
+double value_of(const std::string& expression, const std::string& declarations = "") {
+  const Grammar g = parse(declarations + "axiom: A(3, 4)\ng: A(x, y) -> B(" + expression + ")\n", "test");
+  return derive(g, 0, 0, 1).parameters.at(0);
+}
+
+TEST(Expression, BindsAsInMathematics) {
+  EXPECT_EQ(value_of("1 + 2 * 3 ^ 2"), 19.);
+  EXPECT_EQ(value_of("2 ^ 3 ^ 2"), 512.);
+  EXPECT_EQ(value_of("-x ^ 2"), -9.);
+  EXPECT_EQ(value_of("2 ^ -1"), .5);
+  EXPECT_EQ(value_of("10 - 4 - 3"), 3.);
+  EXPECT_EQ(value_of("(10 - 4) / x / 2"), 1.);
+  EXPECT_EQ(value_of("7 % 4 + mod(-1, 4)"), 6.);
+  EXPECT_EQ(value_of("1 < 2 & 2 < 1 | 1"), 1.);
+  EXPECT_EQ(value_of("!(x == 3) || y >= 4 && x != y"), 1.);
+  EXPECT_EQ(value_of("1.5e2 + .5"), 150.5);
+}
+
+TEST(Expression, HasFunctionsInDegrees) {
+  EXPECT_NEAR(value_of("sin(30) + cos(60) + tan(45)"), 2., 1e-12);
+  EXPECT_NEAR(value_of("acos(0) + asin(1) + atan2(1, 1)"), 225., 1e-12);
+  EXPECT_NEAR(value_of("exp(log(x)) * sqrt(y) + abs(-1)"), 7., 1e-12);
+  EXPECT_EQ(value_of("min(x, y) + max(x, y) + floor(1.9) + ceil(1.1) + round(1.5) + sign(-y) + pow(x, 2)"),
+            20.);
+}
+
+TEST(Expression, EvaluatesOnlyTheChosenPart) {
+  EXPECT_EQ(value_of("if(x > y, 1 / 0, x)"), 3.);
+  EXPECT_EQ(value_of("if(x < y, if(0, 1, 2), 3) + 10"), 12.);
+}
+
+TEST(Expression, CallsFunctionsTablesAndConstants) {
+  const std::string declarations =
+      "#define half 1 / 2\n"
+      "function square(v) = v * v\n"
+      "function hypotenuse(a, b) = sqrt(square(a) + square(b)) * 2 * half\n"
+      "table steps_of = -1: 5, 2: 10, 8: 20\n";
+  EXPECT_EQ(value_of("hypotenuse(x, y)", declarations), 5.);
+  EXPECT_EQ(value_of("hypotenuse(hypotenuse(3, y), square(2) * 3)", declarations), 13.);
+  EXPECT_EQ(value_of("steps_of(-7)", declarations), 5.);
+  EXPECT_EQ(value_of("steps_of(-1)", declarations), 5.);
+  EXPECT_EQ(value_of("steps_of(2.5)", declarations), 20.);
+  EXPECT_EQ(value_of("steps_of(99)", declarations), 20.);
+}
+
+TEST(Expression, DrawsAreRepeatedByTheSameSeedOnly) {
+  const Grammar g =
+      parse("distribution size = gamma(2, 3)\naxiom: A\ng: A -> B(size(), size(), normal(0, 1))\n", "test");
+  const Word word = derive(g, 7, 1, 1);
+  EXPECT_EQ(word.parameters, derive(g, 7, 1, 1).parameters);
+  EXPECT_NE(word.parameters, derive(g, 7, 2, 1).parameters);
+  EXPECT_NE(word.parameters, derive(g, 8, 1, 1).parameters);
+  EXPECT_NE(word.parameters[0], word.parameters[1]);
+}
+
+struct Drawing {
+  const char* expression;
+  double mean, variance;
+};
+TEST(Expression, DistributionsHaveTheirMomentsAndLimits) {
+  const double below = std::exp(1. + .08), lognormal_variance = (std::exp(.16) - 1) * below * below;
+  const Drawing drawings[] = {
+      {"uniform(2, 8)", 5, 3},
+      {"normal(4, 2)", 4, 4},
+      {"truncnormal(0, 1, -1, 1)", 0, .2911},
+      {"truncnormal(0, 1, 1, 2)", 1.3832, .0724},
+      {"lognormal(1, 0.4)", below, lognormal_variance},
+      {"gamma(3, 2)", 6, 12},
+      {"exponential(5)", 5, 25},
+      {"poisson(4.5)", 4.5, 4.5},
+      {"poisson(70)", 70, 70},
+      {"chance(0.3)", .3, .21},
+  };
+  for (const Drawing& d : drawings) {
+    const Grammar g = parse(std::string("axiom: A\ng: A -> B(") + d.expression + ")\n", "test");
+    Deriver deriver(g);
+    double sum = 0., squares = 0.;
+    constexpr int count = 40000;
+    for (int i = 0; i < count; ++i) {
+      const double x = deriver.derive(1, std::uint64_t(i), 1).parameters[0];
+      sum += x, squares += x * x;
+    }
+    const double mean = sum / count;
+    EXPECT_NEAR(mean, d.mean, 5 * std::sqrt(d.variance / count)) << d.expression;
+    EXPECT_NEAR((squares / count - mean * mean) / d.variance, 1., .08) << d.expression;
+  }
+}
+
+TEST(Grammar, BindingsUseADrawTwice) {
+  const Grammar g =
+      parse("axiom: A(10)\ng: A(d) { r = uniform(0, 1), s = r * d } -> B(r, s) [C(d - s)]\n", "test");
+  const Word word = derive(g, 3, 0, 1);
+  EXPECT_EQ(word.parameters[1], word.parameters[0] * 10);
+  EXPECT_EQ(word.parameters[2], 10 - word.parameters[1]);
+}
+
+TEST(Grammar, CellValuesAreDrawnOnceANeuron) {
+  const Grammar g = parse(
+      "cell size = normal(100, 10)\ncell twice = 2 * size\naxiom: A\ng: A -> B(size, twice) A\n", "test");
+  const Word word = derive(g, 3, 0, 3);
+  EXPECT_EQ(word.parameters[0], word.parameters[4]);
+  EXPECT_EQ(word.parameters[1], 2 * word.parameters[0]);
+  EXPECT_NE(word.parameters[0], derive(g, 3, 1, 3).parameters[0]);
+}
+
+TEST(Grammar, TakesTheLongestNameAndJoinsIndentedLines) {
+  const Grammar g = parse(
+      "# a comment\ntitle: a test\n/* another\n   one */\nmodule Tip(d), TipOfTips(d)\n\n"
+      "axiom: TipOfTips(1)Tip(2)Z\n  Tip(3)  # here\ngo: Tip(d) ->\n\n  a_r aB\n",
+      "folder/x.lsys");
+  EXPECT_EQ(g.title, "a test");
+  EXPECT_EQ(g.name, "x");
+  EXPECT_EQ(to_string(derive(g, 0, 0, 1), g), "TipOfTips(1)a_raBZa_raB");
+}
+
+struct Bad {
+  const char* text;
+  std::size_t line;
+  const char* says;
+};
+TEST(Grammar, ErrorsNameLineColumnAndRemedy) {
+  const Bad table[] = {
+      {"", 1, "no axiom"},
+      {"axiom: A\n", 2, "no production"},
+      {"axiom: A(1\np: A(x) -> B\n", 1, "column 11: a ')' is missing"},
+      {"axiom: A\np: A -> B(x)\n", 2, "column 11: 'x' is not known"},
+      {"axiom: A\np: A -> [B\n", 2, "not closed"},
+      {"axiom: A\np: A -> B]\n", 2, "closes nothing"},
+      {"axiom: A\np: A(x) -> B(sin(x, 2))\n", 2, "column 14: sin takes 1 argument, 2 given"},
+      {"axiom: A\np: A(x) -> B(foo(x))\n", 2, "column 14: there is no function 'foo'"},
+      {"axiom: A\np: AB -> C\n", 2, "one module"},
+      {"axiom: A\np: A -> C\np: A -> D\n", 3, "production p already"},
+      {"axiom: A\np: A(x) : x = 3 -> C\n", 2, "column 13: write =="},
+      {"axiom: A\np: A(x, x) -> C\n", 2, "has a meaning already"},
+      {"axiom: A\np: A B\n", 2, "one module"},
+      {"axiom: A\np: A : 1\n", 2, "'->' is missing"},
+      {"module Tip(d)\naxiom: Tip(1, 2)\np: Tip(d) -> C\n", 2,
+       "column 8: module Tip has 1 parameter, 2 given"},
+      {"axiom: A\np: A -> F(1, 2, 3)\n", 2, "module F has 0 to 2 parameters, 3 given"},
+      {"#define x uniform(0, 1)\naxiom: A\np: A -> B\n", 1, "must be a constant"},
+      {"function f(x) = uniform(0, x)\naxiom: A\np: A -> B\n", 1, "may not draw"},
+      {"distribution f(x) = x\naxiom: A\np: A -> B\n", 1, "does not draw"},
+      {"table t = 1: 2, 1: 3\naxiom: A\np: A -> B\n", 1, "must increase"},
+      {"steps: 0.5\naxiom: A\np: A -> B\n", 1, "whole number"},
+      {"axiom: A\nfoo A -> B\n", 2, "column 1: a statement cannot begin with 'foo'"},
+      {"axiom: A\naxiom: B\np: A -> B\n", 2, "an axiom already"},
+      {"axiom: A\np: A -> B : 0.5 0.5\n", 2, "should end here"},
+      {"axiom: A /* open\np: A -> B\n", 1, "column 10: the comment is not closed"},
+      {"axiom: A\n\n  \np: A ->\n  B\n  C(1 +)\n", 6, "column 8: a number, a name"},
+      {"axiom: A\np: [ -> B\n", 2, "bracket"},
+      {"axiom: \xff\np: A -> B\n", 1, "no module"},
+  };
+  for (const Bad& bad : table) {
+    try {
+      parse(bad.text, "bad.lsys");
+      ADD_FAILURE() << "was read: " << bad.text;
+    } catch (const InputError& error) {
+      EXPECT_EQ(error.line(), bad.line) << error.what();
+      EXPECT_NE(std::string(error.what()).find(bad.says), std::string::npos)
+          << error.what() << "\nfor " << bad.text;
+      EXPECT_TRUE(std::string(error.what()).starts_with("bad.lsys:")) << error.what();
+      EXPECT_NE(std::string(error.what()).find("column "), std::string::npos) << error.what();
+    }
+  }
+}
+
+TEST(Grammar, DeepNestingIsRefusedNotSuffered) {
+  const std::string deep(100000, '(');
+  EXPECT_THROW(parse("axiom: A\np: A -> B(" + deep + "1\n", "deep"), InputError);
+  const std::string minus(100000, '-');
+  EXPECT_THROW(parse("axiom: A\np: A -> B(" + minus + "1)\n", "deep"), InputError);
+}
+
+// Cut anywhere, with anything put in: a value or an InputError, never anything else.
+RC_GTEST_PROP(Grammar, AnyTextIsReadOrRefused, ()) {
+  static const std::string whole =
+      parse_file(std::string(FOREST_SOURCE_DIR) + "/data/grammars/pyramidal.lsys").text;
+  std::string text = whole.substr(*rc::gen::inRange<std::size_t>(0, whole.size()));
+  text.resize(*rc::gen::inRange<std::size_t>(0, text.size() + 1));
+  if (!text.empty()) text[*rc::gen::inRange<std::size_t>(0, text.size())] = *rc::gen::arbitrary<char>();
+  try {
+    parse(text, "cut");
+  } catch (const InputError&) {
+  }
+}
+
+TEST(Word, IsWrittenAndReadBackExactly) {
+  const Grammar g = parse_file(std::string(FOREST_SOURCE_DIR) + "/data/grammars/purkinje.lsys");
+  for (std::uint64_t i = 0; i < 5; ++i) {
+    const Word word = derive(g, 1, i, 30);
+    const Word back = parse_word(to_string(word, g), g);
+    EXPECT_EQ(back.parameters, word.parameters);
+    ASSERT_EQ(back.modules.size(), word.modules.size());
+    for (std::size_t k = 0; k < word.modules.size(); ++k)
+      EXPECT_EQ(back.modules[k].symbol, word.modules[k].symbol);
+  }
+  EXPECT_THROW(parse_word("Bud(uniform(0, 1), 2)", g), InputError);
+  EXPECT_THROW(parse_word("Q(1)", g), InputError);
+}
+
+}  // namespace
+}  // namespace forest::lsystem

@@ -1,0 +1,128 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/turtle.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+#include <rapidcheck/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/derive.h"
+#include "forest/morphology/measure.h"
+#include "forest/morphology/validate.h"
+
+namespace forest::lsystem {
+namespace {
+
+Morphology drawn(const std::string& word, const std::string& declarations = "angle: 90\n") {
+  const Grammar g = parse(declarations + "axiom: " + word + "\nnothing: z -> z\n", "turtle");
+  return interpret(derive(g, 0, 0, 0), g);
+}
+
+Vec3 end_of(const std::string& word) { return drawn(word).points().back().position(); }
+
+void expect_near(const Vec3& a, const Vec3& b) {
+  EXPECT_NEAR((a - b).norm(), 0.f, 1e-5f) << a.transpose() << " and " << b.transpose();
+}
+
+TEST(Turtle, HeadsToThePiaWithItsLeftAtMinusX) {
+  expect_near(end_of("F(3)"), {0, 3, 0});
+  expect_near(end_of("+F"), {-1, 0, 0});
+  expect_near(end_of("-F"), {1, 0, 0});
+  expect_near(end_of("&F"), {0, 0, -1});
+  expect_near(end_of("^F"), {0, 0, 1});
+  expect_near(end_of("|F"), {0, -1, 0});
+  expect_near(end_of("/+F"), {0, 0, 1});    // the left wing is up
+  expect_near(end_of("\\+F"), {0, 0, -1});  // the left wing is down
+  expect_near(end_of("/(30)\\(30)+F"), {-1, 0, 0});
+  expect_near(end_of("f(2)F(1)"), {0, 3, 0});
+}
+
+TEST(Turtle, LevelsItsLeft) {
+  // After $ a turn to the left stays horizontal, whatever was rolled before.
+  for (const char* before : {"+(40)/(77)", "&(30)\\(10)+(20)", "^(100)/(5)-(60)"})
+    EXPECT_NEAR(end_of(std::string(before) + "$+F").y(), 0.f, 1e-6f) << before;
+}
+
+RC_GTEST_PROP(Turtle, TurningMovesNothingAndPathsAreAsLongAsTheirSteps, ()) {
+  std::string word;
+  double length = 0.;
+  const int count = *rc::gen::inRange(1, 60);
+  for (int i = 0; i < count; ++i) {
+    word += *rc::gen::elementOf(std::string("+-&^\\/|$"));
+    if (word.back() != '|' && word.back() != '$')
+      word += "(" + std::to_string(*rc::gen::inRange(0, 360)) + ")";
+    if (i % 2 == 0) word += "F(2)", length += 2.;
+  }
+  const Morphology m = drawn(word);
+  RC_ASSERT(std::abs(total_length(m) - length) < 1e-3);
+  RC_ASSERT(m.sections().size() == 1u);
+}
+
+TEST(Turtle, BranchPointsEndSections) {
+  const Morphology m = drawn("!(2)F(10,1.5)F(5,1)[+(30)!(0.8)F(4,0.5)]-(30)!(0.6)F(3)");
+  ASSERT_EQ(m.sections().size(), 3u);
+  EXPECT_EQ(m.points(SectionId(0)).size(), 3u);
+  EXPECT_EQ(m.points(SectionId(0))[0].radius, 1.f);
+  EXPECT_EQ(m.points(SectionId(0))[1].radius, .75f);
+  EXPECT_EQ(m.points(SectionId(1))[0].radius, .4f);  // a daughter begins with its own diameter
+  EXPECT_EQ(m.points(SectionId(1))[1].radius, .25f);
+  EXPECT_EQ(m.points(SectionId(2))[1].radius, .3f);
+  EXPECT_EQ(m.section(SectionId(2)).parent, SectionId(0));
+  expect_near(m.points(SectionId(1))[0].position(), {0, 15, 0});
+}
+
+TEST(Turtle, BranchesThatDrawNothingEndNoSection) {
+  EXPECT_EQ(drawn("F[+]F[!(3)f(2)]F").sections().size(), 1u);
+  EXPECT_EQ(drawn("F[F]").sections().size(), 1u);
+  EXPECT_EQ(drawn("F[F(0)]F").sections().size(), 1u);
+}
+
+TEST(Turtle, DrawsSomaKindsAndRoots) {
+  const Morphology m =
+      drawn("f(5) Soma(20) [Axon | f(10) F(5)] [Apical f(10) F(5) Kind(12) F(2)] [Glia f(10) F]");
+  EXPECT_EQ(m.soma().sphere(), (Point{0, 5, 0, 10}));
+  ASSERT_EQ(m.sections().size(), 4u);
+  EXPECT_EQ(m.roots().size(), 3u);
+  const SectionKind kinds[] = {SectionKind::axon, SectionKind::apical, SectionKind::custom,
+                               SectionKind::glia};
+  for (std::size_t i = 0; i < 4; ++i) EXPECT_EQ(m.sections()[i].kind, kinds[i]);
+  EXPECT_EQ(m.sections()[2].tag, 12);
+  EXPECT_EQ(m.sections()[2].parent, SectionId(1));
+  EXPECT_EQ(m.sections()[0].soma_point, 0);
+  EXPECT_EQ(m.sections()[2].soma_point, -1);
+  expect_near(m.points(SectionId(0))[0].position(), {0, -5, 0});
+}
+
+TEST(Turtle, TropismBendsTowardsItsDirection) {
+  std::string many;
+  for (int i = 0; i < 200; ++i) many += "F";
+  const auto heading = [&](const std::string& word) {
+    const Morphology m = drawn(word + many);
+    const auto points = m.points();
+    return Vec3(points.back().position() - points[points.size() - 2].position());
+  };
+  expect_near(heading("+(80)T(0.2)"), {0, 1, 0});
+  expect_near(heading("T(0.2,1,0,0)"), {1, 0, 0});
+  EXPECT_NEAR(heading("+(80)[T(0.2)F]").x(), -std::sin(radians(80)),
+              1e-5f);  // forgotten at the end of a branch
+  const Morphology m = drawn("Soma(2) f(100) -(100) Outward(0.2)" + many);
+  const Vec3 end = m.points().back().position(), before = m.points()[m.points().size() - 2].position();
+  EXPECT_GT((end - before).dot(end.normalized()), .99f);
+}
+
+TEST(Turtle, RefusesWhatItCannotDraw) {
+  EXPECT_THROW(drawn("Soma(1) Soma(2)"), Error);
+  EXPECT_THROW(drawn("Soma(-1)"), Error);
+  const Grammar g = parse("axiom: A\np: A -> F\n", "x");
+  const auto word = [](std::vector<Symbol> symbols) {
+    Word w;
+    for (const Symbol s : symbols) w.modules.push_back({s, 0, 0});
+    return w;
+  };
+  EXPECT_THROW(interpret(word({Symbol(Action::push)}), g), Error);
+  EXPECT_THROW(interpret(word({Symbol(Action::pop)}), g), Error);
+}
+
+}  // namespace
+}  // namespace forest::lsystem
