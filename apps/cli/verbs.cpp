@@ -11,6 +11,7 @@ std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
 std::function<void()> export_files(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
+std::function<void()> grow(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
   static constexpr auto table = std::to_array<Verb>({
@@ -24,6 +25,8 @@ std::span<const Verb> verbs() {
        "brainforest export --repo cells.db --population traced --format swc --out exported/", export_files},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
        "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
+      {"grow", "Grow neurons from a grammar",
+       "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
   });
   return table;
 }

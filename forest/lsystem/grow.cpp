@@ -7,18 +7,29 @@
 
 namespace forest::lsystem {
 
+namespace {
+
+Morphology grown(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
+  return interpret(
+      deriver.derive(seed, index), grammar,
+      {{"grammar", grammar.name}, {"seed", std::to_string(seed)}, {"index", std::to_string(index)}});
+}
+
+}  // namespace
+
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
-  return interpret(Deriver(grammar).derive(seed, index), grammar);
+  Deriver deriver(grammar);
+  return grown(deriver, grammar, seed, index);
 }
 
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,
-                                        Progress& progress) {
+                                        Progress& progress, std::uint64_t first) {
   std::vector<Morphology> neurons(count);
   progress.begin("growing", count);
   parallel_ranges(count, 1, [&](std::size_t begin, std::size_t end) {
     Deriver deriver(grammar);
     for (std::size_t i = begin; i < end; ++i) {
-      neurons[i] = interpret(deriver.derive(seed, i), grammar);
+      neurons[i] = grown(deriver, grammar, seed, first + i);
       progress.advance();
     }
   });

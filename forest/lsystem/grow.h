@@ -11,11 +11,11 @@
 
 namespace forest::lsystem {
 
-/// The neuron `index` of the population `seed`: a pure function. Throws as Deriver::derive and interpret do.
+/// The neuron `index` of the population `seed`: a pure function. It says in its annotations where it comes from. Throws as Deriver::derive and interpret do.
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
 
-/// Neurons 0 to count - 1, on all cores; the same at any number of threads.
+/// Neurons first to first + count - 1, on all cores; the same at any number of threads.
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,
-                                        Progress& progress = Progress::none());
+                                        Progress& progress = Progress::none(), std::uint64_t first = 0);
 
 }  // namespace forest::lsystem

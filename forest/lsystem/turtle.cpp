@@ -70,7 +70,8 @@ struct State {
 
 class Turtle {
  public:
-  Turtle(const Word& word, const Grammar& grammar) : word_(word), grammar_(grammar) {
+  Turtle(const Word& word, const Grammar& grammar, const Annotations& annotations)
+      : word_(word), grammar_(grammar), annotations_(annotations) {
     state_.frame.col(0) = Eigen::Vector3d::UnitY();
     state_.frame.col(1) = -Eigen::Vector3d::UnitX();
     state_.frame.col(2) = Eigen::Vector3d::UnitZ();
@@ -258,11 +259,13 @@ class Turtle {
       for (std::uint32_t k = begin; k <= i; ++k) section_of[k] = id;
       ++i;
     }
+    for (const auto& [key, value] : annotations_) builder.annotate(key, value);
     return builder.build();
   }
 
   const Word& word_;
   const Grammar& grammar_;
+  const Annotations& annotations_;
   State state_;
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
@@ -274,6 +277,8 @@ class Turtle {
 
 std::span<const TurtleSymbol> turtle_symbols() { return symbol_table; }
 
-Morphology interpret(const Word& word, const Grammar& grammar) { return Turtle(word, grammar).run(); }
+Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations) {
+  return Turtle(word, grammar, annotations).run();
+}
 
 }  // namespace forest::lsystem

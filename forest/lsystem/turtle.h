@@ -29,7 +29,8 @@ struct TurtleSymbol {
 std::span<const TurtleSymbol> turtle_symbols();
 
 /// Draws the word. Symbols that are none of the turtle's are passed over.
+/// @param annotations  given to the neuron as they are
 /// Throws Error when brackets do not match, a number is not finite or there are two somata.
-Morphology interpret(const Word& word, const Grammar& grammar);
+Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations = {});
 
 }  // namespace forest::lsystem

@@ -1,0 +1,144 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest grow: neurons from a grammar, into a repository or a folder of SWC files.
+#include "forest/lsystem/grow.h"
+
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/io/format.h"
+#include "forest/morphology/measure.h"
+#include "forest/repository/repository.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/grammars.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::string grammar, repo, population;
+  std::filesystem::path out;
+  std::size_t count = 1;
+  std::uint64_t seed = 0;
+};
+
+constexpr std::size_t batch = 2000;  // neurons held at a time
+
+/// Where grown neurons go. What was put is undone unless it is finished.
+class Destination {
+ public:
+  virtual ~Destination() = default;
+  virtual void put(const Morphology& neuron, const std::string& name, std::uint64_t index) = 0;
+  virtual void finish() = 0;
+};
+
+class IntoRepository final : public Destination {
+ public:
+  IntoRepository(const Options& options, const lsystem::Grammar& grammar)
+      : options_(options),
+        name_(grammar.name),
+        repository_(repository::Repository::open(options.repo, repository::Access::write)),
+        transaction_(repository_.begin()),
+        hash_(repository_.add_grammar(grammar.name, grammar.text)) {}
+
+  void put(const Morphology& neuron, const std::string& name, std::uint64_t index) override {
+    repository_.add(neuron, {.name = name,
+                             .population = options_.population.empty() ? name_ : options_.population,
+                             .provenance = repository::Grown{name_, hash_, options_.seed, index},
+                             .number_if_taken = true});
+  }
+  void finish() override { transaction_.commit(); }
+
+ private:
+  const Options& options_;
+  std::string name_;
+  repository::Repository repository_;
+  repository::Repository::Transaction transaction_;
+  std::string hash_;
+};
+
+class IntoFolder final : public Destination {
+ public:
+  explicit IntoFolder(std::filesystem::path folder) : folder_(std::move(folder)) {
+    std::error_code error;
+    std::filesystem::create_directories(folder_, error);
+    if (error)
+      throw Error(fmt::format("{}: the folder cannot be made ({}); choose another", folder_.string(),
+                              error.message()));
+  }
+  ~IntoFolder() override {
+    std::error_code none;
+    for (const auto& file : unfinished_) std::filesystem::remove(file, none);
+  }
+  void put(const Morphology& neuron, const std::string& name, std::uint64_t) override {
+    const auto file = folder_ / (name + ".swc");
+    if (!std::filesystem::exists(file)) unfinished_.push_back(file);
+    io::write(file, neuron);
+  }
+  void finish() override { unfinished_.clear(); }
+
+ private:
+  std::filesystem::path folder_;
+  std::vector<std::filesystem::path> unfinished_;
+};
+
+void run(const Options& options, Console& console) {
+  const lsystem::Grammar grammar = find_grammar(options.grammar);
+  std::vector<std::unique_ptr<Destination>> destinations;
+  if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
+  if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
+
+  std::size_t segments = 0;
+  double length = 0.;
+  for (std::size_t first = 0; first < options.count; first += batch) {
+    const auto neurons = lsystem::grow_population(grammar, std::min(batch, options.count - first),
+                                                  options.seed, console.progress(), first);
+    for (std::size_t i = 0; i < neurons.size(); ++i) {
+      const std::string name = fmt::format("{}-{}-{:05}", grammar.name, options.seed, first + i);
+      for (const auto& destination : destinations) destination->put(neurons[i], name, first + i);
+      segments += neurons[i].segment_count();
+      length += total_length(neurons[i]);
+    }
+  }
+  for (const auto& destination : destinations) destination->finish();
+
+  console.print({{"grammar", grammar.name},
+                 {"title", grammar.title},
+                 {"seed", options.seed},
+                 {"neurons", options.count},
+                 {"segments", segments},
+                 {"length", length}});
+  const double count = double(options.count);
+  console.table({"grammar", "neurons", "segments each", "length each (µm)"},
+                {{grammar.name, fmt::format("{}", options.count),
+                  fmt::format("{:.0f}", double(segments) / count), fmt::format("{:.0f}", length / count)}});
+}
+
+}  // namespace
+
+std::function<void()> grow(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command
+      .add_option("--grammar", options->grammar,
+                  fmt::format("{}, or a file in the notation of docs/lsystem/notation.md",
+                              fmt::join(built_in_grammars(), ", ")))
+      ->required();
+  command.add_option("--count", options->count, "Neurons to grow")
+      ->check(CLI::Range(1, 100'000'000))
+      ->capture_default_str();
+  command.add_option("--seed", options->seed, "The same seed grows the same neurons")->capture_default_str();
+  CLI::Option_group* into = command.add_option_group("into", "where the neurons go");
+  CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
+  into->add_option("--out", options->out, "Write them into this folder as SWC files");
+  into->require_option(1, 2);
+  command.add_option("--population", options->population, "Their population; by default the grammar's name")
+      ->needs(repo);
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

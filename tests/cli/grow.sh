@@ -1,0 +1,59 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest grow: into a repository and into a folder, the same every time, and what it refuses.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+fails_with() {  # status, words of the sentence, command…
+  local status=$1 words=$2 got=0
+  shift 2
+  "$@" >out.txt 2>err.txt || got=$?
+  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
+  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
+}
+
+for grammar in motoneuron purkinje pyramidal; do
+  $BRAINFOREST grow --help | grep -q $grammar
+  $BRAINFOREST grow --grammar $grammar --count 3 --seed 7 --out one --threads 1 >/dev/null
+  $BRAINFOREST grow --grammar $grammar --count 3 --seed 7 --out four --threads 4 >/dev/null
+done
+[ "$(ls one | wc -l)" = 9 ]
+diff -r one four
+! cmp -s one/pyramidal-7-00000.swc one/pyramidal-7-00001.swc
+
+# Neurons of a repository are those of the folder, with where they come from.
+$BRAINFOREST grow --grammar pyramidal --count 3 --seed 7 --repo cells.db --population L5 --json >grown.json
+python3 - <<'PY'
+import json, sqlite3
+grown = json.load(open("grown.json"))
+assert (grown["grammar"], grown["seed"], grown["neurons"]) == ("pyramidal", 7, 3), grown
+assert grown["segments"] > 900
+PY
+$BRAINFOREST measure --repo cells.db --population L5 --metric total_length,number_of_segments --csv repo.csv >/dev/null
+$BRAINFOREST measure one/pyramidal-*.swc --metric total_length,number_of_segments --csv files.csv >/dev/null
+python3 - <<'PY'
+import csv
+repo, files = (list(csv.reader(open(name, encoding="utf-8")))[1:] for name in ("repo.csv", "files.csv"))
+assert len(repo) == 3
+for a, b in zip(repo, files):
+    assert a[2] == b[2] and abs(float(a[1]) / float(b[1]) - 1) < 1e-4, (a, b)
+PY
+cp cells.db before.db
+$BRAINFOREST grow --grammar pyramidal --count 3 --seed 7 --repo cells.db --population L5 >/dev/null  # again: nothing changes
+cmp cells.db before.db
+
+# A grammar of one's own; its mistakes are named by line and column.
+printf 'title: a stick\nsteps: 3\naxiom: Soma(10) f(5) A\ngrow: A -> F(10, 1) A\n' >stick.lsys
+$BRAINFOREST grow --grammar stick.lsys --out stick >/dev/null
+grep -q 'stick' stick/stick-0-00000.swc
+sed 's/F(10/F(ten/' stick.lsys >bad.lsys
+fails_with 1 "bad.lsys:4: column 14: 'ten' is not known" $BRAINFOREST grow --grammar bad.lsys --out bad
+[ ! -e bad ]
+
+# A runaway is stopped, named, and leaves nothing behind.
+printf 'limit: 1000\nsteps: 50\naxiom: A\nrabbits: A -> F [+ A] A\n' >runaway.lsys
+fails_with 1 'production rabbits' $BRAINFOREST grow --grammar runaway.lsys --out runaway --repo runaway.db
+[ -z "$(ls -A runaway)" ]
+
+fails_with 1 'motoneuron, purkinje, pyramidal' $BRAINFOREST grow --grammar nobody --out x
+fails_with 2 '' $BRAINFOREST grow --grammar pyramidal
+fails_with 2 '' $BRAINFOREST grow --grammar pyramidal --out x --population L5
+fails_with 2 '' $BRAINFOREST grow --grammar pyramidal --out x --count 0
