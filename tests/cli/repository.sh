@@ -1,0 +1,177 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest import, list, show and export: nothing is lost, nothing is stored in part, and the same command gives the
+# same bytes.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+fails_with() {  # status, words of the sentence, command…
+  local status=$1 words=$2 got=0
+  shift 2
+  "$@" >out.txt 2>err.txt || got=$?
+  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
+  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
+}
+json() { python3 -c "import json,sys; d=json.load(sys.stdin); print($1)"; }
+
+# Forty cells of 20 to 300 sections, two folders deep, and one with oddities.
+python3 - <<'PY'
+import os, random
+for c in range(40):
+    rng = random.Random(c)
+    folder = f"cells/{'deep' if c % 2 else 'upper'}"
+    os.makedirs(folder, exist_ok=True)
+    rows, ends, n = ["1 1 0 0 0 8 -1"], [(1, 0, 0, 0)], 1
+    for s in range(20 + 7 * c):
+        parent, x, y, z = rng.choice(ends)
+        for _ in range(5):
+            x, y, z = x + rng.uniform(-5, 5), y + rng.uniform(0, 5), z + rng.uniform(-5, 5)
+            n += 1
+            rows.append(f"{n} {3 + c % 2} {x:.3f} {y:.3f} {z:.3f} {rng.uniform(.2, 2):.3f} {parent}")
+            parent = n
+        ends.append((n, x, y, z))
+    open(f"{folder}/cell{c:02}.swc", "w").write("\n".join(rows) + "\n")
+open("odd.swc", "w").write("1 1 0 0 0 5 -1\n2 3 0 5 0 -1 1\n3 0 0 15 0 1 2\n")
+PY
+
+# Folders are walked in order; each file is a neuron. The bytes are the same at any number of threads, and again.
+$BRAINFOREST import cells --repo one.db --population P --threads 1 >one.txt
+$BRAINFOREST import cells --repo two.db --population P --threads 2 >two.txt
+cmp one.txt two.txt
+cmp one.db two.db
+$BRAINFOREST import cells --repo two.db --population P >again.txt
+grep -q '^0 stored, 40 already there' again.txt
+cmp one.db two.db
+[ "$(ls one.db*)" = one.db ]
+
+# An independent reader finds what the schema's page says.
+[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n1' ]
+[ "$(sqlite3 one.db 'select count(*), sum(sections), min(name), max(name) from neurons')" = '40|'"$(sqlite3 one.db 'select count(*) from sections')"'|cell00|cell39' ]
+[ "$(sqlite3 one.db "select count(*) from neurons join provenance on neuron = id where origin = 'traced' and length(source_hash) = 32 and source_file like 'cells/%.swc'")" = 40 ]
+python3 - <<'PY'
+import math, sqlite3, struct
+db = sqlite3.connect("one.db")
+for neuron, blob in db.execute("select neuron, data from points"):
+    points = list(struct.iter_unpack("<4f", blob))
+    for parent, first, count, length in db.execute(
+            "select parent, first_point, point_count, length from sections where neuron = ? order by number", (neuron,)):
+        run = points[first:first + count]
+        assert abs(sum(math.dist(a[:3], b[:3]) for a, b in zip(run, run[1:])) - length) < 1e-3 * length
+    assert db.execute("select sum(length) from arbors where neuron = ?", (neuron,)).fetchone()[0] > 0
+PY
+
+# list and show.
+$BRAINFOREST list --repo one.db --population P >list.txt
+grep -q 'cells/upper/cell38.swc' list.txt
+[ "$($BRAINFOREST list --repo one.db --json | json '[(p["name"], p["neurons"]) for p in d["populations"]], len(d["neurons"])')" = "[('P', 40)] 40" ]
+$BRAINFOREST show cell07 --repo one.db --sections >show.txt
+grep -q '^traced  *cells/deep/cell07.swc$' show.txt
+grep -q '^soma radius (µm)  *8.00$' show.txt
+id=$(sqlite3 one.db "select id from neurons where name = 'cell07'")
+$BRAINFOREST show "$id" --repo one.db --sections | cmp - show.txt
+[ "$($BRAINFOREST show cell07 --repo one.db --sections --json | json 'len(d[0]["section_list"]) == d[0]["sections"] == sum(a["sections"] for a in d[0]["arbors"]) == sum(k["sections"] for k in d[0]["kinds"])')" = True ]
+
+# export, and back.
+$BRAINFOREST export --repo one.db --population P --format swc --out exported >/dev/null
+[ "$(ls exported | wc -l)" = 40 ]
+$BRAINFOREST export --repo two.db --out exported2 --threads 1 >/dev/null
+diff -r exported exported2
+$BRAINFOREST import exported --repo back.db --population P >/dev/null
+facts="select name, stems, n.sections, n.points, group_concat(s.number || '<' || coalesce(s.parent, '') || ':' || s.kind) from neurons n join sections s on s.neuron = n.id group by n.id order by name"
+[ "$(sqlite3 one.db "$facts")" = "$(sqlite3 back.db "$facts")" ]
+$BRAINFOREST export cell07 "$id" cell00 --repo one.db --out some >/dev/null
+[ "$(ls some | tr '\n' ' ')" = 'cell00.swc cell07.swc ' ]
+cmp some/cell07.swc exported/cell07.swc
+
+# Oddities are counted, and shown with their line when asked.
+$BRAINFOREST import odd.swc --repo odd.db >odd.txt 2>odd.err
+grep -q 'odd.swc  odd  .* stored' odd.txt && grep -q 'shown by --verbose' odd.txt && [ ! -s odd.err ]
+$BRAINFOREST import odd.swc --repo odd2.db --verbose >/dev/null 2>odd.err
+grep -q '^odd.swc:2: negative-radius: ' odd.err
+
+# A bad file among many is named, the rest is stored, and the status says so.
+mkdir mixed && cp cells/upper/cell0*.swc mixed/ && echo nonsense >mixed/bad.swc && : >mixed/empty.swc
+fails_with 1 'mixed/bad.swc:1: ' $BRAINFOREST import mixed --repo mixed.db
+[ "$(sqlite3 mixed.db 'select count(*) from neurons')" = "$(ls mixed/cell*.swc | wc -l)" ]
+fails_with 1 '2 of 2 files could not be read' $BRAINFOREST import mixed/bad.swc mixed/empty.swc --repo never.db
+[ ! -e never.db ]
+
+# Another file of a taken name gets a number; the same file under another name is the same neuron.
+mkdir twins && sed 's/ 8 -1/ 9 -1/' cells/upper/cell00.swc >twins/cell00.swc && cp cells/upper/cell02.swc twins/copy.swc
+$BRAINFOREST import twins --repo one.db --population P >twins.txt 2>twins.err
+grep -q "stored as 'cell00-2'" twins.err && grep -q "same file as that of neuron 'cell02'" twins.err
+$BRAINFOREST import twins --repo one.db --population Q >/dev/null
+fails_with 1 'say --population with one of: P, Q' $BRAINFOREST show cell00 --repo one.db
+$BRAINFOREST export --repo one.db --out both >/dev/null
+[ "$(ls both/P | wc -l) $(ls both/Q | wc -l)" = '41 2' ]
+
+# Strange names of files and populations are only names.
+mkdir strange
+for name in "a'b" '"); drop table neurons; --' $'\xff\xfe' 'β cell' '%2E' '-rf'; do cp cells/upper/cell04.swc "strange/$name.swc"; echo "# $name" >>"strange/$name.swc"; done
+$BRAINFOREST import strange --repo strange.db --population "'); drop table neurons; --" >/dev/null
+$BRAINFOREST list --repo strange.db --population "'); drop table neurons; --" --json | json 'sorted(n["name"] for n in d["neurons"])' |
+  grep -qF '"); drop table neurons; --'
+$BRAINFOREST export --repo strange.db --out strange_out >/dev/null
+[ "$(ls strange_out | wc -l)" = 6 ]
+$BRAINFOREST import strange_out --repo strange.db --population back >/dev/null
+
+# What is no repository is refused with a sentence and not touched.
+cp cells/upper/cell00.swc not.db
+fails_with 1 'not.db: is no repository' $BRAINFOREST import cells --repo not.db
+cmp not.db cells/upper/cell00.swc
+fails_with 1 'there is no such repository' $BRAINFOREST list --repo missing.db
+[ ! -e missing.db ]
+head -c 50000 one.db >cut.db
+fails_with 1 'damaged or cut off' $BRAINFOREST list --repo cut.db
+fails_with 1 'there is no neuron' $BRAINFOREST show nobody --repo one.db
+fails_with 1 "those that are there: P, Q" $BRAINFOREST list --repo one.db --population R
+fails_with 1 'cannot be' $BRAINFOREST export --repo one.db --out not.db/folder
+fails_with 2 'files' $BRAINFOREST import --repo x.db
+fails_with 2 '--repo' $BRAINFOREST list
+fails_with 2 'is no name' $BRAINFOREST import cells --repo x.db --population $'a\nb'
+fails_with 2 '--format' $BRAINFOREST export --repo one.db --format jpeg --out x
+
+# A full disk: a sentence, and whole neurons.
+got=0
+(ulimit -f 200 && exec $BRAINFOREST import cells --repo full.db) >/dev/null 2>full.err || got=$?
+[ "$got" = 1 ] && grep -q 'the disk is full' full.err
+[ "$(sqlite3 full.db 'pragma integrity_check')" = ok ]
+$BRAINFOREST import cells --repo full.db --population default >/dev/null
+[ "$(sqlite3 full.db 'select count(*) from neurons')" = 40 ]
+
+# Killed at any moment, the repository opens and holds whole neurons only; importing again completes it. Two at once, too.
+python3 - <<'PY'
+import filecmp, os, random, shutil, signal, sqlite3, subprocess, time
+program = os.environ["BRAINFOREST"]
+quiet = dict(stdout=subprocess.DEVNULL, check=True)
+begin = time.monotonic()
+subprocess.run([program, "import", "cells", "--repo", "whole.db"], **quiet)
+took = time.monotonic() - begin
+rng = random.Random(1)
+seen = set()
+for round in range(24):
+    if round % 4 == 0 and os.path.exists("killed.db"): os.remove("killed.db")
+    child = subprocess.Popen([program, "import", "cells", "--repo", "killed.db"], stdout=subprocess.DEVNULL)
+    time.sleep(rng.uniform(0, took))
+    child.send_signal(signal.SIGKILL)
+    child.wait()
+    if not os.path.exists("killed.db"): continue
+    subprocess.run([program, "list", "--repo", "killed.db"], **quiet)
+    db = sqlite3.connect("killed.db")
+    assert db.execute("pragma integrity_check").fetchall() == [("ok",)]
+    assert db.execute("pragma foreign_key_check").fetchall() == []
+    names = [name for name, in db.execute("select name from neurons")]
+    db.close()
+    seen.add(len(names))
+    if not names: continue
+    shutil.rmtree("killed", ignore_errors=True)
+    subprocess.run([program, "export", "--repo", "killed.db", "--out", "killed"], **quiet)
+    assert sorted(os.listdir("killed")) == sorted(name + ".swc" for name in names)
+    for name in names: assert filecmp.cmp(f"killed/{name}.swc", f"exported/{name}.swc", shallow=False), name
+assert len(seen) > 1, seen
+subprocess.run([program, "import", "cells", "--repo", "killed.db"], **quiet)
+assert sqlite3.connect("killed.db").execute("select count(*) from neurons").fetchone() == (40,)
+
+both = [subprocess.Popen([program, "import", f"cells/{half}", "cells", "--repo", "both.db"], stdout=subprocess.DEVNULL)
+        for half in ("upper", "deep")]
+assert [child.wait() for child in both] == [0, 0]
+assert sqlite3.connect("both.db").execute("select count(*) from neurons").fetchone() == (40,)
+PY
