@@ -50,7 +50,7 @@ void refuse_foreign_folder(const fs::path& folder) {
 
 void check_file_name(const std::string& name) {
   const bool good =
-      !name.empty() && name.size() <= 200 && name[0] != '.' && name != "NULL" && name != "NONE" &&
+      !name.empty() && name.size() <= 250 && name[0] != '.' && name != "NULL" && name != "NONE" &&
       name != "None" &&
       std::ranges::none_of(name, [](char c) { return c == '/' || (c >= 0 && c < ' ') || c == 0x7f; });
   if (!good)

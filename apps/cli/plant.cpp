@@ -1,0 +1,71 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest plant: neurons of a repository into a column, as a SONATA circuit.
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/io/sonata.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/planting.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::string recipe, repo;
+  std::filesystem::path out;
+  std::uint64_t seed = 0;
+};
+
+void run(const Options& options, Console& console) {
+  const Planted planted =
+      plant_from_repository(find_recipe(options.recipe), options.repo, options.seed, console.progress());
+  const circuit::Circuit& circuit = planted.circuit;
+  io::write_sonata(options.out, circuit, planted.morphologies, console.progress());
+
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  std::vector<std::vector<std::string>> lines;
+  for (const circuit::Tally& row : circuit::tally(circuit)) {
+    const std::string &layer = circuit.layers[row.layer].name, &type = circuit.types[row.type].name;
+    list.push_back({{"layer", layer}, {"type", type}, {"count", row.count}, {"density", row.density}});
+    lines.push_back({layer, type, std::to_string(row.count), fmt::format("{:.0f}", row.density)});
+  }
+  console.print({{"circuit", options.out.string()},
+                 {"name", circuit.name},
+                 {"seed", options.seed},
+                 {"radius", circuit.radius},
+                 {"neurons", circuit.instances.size()},
+                 {"morphologies", circuit.morphologies.size()},
+                 {"planted", list}});
+  console.table({"layer", "type", "neurons", "neurons/mm³"}, lines);
+  console.say(fmt::format("\n{} neurons of {} shapes are planted in {}", circuit.instances.size(),
+                          circuit.morphologies.size(), options.out.string()));
+}
+
+}  // namespace
+
+std::function<void()> plant(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command
+      .add_option("--recipe", options->recipe,
+                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000")
+      ->required()
+      ->type_name("FILE|NAME");
+  command.add_option("--repo", options->repo, "The repository the neurons come from")
+      ->required()
+      ->type_name("FILE");
+  command
+      .add_option("--out", options->out,
+                  "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")
+      ->required()
+      ->type_name("DIR");
+  command.add_option("--seed", options->seed, "The same seed plants the same circuit")->capture_default_str();
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

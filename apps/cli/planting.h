@@ -1,0 +1,28 @@
+// SPDX-License-Identifier: Apache-2.0
+// From a recipe and a repository to a circuit with its morphologies: what `plant` and `demo` share.
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "forest/circuit/recipe.h"
+#include "forest/core/progress.h"
+#include "forest/morphology/morphology.h"
+
+namespace forest::cli {
+
+/// The recipe at a path, or the one that ships under a name ("column-1000"). Throws InputError that lists the names.
+circuit::Recipe find_recipe(const std::string& name_or_path);
+
+struct Planted {
+  circuit::Circuit circuit;
+  std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
+};
+
+/// Plants the neurons of a repository. A morphology is called as its neuron, made safe as a file name.
+/// Throws Error when a population that the recipe plants from is empty, with the commands that fill it.
+Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
+                              Progress& progress);
+
+}  // namespace forest::cli

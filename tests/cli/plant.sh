@@ -1,0 +1,68 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest plant: a circuit from a repository, read by h5py; the same bytes again; what it refuses.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+fails_with() {  # status, words of the sentence, command…
+  local status=$1 words=$2 got=0
+  shift 2
+  "$@" >out.txt 2>err.txt || got=$?
+  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
+  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
+}
+
+# Two cells of each of the three populations that the shipped recipes plant; the soma away from the origin.
+for population in pyramidal purkinje motoneuron; do
+  for i in 1 2; do
+    cat >$population-$i.swc <<SWC
+1 1 10 20 30 $((4 + i)) -1
+2 3 10 3$i 30 1 1
+3 3 10 9$i 30 1 2
+4 3 60 15$i 30 .5 3
+5 3 -40 14$i 50 .5 3
+SWC
+  done
+  $BRAINFOREST import $population-*.swc --repo cells.db --population $population >import.txt
+done
+
+$BRAINFOREST plant --recipe column-1000 --repo cells.db --seed 7 --out column/ >planted.txt
+grep -q '^L4 .*Purkinje cell' planted.txt
+grep -q '^1000 neurons of 6 shapes' planted.txt
+/usr/bin/python3 "$FOREST_SOURCE_DIR/tests/sonata_layout.py" column 1000
+
+# The same seed gives the same bytes at any number of threads, over the old circuit too; another seed another circuit.
+$BRAINFOREST plant --recipe column-1000 --repo cells.db --seed 7 --out again --threads 1 >/dev/null
+diff -r column again
+$BRAINFOREST plant --recipe column-1000 --repo cells.db --seed 8 --out again --json >again.json
+! diff -rq column again >/dev/null
+python3 - <<'PY'
+import json
+planted = json.load(open("again.json"))
+assert planted["neurons"] == 1000 == sum(row["count"] for row in planted["planted"]), planted
+assert planted["morphologies"] == 6
+PY
+[ -z "$(find . -maxdepth 1 -name '.*.??????')" ]  # nothing half written is left
+
+# Names that files cannot have, or that two populations share, do not clash.
+cp pyramidal-1.swc same.swc
+$BRAINFOREST import same.swc --repo names.db --population pyramidal >/dev/null
+$BRAINFOREST import same.swc --repo names.db --population purkinje >/dev/null
+$BRAINFOREST import same.swc --repo names.db --population motoneuron >/dev/null
+$BRAINFOREST plant --recipe column-1000 --repo names.db --out names >/dev/null
+[ "$(ls names/morphologies | wc -l)" = 3 ]
+/usr/bin/python3 "$FOREST_SOURCE_DIR/tests/sonata_layout.py" names 1000
+
+# What is wrong is said in a sentence with what to do, and nothing is left behind.
+$BRAINFOREST import pyramidal-1.swc --repo few.db --population pyramidal >/dev/null
+fails_with 1 'population purkinje, which is empty; grow' $BRAINFOREST plant --recipe column-1000 --repo few.db --out few
+fails_with 1 'column-1000, column-10000' $BRAINFOREST plant --recipe nosuch --repo cells.db --out few
+sed 's/^radius = .*/radius = 20/' "$FOREST_SOURCE_DIR/data/recipes/column-1000.toml" >narrow.toml
+fails_with 1 'do not fit without overlap' $BRAINFOREST plant --recipe narrow.toml --repo cells.db --out few
+sed 's/^radius/diameter/' narrow.toml >wrong.toml
+fails_with 1 'wrong.toml:[0-9]*: .*no key "diameter"' $BRAINFOREST plant --recipe wrong.toml --repo cells.db --out few
+fails_with 1 'few.db' $BRAINFOREST plant --recipe column-1000 --repo no/few.db --out few
+[ ! -e few ]
+mkdir mine && echo notes >mine/notes.txt
+fails_with 1 'not replaced' $BRAINFOREST plant --recipe column-1000 --repo cells.db --out mine
+[ "$(ls mine)" = notes.txt ]
+fails_with 2 '--recipe' $BRAINFOREST plant --repo cells.db --out few
+fails_with 2 '' $BRAINFOREST plant --recipe column-1000 --repo cells.db --out few --seed x
