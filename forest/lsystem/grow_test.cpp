@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/core/parallel.h"
 #include "forest/morphology/validate.h"
 #include "forest/statistics/metric.h"
@@ -67,7 +68,21 @@ TEST(Grow, BuiltInNeuronsAreSound) {
   }
 }
 
-// No built-in grammar may run away for any seed: 3,000 neurons of each.
+// The worked example of the documentation, as it stands there.
+TEST(Grow, TheDocumentedExampleGrows) {
+  const MappedFile page(std::string(FOREST_SOURCE_DIR) + "/docs/lsystem/notation.md");
+  const std::string_view text = page.text();
+  const std::size_t begin = text.find("```\n") + 4;
+  const Grammar g = parse(text.substr(begin, text.find("```", begin) - begin), "notation.md");
+  EXPECT_EQ(g.title, "a small bush");
+  for (const Morphology& m : grow_population(g, 20, 1)) {
+    EXPECT_EQ(m.soma().sphere().radius, 7.5f);
+    EXPECT_GE(m.segment_count(), 19u);
+    for (std::size_t i = 0; i < m.sections().size(); ++i) EXPECT_LE(m.children(SectionId(i)).size(), 2u);
+  }
+}
+
+// No built-in grammar may run away for any seed: a thousand neurons of each.
 TEST(Grow, BuiltInGrammarsDoNotRunAway) {
   for (const auto name : builtin) EXPECT_NO_THROW(grow_population(grammar(name), 1000, 99)) << name;
 }
