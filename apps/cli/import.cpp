@@ -19,6 +19,7 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/verb.h"
 
@@ -44,34 +45,6 @@ struct Arrival {
   std::optional<Added> added;
   std::size_t sections = 0, warnings = 0;
 };
-
-bool known(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
-    return std::ranges::find(f.extensions, extension) != f.extensions.end();
-  });
-}
-
-/// Files as they were named, folders as the files of a known format anywhere below them, sorted.
-std::vector<Arrival> arrivals(const std::vector<std::string>& names) {
-  std::vector<Arrival> arrivals;
-  const auto add = [&](const fs::path& path) { arrivals.emplace_back().path = path; };
-  for (const std::string& name : names) {
-    if (!fs::is_directory(name)) {
-      add(name);
-      continue;
-    }
-    std::vector<fs::path> below;
-    for (const auto& entry : fs::recursive_directory_iterator(name))
-      if (known(entry.path()) && !entry.is_directory()) below.push_back(entry.path());
-    if (below.empty())
-      throw InputError(name, 0, "holds no file of a known format; name the files themselves");
-    std::ranges::sort(below);
-    std::ranges::for_each(below, add);
-  }
-  return arrivals;
-}
 
 void read(Arrival& file) {
   try {
@@ -130,7 +103,8 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
 }
 
 void run(const Options& options, Console& console) {
-  std::vector<Arrival> files = arrivals(options.files);
+  std::vector<Arrival> files;
+  for (const fs::path& path : neuron_files(options.files)) files.emplace_back().path = path;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
   const std::size_t window = 64;  // neurons in memory at a time

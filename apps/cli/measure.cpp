@@ -19,6 +19,8 @@
 #include "forest/statistics/summary.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/neurons.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -28,7 +30,7 @@ using namespace statistics;
 using Picks = std::vector<const Metric*>;
 
 struct Options {
-  std::vector<std::filesystem::path> files;
+  std::vector<std::string> files;  // or folders
   std::string repo, population;
   std::vector<std::string> metrics;
   std::string kind = "all", level = "neuron";
@@ -65,22 +67,19 @@ struct Neurons {
 };
 
 Neurons of_files(const Options& options) {
+  std::vector<std::filesystem::path> files = neuron_files(options.files);
   Neurons neurons;
-  for (const auto& file : options.files) neurons.names.push_back(file.string());
-  neurons.reader = [&options] {
-    return [&options](std::size_t i) { return io::read(options.files[i]).morphology; };
+  for (const auto& file : files) neurons.names.push_back(file.string());
+  neurons.reader = [files = std::move(files)] {
+    return [&files](std::size_t i) { return io::read(files[i]).morphology; };
   };
   return neurons;
 }
 
 Neurons of_repository(const Options& options) {
   using namespace repository;
-  const auto rows = Repository::open(options.repo, Access::read).neurons(options.population);
-  if (rows.empty())
-    throw Error(options.population.empty()
-                    ? fmt::format("{} holds no neuron; import or grow some first", options.repo)
-                    : fmt::format("{} holds no population '{}'; brainforest list shows those it has",
-                                  options.repo, options.population));
+  const auto rows = pick_neurons(Repository::open(options.repo, Access::read), {}, options.population);
+  if (rows.empty()) throw Error(fmt::format("{} holds no neuron; import or grow some first", options.repo));
   Neurons neurons;
   std::vector<NeuronId> ids;
   for (const NeuronRow& row : rows) {
@@ -222,8 +221,9 @@ void print_neuron(Console& console, const Picks& picks, const Row& row) {
 }
 
 /// A row each, and of several neurons their mean and standard deviation.
-void print_rows(Console& console, const std::vector<Column>& columns, const std::vector<Row>& rows,
-                bool summaries) {
+void print_rows(Console& console, const Options& options, const std::vector<Column>& columns,
+                const std::vector<Row>& rows) {
+  const bool summaries = options.level == "neuron", files = options.repo.empty();
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> lines(rows.size() + (summaries ? 2 : 0));
   for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -231,7 +231,7 @@ void print_rows(Console& console, const std::vector<Column>& columns, const std:
     header.push_back(columns[c].title());
     std::vector<double> values;
     for (std::size_t r = 0; r < rows.size(); ++r) {
-      lines[r].push_back(c == 0 ? short_name(rows[r][c]) : shown(rows[r][c]));
+      lines[r].push_back(c == 0 && files ? short_name(rows[r][c]) : shown(rows[r][c]));
       if (const double* value = std::get_if<double>(&rows[r][c])) values.push_back(*value);
     }
     if (!summaries) continue;
@@ -299,7 +299,7 @@ void run(const Options& options, Console& console) {
   } else if (options.level == "neuron" && all.size() == 1) {
     print_neuron(console, picks, all[0]);
   } else if (options.level == "neuron" || options.csv.empty()) {
-    print_rows(console, header, all, options.level == "neuron");
+    print_rows(console, options, header, all);
   }
   if (!options.csv.empty())
     console.say(fmt::format("{} rows of {} columns were written to {}", all.size(), header.size(),
@@ -315,21 +315,27 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> measure(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  CLI::Option* files = command.add_option("files", options->files, "Files of traced or grown neurons")
-                           ->check(CLI::ExistingFile);
+  CLI::Option* files =
+      command.add_option("files", options->files, "Files of neurons, or folders with such files below them")
+          ->check(CLI::ExistingPath)
+          ->type_name("FILES");
   CLI::Option* repo =
       command.add_option("--repo", options->repo, "Measure the neurons of this repository instead")
-          ->excludes(files);
+          ->excludes(files)
+          ->type_name("FILE");
   command.add_option("--population", options->population, "Only those of this population")->needs(repo);
   command
       .add_option("--metric", options->metrics,
                   "Metrics to show, by their or L-Measure's name; all by default")
+      ->type_name("NAME")
       ->delimiter(',')
       ->check([](const std::string& name) {
         return find_metric(name) ? ""
                                  : fmt::format("There is no metric called '{}'; --list shows them", name);
       });
   command.add_option("--kind", options->kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
+      ->type_name("KIND")
+      ->capture_default_str()
       ->check([](const std::string& word) -> std::string {
         try {
           kind_set(word);
@@ -339,7 +345,9 @@ std::function<void()> measure(CLI::App& command, Console& console) {
         }
       });
   command.add_option("--level", options->level, "What a row is: neuron, section, bifurcation or shell")
-      ->check(CLI::IsMember({"neuron", "section", "bifurcation", "shell"}));
+      ->check(CLI::IsMember({"neuron", "section", "bifurcation", "shell"}))
+      ->type_name("LEVEL")
+      ->capture_default_str();
   command.add_option("--csv", options->csv, "Write the table to this file")->type_name("FILE");
   command.add_flag("--list", options->list, "Show all metrics and what they are");
   command.parse_complete_callback([options] {

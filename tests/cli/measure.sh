@@ -55,6 +55,17 @@ $BRAINFOREST measure many_*.swc --threads 1 --csv one.csv >one_thread.txt
 $BRAINFOREST measure many_*.swc --threads 4 --csv one.csv.4 >four_threads.txt
 cmp one.csv one.csv.4
 
+# A folder is its files, and a repository gives the same values as the files in it.
+mkdir cells && mv many_*.swc cells
+$BRAINFOREST measure cells --csv files.csv >/dev/null
+$BRAINFOREST import cells --repo cells.db --population many >/dev/null
+$BRAINFOREST measure --repo cells.db --population many --csv repository.csv >/dev/null
+sed -E 's|^cells/(.*)\.swc,|\1,|' files.csv | cmp - repository.csv
+$BRAINFOREST measure --repo cells.db --metric total_length >repository.txt
+grep -q '^many/many_1 ' repository.txt
+fails_with 1 'few' $BRAINFOREST measure --repo cells.db --population few
+fails_with 2 'excludes' $BRAINFOREST measure fork.swc --repo cells.db
+
 # A bad file is named, the others are measured, and the status says so.
 echo nonsense >bad.swc
 fails_with 1 'bad.swc' $BRAINFOREST measure bad.swc fork.swc --csv rest.csv
