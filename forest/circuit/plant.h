@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Planting: from a recipe and the neurons at hand to a circuit. Counts are exact, somata do not overlap, and
-// the result is a pure function of (recipe, candidates, seed), the same at any number of threads.
+// Planting: from a recipe and the neurons at hand to a circuit. Counts are exact, somata do not overlap, and the
+// result is a pure function of (recipe, candidates, seed), the same at any number of threads.
 //
 // Somata are placed by random sequential addition (Feder 1980, "Random sequential adsorption"): each is given
 // uniform places in its layer until it is clear of those before it. Large somata go first, as they find room
-// hardest. A grid of cells keeps each trial at the cost of a few comparisons, so that a million neurons take
-// about a second at common densities. Random sequential addition jams when spheres fill about 38 % of the
-// volume; before that it is refused.
+// hardest. A grid of cells keeps each trial at the cost of a few comparisons. Random sequential addition jams
+// when spheres fill about 38 % of the volume; near that a soma needs ever more trials, and a layer where one
+// finds no place is refused.
 #pragma once
 
 #include <cstdint>
