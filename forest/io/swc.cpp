@@ -114,12 +114,9 @@ class RowOfId {
   /// none.
   std::int32_t find(std::int64_t id, std::size_t asking) const {
     if (!sorted_.empty()) {
-      const auto range = std::ranges::equal_range(sorted_, id, {}, &Entry::first);
-      if (range.empty()) return none;
-      const auto after =
-          std::ranges::lower_bound(range, static_cast<std::int32_t>(asking), {}, &Entry::second);
-      if (after != range.begin()) return std::prev(after)->second;
-      return after->second;
+      const auto after = std::ranges::lower_bound(sorted_, Entry{id, static_cast<std::int32_t>(asking)});
+      if (after != sorted_.begin() && std::prev(after)->first == id) return std::prev(after)->second;
+      return after != sorted_.end() && after->first == id ? after->second : none;
     }
     if (!direct_.empty()) {
       const std::uint64_t at = static_cast<std::uint64_t>(id) - static_cast<std::uint64_t>(first_);
