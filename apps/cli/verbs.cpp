@@ -13,6 +13,7 @@ std::function<void()> export_files(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
 std::function<void()> plant(CLI::App&, Console&);
+std::function<void()> bench(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
   static constexpr auto table = std::to_array<Verb>({
@@ -30,6 +31,7 @@ std::span<const Verb> verbs() {
        "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
+      {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
   });
   return table;
 }

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/bench.h"
+
+#include <array>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+
+#include "apps/cli/console.h"
+
+namespace forest::cli {
+
+// One declaration and one row a benchmark.
+std::function<void()> bench_io(CLI::App&, Console&);
+
+std::span<const Benchmark> benchmarks() {
+  static constexpr auto table = std::to_array<Benchmark>({
+      {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
+  });
+  return table;
+}
+
+std::function<void()> bench(CLI::App& command, Console& console) {
+  command.require_subcommand(1);
+  const auto chosen = std::make_shared<std::function<void()>>();
+  for (const Benchmark& benchmark : benchmarks()) {
+    CLI::App* sub = command.add_subcommand(benchmark.name, benchmark.summary);
+    sub->add_flag("--json", console.json, "Print results as JSON");
+    sub->add_option("--threads", console.threads, "Number of threads; 0 for all cores")
+        ->check(CLI::NonNegativeNumber);
+    sub->callback([chosen, job = benchmark.setup(*sub, console)] { *chosen = job; });
+  }
+  return [chosen] { (*chosen)(); };
+}
+
+}  // namespace forest::cli
