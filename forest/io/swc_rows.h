@@ -59,6 +59,11 @@ enum class SwcOddity : std::uint8_t {
   count
 };
 
+inline constexpr std::int32_t swc_soma_type = 1;
+inline SectionKind swc_kind(std::int32_t type) {
+  return type < 0 || type > 7 || type == swc_soma_type ? SectionKind::custom : SectionKind(type);
+}
+
 /// The first line of a file that write_swc wrote. It is read to the letter: nothing is guessed about types
 /// and soma.
 inline constexpr std::string_view swc_marker = "Brain Forest SWC 1 (INCF v1)";
