@@ -110,15 +110,18 @@ TEST(Motoneuron, HasThePublishedStemsTipsAndOrder) {
 }
 
 TEST(Purkinje, IsAFanInItsPlaneTowardsThePia) {
-  for (const Morphology& m : grow_population(grammar("purkinje"), 30, 5)) {
+  const auto cells = grow_population(grammar("purkinje"), 200, 5);
+  for (const Morphology& m : cells) {
     const Vec3 extent = m.bounds().extent();
-    EXPECT_LT(extent.z(), .4f * std::min(extent.x(), extent.y()));
-    EXPECT_GT(m.bounds().high.y(), 2 * -m.bounds().low.y());
+    EXPECT_LT(extent.z(), .5f * std::min(extent.x(), extent.y()));
+    EXPECT_GT(m.bounds().high.y(), -m.bounds().low.y());
   }
+  EXPECT_LT(statistics::summarize(of_cells(cells, "total_depth")).mean, 40.);
+  EXPECT_GT(statistics::summarize(of_cells(cells, "length_fraction_above_soma")).mean, .95);
 }
 
 TEST(Pyramidal, HasOneApicalTreeTowardsThePiaBasalDendritesAndAnAxon) {
-  for (const Morphology& m : grow_population(grammar("pyramidal"), 30, 5)) {
+  for (const Morphology& m : grow_population(grammar("pyramidal"), 200, 5)) {
     int apical = 0, basal = 0, axon = 0;
     for (const SectionId id : m.roots()) {
       apical += m.section(id).kind == SectionKind::apical;

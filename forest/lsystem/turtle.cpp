@@ -38,6 +38,9 @@ constexpr TurtleSymbol symbol_table[] = {
     {"Kind", "number", "what follows is of this SWC type", Action::kind, 1, 1},
     {"Outward", "strength", "from here on bend away from the soma by strength; 0 ends it", Action::outward, 1,
      1},
+    {"Flat", "strength, x, y, z",
+     "from here on bend by strength into the plane across a direction, (0, 0, 1) when not given; 0 ends it",
+     Action::flat, 1, 4},
 };
 
 static_assert([] {
@@ -61,9 +64,10 @@ struct Drawn {
 struct State {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d frame;  // columns: heading, left, up
-  double diameter = 1., tropism = 0., outward = 0.;
-  Eigen::Vector3d towards = Eigen::Vector3d::UnitY();
-  std::uint32_t node = none;  // the drawn point the turtle stands on
+  double diameter = 1., tropism = 0., outward = 0., flat = 0.;
+  Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
+  Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
+  std::uint32_t node = none;                           // the drawn point the turtle stands on
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
 };
@@ -134,10 +138,13 @@ class Turtle {
         return;
       case Action::tropism:
         state_.tropism = parameter(0, 0.);
-        if (values.size() > 1) {
-          state_.towards = {parameter(1, 0.), parameter(2, 0.), parameter(3, 0.)};
-          if (state_.towards.norm() > 0.) state_.towards.normalize();
-        }
+        if (values.size() > 1)
+          state_.towards = direction(parameter(1, 0.), parameter(2, 0.), parameter(3, 0.));
+        return;
+      case Action::flat:
+        state_.flat = parameter(0, 0.);
+        if (values.size() > 1)
+          state_.across = direction(parameter(1, 0.), parameter(2, 0.), parameter(3, 0.));
         return;
       case Action::outward:
         state_.outward = parameter(0, 0.);
@@ -155,6 +162,10 @@ class Turtle {
       case Action::kind:
         return become_numbered(parameter(0, 0.));
     }
+  }
+
+  static Eigen::Vector3d direction(double x, double y, double z) {
+    return Eigen::Vector3d(x, y, z).stableNormalized();
   }
 
   void rotate(int a, int b, double angle) {  // column a towards column b
@@ -198,6 +209,10 @@ class Turtle {
         {state_.position, float(0.5 * diameter), start, state_.node, 0, state_.tag, state_.kind});
     state_.node = std::uint32_t(drawn_.size() - 1);
     if (state_.tropism != 0.) bend(state_.towards, state_.tropism);
+    if (state_.flat != 0.) {
+      const Eigen::Vector3d heading = state_.frame.col(0);
+      bend((heading - heading.dot(state_.across) * state_.across).stableNormalized(), state_.flat);
+    }
     if (state_.outward != 0.) {
       const Eigen::Vector3d out = state_.position - soma_place_;
       if (const double distance = out.norm(); distance > 0.) bend(out / distance, state_.outward);

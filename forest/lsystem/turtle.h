@@ -17,7 +17,7 @@ namespace forest::lsystem {
 enum class Action : std::uint8_t {
   // clang-format off
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
-  push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward,
+  push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
   // clang-format on
 };
 

@@ -106,6 +106,8 @@ TEST(Turtle, TropismBendsTowardsItsDirection) {
   expect_near(heading("T(0.2,1,0,0)"), {1, 0, 0});
   EXPECT_NEAR(heading("+(80)[T(0.2)F]").x(), -std::sin(radians(80)),
               1e-5f);  // forgotten at the end of a branch
+  EXPECT_NEAR(heading("&(50)Flat(0.2)").z(), 0.f, 1e-5f);
+  expect_near(heading("+(30)Flat(0.2,1,0,0)"), {0, 1, 0});
   const Morphology m = drawn("Soma(2) f(100) -(100) Outward(0.2)" + many);
   const Vec3 end = m.points().back().position(), before = m.points()[m.points().size() - 2].position();
   EXPECT_GT((end - before).dot(end.normalized()), .99f);
