@@ -6,8 +6,8 @@
 # GCC 12 warns falsely of std::string concatenation (-Wrestrict, GCC bug 105329) and of Eigen vectors (-Warray-bounds).
 set(FOREST_WARNINGS -Wall -Wextra -Wshadow -Wconversion $<$<CXX_COMPILER_ID:GNU>:-Wno-restrict> $<$<CXX_COMPILER_ID:GNU>:-Wno-array-bounds>
                     $<$<BOOL:${FOREST_WARNINGS_AS_ERRORS}>:-Werror>)
-if(FOREST_SANITIZE)
-  add_compile_options(-fsanitize=${FOREST_SANITIZE} -fno-sanitize-recover=all -fno-omit-frame-pointer)
+if(FOREST_SANITIZE) # but not `vptr`: SOCI keeps its type information to itself
+  add_compile_options(-fsanitize=${FOREST_SANITIZE} -fno-sanitize=vptr -fno-sanitize-recover=all -fno-omit-frame-pointer)
   add_link_options(-fsanitize=${FOREST_SANITIZE})
 endif()
 
