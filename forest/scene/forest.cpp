@@ -249,14 +249,16 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
               again);
   require(hash64(std::as_bytes(std::span(header.table)), header.file_size) == header.table_hash,
           "has a damaged table of contents" + again);
-  std::uint64_t end = sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
+  std::uint64_t end =
+      sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
   for (std::uint32_t p = 0; p < part_count; ++p) {
     const Entry& e = header.table[p];
     require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
                 e.offset <= bytes.size() && e.count <= (bytes.size() - e.offset) / e.element_size,
             "has a wrong table of contents" + again);
     require(e.offset >= end && e.offset - end < alignment &&
-                std::ranges::all_of(bytes.subspan(end, e.offset - end), [](std::byte b) { return b == std::byte{0}; }),
+                std::ranges::all_of(bytes.subspan(end, e.offset - end),
+                                    [](std::byte b) { return b == std::byte{0}; }),
             "is damaged between its parts" + again);
     end = e.offset + e.count * e.element_size;
     data->parts[p] = bytes.subspan(e.offset, e.count * e.element_size);

@@ -53,8 +53,8 @@ TEST(ForestFile, CutShortAtAnyByteIsRefused) {
 }
 
 TEST(ForestFile, AnyChangedByteIsRefused) {
-  const auto bytes =
-      pack(sample_circuit(3), std::vector<Morphology>{testing::random_tree(1, 5), Morphology(), Morphology()});
+  const auto bytes = pack(sample_circuit(3),
+                          std::vector<Morphology>{testing::random_tree(1, 5), Morphology(), Morphology()});
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     auto damaged = bytes;
     damaged[i] ^= std::byte{0x41};

@@ -61,7 +61,8 @@ std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, 
         const auto t = intersect(ray, cone);
         if (!t || *t < near) continue;
         // At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
-        if (best && std::tuple(*t, index, s) >= std::tuple(best->distance, best->instance, best->segment)) continue;
+        if (best && std::tuple(*t, index, s) >= std::tuple(best->distance, best->instance, best->segment))
+          continue;
         best =
             Pick{index, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
       }
