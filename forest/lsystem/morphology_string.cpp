@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 
 #include <fmt/format.h>
 
@@ -135,7 +136,7 @@ class Reader {
   std::int64_t whole() {
     const std::size_t place = (text_.more(), text_.at());
     const double value = text_.signed_number();
-    if (value != double(std::int64_t(value)) || value < -2147483648. || value > 2147483647.)
+    if (!(value >= -2147483648. && value <= 2147483647. && value == std::floor(value)))
       text_.fail_at(place, "a whole number is missing here");
     return std::int64_t(value);
   }

@@ -1,0 +1,22 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest bench grow: what it prints and refuses. How fast it is, no test asks.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+"$BRAINFOREST" bench grow --seconds 0.01 --json >out.json
+python3 - <<'PY'
+import json
+out = json.load(open("out.json"))
+assert out["neurons_per_second"] > 0 and out["segments_per_second"] > out["neurons_per_second"], out
+assert set(out["growing"]) == {"motoneuron", "purkinje", "pyramidal"}, out
+for result in out["growing"].values():
+    assert result["neurons"] >= 200 and result["segments_each"] > 500, out
+PY
+
+# A grammar that grows nothing, or the same twice, is not timed.
+printf 'axiom: Soma(10) A\ngrow: A -> B\n' >nothing.lsys
+printf 'steps: 2\naxiom: Soma(10) A\ngrow: A -> F(10) A\n' >same.lsys
+for grammar in nothing same; do
+  status=0
+  "$BRAINFOREST" bench grow --grammar $grammar.lsys >out.txt 2>err.txt || status=$?
+  [ $status = 1 ] && grep -q 'not really grown' err.txt
+done
