@@ -87,9 +87,8 @@ TEST(Grow, BuiltInGrammarsDoNotRunAway) {
   for (const auto name : builtin) EXPECT_NO_THROW(grow_population(grammar(name), 1000, 99)) << name;
 }
 
-// Published means and standard deviations of six cells of Burke's archive (v_e_moto1 to 6, by L-Measure).
-// Order is counted from 0 at the stem here, from 1 there or here: either is within the two standard
-// deviations.
+// Published means and standard deviations of six cells of Burke's archive (v_e_moto1 to 6, by L-Measure). We count order
+// from 0 at the stem; counted from 1 it would be within the two standard deviations as well.
 struct Published {
   const char* metric;
   double mean, sd;
