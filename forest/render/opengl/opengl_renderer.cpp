@@ -157,7 +157,7 @@ struct OpenGLRenderer::Device {
     for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
       mark_items.push_back({0, std::uint32_t(i),
                             std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
-                            0, 0, 0});
+                            0, 0, INFINITY});  // never culled as a whole
     overlay_segments.upload(std::span<const Segment>(marks));
     set(lists[overlay_list], mark_items);
 

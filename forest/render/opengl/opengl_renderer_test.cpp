@@ -73,6 +73,16 @@ TEST(OpenGLRenderer, AThinLineCoversItsAreaOnTheMean) {
   }
 }
 
+TEST(OpenGLRenderer, OverlaysAreSeenWhereverTheOriginIs) {
+  for (const float beside : {0.f, 500.f}) {  // the origin in the picture, and far beside it
+    Fixture f;
+    f.frame.camera.eye.x() = f.frame.camera.target.x() = beside;
+    const std::vector<frame::Overlay> marks{{Vec3(beside - 10, 0, 0), Vec3(beside + 10, 0, 0), 2.f, 5}};
+    f.frame.overlays = marks;
+    EXPECT_GT(red_area(f.draw()), 300.) << beside;
+  }
+}
+
 TEST(OpenGLRenderer, NearerHidesFartherInAnyOrderAndAnyBand) {
   for (const bool swapped : {false, true}) {
     Fixture f;

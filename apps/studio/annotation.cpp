@@ -1,0 +1,126 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/annotation.h"
+
+#include <QPainter>
+#include <algorithm>
+#include <cmath>
+
+#include "apps/studio/selection.h"
+
+namespace forest::studio {
+namespace {
+
+constexpr int margin = 18;  // points, from the edges of the picture
+
+void plate(QPainter& painter, const QRectF& area, const Ink& ink) {
+  painter.setPen(Qt::NoPen);
+  painter.setBrush(ink.plate);
+  painter.drawRoundedRect(area, 6, 6);
+}
+
+}  // namespace
+
+Ink ink_on(scene::Background background) {
+  return background == scene::Background::dark
+             ? Ink{QColor(226, 232, 240), QColor(150, 163, 182), QColor(8, 12, 19, 150)}
+             : Ink{QColor(32, 40, 52), QColor(96, 108, 126), QColor(255, 255, 255, 170)};
+}
+
+QColor to_screen(const Vec3& linear) {
+  const auto srgb = [](float c) {
+    c = std::clamp(c, 0.f, 1.f);
+    return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
+  };
+  return QColor::fromRgbF(srgb(linear.x()), srgb(linear.y()), srgb(linear.z()));
+}
+
+float round_length(float longest) {
+  const float decade = std::pow(10.f, std::floor(std::log10(longest)));
+  for (const float step : {5.f, 2.f})
+    if (step * decade <= longest) return step * decade;
+  return decade;
+}
+
+void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
+  const float micrometres_a_point = (camera.eye - camera.target).norm() / camera.focal(float(area.height()));
+  const float length = round_length(micrometres_a_point * 160.f);
+  const qreal width = qreal(length / micrometres_a_point);
+  const QPointF left(area.left() + margin + 10, area.bottom() - margin - 10),
+      right = left + QPointF(width, 0);
+  const QString label =
+      length < 1000.f ? QString("%1 µm").arg(length) : QString("%1 mm").arg(length / 1000.f);
+  const qreal text_width = painter.fontMetrics().horizontalAdvance(label);
+  plate(painter, QRectF(left - QPointF(10, 28), QSizeF(std::max(width, text_width) + 20, 38)), ink);
+  painter.setPen(QPen(ink.text, 1.6));
+  painter.drawLine(left, right);
+  for (const QPointF& end : {left, right}) painter.drawLine(end - QPointF(0, 4), end + QPointF(0, 4));
+  painter.drawText(left - QPointF(0, 9), label);
+}
+
+void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
+  constexpr qreal length = 30;
+  const QPointF centre(area.right() - margin - 40, area.bottom() - margin - 40);
+  plate(painter, QRectF(centre - QPointF(48, 48), QSizeF(96, 96)), ink);
+  struct Axis {
+    const char* name;
+    Vec3 way;
+    QColor colour;
+  };
+  // Okabe & Ito's vermilion, green and blue.
+  Axis axes[] = {{"x", Vec3::UnitX(), {213, 94, 0}},
+                 {"y pia", Vec3::UnitY(), {0, 178, 130}},
+                 {"z", Vec3::UnitZ(), {70, 150, 220}}};
+  const Mat3 seen = camera.axes().transpose();
+  std::ranges::sort(axes, {}, [&](const Axis& a) { return (seen * a.way).z(); });  // far ones first
+  for (const Axis& a : axes) {
+    const Vec3 way = seen * a.way;
+    const QPointF tip = centre + length * QPointF(way.x(), -way.y());
+    painter.setPen(QPen(a.colour, 2, Qt::SolidLine, Qt::RoundCap));
+    painter.drawLine(centre, tip);
+    painter.setPen(ink.text);
+    const QRectF box(centre + (length + 10.) * QPointF(way.x(), -way.y()) - QPointF(24, 8), QSizeF(48, 16));
+    painter.drawText(box, Qt::AlignCenter, a.name);
+  }
+}
+
+void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
+                  const Ink& ink) {
+  if (legend.empty()) return;
+  const qreal line = painter.fontMetrics().height() + 5.;
+  qreal widest = 0;
+  for (const auto& entry : legend)
+    widest =
+        std::max(widest, qreal(painter.fontMetrics().horizontalAdvance(QString::fromStdString(entry.name))));
+  const QPointF corner(area.left() + margin, area.top() + margin);
+  plate(painter, QRectF(corner, QSizeF(widest + 44, line * qreal(legend.size()) + 14)), ink);
+  for (std::size_t i = 0; i < legend.size(); ++i) {
+    const QPointF middle = corner + QPointF(18, 7 + line * (qreal(i) + .5));
+    painter.setPen(Qt::NoPen);
+    painter.setBrush(to_screen(legend[i].colour));
+    painter.drawEllipse(middle, 5, 5);
+    painter.setPen(ink.text);
+    painter.drawText(QRectF(middle + QPointF(13, -line / 2), QSizeF(widest + 4, line)), Qt::AlignVCenter,
+                     QString::fromStdString(legend[i].name));
+  }
+}
+
+void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {
+  painter.setBrush(Qt::NoBrush);
+  painter.setPen(QPen(ink.faint, 1.4));
+  painter.drawEllipse(place, 14, 14);
+  painter.drawPoint(place);
+}
+
+void mark_selection(frame::Palette& palette, scene::Background background, bool dim) {
+  const bool light = background == scene::Background::light;
+  if (dim) {
+    const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
+    for (std::size_t i = 0; i < palette.size(); ++i)
+      if (i != scene::highlight_entry && i != scene::outline_entry)
+        palette[i] = .28f * palette[i] + .72f * back;
+  }
+  palette[section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
+  palette[scene::highlight_entry] = light ? Vec3(.05f, .05f, .35f) : Vec3(.80f, .90f, 1.f);
+}
+
+}  // namespace forest::studio

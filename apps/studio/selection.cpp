@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/selection.h"
+
+#include <algorithm>
+#include <cmath>
+#include <set>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/scene/view.h"
+
+namespace forest::studio {
+namespace {
+
+using Json = nlohmann::ordered_json;
+
+struct Subject {
+  const scene::Forest& forest;
+  const Selection& selection;
+  const frame::Instance& instance;
+  const scene::Neuron& neuron;
+  const scene::SectionFacts* section;  // null for the soma
+
+  std::uint32_t index() const { return selection.pick.instance; }
+  const circuit::Circuit& circuit() const { return forest.circuit(); }
+  std::uint32_t section_of(std::uint32_t segment) const {
+    return forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
+  }
+  std::set<std::uint32_t> sections() const {  // of the subarbor
+    std::set<std::uint32_t> found;
+    for (const std::uint32_t s : selection.subarbor)
+      if (section_of(s) != scene::soma_section) found.insert(section_of(s));
+    return found;
+  }
+  template <class Value>
+  auto sum(Value value) const {  // over the sections of the subarbor
+    decltype(value(*section)) total = 0;
+    for (const std::uint32_t s : sections()) total += value(forest.sections()[neuron.first_section + s]);
+    return total;
+  }
+};
+
+Subject subject(const scene::Forest& forest, const Selection& selection) {
+  const frame::Instance& instance = forest.instances()[selection.pick.instance];
+  const scene::Neuron& neuron = forest.neurons()[instance.morphology];
+  return {forest, selection, instance, neuron,
+          selection.is_soma() ? nullptr : &forest.sections()[neuron.first_section + selection.pick.section]};
+}
+
+double tidy(float value) { return std::round(double(value) * 1000.) / 1000.; }
+
+// One row feeds the panel, the JSON and the documentation. A null value: the row does not apply.
+struct Row {
+  const char* key;
+  const char* name;
+  const char* unit;
+  const char* hint;
+  Json (*value)(const Subject&);
+};
+constexpr std::uint32_t none = 0xffffffffu;
+const Row rows[] = {
+    {"neuron", "Neuron", "", "Id of the planted neuron, from 0",
+     [](const Subject& s) { return Json(s.index()); }},
+    {"type", "Cell type", "", "From the recipe of the column",
+     [](const Subject& s) { return Json(s.circuit().types[s.forest.types()[s.index()]].name); }},
+    {"layer", "Layer", "", "Where its soma lies",
+     [](const Subject& s) { return Json(s.circuit().layers[s.forest.layers()[s.index()]].name); }},
+    {"morphology", "Morphology", "", "Name of the grown or traced neuron that stands here",
+     [](const Subject& s) { return Json(s.circuit().morphologies[s.instance.morphology]); }},
+    {"position", "Soma position", "µm", "x, y, z in the tissue; y points to the pia",
+     [](const Subject& s) {
+       return Json{tidy(s.instance.x), tidy(s.instance.y), tidy(s.instance.z)};
+     }},
+    {"section", "Section", "", "Id of the section within its neuron, from 0",
+     [](const Subject& s) { return s.section ? Json(s.selection.pick.section) : Json("soma"); }},
+    {"kind", "Kind", "", "Axon, basal or apical dendrite, …",
+     [](const Subject& s) { return s.section ? Json(name_of(SectionKind(s.section->kind))) : Json("soma"); }},
+    {"order", "Branch order", "", "Branch points between the section and the soma: 0 for a stem",
+     [](const Subject& s) { return s.section ? Json(s.section->order) : Json(); }},
+    {"length", "Length", "µm", "Of the section, along its path",
+     [](const Subject& s) { return s.section ? Json(tidy(s.section->length)) : Json(); }},
+    {"diameter_start", "Diameter, start", "µm", "Where the section begins",
+     [](const Subject& s) { return s.section ? Json(tidy(s.section->diameter_start)) : Json(); }},
+    {"diameter_end", "Diameter, end", "µm", "Where the section ends",
+     [](const Subject& s) { return s.section ? Json(tidy(s.section->diameter_end)) : Json(); }},
+    {"diameter", "Soma diameter", "µm", "Of the sphere of the same place and mean size",
+     [](const Subject& s) { return s.section ? Json() : Json(tidy(2.f * s.neuron.soma_radius)); }},
+    {"path_distance", "Path distance", "µm", "Along the branches, from the soma to the section's end",
+     [](const Subject& s) { return s.section ? Json(tidy(s.section->path_distance)) : Json(); }},
+    {"parent", "Parent section", "", "The section that it grows out of (key P selects it)",
+     [](const Subject& s) {
+       return !s.section ? Json() : s.section->parent == none ? Json("soma") : Json(s.section->parent);
+     }},
+    {"daughters", "Daughters", "", "Sections that grow out of its end: 0 for a terminal, 2 at a bifurcation",
+     [](const Subject& s) { return s.section ? Json(s.section->daughters) : Json(); }},
+    {"subarbor_sections", "Subarbor sections", "", "The section and all that grows out of it",
+     [](const Subject& s) { return Json(s.sections().size()); }},
+    {"subarbor_tips", "Subarbor tips", "", "Its terminals",
+     [](const Subject& s) { return Json(s.sum([](const auto& f) { return int(f.daughters == 0); })); }},
+    {"subarbor_length", "Subarbor length", "µm", "Sum over its sections",
+     [](const Subject& s) { return Json(tidy(s.sum([](const auto& f) { return f.length; }))); }},
+};
+
+std::string in_words(const Json& value) {
+  if (value.is_string()) return value.get<std::string>();
+  if (value.is_array())
+    return fmt::format("{:.1f}, {:.1f}, {:.1f}", value[0].get<float>(), value[1].get<float>(),
+                       value[2].get<float>());
+  if (value.is_number_float()) return fmt::format("{:.2f}", value.get<float>());
+  return value.dump();
+}
+
+}  // namespace
+
+Selection select(const scene::Forest& forest, const scene::Pick& pick) {
+  return {pick, scene::subarbor(forest, pick.instance, pick.section)};
+}
+
+std::optional<scene::Pick> parent_of(const scene::Forest& forest, const scene::Pick& pick) {
+  if (pick.section == scene::soma_section) return std::nullopt;
+  const scene::Neuron& neuron = forest.neurons()[forest.instances()[pick.instance].morphology];
+  scene::Pick parent = pick;
+  parent.section = forest.sections()[neuron.first_section + pick.section].parent;  // all ones: the soma
+  static_assert(none == scene::soma_section);
+  const auto sections = forest.section_of_segment().subspan(neuron.first_original, neuron.original_count);
+  const auto first = std::ranges::find(sections, parent.section);
+  if (first == sections.end()) return std::nullopt;  // a neuron without soma
+  parent.segment = neuron.first_segment + std::uint32_t(first - sections.begin());
+  return parent;
+}
+
+std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection) {
+  const Subject s = subject(forest, selection);
+  std::vector<Fact> known;
+  for (const Row& row : rows)
+    if (const Json value = row.value(s); !value.is_null())
+      known.push_back({row.name, row.unit, row.hint, in_words(value)});
+  return known;
+}
+
+nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& selection) {
+  const Subject s = subject(forest, selection);
+  Json json;
+  for (const Row& row : rows)
+    if (Json value = row.value(s); !value.is_null()) json[row.key] = std::move(value);
+  json["segment"] = selection.pick.segment - s.neuron.first_segment;
+  return json;
+}
+
+std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection) {
+  const Subject s = subject(forest, selection);
+  std::vector<frame::Overlay> marks;
+  const auto mark = [&](bool section, std::uint32_t entry) {
+    for (const std::uint32_t segment : selection.subarbor) {
+      if ((s.section_of(segment) == selection.pick.section) != section || marks.size() >= most_marks)
+        continue;
+      const RoundCone cone = scene::in_world(forest, s.index(), segment);
+      marks.push_back({cone.a, cone.b, 1.12f * std::max(cone.radius_a, cone.radius_b) + .05f, entry});
+    }
+  };
+  mark(true, section_entry);
+  mark(false, scene::highlight_entry);
+  return marks;
+}
+
+Sphere around(const scene::Forest& forest, const Selection& selection) {
+  Bounds bounds;
+  for (const std::uint32_t segment : selection.subarbor) {
+    const RoundCone cone = scene::in_world(forest, selection.pick.instance, segment);
+    bounds.add(cone.a, cone.radius_a);
+    bounds.add(cone.b, cone.radius_b);
+  }
+  return {bounds.centre(), .5f * bounds.extent().norm()};
+}
+
+}  // namespace forest::studio

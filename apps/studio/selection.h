@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+// What is told and shown of a picked branch: its facts as one table, and the marks over its subarbor.
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include <nlohmann/json_fwd.hpp>
+
+#include "forest/core/bounds.h"
+#include "forest/frame/frame.h"
+#include "forest/scene/pick.h"
+
+namespace forest::studio {
+
+/// A picked segment with the segments that grow out of its section.
+struct Selection {
+  scene::Pick pick;
+  std::vector<std::uint32_t> subarbor;  // in Forest::segments()
+
+  bool is_soma() const { return pick.section == scene::soma_section; }
+};
+
+Selection select(const scene::Forest& forest, const scene::Pick& pick);
+/// The section that the selected one grows out of (the soma for a stem); none for the soma.
+std::optional<scene::Pick> parent_of(const scene::Forest& forest, const scene::Pick& pick);
+
+/// A row of the selection panel.
+struct Fact {
+  const char* name;  // in the field's words
+  const char* unit;  // "" when it has none
+  const char* hint;
+  std::string value;
+};
+/// Those that apply: a soma has no order, a section no radius.
+std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection);
+/// The same for a machine, {"neuron": 12, …}: lengths in µm.
+nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& selection);
+
+inline constexpr std::uint32_t section_entry = 125;  // palette entry of the picked section
+inline constexpr std::size_t most_marks = 50'000;  // capsules of a highlight; the section itself comes first
+
+/// Capsules a little thicker than the branches: the picked section as section_entry, the rest as highlight_entry.
+std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection);
+/// A sphere around the subarbor, in the world.
+Sphere around(const scene::Forest& forest, const Selection& selection);
+
+}  // namespace forest::studio

@@ -1,0 +1,136 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/settings.h"
+
+#include "apps/studio/camera_control.h"
+
+namespace forest::studio {
+namespace {
+
+using S = Settings;
+
+constexpr const char* group_names[] = {"Eye", "Flight", "Gaze", "Detail", "Colour", "Depth", "Shown"};
+constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron"};
+constexpr const char* background_words[] = {"Dark", "Light"};
+
+constexpr double far = 1e6;  // µm
+
+template <Vec3 frame::Camera::*point, int axis>
+float coordinate(const S& s) {
+  return (s.view.camera.*point)[axis];
+}
+template <Vec3 frame::Camera::*point, int axis>
+void set_coordinate(S& s, float value) {
+  frame::Camera moved = s.view.camera;
+  (moved.*point)[axis] = value;
+  if (bearing(moved).distance >= shortest) s.view.camera = moved;
+}
+template <float Bearing::*angle>
+float turn(const S& s) {
+  return bearing(s.view.camera).*angle;
+}
+template <float Bearing::*angle>
+void set_turn(S& s, float value) {
+  Bearing b = bearing(s.view.camera);
+  b.*angle = value;
+  s.view.camera = looking(s.view.camera, b);
+}
+void set_distance(S& s, float value) {
+  Bearing b = bearing(s.view.camera);
+  b.distance = value;
+  s.view.camera = around_target(s.view.camera, b);
+}
+
+Vec2 gaze(const S& s) { return s.view.detail.gaze.value_or(Vec2(.5f, .5f)); }
+template <int axis>
+void set_gaze(S& s, float percent) {
+  if (!s.view.detail.gaze) return;
+  (*s.view.detail.gaze)[axis] = percent / 100.f;
+}
+
+using Camera = frame::Camera;
+constexpr Number number_table[] = {
+    {"Eye", "Eye", "x", "µm", "Where the eye is", "Alt+X", -far, far, 10, 1, coordinate<&Camera::eye, 0>,
+     set_coordinate<&Camera::eye, 0>},
+    {"Eye", "Eye", "y", "µm", "Where the eye is; y grows towards the pia", "Alt+Y", -far, far, 10, 1,
+     coordinate<&Camera::eye, 1>, set_coordinate<&Camera::eye, 1>},
+    {"Eye", "Eye", "z", "µm", "Where the eye is", "Alt+Z", -far, far, 10, 1, coordinate<&Camera::eye, 2>,
+     set_coordinate<&Camera::eye, 2>},
+    {"Eye", "Target", "x", "µm", "The point looked at and orbited about", "Alt+Shift+X", -far, far, 10, 1,
+     coordinate<&Camera::target, 0>, set_coordinate<&Camera::target, 0>},
+    {"Eye", "Target", "y", "µm", "The point looked at; y grows towards the pia", "Alt+Shift+Y", -far, far, 10,
+     1, coordinate<&Camera::target, 1>, set_coordinate<&Camera::target, 1>},
+    {"Eye", "Target", "z", "µm", "The point looked at and orbited about", "Alt+Shift+Z", -far, far, 10, 1,
+     coordinate<&Camera::target, 2>, set_coordinate<&Camera::target, 2>},
+    {"Eye", "Azimuth", "", "°", "Direction of view about the vertical: 0 towards -z, 90 towards +x", "Alt+A",
+     -180, 180, 5, 1, turn<&Bearing::azimuth>, set_turn<&Bearing::azimuth>},
+    {"Eye", "Elevation", "", "°", "Direction of view: 90 straight up to the pia, -90 straight down", "Alt+L",
+     -steepest, steepest, 5, 1, turn<&Bearing::elevation>, set_turn<&Bearing::elevation>},
+    {"Eye", "Distance", "", "µm", "From the eye to the target", "Alt+D", shortest, far, 10, 1,
+     turn<&Bearing::distance>, set_distance},
+    {"Eye", "Field of view", "", "°", "Height of the picture as an angle at the eye", "Alt+O", 1, 170, 5, 1,
+     [](const S& s) { return s.view.camera.field_of_view; },
+     [](S& s, float v) { s.view.camera.field_of_view = v; }},
+    {"Flight", "Speed", "", "µm/s", "Of flight with W A S D Q E; four times as fast with Shift", "Alt+S", 1,
+     5000, 20, 0, [](const S& s) { return s.speed; }, [](S& s, float v) { s.speed = v; }},
+    {"Gaze", "Gaze", "x", "%", "Share of the width of the picture, from its left", "Alt+G", 0, 100, 5, 0,
+     [](const S& s) { return 100.f * gaze(s).x(); }, set_gaze<0>},
+    {"Gaze", "Gaze", "y", "%", "Share of the height of the picture, from its top", "Alt+Shift+G", 0, 100, 5,
+     0, [](const S& s) { return 100.f * gaze(s).y(); }, set_gaze<1>},
+    {"Gaze", "Acuity slope", "", "′/°",
+     "How fast detail falls off: arc minutes of resolution a degree of eccentricity (people: 1.3 to 1.7)",
+     "Alt+U", 0, 60, .1, 2, [](const S& s) { return s.view.detail.acuity_slope; },
+     [](S& s, float v) { s.view.detail.acuity_slope = v; }},
+    {"Detail", "Acceptable error", "", "pixels", "How far, at most, anything may be drawn from its place",
+     "Alt+R", .05, 100, .25, 2, [](const S& s) { return s.view.detail.error; },
+     [](S& s, float v) { s.view.detail.error = v; }},
+    {"Detail", "Samples", "", "a pixel", "Pictures averaged when the view stands still: 1 rough, 16 smooth",
+     "Alt+M", 1, 1024, 4, 0, [](const S& s) { return float(s.view.samples); },
+     [](S& s, float v) { s.view.samples = std::uint32_t(v); }},
+    {"Depth", "Fog", "", "×", "How fast what is far fades; 0 for none", "Alt+I", 0, 100, .25, 2,
+     [](const S& s) { return s.view.fog; }, [](S& s, float v) { s.view.fog = v; }},
+    {"Depth", "Halo", "", "×", "Dark rim around nearer branches; 0 for none", "Alt+J", 0, 10, .25, 2,
+     [](const S& s) { return s.view.halo; }, [](S& s, float v) { s.view.halo = v; }},
+};
+
+constexpr Choice choice_table[] = {
+    {"Colour", "Colour by", "What a colour means; the legend names it", "C", colour_words,
+     [](const S& s) { return int(s.view.colour_by); },
+     [](S& s, int i) { s.view.colour_by = scene::ColourBy(i); }},
+    {"Colour", "Background", "Dark for the eye and film, light for print", "B", background_words,
+     [](const S& s) { return int(s.view.background); },
+     [](S& s, int i) { s.view.background = scene::Background(i); }},
+};
+
+constexpr Toggle toggle_table[] = {
+    {"Flight", "Fly", "A drag looks around from where the eye is, instead of orbiting the target", "V",
+     [](const S& s) { return s.fly; }, [](S& s, bool on) { s.fly = on; }},
+    {"Gaze", "Gaze-contingent detail", "Full detail only where one looks, less around it", "G",
+     [](const S& s) { return s.view.detail.gaze.has_value(); },
+     [](S& s, bool on) {
+       s.view.detail.gaze = on ? std::optional(gaze(s)) : std::nullopt;
+       s.gaze_follows &= on;
+     }},
+    {"Gaze", "Gaze follows the mouse", "The point looked at is where the mouse is", "M",
+     [](const S& s) { return s.gaze_follows; },
+     [](S& s, bool on) {
+       s.gaze_follows = on;
+       if (on) s.view.detail.gaze = gaze(s);
+     }},
+    {"Depth", "Dim the rest", "The forest steps back while a branch is selected", "X",
+     [](const S& s) { return s.dim; }, [](S& s, bool on) { s.dim = on; }},
+    {"Shown", "Outline", "The column and the limits of its layers", "O", [](const S& s) { return s.outline; },
+     [](S& s, bool on) { s.outline = on; }},
+    {"Shown", "Legend", "What colours mean", "L", [](const S& s) { return s.legend; },
+     [](S& s, bool on) { s.legend = on; }},
+    {"Shown", "Scale and directions", "A scale bar, true at the target's depth, and the axes of the tissue",
+     "R", [](const S& s) { return s.scale; }, [](S& s, bool on) { s.scale = on; }},
+};
+
+}  // namespace
+
+std::span<const char* const> groups() { return group_names; }
+std::span<const Number> numbers() { return number_table; }
+std::span<const Choice> choices() { return choice_table; }
+std::span<const Toggle> toggles() { return toggle_table; }
+
+}  // namespace forest::studio

@@ -1,0 +1,54 @@
+// SPDX-License-Identifier: Apache-2.0
+// All that a person can set in the studio, as one value and as tables of controls: a row feeds the view panel, the menus,
+// the shortcuts and what a screen reader says.
+#pragma once
+
+#include <span>
+
+#include "forest/scene/view.h"
+
+namespace forest::studio {
+
+struct Settings {
+  scene::View view;
+  bool fly = false;           // a drag looks around instead of orbiting
+  float speed = 120.f;        // of flight, µm/s
+  bool gaze_follows = false;  // the gaze is where the mouse is
+  bool outline = true;        // of the column and its layers
+  bool legend = true;         // what colours mean
+  bool scale = true;          // scale bar and directions
+  bool dim = true;            // the rest of the forest while a branch is selected
+};
+
+/// A number with its unit. Rows that follow one another with the same `row` share a line.
+struct Number {
+  const char *group, *row, *name, *unit, *hint;
+  const char* shortcut;  // puts the cursor into the field; "" for none
+  double low, high, step;
+  int decimals;
+  float (*value)(const Settings&);
+  void (*set)(Settings&, float);
+};
+
+/// One of several words.
+struct Choice {
+  const char *group, *name, *hint;
+  const char* shortcut;  // goes on to the next word
+  std::span<const char* const> words;
+  int (*value)(const Settings&);
+  void (*set)(Settings&, int);
+};
+
+/// On or off.
+struct Toggle {
+  const char *group, *name, *hint, *shortcut;
+  bool (*value)(const Settings&);
+  void (*set)(Settings&, bool);
+};
+
+std::span<const char* const> groups();  // in the order of the panel
+std::span<const Number> numbers();
+std::span<const Choice> choices();
+std::span<const Toggle> toggles();
+
+}  // namespace forest::studio

@@ -1,0 +1,315 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/viewport.h"
+
+#include <QKeyEvent>
+#include <QMouseEvent>
+#include <QOpenGLFunctions>
+#include <QOpenGLPaintDevice>
+#include <QPainter>
+#include <cmath>
+
+#include "forest/core/error.h"
+
+#include "apps/studio/annotation.h"
+#include "apps/studio/camera_control.h"
+
+namespace forest::studio {
+namespace {
+
+constexpr int rest_milliseconds = 200;  // a view that stands still so long is drawn in full
+constexpr float glide_seconds = .7f;
+constexpr float tap_seconds = .05f;            // of flight that a tap on a key makes, however short
+constexpr float turn_pixels_a_second = 400.f;  // of the arrow keys
+constexpr float reach = 3.f;                   // a click so many pixels beside a branch means it
+
+struct FlightKey {
+  int key;
+  Vec3 way;   // right, up, forward
+  Vec2 turn;  // right, down
+};
+const FlightKey flight_keys[] = {
+    {Qt::Key_W, {0, 0, 1}, {0, 0}},     {Qt::Key_S, {0, 0, -1}, {0, 0}},    {Qt::Key_A, {-1, 0, 0}, {0, 0}},
+    {Qt::Key_D, {1, 0, 0}, {0, 0}},     {Qt::Key_Q, {0, -1, 0}, {0, 0}},    {Qt::Key_E, {0, 1, 0}, {0, 0}},
+    {Qt::Key_Left, {0, 0, 0}, {-1, 0}}, {Qt::Key_Right, {0, 0, 0}, {1, 0}}, {Qt::Key_Up, {0, 0, 0}, {0, -1}},
+    {Qt::Key_Down, {0, 0, 0}, {0, 1}},
+};
+bool is_flight_key(int key) {
+  return std::ranges::any_of(flight_keys, [key](const FlightKey& k) { return k.key == key; });
+}
+
+Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
+
+}  // namespace
+
+Viewport::Viewport(scene::Forest forest, const scene::View& view, QWidget* parent)
+    : QOpenGLWidget(parent),
+      forest_(std::move(forest)),
+      settings_{.view = view},
+      colouring_(scene::colour(forest_, view.colour_by, view.background)),
+      outline_(scene::outline(forest_)) {
+  setFocusPolicy(Qt::StrongFocus);
+  setMouseTracking(true);
+  setMinimumSize(240, 160);
+  setAccessibleName(tr("The forest"));
+  setAccessibleDescription(tr("Drag to orbit, click a branch to select it, wheel to come nearer"));
+  rest_.setSingleShot(true);
+  rest_.setInterval(rest_milliseconds);
+  connect(&rest_, &QTimer::timeout, this, [this] {
+    stage_ = Stage::full;
+    update();
+  });
+}
+
+Viewport::~Viewport() {
+  makeCurrent();
+  renderer_.reset();
+  doneCurrent();
+}
+
+void Viewport::change(const Settings& settings) {
+  const scene::View& old = settings_.view;
+  if (settings.view.colour_by != old.colour_by || settings.view.background != old.background)
+    colouring_ = scene::colour(forest_, settings.view.colour_by, settings.view.background);
+  settings_ = settings;
+  touch();
+  Q_EMIT changed();
+}
+
+void Viewport::set_camera(const frame::Camera& camera) {
+  settings_.view.camera = camera;
+  touch();
+  Q_EMIT changed();
+}
+
+void Viewport::touch() {
+  stage_ = Stage::moving;
+  rest_.start();
+  update();
+}
+
+void Viewport::glide_to(const frame::Camera& camera) {
+  scene::View to = settings_.view;
+  to.camera = camera;
+  glide_ = Glide{scene::CameraPath({settings_.view, to}), camera, {}};
+  glide_->clock.start();
+  touch();
+}
+
+void Viewport::centre() {
+  const frame::Camera& camera = settings_.view.camera;
+  if (selection_) return glide_to(centred_on(camera, around(forest_, *selection_)));
+  frame::Camera whole = scene::overview(forest_).camera;
+  whole.near = camera.near;
+  whole.field_of_view = camera.field_of_view;
+  glide_to(whole);
+}
+
+void Viewport::select(const std::optional<scene::Pick>& pick) {
+  selection_ = pick ? std::optional(studio::select(forest_, *pick)) : std::nullopt;
+  highlight_ = selection_ ? highlight(forest_, *selection_) : std::vector<frame::Overlay>{};
+  touch();
+  Q_EMIT selected();
+}
+
+std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
+  const frame::Camera& camera = settings_.view.camera;
+  const Ray ray = ray_through(camera, in_points(), vec(place) + Vec2(.5f, .5f));
+  const float pixel = 1.f / camera.focal(float(height()) * float(devicePixelRatioF()));
+  const auto exact = scene::pick(forest_, ray, .5f * pixel, camera.near);
+  return exact ? exact : scene::pick(forest_, ray, reach * pixel, camera.near);
+}
+
+frame::Image Viewport::picture() {
+  makeCurrent();
+  draw_forest(std::max(settings_.view.samples, 16u), settings_.view.detail.error);
+  frame::Image image = renderer_->read();
+  doneCurrent();
+  touch();
+  return image;
+}
+
+QImage Viewport::seen() {
+  // Opacity holds the share of a pixel that is covered, not how clear the window is.
+  return grabFramebuffer().convertToFormat(QImage::Format_RGBA8888);
+}
+
+void Viewport::initializeGL() {
+  try {
+    renderer_ = std::make_unique<render::OpenGLRenderer>();
+    renderer_->load(forest_.geometry());
+    renderer_name_ = QString::fromStdString(renderer_->name());
+  } catch (const std::exception& error) {
+    renderer_.reset();
+    Q_EMIT failed(QString::fromUtf8(error.what()));
+  }
+}
+
+void Viewport::resizeGL(int, int) { touch(); }
+
+void Viewport::advance(float seconds) {
+  if (glide_) {
+    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_seconds);
+    const bool there = t >= 1.f;
+    const frame::Camera camera = there ? glide_->end : glide_->path.at(t).camera;
+    if (there) glide_.reset();
+    set_camera(camera);
+  }
+  if (!flies()) return;
+  Vec3 way = Vec3::Zero();
+  Vec2 turn = Vec2::Zero();
+  for (const FlightKey& k : flight_keys)
+    if (held_.contains(k.key)) way += k.way, turn += k.turn;
+  const float speed = settings_.speed * (fast_ ? 4.f : 1.f);
+  set_camera(fly(look(settings_.view.camera, turn_pixels_a_second * seconds * turn), speed * seconds * way));
+}
+
+void Viewport::draw_forest(std::uint32_t samples, float error) {
+  const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
+             h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
+  scene::View view = settings_.view;
+  view.samples = samples;
+  view.detail.error = error;
+  const scene::Eye eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h));
+  const scene::Cut cut = scene::choose(forest_, eye, {float(w), float(h)});
+  std::vector<frame::Overlay> overlays = highlight_;
+  if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
+  scene::Colouring colouring = colouring_;
+  mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
+  renderer_->draw(scene::compose(forest_, view, colouring, cut, w, h, overlays));
+  figures_.segments = cut.segments, figures_.neurons = cut.neurons;
+  figures_.samples = samples, figures_.error = error;
+}
+
+void Viewport::paintGL() {
+  if (!renderer_) return;
+  advance(std::min(.1f, tick_.isValid() ? 1e-3f * float(tick_.restart()) : 0.f));
+  if (!tick_.isValid()) tick_.start();
+  try {
+    QElapsedTimer clock;
+    clock.start();
+    const scene::View& view = settings_.view;
+    switch (stage_) {
+      case Stage::moving:
+        draw_forest(1, pace_.error(view.detail.error));
+        break;
+      case Stage::full:
+        draw_forest(std::min(4u, view.samples), view.detail.error);
+        break;
+      case Stage::smooth:
+        draw_forest(view.samples, view.detail.error);
+        break;
+      case Stage::finished:
+        break;
+    }
+    QOpenGLFunctions* gl = context()->functions();
+    gl->glDisable(GL_SCISSOR_TEST);
+    renderer_->show(defaultFramebufferObject());
+    // The renderer's opacity says how much of a pixel is covered; the window itself is opaque.
+    gl->glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
+    gl->glClearColor(0, 0, 0, 1);
+    gl->glClear(GL_COLOR_BUFFER_BIT);
+    gl->glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
+    annotate();
+    if (stage_ == Stage::moving) {
+      pace_.drew(float(clock.nsecsElapsed()) * 1e-6f);
+      figures_.frames_per_second = pace_.milliseconds() > 0.f ? 1000.f / pace_.milliseconds() : 0.f;
+    }
+  } catch (const std::exception& error) {
+    renderer_.reset();
+    Q_EMIT failed(QString::fromUtf8(error.what()));
+    return;
+  }
+  Q_EMIT drawn();
+  const bool moves = glide_ || flies();
+  if (moves) {
+    update();
+  } else if (stage_ == Stage::full || stage_ == Stage::smooth) {
+    stage_ = stage_ == Stage::full && settings_.view.samples > 4 ? Stage::smooth : Stage::finished;
+    if (stage_ == Stage::finished) Q_EMIT settled();
+    QTimer::singleShot(0, this, qOverload<>(&QWidget::update));
+  }
+}
+
+void Viewport::annotate() {
+  QOpenGLPaintDevice device(size() * devicePixelRatioF());
+  device.setDevicePixelRatio(devicePixelRatioF());
+  QPainter painter(&device);
+  painter.setFont(font());
+  painter.setRenderHint(QPainter::Antialiasing);
+  const Ink ink = ink_on(settings_.view.background);
+  if (settings_.scale) {
+    paint_scale(painter, rect(), settings_.view.camera, ink);
+    paint_directions(painter, rect(), settings_.view.camera, ink);
+  }
+  if (settings_.legend) paint_legend(painter, rect(), colouring_.legend, ink);
+  if (const auto& gaze = settings_.view.detail.gaze)
+    paint_gaze(painter, QPointF(gaze->x() * float(width()), gaze->y() * float(height())), ink);
+}
+
+void Viewport::mousePressEvent(QMouseEvent* event) {
+  pressed_ = mouse_ = event->position();
+  dragged_ = false;
+  glide_.reset();
+}
+
+void Viewport::mouseMoveEvent(QMouseEvent* event) {
+  const Vec2 moved = vec(event->position() - mouse_);
+  mouse_ = event->position();
+  if (settings_.gaze_follows && settings_.view.detail.gaze) {
+    Settings s = settings_;
+    s.view.detail.gaze = Vec2(vec(mouse_).array() / Vec2(float(width()), float(height())).array());
+    change(s);
+  }
+  if (!event->buttons()) return;
+  if (!dragged_ && (mouse_ - pressed_).manhattanLength() < 4) return;
+  const Vec2 drag = dragged_ ? moved : vec(mouse_ - pressed_);
+  dragged_ = true;
+  const frame::Camera& camera = settings_.view.camera;
+  const bool left = event->buttons() & Qt::LeftButton;
+  if (!left || event->modifiers() & Qt::ShiftModifier)
+    set_camera(pan(camera, in_points(), drag));
+  else
+    set_camera(settings_.fly ? look(camera, drag) : orbit(camera, drag));
+}
+
+void Viewport::mouseReleaseEvent(QMouseEvent* event) {
+  if (!dragged_ && event->button() == Qt::LeftButton) select(pick(event->position()));
+  dragged_ = event->buttons() ? dragged_ : false;
+}
+
+void Viewport::mouseDoubleClickEvent(QMouseEvent* event) {
+  dragged_ = true;  // its release selects nothing
+  select(pick(event->position()));
+  if (selection_) centre();
+}
+
+void Viewport::wheelEvent(QWheelEvent* event) {
+  const float steps = float(event->angleDelta().y()) / 120.f;
+  glide_.reset();
+  set_camera(dolly(settings_.view.camera, in_points(), vec(event->position()), std::pow(.85f, steps)));
+  event->accept();
+}
+
+void Viewport::keyPressEvent(QKeyEvent* event) {
+  fast_ = event->modifiers() & Qt::ShiftModifier;
+  if (!is_flight_key(event->key())) return QOpenGLWidget::keyPressEvent(event);
+  if (event->isAutoRepeat()) return;
+  glide_.reset();
+  const std::set<int> others = std::exchange(held_, {event->key()});
+  advance(tap_seconds);
+  held_.insert(others.begin(), others.end());
+  tick_.restart();
+}
+
+void Viewport::keyReleaseEvent(QKeyEvent* event) {
+  fast_ = event->modifiers() & Qt::ShiftModifier;
+  if (!event->isAutoRepeat()) held_.erase(event->key());
+  QOpenGLWidget::keyReleaseEvent(event);
+}
+
+void Viewport::focusOutEvent(QFocusEvent* event) {
+  held_.clear();
+  QOpenGLWidget::focusOutEvent(event);
+}
+
+}  // namespace forest::studio

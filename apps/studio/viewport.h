@@ -1,0 +1,116 @@
+// SPDX-License-Identifier: Apache-2.0
+// The picture in the window: it draws the forest, takes the mouse and the keys, and picks.
+// A view that moves is drawn with one sample a pixel and as much detail as its pace allows; once it has stood still for
+// a moment it is drawn again in full, and then smoothly.
+#pragma once
+
+#include <QElapsedTimer>
+#include <QOpenGLWidget>
+#include <QTimer>
+#include <memory>
+#include <optional>
+#include <set>
+
+#include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/path.h"
+
+#include "apps/studio/pace.h"
+#include "apps/studio/selection.h"
+#include "apps/studio/settings.h"
+
+namespace forest::studio {
+
+class Viewport final : public QOpenGLWidget {
+  Q_OBJECT
+
+ public:
+  Viewport(scene::Forest forest, const scene::View& view, QWidget* parent = nullptr);
+  ~Viewport() override;
+
+  const scene::Forest& forest() const { return forest_; }
+  const Settings& settings() const { return settings_; }
+  void change(const Settings& settings);
+  /// Glides there, slow in and slow out.
+  void glide_to(const frame::Camera& camera);
+  /// Glides to where the selected subarbor, or without one the whole forest, fills the picture.
+  void centre();
+
+  const std::optional<Selection>& selection() const { return selection_; }
+  void select(const std::optional<scene::Pick>& pick);
+  /// What is drawn at a place of this widget: to half a pixel, else the nearest branch within a few.
+  std::optional<scene::Pick> pick(const QPointF& place) const;
+
+  /// The picture alone, in full, at its size on the screen.
+  frame::Image picture();
+  /// What is seen, with legend and scale.
+  QImage seen();
+
+  struct Figures {
+    float frames_per_second = 0.f;  // while moving
+    std::uint64_t segments = 0;     // drawn
+    std::uint32_t neurons = 0;      // in sight
+    std::uint32_t samples = 1;
+    float error = 0.f;  // acceptable, pixels
+  };
+  const Figures& figures() const { return figures_; }
+  QString renderer_name() const { return renderer_name_; }
+
+ Q_SIGNALS:
+  void changed();   // the settings, by hand or otherwise
+  void selected();  // something else, or nothing
+  void drawn();
+  void settled();  // the picture is finished
+  void failed(const QString& sentence);
+
+ protected:
+  void initializeGL() override;
+  void resizeGL(int width, int height) override;
+  void paintGL() override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void mouseReleaseEvent(QMouseEvent* event) override;
+  void mouseDoubleClickEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  void keyPressEvent(QKeyEvent* event) override;
+  void keyReleaseEvent(QKeyEvent* event) override;
+  void focusOutEvent(QFocusEvent* event) override;
+
+ private:
+  // From a moving picture to a finished one.
+  enum class Stage { moving, full, smooth, finished };
+
+  struct Glide {
+    scene::CameraPath path;
+    frame::Camera end;
+    QElapsedTimer clock;
+  };
+
+  void set_camera(const frame::Camera& camera);
+  void touch();                 // something changed: draw, and refine once it stands still
+  void advance(float seconds);  // glide and flight
+  bool flies() const { return !held_.empty(); }
+  void draw_forest(std::uint32_t samples, float error);
+  void annotate();
+  frame::Viewport in_points() const { return {float(width()), float(height())}; }
+
+  scene::Forest forest_;
+  Settings settings_;
+  scene::Colouring colouring_;
+  std::vector<frame::Overlay> outline_, highlight_;
+  std::optional<Selection> selection_;
+  std::unique_ptr<render::OpenGLRenderer> renderer_;
+  QString renderer_name_;
+
+  Stage stage_ = Stage::moving;
+  Pace pace_;
+  Figures figures_;
+  QTimer rest_;         // runs out when the view has stood still
+  QElapsedTimer tick_;  // since the last step of flight
+  std::optional<Glide> glide_;
+  std::set<int> held_;  // keys of flight
+  bool fast_ = false;   // with Shift
+  QPointF pressed_, mouse_;
+  bool dragged_ = false;
+};
+
+}  // namespace forest::studio

@@ -1,0 +1,262 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/window.h"
+
+#include <QAction>
+#include <QApplication>
+#include <QClipboard>
+#include <QCloseEvent>
+#include <QDockWidget>
+#include <QFileDialog>
+#include <QLabel>
+#include <QMenuBar>
+#include <QMessageBox>
+#include <QScrollArea>
+#include <QSettings>
+#include <QStatusBar>
+
+#include <nlohmann/json.hpp>
+
+#include "forest/io/png.h"
+
+#include "apps/studio/selection_panel.h"
+#include "apps/studio/view_panel.h"
+
+namespace forest::studio {
+namespace {
+
+// What the mouse and the keys of flight do; menus tell the rest.
+constexpr const char* gestures[][2] = {
+    {"Drag", "orbit about the target (in fly mode: look around)"},
+    {"Right drag, or Shift and drag", "move across the picture"},
+    {"Wheel", "come nearer to, or go away from, what is under the mouse"},
+    {"Click", "select a branch and its subarbor"},
+    {"Double click", "select it and go there"},
+    {"W A S D, Q E", "fly forward, left, back, right, down, up (Shift: four times as fast)"},
+    {"Arrows", "turn the eye"},
+};
+
+}  // namespace
+
+Window::Window(scene::Forest forest, const scene::View& view, const QString& title)
+    : viewport_(new Viewport(std::move(forest), view, this)) {
+  setWindowTitle(tr("%1 – Brain Forest").arg(title));
+  setCentralWidget(viewport_);
+  setDockNestingEnabled(true);
+  add_docks();
+  add_menus();
+  for (QLabel** label : {&pace_, &drawn_, &sight_, &quality_})
+    statusBar()->addWidget(*label = new QLabel(this));
+  statusBar()->addPermanentWidget(renderer_ = new QLabel(this));
+  statusBar()->setSizeGripEnabled(false);
+  pace_->setToolTip(tr("Pictures a second while the view moves"));
+  drawn_->setToolTip(tr("Segments drawn of all there are: what is too small to be seen is drawn as fewer"));
+  sight_->setToolTip(tr("Neurons of which something is in the picture"));
+  quality_->setToolTip(tr("Samples a pixel and acceptable error of this picture"));
+  renderer_->setToolTip(tr("Who draws"));
+
+  panel_rest_.setSingleShot(true);
+  panel_rest_.setInterval(100);
+  connect(&panel_rest_, &QTimer::timeout, this,
+          [this] { view_panel_->show_settings(viewport_->settings()); });
+  connect(viewport_, &Viewport::changed, this, [this] {
+    if (!panel_rest_.isActive()) panel_rest_.start();
+  });
+  connect(viewport_, &Viewport::selected, this, [this] {
+    const auto& selection = viewport_->selection();
+    selection_panel_->show_facts(selection ? facts(viewport_->forest(), *selection) : std::vector<Fact>{});
+  });
+  connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
+
+  resize(1280, 800);
+  QSettings kept;
+  restoreGeometry(kept.value("window/geometry").toByteArray());
+  restoreState(kept.value("window/panels").toByteArray());
+  viewport_->setFocus();
+}
+
+void Window::add_docks() {
+  view_panel_ = new ViewPanel(
+      viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
+  selection_panel_ = new SelectionPanel(this);
+  auto* scroll = new QScrollArea(this);
+  scroll->setWidget(view_panel_);
+  scroll->setWidgetResizable(true);
+  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  scroll->setMinimumWidth(300);
+  const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_}, {"View", scroll}};
+  QList<QDockWidget*> added;
+  for (const auto& [name, widget] : docks) {
+    auto* dock = new QDockWidget(tr(name), this);
+    dock->setObjectName(name);
+    dock->setWidget(widget);
+    addDockWidget(Qt::RightDockWidgetArea, dock);
+    added.push_back(dock);
+  }
+  resizeDocks(added, {420, 300}, Qt::Vertical);
+}
+
+template <class Row, class Value>
+void Window::set(const Row& row, Value value) {
+  Settings settings = viewport_->settings();
+  row.set(settings, value);
+  viewport_->change(settings);
+}
+
+void Window::add_menus() {
+  struct Command {
+    const char *menu, *name, *shortcut, *hint;
+    std::function<void()> run;
+  };
+  const Command commands[] = {
+      {"&File", "&Save picture…", "Ctrl+S", "The forest alone as a PNG, smooth, at its size on the screen",
+       [this] { save_picture(false); }},
+      {"&File", "Save picture with &legend…", "Ctrl+Shift+S",
+       "What is seen, with scale, directions and legend, as a PNG", [this] { save_picture(true); }},
+      {"&File", "&Quit", "Ctrl+Q", "Close the window; its panels are remembered", [this] { close(); }},
+      {"&Edit", "&Copy view", "Ctrl+C", "Where the eye is and what colours mean, as one line of JSON",
+       [this] { copy_view(); }},
+      {"&Edit", "&Paste view", "Ctrl+V", "Go to a view that was copied", [this] { paste_view(); }},
+      {"&Edit", "Copy &facts", "Ctrl+Shift+C", "The facts of the selected branch as JSON",
+       [this] {
+         if (const auto& s = viewport_->selection())
+           QApplication::clipboard()->setText(
+               QString::fromStdString(to_json(viewport_->forest(), *s).dump()));
+       }},
+      {"&Edit", "Select the &parent", "P", "The section that the selected one grows out of",
+       [this] {
+         if (const auto& s = viewport_->selection())
+           if (const auto parent = parent_of(viewport_->forest(), s->pick)) viewport_->select(parent);
+       }},
+      {"&Edit", "C&lear the selection", "Esc", "Select nothing", [this] { viewport_->select(std::nullopt); }},
+      {"&View", "&Centre on the selection", "F", "Go to where the selected subarbor fills the picture",
+       [this] { viewport_->centre(); }},
+      {"&View", "&Whole forest", "Home", "Go back outside and see everything",
+       [this] {
+         frame::Camera camera = scene::overview(viewport_->forest()).camera;
+         camera.near = viewport_->settings().view.camera.near;
+         viewport_->glide_to(camera);
+       }},
+      {"&View", "&Full screen", "F11", "The window over the whole screen, and back",
+       [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); }},
+      {"&Help", "&Keys and mouse", "F1", "What the keys and the mouse do", [this] { explain(); }},
+  };
+  const auto menu = [this](const char* name) {
+    for (QAction* action : menuBar()->actions())
+      if (action->text() == tr(name)) return action->menu();
+    return menuBar()->addMenu(tr(name));
+  };
+  const auto add = [this](QMenu* to, const char* name, const char* shortcut, const char* hint) {
+    QAction* action = to->addAction(tr(name));
+    action->setShortcut(QKeySequence(shortcut));
+    action->setStatusTip(tr(hint));
+    action->setToolTip(tr(hint));
+    return action;
+  };
+  for (const char* name : {"&File", "&Edit", "&View", "&Panels", "&Help"}) menu(name);
+  for (const Command& c : commands)
+    connect(add(menu(c.menu), c.name, c.shortcut, c.hint), &QAction::triggered, this, c.run);
+  QMenu* view = menu("&View");
+  view->addSeparator();
+  for (const Toggle& toggle : toggles()) {
+    QAction* action = add(view, toggle.name, toggle.shortcut, toggle.hint);
+    action->setCheckable(true);
+    connect(action, &QAction::triggered, this, [this, &toggle](bool on) { set(toggle, on); });
+    const auto show = [this, action, &toggle] { action->setChecked(toggle.value(viewport_->settings())); };
+    connect(viewport_, &Viewport::changed, action, show);
+    show();
+  }
+  view->addSeparator();
+  for (const Choice& choice : choices())
+    connect(add(view, choice.name, choice.shortcut, choice.hint), &QAction::triggered, this, [this, &choice] {
+      set(choice, (choice.value(viewport_->settings()) + 1) % int(choice.words.size()));
+    });
+  int number = 0;
+  for (QDockWidget* dock : findChildren<QDockWidget*>()) {
+    QAction* action = dock->toggleViewAction();
+    action->setShortcut(QKeySequence(QString("Ctrl+%1").arg(++number)));
+    menu("&Panels")->addAction(action);
+  }
+}
+
+void Window::show_figures() {
+  const Viewport::Figures& f = viewport_->figures();
+  const QLocale locale;
+  pace_->setText(f.frames_per_second > 0.f ? tr("%1 frames/s").arg(double(f.frames_per_second), 0, 'f', 0)
+                                           : tr("– frames/s"));
+  drawn_->setText(tr("%1 of %2 segments")
+                      .arg(locale.toString(qulonglong(f.segments)),
+                           locale.toString(qulonglong(viewport_->forest().segment_total()))));
+  sight_->setText(tr("%1 of %2 neurons in sight")
+                      .arg(locale.toString(f.neurons),
+                           locale.toString(qulonglong(viewport_->forest().instances().size()))));
+  quality_->setText(tr("%1 samples, error %2 pixels").arg(f.samples).arg(double(f.error), 0, 'f', 1));
+  renderer_->setText(viewport_->renderer_name());
+}
+
+void Window::copy_view() {
+  QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->settings().view)));
+  statusBar()->showMessage(tr("The view is on the clipboard as one line of JSON."), 4000);
+}
+
+void Window::paste_view() {
+  try {
+    Settings settings = viewport_->settings();
+    settings.view = scene::parse_view(QApplication::clipboard()->text().toStdString(), "clipboard");
+    viewport_->change(settings);
+  } catch (const std::exception& error) {
+    statusBar()->showMessage(QString::fromUtf8(error.what()), 8000);
+  }
+}
+
+void Window::save_picture(bool as_seen) {
+  QString path = QFileDialog::getSaveFileName(this, tr("Save picture"), "forest.png", tr("Pictures (*.png)"),
+                                              nullptr, QFileDialog::DontUseNativeDialog);
+  if (path.isEmpty()) return;
+  if (!path.endsWith(".png", Qt::CaseInsensitive)) path += ".png";
+  try {
+    if (as_seen) {
+      write_image(path.toStdString(), viewport_->seen());
+    } else {
+      const frame::Image image = viewport_->picture();
+      io::write_png(path.toStdString(), image.width, image.height, image.pixels);
+    }
+    statusBar()->showMessage(tr("Saved %1").arg(path), 6000);
+  } catch (const std::exception& error) {
+    QMessageBox::warning(this, tr("Save picture"), QString::fromUtf8(error.what()));
+  }
+}
+
+void Window::explain() {
+  QString text = "<table cellspacing='4'>";
+  const auto row = [&text](const QString& key, const QString& what) {
+    text += QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>").arg(key, what);
+  };
+  for (const auto& [gesture, what] : gestures) row(gesture, what);
+  for (QAction* menu : menuBar()->actions())
+    for (QAction* action : menu->menu()->actions())
+      if (!action->shortcut().isEmpty())
+        row(action->shortcut().toString(QKeySequence::NativeText),
+            action->toolTip().isEmpty() ? action->text().remove('&') : action->toolTip());
+  auto* box =
+      new QMessageBox(QMessageBox::NoIcon, tr("Keys and mouse"), text + "</table>", QMessageBox::Close, this);
+  box->setAttribute(Qt::WA_DeleteOnClose);
+  box->setModal(false);
+  box->show();
+}
+
+void Window::closeEvent(QCloseEvent* event) {
+  QSettings kept;
+  kept.setValue("window/geometry", saveGeometry());
+  kept.setValue("window/panels", saveState());
+  QMainWindow::closeEvent(event);
+}
+
+void write_image(const std::filesystem::path& path, const QImage& seen) {
+  const QImage image = seen.convertToFormat(QImage::Format_RGBA8888);
+  std::vector<std::uint8_t> pixels;
+  for (int y = 0; y < image.height(); ++y)
+    pixels.insert(pixels.end(), image.constScanLine(y), image.constScanLine(y) + 4 * image.width());
+  io::write_png(path, std::uint32_t(image.width()), std::uint32_t(image.height()), pixels);
+}
+
+}  // namespace forest::studio

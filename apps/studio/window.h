@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// The window: the forest in the middle, panels at the side, menus made from tables, and figures at the bottom.
+#pragma once
+
+#include <QMainWindow>
+#include <filesystem>
+
+#include "apps/studio/viewport.h"
+
+class QLabel;
+
+namespace forest::studio {
+
+/// As PNG, whole or not at all; throws Error.
+void write_image(const std::filesystem::path& path, const QImage& seen);
+
+class SelectionPanel;
+class ViewPanel;
+
+class Window final : public QMainWindow {
+ public:
+  Window(scene::Forest forest, const scene::View& view, const QString& title);
+
+  Viewport& viewport() { return *viewport_; }
+
+ protected:
+  void closeEvent(QCloseEvent* event) override;
+
+ private:
+  void add_docks();
+  void add_menus();
+  void show_figures();
+  void copy_view();
+  void paste_view();
+  void save_picture(bool as_seen);
+  void explain();
+  template <class Row, class Value>
+  void set(const Row& row, Value value);
+
+  Viewport* viewport_;
+  ViewPanel* view_panel_;
+  SelectionPanel* selection_panel_;
+  QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
+  QTimer panel_rest_;  // the panel follows a moving view a few times a second
+};
+
+}  // namespace forest::studio

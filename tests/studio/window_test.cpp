@@ -1,0 +1,449 @@
+// SPDX-License-Identifier: Apache-2.0
+// The studio as a person uses it: the program itself on a display (Xvfb under ctest), driven by real mouse and keyboard
+// events (xdotool), and asked what it did by its own --report.
+#include <array>
+#include <csignal>
+#include <cstdio>
+#include <cstdlib>
+#include <deque>
+#include <fcntl.h>
+#include <filesystem>
+#include <fstream>
+#include <poll.h>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+#include <nlohmann/json.hpp>
+#include <sys/wait.h>
+
+#include "forest/core/file.h"
+#include "forest/core/random.h"
+#include "forest/io/png.h"
+#include "forest/render/opengl/context.h"
+#include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/pick.h"
+#include "forest/scene/view.h"
+
+#include "tests/sample_forest.h"
+
+namespace forest::studio {
+namespace {
+
+using Json = nlohmann::json;
+constexpr int patience = 120'000;  // milliseconds before a program that says nothing is given up
+
+const std::filesystem::path folder = STUDIO_TEST_FOLDER;
+
+std::filesystem::path sample_file() {
+  static const std::filesystem::path path = [] {
+    std::filesystem::create_directories(folder);
+    write_file(folder / "sample.forest",
+               scene::pack(testing::sample_circuit(120), testing::sample_neurons()));
+    return folder / "sample.forest";
+  }();
+  return path;
+}
+const scene::Forest& sample() {
+  static const scene::Forest forest = scene::Forest::open(sample_file());
+  return forest;
+}
+
+// A running studio.
+class Studio {
+ public:
+  explicit Studio(std::vector<std::string> arguments) {
+    arguments.insert(arguments.begin(), STUDIO_PROGRAM);
+    int out[2], error[2];
+    if (pipe(out) || pipe(error)) throw std::runtime_error("no pipe");
+    pid_ = fork();
+    if (pid_ == 0) {
+      dup2(out[1], 1), dup2(error[1], 2);
+      for (const int end : {out[0], out[1], error[0], error[1]}) close(end);
+      std::vector<char*> words;
+      for (auto& a : arguments) words.push_back(a.data());
+      words.push_back(nullptr);
+      execv(words[0], words.data());
+      _exit(127);
+    }
+    close(out[1]), close(error[1]);
+    out_ = out[0], error_ = error[0];
+  }
+  ~Studio() {
+    if (pid_ > 0) kill(pid_, SIGKILL), waitpid(pid_, nullptr, 0);
+    close(out_), close(error_);
+  }
+  Studio(const Studio&) = delete;
+  Studio& operator=(const Studio&) = delete;
+
+  /// The next report of that event; those before it are passed over.
+  Json wait_for(const std::string& event) {
+    for (;;) {
+      const Json line = Json::parse(next_line());
+      if (line.at("event") == event) return line;
+    }
+  }
+  /// What it said in the end, and its exit status.
+  std::pair<std::string, int> end() {
+    std::string said;
+    std::array<char, 4096> part;
+    for (ssize_t n; (n = read(error_, part.data(), part.size())) > 0;)
+      said.append(part.data(), std::size_t(n));
+    int status = 0;
+    waitpid(std::exchange(pid_, -1), &status, 0);
+    return {said, WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)};
+  }
+
+ private:
+  std::string next_line() {
+    for (;;) {
+      if (const auto at = heard_.find('\n'); at != std::string::npos) {
+        const std::string line = heard_.substr(0, at);
+        heard_.erase(0, at + 1);
+        return line;
+      }
+      pollfd ready{out_, POLLIN, 0};
+      if (poll(&ready, 1, patience) <= 0) throw std::runtime_error("the studio says nothing any more");
+      std::array<char, 4096> part;
+      const ssize_t n = read(out_, part.data(), part.size());
+      if (n <= 0) throw std::runtime_error("the studio has ended: " + end().first);
+      heard_.append(part.data(), std::size_t(n));
+    }
+  }
+
+  pid_t pid_ = -1;
+  int out_ = -1, error_ = -1;
+  std::string heard_;
+};
+
+void xdotool(const std::string& what) {
+  ASSERT_EQ(std::system(("xdotool " + what).c_str()), 0) << "xdotool " << what;
+}
+
+// A studio on the sample from a near view, with a hand on its mouse.
+class Window : public ::testing::Test {
+ protected:
+  void SetUp() override {
+    if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+    scene::View view = scene::overview(sample());
+    view.camera.near = .5f;
+    view.camera.eye = view.camera.target + .45f * (view.camera.eye - view.camera.target);
+    view.samples = 4;
+    write_file(folder / "near.json", scene::to_json(view));
+    setenv("XDG_CONFIG_HOME", (folder / "settings").c_str(), 1);
+    std::filesystem::remove_all(folder / "settings");
+    studio_ = std::make_unique<Studio>(std::vector<std::string>{sample_file(), "--view", folder / "near.json",
+                                                                "--size", "1280x800", "--report"});
+    settle();
+    xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
+  }
+
+  // Waits until the picture is finished and remembers what is seen.
+  void settle() {
+    const Json report = studio_->wait_for("settled");
+    view_ = scene::parse_view(report.at("view").dump());
+    picture_ = report.at("picture");
+  }
+  frame::Viewport viewport() const {
+    return {picture_.at("width").get<float>(), picture_.at("height").get<float>()};
+  }
+  std::string place(const Vec2& pixel) const {  // on the screen
+    return fmt::format("{} {}", int(pixel.x()) + picture_.at("x").get<int>(),
+                       int(pixel.y()) + picture_.at("y").get<int>());
+  }
+  void point(const Vec2& pixel) { xdotool("mousemove " + place(pixel)); }
+  Json click(const Vec2& pixel) {
+    xdotool("mousemove " + place(pixel) + " click 1");
+    return studio_->wait_for("selected").at("facts");
+  }
+  void drag(int button, const Vec2& from, const Vec2& to, const std::string& with = "") {
+    const Vec2 half = .5f * (from + to);
+    xdotool(fmt::format("{} mousemove {} mousedown {} mousemove {} mousemove {} mouseup {} {}",
+                        with.empty() ? "" : "keydown " + with, place(from), button, place(half), place(to),
+                        button, with.empty() ? "" : "keyup " + with));
+    settle();
+  }
+  void key(const std::string& key) { xdotool("key " + key); }
+  // The picture alone, as Ctrl+S saves it.
+  io::Picture saved(const std::string& name) {
+    const std::filesystem::path path = folder / name;
+    std::filesystem::remove(path);
+    key("ctrl+s");
+    xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus");
+    xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", path.string()));
+    key("Return");
+    for (int i = 0; i < patience / 50 && !std::filesystem::exists(path); ++i) usleep(50'000);
+    settle();
+    xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
+    return io::read_png(path);
+  }
+
+  std::unique_ptr<Studio> studio_;
+  scene::View view_;
+  Json picture_;
+};
+
+// The nearest segment of all that a ray meets, found by asking each of them.
+std::optional<scene::Pick> brute_force(const Ray& ray, float tolerance, float near) {
+  std::optional<scene::Pick> best;
+  const scene::Forest& forest = sample();
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
+    const scene::Neuron& n = forest.neurons()[forest.instances()[i].morphology];
+    for (std::uint32_t k = 0; k < n.original_count; ++k) {
+      RoundCone cone = scene::in_world(forest, i, n.first_segment + k);
+      const float wider = tolerance * (.5f * (cone.a + cone.b) - ray.origin).norm();
+      cone.radius_a += wider, cone.radius_b += wider;
+      const auto t = intersect(ray, cone);
+      if (t && *t >= near && (!best || *t < best->distance))
+        best = scene::Pick{i, n.first_segment + k, forest.section_of_segment()[n.first_original + k], *t};
+    }
+  }
+  return best;
+}
+
+struct Target {
+  Vec2 pixel;
+  std::optional<scene::Pick> pick;
+};
+// A pixel that shows a branch (or nothing) so clearly that a few pixels more or less do not matter.
+Target clear_target(Random& random, const scene::View& view, const frame::Viewport& viewport,
+                    bool something) {
+  for (;;) {
+    const Vec2 pixel(float(20 + random.below(std::uint32_t(viewport.width) - 40)),
+                     float(20 + random.below(std::uint32_t(viewport.height) - 40)));
+    const Ray ray = ray_through(view.camera, viewport, pixel + Vec2(.5f, .5f));
+    const float slope = 1.f / view.camera.focal(viewport.height);
+    const auto exact = brute_force(ray, 0.f, view.camera.near),
+               rough = brute_force(ray, 5.f * slope, view.camera.near);
+    if (!something && !rough) return {pixel, {}};
+    if (something && exact && rough && exact->instance == rough->instance && exact->section == rough->section)
+      return {pixel, exact};
+  }
+}
+
+double difference(const io::Picture& a, const io::Picture& b) {  // share of pixels that differ visibly
+  std::size_t differing = 0;
+  for (std::size_t i = 0; i < a.pixels.size(); i += 4) {
+    int most = 0;
+    for (std::size_t c = 0; c < 3; ++c) most = std::max(most, std::abs(a.pixels[i + c] - b.pixels[i + c]));
+    differing += most > 12;
+  }
+  return double(differing) / double(a.pixels.size() / 4);
+}
+
+TEST_F(Window, ClickSelectsWhatBruteForceFinds) {
+  Random random(11);
+  for (int i = 0; i < 6; ++i) {
+    const Target target = clear_target(random, view_, viewport(), true);
+    const Json facts = click(target.pixel);
+    ASSERT_FALSE(facts.is_null());
+    EXPECT_EQ(facts.at("neuron"), target.pick->instance);
+    const bool soma = target.pick->section == scene::soma_section;
+    EXPECT_EQ(facts.at("section"), soma ? Json("soma") : Json(target.pick->section));
+  }
+  EXPECT_TRUE(click(clear_target(random, view_, viewport(), false).pixel).is_null());
+}
+
+TEST_F(Window, SelectionIsLitInThePictureAndEscapePutsItOut) {
+  Random random(12);
+  const Target target = clear_target(random, view_, viewport(), true);
+  const io::Picture before = saved("before.png");
+  click(target.pixel);
+  settle();
+  const io::Picture lit = saved("lit.png");
+  const auto at = [&](const io::Picture& p) {
+    const std::size_t i = 4 * (std::size_t(target.pixel.y()) * p.width + std::size_t(target.pixel.x()));
+    return std::array<int, 3>{p.pixels[i], p.pixels[i + 1], p.pixels[i + 2]};
+  };
+  EXPECT_NE(at(before), at(lit));
+  EXPECT_GT(at(lit)[0], at(lit)[2]);  // the picked section is red
+  EXPECT_GT(difference(before, lit), .02);
+  key("Escape");
+  EXPECT_TRUE(studio_->wait_for("selected").at("facts").is_null());
+  settle();
+  EXPECT_EQ(saved("after.png").pixels, before.pixels);
+}
+
+TEST_F(Window, DragOrbitsAboutTheTarget) {
+  const io::Picture before = saved("orbit_before.png");
+  const scene::View old = view_;
+  drag(1, {300, 300}, {420, 260});
+  EXPECT_EQ(view_.camera.target, old.camera.target);
+  const float distance = (old.camera.eye - old.camera.target).norm();
+  EXPECT_NEAR((view_.camera.eye - view_.camera.target).norm(), distance, 1e-3f * distance);
+  EXPECT_GT((view_.camera.eye - old.camera.eye).norm(), .2f * distance);
+  EXPECT_GT(difference(before, saved("orbit_after.png")), .1);
+}
+
+TEST_F(Window, SavedPictureIsThatOfTheViewDrawnWithoutAWindow) {
+  drag(1, {300, 300}, {380, 330});
+  key("o");  // no outline
+  settle();
+  const io::Picture seen = saved("window.png");
+  const render::OffscreenContext context;
+  render::OpenGLRenderer renderer;
+  renderer.load(sample().geometry());
+  scene::View view = view_;
+  view.samples = 16;
+  const auto width = seen.width, height = seen.height;
+  const frame::Viewport pixels{float(width), float(height)};
+  const scene::Colouring colouring = scene::colour(sample(), view.colour_by, view.background);
+  const scene::Cut cut = scene::choose(
+      sample(), scene::Eye(view.camera, pixels, scene::detail_for(view, width, height)), pixels);
+  renderer.draw(scene::compose(sample(), view, colouring, cut, width, height));
+  EXPECT_LT(difference(seen, {width, height, renderer.read().pixels}), .001);
+}
+
+TEST_F(Window, WheelComesNearerToWhatIsUnderTheMouse) {
+  const scene::View old = view_;
+  point({200, 200});
+  xdotool("click 4");
+  settle();
+  const float before = (old.camera.eye - old.camera.target).norm(),
+              after = (view_.camera.eye - view_.camera.target).norm();
+  EXPECT_LT(after, .95f * before);
+  const auto at_target_depth = [&](const frame::Camera& camera) -> Vec3 {
+    const Ray ray = ray_through(camera, viewport(), {200, 200});
+    const Vec3 forward = (camera.target - camera.eye).normalized();
+    return camera.eye + ray.direction * ((camera.target - camera.eye).norm() / ray.direction.dot(forward));
+  };
+  EXPECT_LT((at_target_depth(old.camera) - at_target_depth(view_.camera)).norm(), 1.f);
+}
+
+TEST_F(Window, RightDragAndShiftDragMoveAcross) {
+  for (const auto& [button, with] : {std::pair(3, ""), std::pair(1, "shift")}) {
+    const scene::View old = view_;
+    drag(button, {300, 300}, {360, 300}, with);
+    const Vec3 moved = project(view_.camera, viewport(), old.camera.target);
+    EXPECT_NEAR(moved.x(), .5f * viewport().width + 60.f, 1.f);
+    EXPECT_NEAR(moved.y(), .5f * viewport().height, 1.f);
+  }
+}
+
+TEST_F(Window, KeysFlyAndTurn) {
+  point({300, 300});
+  const scene::View old = view_;
+  const Vec3 forward = (old.camera.target - old.camera.eye).normalized();
+  xdotool("keydown w sleep 0.3 keyup w");
+  settle();
+  EXPECT_GT((view_.camera.eye - old.camera.eye).dot(forward), 5.f);
+  const scene::View flown = view_;
+  key("e");
+  settle();
+  EXPECT_GT((view_.camera.eye - flown.camera.eye).dot(flown.camera.axes().col(1)), 1.f);
+  const scene::View risen = view_;
+  key("Left");
+  settle();
+  EXPECT_EQ(view_.camera.eye, risen.camera.eye);
+  EXPECT_LT((view_.camera.target - risen.camera.target).dot(risen.camera.axes().col(0)), -1.f);
+  key("v");  // fly: a drag now turns the eye where it is
+  const scene::View turned = view_;
+  drag(1, {300, 300}, {340, 300});
+  EXPECT_EQ(view_.camera.eye, turned.camera.eye);
+  EXPECT_GT((view_.camera.target - turned.camera.target).dot(turned.camera.axes().col(0)), 1.f);
+}
+
+TEST_F(Window, CentreGoesToTheSelection) {
+  Random random(13);
+  const Target target = clear_target(random, view_, viewport(), true);
+  click(target.pixel);
+  settle();
+  key("f");
+  settle();
+  // All of the subarbor is in sight now, and its middle in the middle.
+  for (const std::uint32_t segment : scene::subarbor(sample(), target.pick->instance, target.pick->section)) {
+    const Vec3 seen =
+        project(view_.camera, viewport(), scene::in_world(sample(), target.pick->instance, segment).a);
+    EXPECT_GT(seen.z(), 0.f);
+    EXPECT_NEAR(seen.x(), .5f * viewport().width, .55f * viewport().height);
+    EXPECT_NEAR(seen.y(), .5f * viewport().height, .55f * viewport().height);
+  }
+}
+
+TEST_F(Window, ViewIsCopiedAndPasted) {
+  key("ctrl+c");
+  const scene::View old = view_;
+  drag(1, {300, 300}, {420, 260});
+  ASSERT_NE(scene::to_json(view_), scene::to_json(old));
+  key("ctrl+v");
+  settle();
+  EXPECT_EQ(scene::to_json(view_), scene::to_json(old));
+}
+
+TEST_F(Window, ControlsHaveKeys) {
+  key("b");
+  settle();
+  EXPECT_EQ(view_.background, scene::Background::light);
+  key("c");
+  settle();
+  EXPECT_EQ(view_.colour_by, scene::ColourBy::layer);
+  key("g");
+  settle();
+  EXPECT_TRUE(view_.detail.gaze.has_value());
+  key("alt+x");
+  xdotool("type 123");
+  key("Return");
+  settle();
+  EXPECT_NEAR(view_.camera.eye.x(), 123.f, .1f);
+  const io::Picture light = saved("light.png");
+  EXPECT_GT(light.pixels[0], 200);
+}
+
+TEST_F(Window, GazeFollowsTheMouse) {
+  key("m");
+  settle();
+  point({100, 250});
+  settle();
+  ASSERT_TRUE(view_.detail.gaze);
+  EXPECT_NEAR(view_.detail.gaze->x() * viewport().width, 100.f, 1.f);
+  EXPECT_NEAR(view_.detail.gaze->y() * viewport().height, 250.f, 1.f);
+}
+
+TEST(Studio, WritesAScreenshotOfItsWindow) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  const auto path = folder / "screenshot.png";
+  std::filesystem::remove(path);
+  setenv("XDG_CONFIG_HOME", (folder / "settings").c_str(), 1);
+  Studio studio({sample_file(), "--size", "1000x700", "--screenshot", path});
+  EXPECT_EQ(studio.end(), std::pair(std::string(), 0));
+  const io::Picture picture = io::read_png(path);
+  EXPECT_EQ(picture.width, 1000u);
+  EXPECT_EQ(picture.height, 700u);
+}
+
+TEST(Studio, WhatGoesWrongIsOneSentence) {
+  std::filesystem::create_directories(folder);
+  write_file(folder / "no.forest", "this is no forest");
+  write_file(folder / "no.json", "{\"eye\": 3}");
+  const std::pair<std::vector<std::string>, int> wrong[] = {
+      {{folder / "missing.forest"}, 1},
+      {{folder / "no.forest"}, 1},
+      {{sample_file(), "--view", folder / "no.json"}, 1},
+      {{sample_file(), "--size", "big"}, 1},
+      {{}, 2},
+      {{sample_file(), "--no-such-option"}, 2},
+  };
+  for (const auto& [arguments, status] : wrong) {
+    const auto [said, ended] = Studio(arguments).end();
+    EXPECT_EQ(ended, status) << said;
+    EXPECT_FALSE(said.empty());
+    if (status == 1) {
+      EXPECT_EQ(std::ranges::count(said, '\n'), 1) << said;
+    }
+  }
+}
+
+TEST(Studio, WithoutADisplayItSaysSo) {
+  const char* display = std::getenv("DISPLAY");
+  const std::string kept = display ? display : "";
+  unsetenv("DISPLAY");
+  unsetenv("WAYLAND_DISPLAY");
+  const auto [said, ended] = Studio({sample_file()}).end();
+  if (display) setenv("DISPLAY", kept.c_str(), 1);
+  EXPECT_EQ(ended, 1);
+  EXPECT_NE(said.find("no display"), std::string::npos) << said;
+  EXPECT_EQ(std::ranges::count(said, '\n'), 1) << said;
+}
+
+}  // namespace
+}  // namespace forest::studio
