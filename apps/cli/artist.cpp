@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/artist.h"
+
+#include <chrono>
+#include <cmath>
+#include <cstdio>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/io/film.h"
+#include "forest/io/png.h"
+#include "forest/scene/cut.h"
+
+namespace forest::cli {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+}  // namespace
+
+Artist::Artist(scene::Forest forest) : forest_(std::move(forest)), outline_(scene::outline(forest_)) {
+  renderer_.load(forest_.geometry());
+}
+
+Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline) {
+  if (!colouring_ || view.colour_by != coloured_by_ || view.background != coloured_for_) {
+    colouring_ = scene::colour(forest_, view.colour_by, view.background);
+    coloured_by_ = view.colour_by, coloured_for_ = view.background;
+  }
+  Drawn drawn;
+  auto start = Clock::now();
+  const frame::Viewport viewport{float(width), float(height)};
+  const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
+  const scene::Cut cut = scene::choose(forest_, eye, viewport);
+  drawn.cull = milliseconds_since(start);
+  drawn.segments = cut.segments;
+  drawn.neurons = cut.neurons;
+  const auto lines = with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
+  const frame::Timing timing = renderer_.draw(scene::compose(forest_, view, *colouring_, cut, width, height, lines));
+  drawn.draw = timing.draw, drawn.resolve = timing.resolve;
+  start = Clock::now();
+  drawn.image = renderer_.read();
+  drawn.read = milliseconds_since(start);
+  return drawn;
+}
+
+FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan, const std::filesystem::path& file,
+                 Progress& progress) {
+  const auto start = Clock::now();
+  const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
+  io::Film film(file, plan.width, plan.height, plan.frames_per_second);
+  if (!plan.pictures.empty()) std::filesystem::create_directories(plan.pictures);
+  FilmFigures figures;
+  progress.begin("filming", std::size_t(count));
+  for (int i = 0; i < count; ++i) {
+    scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
+    view.samples = plan.samples;
+    const Drawn drawn = artist.draw(view, plan.width, plan.height);
+    if (drawn.segments && drawn.image.covered == 0.)
+      throw Error(fmt::format("picture {} of the film shows nothing though {} segments were drawn; the OpenGL driver ({}) may be at fault",
+                              i, drawn.segments, artist.renderer()));
+    figures.covered += drawn.image.covered / count;
+    film.add(drawn.image.pixels);
+    if (!plan.pictures.empty())
+      io::write_png(plan.pictures / fmt::format("{:05}.png", i), plan.width, plan.height, drawn.image.pixels);
+    progress.advance();
+  }
+  film.finish();
+  progress.end();
+  figures.pictures = std::uint32_t(count);
+  figures.seconds = milliseconds_since(start) / 1000.;
+  figures.codec = film.codec();
+  return figures;
+}
+
+std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {
+  unsigned width = 0, height = 0;
+  char end = 0;
+  if (std::sscanf(text.c_str(), "%5ux%5u%c", &width, &height, &end) != 2 || !width || !height || width > 16384 || height > 16384)
+    throw Error(fmt::format("'{}' is no size of a picture; give WIDTHxHEIGHT in pixels up to 16384, for example 1920x1080", text));
+  return {width, height};
+}
+
+scene::View read_view(const std::string& file_or_text) {
+  if (file_or_text.starts_with('{')) return scene::parse_view(file_or_text, "--view");
+  const MappedFile file(file_or_text);
+  return scene::parse_view(file.text(), file_or_text);
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,69 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of a forest without a window: what render, movie, demo and bench share.
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <optional>
+
+#include "forest/core/progress.h"
+#include "forest/render/opengl/context.h"
+#include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/path.h"
+#include "forest/scene/view.h"
+
+namespace forest::cli {
+
+/// What one picture took and showed.
+struct Drawn {
+  double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
+  std::uint64_t segments = 0;                            // drawn
+  std::uint32_t neurons = 0;                             // in sight
+  frame::Image image;
+};
+
+class Artist {
+ public:
+  explicit Artist(scene::Forest forest);
+
+  /// @param with_outline  the column's outline too
+  Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  const scene::Forest& forest() const { return forest_; }
+  std::string renderer() const { return renderer_.name(); }
+
+ private:
+  scene::Forest forest_;
+  render::OffscreenContext context_;
+  render::OpenGLRenderer renderer_;
+  std::vector<frame::Overlay> outline_;
+  std::optional<scene::Colouring> colouring_;
+  scene::ColourBy coloured_by_ = scene::ColourBy::type;
+  scene::Background coloured_for_ = scene::Background::dark;
+};
+
+/// Sums over the pictures of a film.
+struct FilmFigures {
+  std::uint32_t pictures = 0;
+  double seconds = 0.;       // drawing and encoding
+  double covered = 0.;       // mean share of pixels
+  std::string codec;
+};
+
+struct FilmPlan {
+  std::uint32_t width = 1280, height = 720, samples = 8;
+  int frames_per_second = 25;
+  double seconds = 5.;
+  std::filesystem::path pictures;  // when not empty: a folder for the single pictures as PNG files
+};
+
+/// Films what a path shows. Throws Error when not a single pixel was covered in a picture that should show the forest.
+FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan, const std::filesystem::path& file,
+                 Progress& progress);
+
+/// "1920x1080" to numbers; throws Error.
+std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);
+
+/// A view from a file, or from the text itself when it begins with '{'.
+scene::View read_view(const std::string& file_or_text);
+
+}  // namespace forest::cli

@@ -1,0 +1,96 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest render and brainforest movie: a forest file becomes a picture or a film, without a display.
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/io/png.h"
+
+#include "apps/cli/artist.h"
+#include "apps/cli/console.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+constexpr const char* view_help = "View as a JSON file or text (docs/scene/view.md); by default the whole forest";
+
+}  // namespace
+
+std::function<void()> render(CLI::App& command, Console& console) {
+  struct Options {
+    std::filesystem::path forest, out;
+    std::string view, size = "1920x1080";
+    bool outline = false;
+  };
+  const auto options = std::make_shared<Options>();
+  command.add_option("forest", options->forest, "Forest file")->required();
+  command.add_option("--view", options->view, view_help);
+  command.add_option("--size", options->size, "Width x height in pixels")->capture_default_str();
+  command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
+  command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
+  return [options, &console] {
+    const auto [width, height] = parse_size(options->size);
+    const scene::Forest forest = scene::Forest::open(options->forest);
+    const scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
+    Artist artist(forest);
+    const Drawn drawn = artist.draw(view, width, height, options->outline);
+    io::write_png(options->out, width, height, drawn.image.pixels);
+    console.print({{"file", options->out.string()},
+                   {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
+                   {"neurons", drawn.neurons},
+                   {"segments", drawn.segments},
+                   {"covered", drawn.image.covered},
+                   {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
+                   {"renderer", artist.renderer()}});
+    console.table({"picture", "neurons in sight", "segments drawn", "pixels covered", "seconds"},
+                  {{options->out.string(), fmt::format("{}", drawn.neurons), fmt::format("{}", drawn.segments),
+                    fmt::format("{:.1f} %", 100. * drawn.image.covered),
+                    fmt::format("{:.2f}", (drawn.cull + drawn.draw + drawn.resolve) / 1000.)}});
+  };
+}
+
+std::function<void()> movie(CLI::App& command, Console& console) {
+  struct Options {
+    std::filesystem::path forest, out;
+    std::vector<std::string> views;
+    std::string size = "1280x720";
+    FilmPlan plan;
+  };
+  const auto options = std::make_shared<Options>();
+  command.add_option("forest", options->forest, "Forest file")->required();
+  command.add_option("--view", options->views, "Key views, two or more, as JSON files or texts; by default a walk into the forest");
+  command.add_option("--size", options->size, "Width x height in pixels, both even")->capture_default_str();
+  command.add_option("--seconds", options->plan.seconds, "Length of the film")->check(CLI::Range(0.04, 3600.))->capture_default_str();
+  command.add_option("--fps", options->plan.frames_per_second, "Pictures a second")->check(CLI::Range(1, 120))->capture_default_str();
+  command.add_option("--samples", options->plan.samples, "Subframes a picture: more is smoother and slower")
+      ->check(CLI::Range(1, 256))
+      ->capture_default_str();
+  command.add_option("--pictures", options->plan.pictures, "Also write every picture into this folder");
+  command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
+  return [options, &console] {
+    FilmPlan plan = options->plan;
+    std::tie(plan.width, plan.height) = parse_size(options->size);
+    const scene::Forest forest = scene::Forest::open(options->forest);
+    std::vector<scene::View> views;
+    for (const std::string& view : options->views) views.push_back(read_view(view));
+    if (views.size() == 1) throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
+    const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
+    Artist artist(forest);
+    const FilmFigures figures = film(artist, path, plan, options->out, console.progress());
+    console.print({{"file", options->out.string()},
+                   {"pictures", figures.pictures},
+                   {"frames_per_second", figures.pictures / figures.seconds},
+                   {"covered", figures.covered},
+                   {"codec", figures.codec},
+                   {"renderer", artist.renderer()}});
+    console.table({"film", "pictures", "pictures/s", "pixels covered", "codec"},
+                  {{options->out.string(), fmt::format("{}", figures.pictures), fmt::format("{:.1f}", figures.pictures / figures.seconds),
+                    fmt::format("{:.1f} %", 100. * figures.covered), figures.codec}});
+  };
+}
+
+}  // namespace forest::cli

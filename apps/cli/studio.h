@@ -1,0 +1,14 @@
+// SPDX-License-Identifier: Apache-2.0
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+namespace forest::cli {
+
+bool has_display();
+
+/// Becomes the studio: returns only by throwing Error.
+[[noreturn]] void open_studio(const std::filesystem::path& forest, const std::string& view = "");
+
+}  // namespace forest::cli

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest view: opens the studio, the program beside this one.
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstdlib>
+#include <cstring>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/studio.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+
+bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
+
+void open_studio(const std::filesystem::path& forest, const std::string& view) {
+  if (!has_display()) throw Error("there is no display to open the studio on; make a picture with 'brainforest render' instead");
+  std::error_code ignored;
+  const auto studio = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path() / "brainforest-studio";
+  std::vector<std::string> words{studio.string(), forest.string()};
+  if (!view.empty()) words.insert(words.end(), {"--view", view});
+  std::vector<char*> arguments;
+  for (std::string& word : words) arguments.push_back(word.data());
+  arguments.push_back(nullptr);
+  std::fflush(nullptr);
+  ::execv(arguments[0], arguments.data());
+  throw Error(fmt::format("the studio cannot be started ({}: {}); build it with './dev build'", studio.string(), std::strerror(errno)));
+}
+
+std::function<void()> view(CLI::App& command, Console&) {
+  struct Options {
+    std::filesystem::path forest;
+    std::string view;
+  };
+  const auto options = std::make_shared<Options>();
+  command.add_option("forest", options->forest, "Forest file")->required();
+  command.add_option("--view", options->view, "View as a JSON file");
+  return [options] {
+    MappedFile exists(options->forest);  // says so here rather than in a window
+    open_studio(options->forest, options->view);
+  };
+}
+
+}  // namespace forest::cli
