@@ -41,8 +41,10 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull = milliseconds_since(start);
   drawn.segments = cut.segments;
   drawn.neurons = cut.neurons;
-  const auto lines = with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
-  const frame::Timing timing = renderer_.draw(scene::compose(forest_, view, *colouring_, cut, width, height, lines));
+  const auto lines =
+      with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
+  const frame::Timing timing =
+      renderer_.draw(scene::compose(forest_, view, *colouring_, cut, width, height, lines));
   drawn.draw = timing.draw, drawn.resolve = timing.resolve;
   start = Clock::now();
   drawn.image = renderer_.read();
@@ -50,8 +52,8 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   return drawn;
 }
 
-FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan, const std::filesystem::path& file,
-                 Progress& progress) {
+FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
+                 const std::filesystem::path& file, Progress& progress) {
   const auto start = Clock::now();
   const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
   io::Film film(file, plan.width, plan.height, plan.frames_per_second);
@@ -63,8 +65,10 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     view.samples = plan.samples;
     const Drawn drawn = artist.draw(view, plan.width, plan.height);
     if (drawn.segments && drawn.image.covered == 0.)
-      throw Error(fmt::format("picture {} of the film shows nothing though {} segments were drawn; the OpenGL driver ({}) may be at fault",
-                              i, drawn.segments, artist.renderer()));
+      throw Error(
+          fmt::format("picture {} of the film shows nothing though {} segments were drawn; the OpenGL driver "
+                      "({}) may be at fault",
+                      i, drawn.segments, artist.renderer()));
     figures.covered += drawn.image.covered / count;
     film.add(drawn.image.pixels);
     if (!plan.pictures.empty())
@@ -82,8 +86,11 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {
   unsigned width = 0, height = 0;
   char end = 0;
-  if (std::sscanf(text.c_str(), "%5ux%5u%c", &width, &height, &end) != 2 || !width || !height || width > 16384 || height > 16384)
-    throw Error(fmt::format("'{}' is no size of a picture; give WIDTHxHEIGHT in pixels up to 16384, for example 1920x1080", text));
+  if (std::sscanf(text.c_str(), "%5ux%5u%c", &width, &height, &end) != 2 || !width || !height ||
+      width > 16384 || height > 16384)
+    throw Error(fmt::format(
+        "'{}' is no size of a picture; give WIDTHxHEIGHT in pixels up to 16384, for example 1920x1080",
+        text));
   return {width, height};
 }
 

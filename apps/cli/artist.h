@@ -44,8 +44,8 @@ class Artist {
 /// Sums over the pictures of a film.
 struct FilmFigures {
   std::uint32_t pictures = 0;
-  double seconds = 0.;       // drawing and encoding
-  double covered = 0.;       // mean share of pixels
+  double seconds = 0.;  // drawing and encoding
+  double covered = 0.;  // mean share of pixels
   std::string codec;
 };
 
@@ -57,8 +57,8 @@ struct FilmPlan {
 };
 
 /// Films what a path shows. Throws Error when not a single pixel was covered in a picture that should show the forest.
-FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan, const std::filesystem::path& file,
-                 Progress& progress);
+FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
+                 const std::filesystem::path& file, Progress& progress);
 
 /// "1920x1080" to numbers; throws Error.
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);

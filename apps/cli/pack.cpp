@@ -21,7 +21,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     bool verbose = false;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("circuit", options->circuit, "Folder of a SONATA circuit, or its configuration file")->required();
+  command.add_option("circuit", options->circuit, "Folder of a SONATA circuit, or its configuration file")
+      ->required();
   command.add_option("-o,--out", options->out, "The forest file")->required();
   command.add_flag("--verbose", options->verbose, "Say every oddity of the circuit's files");
   return [options, &console] {
@@ -29,7 +30,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     if (options->verbose)
       for (const io::Warning& w : read.warnings) console.warn(w.sentence);
     else if (!read.warnings.empty())
-      console.warn(fmt::format("{} oddities in {}; see them with --verbose", read.warnings.size(), options->circuit.string()));
+      console.warn(fmt::format("{} oddities in {}; see them with --verbose", read.warnings.size(),
+                               options->circuit.string()));
     const auto bytes = scene::pack(read.circuit, read.morphologies, console.progress());
     write_file(options->out, bytes);
     const scene::Forest forest = scene::Forest::open(options->out);
@@ -39,8 +41,9 @@ std::function<void()> pack(CLI::App& command, Console& console) {
                    {"segments", forest.segment_total()},
                    {"bytes", forest.bytes()}});
     console.table({"file", "neurons", "distinct", "segments", "bytes"},
-                  {{options->out.string(), fmt::format("{}", forest.instances().size()), fmt::format("{}", forest.neurons().size()),
-                    fmt::format("{}", forest.segment_total()), fmt::format("{}", forest.bytes())}});
+                  {{options->out.string(), fmt::format("{}", forest.instances().size()),
+                    fmt::format("{}", forest.neurons().size()), fmt::format("{}", forest.segment_total()),
+                    fmt::format("{}", forest.bytes())}});
   };
 }
 

@@ -16,7 +16,8 @@
 namespace forest::cli {
 namespace {
 
-constexpr const char* view_help = "View as a JSON file or text (docs/scene/view.md); by default the whole forest";
+constexpr const char* view_help =
+    "View as a JSON file or text (docs/scene/view.md); by default the whole forest";
 
 }  // namespace
 
@@ -47,8 +48,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
                    {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
                    {"renderer", artist.renderer()}});
     console.table({"picture", "neurons in sight", "segments drawn", "pixels covered", "seconds"},
-                  {{options->out.string(), fmt::format("{}", drawn.neurons), fmt::format("{}", drawn.segments),
-                    fmt::format("{:.1f} %", 100. * drawn.image.covered),
+                  {{options->out.string(), fmt::format("{}", drawn.neurons),
+                    fmt::format("{}", drawn.segments), fmt::format("{:.1f} %", 100. * drawn.image.covered),
                     fmt::format("{:.2f}", (drawn.cull + drawn.draw + drawn.resolve) / 1000.)}});
   };
 }
@@ -62,10 +63,15 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
-  command.add_option("--view", options->views, "Key views, two or more, as JSON files or texts; by default a walk into the forest");
+  command.add_option("--view", options->views,
+                     "Key views, two or more, as JSON files or texts; by default a walk into the forest");
   command.add_option("--size", options->size, "Width x height in pixels, both even")->capture_default_str();
-  command.add_option("--seconds", options->plan.seconds, "Length of the film")->check(CLI::Range(0.04, 3600.))->capture_default_str();
-  command.add_option("--fps", options->plan.frames_per_second, "Pictures a second")->check(CLI::Range(1, 120))->capture_default_str();
+  command.add_option("--seconds", options->plan.seconds, "Length of the film")
+      ->check(CLI::Range(0.04, 3600.))
+      ->capture_default_str();
+  command.add_option("--fps", options->plan.frames_per_second, "Pictures a second")
+      ->check(CLI::Range(1, 120))
+      ->capture_default_str();
   command.add_option("--samples", options->plan.samples, "Subframes a picture: more is smoother and slower")
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
@@ -77,7 +83,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     const scene::Forest forest = scene::Forest::open(options->forest);
     std::vector<scene::View> views;
     for (const std::string& view : options->views) views.push_back(read_view(view));
-    if (views.size() == 1) throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
+    if (views.size() == 1)
+      throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
     Artist artist(forest);
     const FilmFigures figures = film(artist, path, plan, options->out, console.progress());
@@ -88,7 +95,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
                    {"codec", figures.codec},
                    {"renderer", artist.renderer()}});
     console.table({"film", "pictures", "pictures/s", "pixels covered", "codec"},
-                  {{options->out.string(), fmt::format("{}", figures.pictures), fmt::format("{:.1f}", figures.pictures / figures.seconds),
+                  {{options->out.string(), fmt::format("{}", figures.pictures),
+                    fmt::format("{:.1f}", figures.pictures / figures.seconds),
                     fmt::format("{:.1f} %", 100. * figures.covered), figures.codec}});
   };
 }

@@ -6,6 +6,7 @@
 namespace forest::cli {
 
 // One declaration and one row a verb, in the order of --help.
+std::function<void()> demo(CLI::App&, Console&);
 std::function<void()> import_files(CLI::App&, Console&);
 std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
@@ -14,9 +15,14 @@ std::function<void()> measure(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
 std::function<void()> plant(CLI::App&, Console&);
 std::function<void()> bench(CLI::App&, Console&);
+std::function<void()> pack(CLI::App&, Console&);
+std::function<void()> render(CLI::App&, Console&);
+std::function<void()> movie(CLI::App&, Console&);
+std::function<void()> view(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
   static constexpr auto table = std::to_array<Verb>({
+      {"demo", "Do it all: grow, store, plant, pack, draw and film a forest", "brainforest demo --out demo", demo},
       {"import", "Store traced neurons in a repository",
        "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
       {"list", "List the populations and neurons of a repository",
@@ -32,6 +38,11 @@ std::span<const Verb> verbs() {
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
       {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
+      {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest", pack},
+      {"render", "Draw a forest as a picture, without a display",
+       "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
+      {"movie", "Film a walk through a forest, without a display", "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
+      {"view", "Open a forest in the studio", "brainforest view column.forest", view},
   });
   return table;
 }

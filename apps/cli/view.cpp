@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest view: opens the studio, the program beside this one.
-#include <unistd.h>
-
 #include <cerrno>
 #include <cstdlib>
 #include <cstring>
 #include <memory>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -22,9 +21,12 @@ namespace forest::cli {
 bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
 
 void open_studio(const std::filesystem::path& forest, const std::string& view) {
-  if (!has_display()) throw Error("there is no display to open the studio on; make a picture with 'brainforest render' instead");
+  if (!has_display())
+    throw Error(
+        "there is no display to open the studio on; make a picture with 'brainforest render' instead");
   std::error_code ignored;
-  const auto studio = std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path() / "brainforest-studio";
+  const auto studio =
+      std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path() / "brainforest-studio";
   std::vector<std::string> words{studio.string(), forest.string()};
   if (!view.empty()) words.insert(words.end(), {"--view", view});
   std::vector<char*> arguments;
@@ -32,7 +34,8 @@ void open_studio(const std::filesystem::path& forest, const std::string& view) {
   arguments.push_back(nullptr);
   std::fflush(nullptr);
   ::execv(arguments[0], arguments.data());
-  throw Error(fmt::format("the studio cannot be started ({}: {}); build it with './dev build'", studio.string(), std::strerror(errno)));
+  throw Error(fmt::format("the studio cannot be started ({}: {}); build it with './dev build'",
+                          studio.string(), std::strerror(errno)));
 }
 
 std::function<void()> view(CLI::App& command, Console&) {

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -28,6 +29,13 @@ Vec3 hex(std::uint32_t rgb) {
 constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
                                                     0x0072B2, 0xD55E00, 0xFFD180, 0xA6DCFF, 0x7FD8B8,
                                                     0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
+// Ramps from the pia down, one a type: warm, blue, green, violet, grey. Each keeps to one family of hues and grows darker,
+// so that types and layers can both be told, by colour-blind eyes too.
+constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B, 0xC8385A},
+                                                             {0xB5E3FF, 0x4FA8E8, 0x2F6FD0},
+                                                             {0xA8F0CF, 0x2FBF8F, 0x0E8F6E},
+                                                             {0xE3C8FF, 0xB48AE8, 0x8A5CD0},
+                                                             {0xE8E8E8, 0xBBBBBB, 0x909090}}};
 // Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
 constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
                                                0x31688E, 0x5A5AA8, 0x8E4A9E};
@@ -58,6 +66,13 @@ Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) 
   }
   if (!v.allFinite()) throw InputError(name, 0, fmt::format("'{}' must be finite", key));
   return v;
+}
+
+Vec3 ramp_colour(std::uint32_t type, float t) {
+  const auto& ramp = ramps[type % ramps.size()];
+  const float at = 2.f * std::clamp(t, 0.f, 1.f);
+  const std::size_t i = at < 1.f ? 0 : 1;
+  return hex(ramp[i]) + (hex(ramp[i + 1]) - hex(ramp[i])) * (at - float(i));
 }
 
 float number_of(const Json& json, const std::string& name, std::string_view key, float low, float high) {
@@ -165,6 +180,20 @@ View overview(const Forest& forest) {
   return view;
 }
 
+View portrait(const Forest& forest) {
+  View view = overview(forest);
+  const Bounds& bounds = forest.soma_bounds();
+  if (bounds.empty()) return view;
+  const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
+  const Vec3 centre = bounds.centre();
+  view.camera.target = centre + Vec3(0.f, -.02f * height, 0.f);
+  view.camera.eye = centre + Vec3(1.6f * radius, -.30f * height, 3.4f * radius);
+  view.camera.field_of_view = 52.f;
+  view.camera.near = .5f;
+  view.samples = 32;
+  return view;
+}
+
 Colouring colour(const Forest& forest, ColourBy by, Background background) {
   Colouring result{.palette = frame::black_palette(),
                    .classes = std::vector<std::uint8_t>(forest.instances().size()),
@@ -179,13 +208,30 @@ Colouring colour(const Forest& forest, ColourBy by, Background background) {
       result.legend.push_back({name_of_class(i), base[i]});
     }
   };
-  const auto from_categories = [](std::size_t i) { return categorical[i % categorical.size()]; };
   switch (by) {
-    case ColourBy::type:
-      fill(circuit.types.size(), from_categories, [&](std::size_t i) { return circuit.types[i].name; });
+    case ColourBy::type: {
+      // The hue tells the type, its step the layer. Pairs of them are numbered as they are met; past sixteen they share.
+      std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint8_t> pairs;
       for (std::size_t i = 0; i < result.classes.size(); ++i)
-        result.classes[i] = std::uint8_t(forest.types()[i] % 16);
+        pairs.try_emplace({forest.types()[i], forest.layers()[i]}, std::uint8_t(0));
+      std::map<std::uint32_t, std::uint32_t> layers_of_type;
+      for (const auto& [pair, number] : pairs) ++layers_of_type[pair.first];
+      std::uint32_t next = 0, step = 0, type_before = 0;
+      for (auto& [pair, number] : pairs) {
+        const auto [type, layer] = pair;
+        step = next > 0 && type == type_before ? step + 1 : 0;
+        type_before = type;
+        number = std::uint8_t(std::min(next++, 15u));
+        const std::uint32_t steps = layers_of_type[type];
+        base[number] =
+            ramp_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light ? .6f : 1.f);
+        result.legend.push_back(
+            {circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""), base[number]});
+      }
+      for (std::size_t i = 0; i < result.classes.size(); ++i)
+        result.classes[i] = pairs[{forest.types()[i], forest.layers()[i]}];
       break;
+    }
     case ColourBy::layer:
       fill(
           circuit.layers.size(), [&](std::size_t i) { return layered[i % layered.size()]; },

@@ -34,6 +34,9 @@ std::string to_json(const View& view);
 /// The view that shows the whole forest from outside, a little from above.
 View overview(const Forest& forest);
 
+/// A picture to hang on a wall: near enough to follow single dendrites, far enough to see the layers.
+View portrait(const Forest& forest);
+
 struct LegendEntry {
   std::string name;
   Vec3 colour;  // linear light

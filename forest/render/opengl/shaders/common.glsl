@@ -145,7 +145,7 @@ void draw_line(Capsule c) {
 
   vec3 tangent = normalize(c.b - c.a + vec3(1e-9));
   float along = dot(tangent, light());
-  float shade = 0.25 + 0.65 * sqrt(max(0.0, 1.0 - along * along));
+  float shade = 0.35 + 0.6 * sqrt(max(0.0, 1.0 - along * along));
   uint payload = payload_of(c.entry, shade, fract(c.rank * 7.0));
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5 * float(thickness - 1);

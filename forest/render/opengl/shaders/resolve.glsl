@@ -40,7 +40,7 @@ void main() {
     }
     vec3 base = vec3(palette[entry * 3u], palette[entry * 3u + 1u], palette[entry * 3u + 2u]);
     float fog = 1.0 - exp(-max(0.0, z - view.fog_start) / view.fog_length);
-    colour = mix(base * (0.12 + 0.95 * shade * shade) * exp(-1.4 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
+    colour = mix(base * (0.16 + 1.05 * shade * shade) * exp(-1.1 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
   }
   vec4 sum = vec4(colour, covered);
   if (view.subframe > 0u) sum += vec4(sums[at * 4u], sums[at * 4u + 1u], sums[at * 4u + 2u], sums[at * 4u + 3u]);
