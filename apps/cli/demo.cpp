@@ -19,6 +19,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/planting.h"
 #include "apps/cli/studio.h"
@@ -79,7 +80,7 @@ void import_into(const std::string& repo, const fs::path& folder, Console& conso
     Morphology morphology;
     std::string hash, error;
   };
-  const std::vector<fs::path> paths = io::neuron_files(folder);
+  const std::vector<fs::path> paths = neuron_files({folder.string()});
   std::vector<File> files(paths.size());
   console.progress().begin("reading", paths.size());
   parallel_for(paths.size(), 1, [&](std::size_t i) {

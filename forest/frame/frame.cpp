@@ -41,6 +41,8 @@ void check(const Frame& frame, const Geometry& geometry) {
       require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
               "an item's sphere must be finite");
     }
+  for (const auto list : {frame.dots, frame.lines, frame.capsules})
+    require(list.size() < (1u << 26), "a list must have fewer than 67,108,864 items");
   for (const Item& item : frame.dots) require(item.segment_count == 1, "a dot is one segment");
   Band before;
   for (const Band& b : frame.bands) {

@@ -55,12 +55,12 @@ struct Constants {
 #define FOREST_DEPTH_MAX 1048574.0
 #define FOREST_KEY_EMPTY 0xffffffffu
 #define FOREST_CLUSTER_SIZE 64u
+#define FOREST_GROUP 256u  // threads of a workgroup that draws
 
 // Constants::flags
 #define FOREST_OVERLAY 1u     // segments lie in the world and name their palette entry
-#define FOREST_DOTS 2u        // the queue will be read by one thread an item, not one workgroup
-#define FOREST_COARSE 4u      // tiles of tiles
-#define FOREST_FIRST_BAND 8u  // nothing is hidden yet
+#define FOREST_COARSE 2u      // tiles of tiles
+#define FOREST_FIRST_BAND 4u  // nothing is hidden yet
 
 // Occlusion: the farthest key of every square of 8 × 8 pixels, then of every 8 × 8 of those.
 #define FOREST_TILE 8u

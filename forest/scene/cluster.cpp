@@ -4,6 +4,7 @@
 #include "forest/scene/cluster.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -198,20 +199,45 @@ std::uint32_t half_pair(float a, float b) {
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
-  std::uint32_t lowest_rank = 255;
+  std::array<std::uint32_t, 2> visible{};
 };
 
-Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
+// The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
+// drawn when width > rank, and a diagonal one counts as 1.42 times as wide.
+float appears_at(const frame::Segment& s, float thickest) {
+  return float(s.meta >> 8 & 255) / (256.f * 2.f * 1.42f * std::max(thickest, 1e-6f));
+}
+
+// Writes the segments of a draft in the order in which they appear, `section` (one entry each, of a leaf) with them.
+Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out,
+           std::span<std::uint32_t> section) {
   Drawn drawn;
+  struct Shown {
+    frame::Segment segment;
+    std::uint32_t section;
+    float from;
+  };
+  std::vector<Shown> segments;
   for (const Strip& s : strips)
     for (std::size_t i = 1; i < s.vertices.size(); ++i) {
       const Vec4 &a = s.vertices[i - 1], &b = s.vertices[i];
-      out.push_back(
-          {a.x(), a.y(), a.z(), half_pair(a.w(), b.w()), b.x(), b.y(), b.z(), s.kind | s.rank << 8});
+      const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
+                                   b.x(), b.y(), b.z(), s.kind | s.rank << 8};
+      segments.push_back({segment, section.empty() ? 0 : section[segments.size()],
+                          appears_at(segment, std::max(a.w(), b.w()))});
       if (a != b)
         drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
-      if (a != b) drawn.lowest_rank = std::min(drawn.lowest_rank, s.rank);
     }
+  std::ranges::stable_sort(segments, {}, &Shown::from);
+  for (std::size_t i = 0; i < segments.size(); ++i) {
+    out.push_back(segments[i].segment);
+    if (!section.empty()) section[i] = segments[i].section;
+  }
+  for (int step = 0; step < 8; ++step) {
+    const auto below = std::ranges::count_if(
+        segments, [&](const Shown& s) { return s.from <= Cluster::magnifications[step]; });
+    drawn.visible[std::size_t(step / 4)] |= std::uint32_t(below) << (8 * (step % 4));
+  }
   return drawn;
 }
 
@@ -389,7 +415,10 @@ ClusterTree build_clusters(const Morphology& m) {
   std::vector<std::uint32_t> first(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {
     first[i] = std::uint32_t(tree.segments.size());
-    drawn[i] = emit(drafts[i].strips, tree.segments);
+    const bool leaf = drafts[i].children[0] < 0;
+    const auto section = leaf ? std::span(tree.section).subspan(drafts[i].leaf_first, drafts[i].leaf_count)
+                              : std::span<std::uint32_t>();
+    drawn[i] = emit(drafts[i].strips, tree.segments, section);
   }
   const std::size_t count = drafts.size();
   const auto index = [&](std::int64_t draft) {
@@ -408,7 +437,7 @@ ClusterTree build_clusters(const Morphology& m) {
                              {index(d.children[0]), index(d.children[1])},
                              d.leaf_first,
                              d.leaf_count,
-                             drawn[i].lowest_rank});
+                             {drawn[i].visible[0], drawn[i].visible[1]}});
   }
   return tree;
 }

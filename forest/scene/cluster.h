@@ -19,7 +19,7 @@
 
 namespace forest::scene {
 
-/// Laid out for the forest file: 52 bytes.
+/// Laid out for the forest file: 56 bytes.
 struct Cluster {
   float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // bounding sphere of all that is below, µm
   float error = 0.f;                              // µm; 0 for a leaf, never less than a child's
@@ -28,11 +28,21 @@ struct Cluster {
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
   std::uint32_t leaf_count = 0;        // … and how many
-  std::uint32_t lowest_rank = 0;       // of the segments drawn, 0–255
+  std::uint32_t visible[2] = {0,
+                              0};  // how many of its segments show at each of `magnifications`: a byte each
 
   bool is_leaf() const { return children[0] == 0; }
+
+  /// Its segments lie in the order in which they appear when one comes nearer: a branch thinner than a pixel shows from
+  /// the magnification (pixels a µm) on at which its width reaches its rank. How many, from the first on, may show.
+  std::uint32_t visible_at(float magnification) const {
+    for (int i = 0; i < 8; ++i)
+      if (magnification <= magnifications[i]) return visible[i / 4] >> (8 * (i % 4)) & 255;
+    return segment_count;
+  }
+  static constexpr float magnifications[8] = {.05f, .1f, .17f, .25f, .35f, .5f, .8f, 1.5f};
 };
-static_assert(sizeof(Cluster) == 52);
+static_assert(sizeof(Cluster) == 56);
 
 struct ClusterTree {
   std::vector<frame::Segment> segments;  // the leaves' first (original_count), then the coarser ones

@@ -47,10 +47,11 @@ void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& f
       continue;
     }
     const float width = 2.f * c.thickness * eye.magnification(sphere);
-    if (detail.thin && width * 256.f < float(c.lowest_rank)) continue;
+    const std::uint32_t count = detail.thin ? c.visible_at(eye.magnification(sphere)) : c.segment_count;
+    if (!count) continue;
     (width <= detail.surface_width ? cut.lines : cut.capsules)
-        .push_back(item(index, c.first_segment, c.segment_count, sphere));
-    cut.segments += c.segment_count;
+        .push_back(item(index, c.first_segment, count, sphere));
+    cut.segments += count;
   }
   if (neuron.soma_radius > 0.f) {
     const Sphere soma{placed.position, neuron.soma_radius};
@@ -71,8 +72,9 @@ void append(std::vector<frame::Item>& to, const std::vector<frame::Item>& from) 
 constexpr std::size_t steps = 64 * 24;
 using Starts = std::array<std::uint32_t, steps + 1>;
 
+// By the centre: a large sphere around the eye says little of where its branches are.
 std::size_t step_of(const frame::Item& item, const Eye& eye) {
-  const float depth = eye.nearest_depth({{item.x, item.y, item.z}, item.radius});
+  const float depth = eye.nearest_depth({{item.x, item.y, item.z}, 0.f});
   return std::size_t(std::clamp(64.f * std::log2(depth / eye.camera().near), 0.f, float(steps - 1)));
 }
 

@@ -109,7 +109,7 @@ TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
   EXPECT_GT(all.bands.size(), 1u);
   for (std::size_t i = 1; i < all.lines.size(); ++i) {
     const auto depth = [&](const frame::Item& item) {
-      return eye.nearest_depth({{item.x, item.y, item.z}, item.radius});
+      return eye.nearest_depth({{item.x, item.y, item.z}, 0.f});
     };
     EXPECT_LE(depth(all.lines[i - 1]), depth(all.lines[i]) * 1.03f);
   }
@@ -117,6 +117,24 @@ TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
   const Cut single = choose(forest, eye, viewport);
   EXPECT_TRUE(same(all.lines, single.lines) && same(all.capsules, single.capsules) &&
               same(all.dots, single.dots));
+}
+
+TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
+  const Forest forest = sample();
+  for (const Cluster& c : forest.clusters()) {
+    for (const float magnification : {.03f, .1f, .3f, 1.f, 3.f}) {
+      const std::uint32_t shown = c.visible_at(magnification);
+      ASSERT_LE(shown, c.segment_count);
+      for (std::uint32_t i = shown; i < c.segment_count; ++i) {
+        const frame::Segment& s = forest.segments()[c.first_segment + i];
+        const auto radius = [&](std::uint32_t bits) {
+          return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
+        };
+        const float width = 2.f * std::max(radius(s.radii & 0xffff), radius(s.radii >> 16)) * magnification;
+        EXPECT_LE(width * 256.f, float(s.meta >> 8 & 255) * 1.01f);
+      }
+    }
+  }
 }
 
 TEST(Cut, GazeDrawsLess) {

@@ -186,11 +186,11 @@ View portrait(const Forest& forest) {
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
   const Vec3 centre = bounds.centre();
-  view.camera.target = centre + Vec3(0.f, -.02f * height, 0.f);
-  view.camera.eye = centre + Vec3(1.6f * radius, -.30f * height, 3.4f * radius);
+  view.camera.target = centre + Vec3(0.f, -.01f * height, 0.f);
+  view.camera.eye = centre + Vec3(1.5f * radius, .21f * height, 3.6f * radius);
   view.camera.field_of_view = 52.f;
   view.camera.near = .5f;
-  view.samples = 32;
+  view.samples = 24;
   return view;
 }
 

@@ -122,6 +122,7 @@ struct OpenGLRenderer::Device {
     std::uint32_t flags;
     Buffer items;
     std::uint32_t count = 0;
+    std::size_t segments = 0;
   };
   enum { capsule_list, dot_list, line_list, overlay_list, list_count };
   static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
@@ -133,7 +134,7 @@ struct OpenGLRenderer::Device {
   Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
       large_queue, tiles;
   std::array<List, list_count> lists{
-      {{&capsules, 0, {}}, {&dots, FOREST_DOTS, {}}, {&lines, 0, {}}, {&capsules, FOREST_OVERLAY, {}}}};
+      {{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}, {&capsules, FOREST_OVERLAY, {}}}};
   frame::Geometry geometry;
   Constants constants{};
   std::uint32_t width = 0, height = 0;
@@ -144,6 +145,8 @@ struct OpenGLRenderer::Device {
     const auto set = [](List& list, std::span<const Item> items) {
       list.items.upload(items);
       list.count = std::uint32_t(items.size());
+      list.segments = 0;
+      for (const Item& item : items) list.segments += item.segment_count;
     };
     set(lists[capsule_list], f.capsules);
     set(lists[dot_list], f.dots);
@@ -176,9 +179,9 @@ struct OpenGLRenderer::Device {
     image.reserve(pixels * 4);
     sums.reserve(f.subframes > 1 ? pixels * 16 : 16);
     tiles.reserve((pixels / 32 + width + height + 64) * 4);
-    std::size_t longest = 0;
-    for (const List& list : lists) longest = std::max<std::size_t>(longest, list.count);
-    queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
+    std::size_t longest = 1;
+    for (const List& list : lists) longest = std::max(longest, list.segments);
+    queue.reserve(16 + 4 * longest);
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
     instances.bind(1);
     keys.bind(3);

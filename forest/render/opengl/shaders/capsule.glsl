@@ -83,3 +83,43 @@ void draw_capsule(Capsule c, int lane, int lanes) {
     }
   }
 }
+
+// A thin capsule without a ray for every pixel: across the axis on screen, depth and shade follow a half circle. Its ends
+// are cut along the scan line, a little beyond the joints, so that bends show no gap.
+void draw_tube(Capsule c) {
+  vec2 p = to_pixel(c.a), q = to_pixel(c.b);
+  float wp = view.focal * c.ra / c.a.z, wq = view.focal * c.rb / c.b.z;
+  float za = depth_code(c.a.z), zb = depth_code(c.b.z);
+  const float octave = 1.442695 * FOREST_DEPTH_STEPS;  // of code, for a relative step in depth
+  float bulge = octave * max(c.ra / c.a.z, c.rb / c.b.z);
+  bool steep = abs(q.y - p.y) > abs(q.x - p.x);
+  if (steep) { p = p.yx; q = q.yx; }
+  if (p.x > q.x) {
+    vec2 swap = p; p = q; q = swap;
+    float s = wp; wp = wq; wq = s;
+    s = za; za = zb; zb = s;
+  }
+  float dx = q.x - p.x, slope = (q.y - p.y) / dx, stretch = sqrt(1.0 + slope * slope);
+  int limit_x = int(steep ? view.height : view.width), limit_y = int(steep ? view.width : view.height);
+  float over = 0.4 * min(wp, wq);
+  int first = max(int(ceil(p.x - over - 0.5)), 0), last = min(int(ceil(q.x + over - 0.5)), limit_x);
+
+  // The normal at distance t from the axis: t along `side`, sqrt(1 - t²) towards the eye, both across the tangent.
+  vec3 tangent = normalize(c.b - c.a), eye = -normalize(c.a + c.b);
+  vec3 facing = normalize(eye - dot(eye, tangent) * tangent), side = cross(tangent, facing);
+  vec2 across = steep ? vec2(1.0, 0.0) : vec2(0.0, -1.0);  // of growing y, in camera axes
+  if (dot(side.xy, across) < 0.0) side = -side;
+  float lit_side = 0.5 * dot(side, light()), lit_front = 0.5 * dot(facing, light());
+
+  for (int x = first; x < last; ++x) {
+    float along = (float(x) + 0.5 - p.x) / dx;
+    float centre = p.y + slope * (along * dx), half_width = mix(wp, wq, clamp(along, 0.0, 1.0)) * stretch;
+    float z = mix(za, zb, clamp(along, 0.0, 1.0)), inverse = 1.0 / half_width;
+    int low = max(int(ceil(centre - half_width - 0.5)), 0), high = min(int(ceil(centre + half_width - 0.5)), limit_y);
+    for (int y = low; y < high; ++y) {
+      float t = (float(y) + 0.5 - centre) * inverse, h = sqrt(max(0.0, 1.0 - t * t));
+      int px = steep ? y : x, py = steep ? x : y;
+      put(px, py, max(z - bulge * h, 0.0), payload_of(c.entry, 0.5 + t * lit_side + h * lit_front, noise_at(px, py)));
+    }
+  }
+}

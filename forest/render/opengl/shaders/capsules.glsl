@@ -1,15 +1,14 @@
-// Near runs: one workgroup an item, one thread a segment. A thread draws its segment as a line when it is thin, leaves it
+// Near runs: one thread a segment. A thread draws its segment as a line when it is thin, leaves it
 // to a whole workgroup (close_ups.glsl) when it is large, and else draws it alone.
 
-layout(local_size_x = 64) in;
+layout(local_size_x = FOREST_GROUP) in;
 
+const float tube_width = 7.0;     // pixels; below, a capsule is shaded by its distance from the axis on screen
 const float large_area = 3000.0;  // pixels of the rectangle around it
 
 void main() {
   Capsule c;
-  if (group_index() >= queued) return;
-  uint item = queue[group_index()], index = gl_LocalInvocationID.x;
-  if (!fetch(item, index, c)) return;
+  if (!fetch_queued(c)) return;
   float width = view.focal * max(c.ra / c.a.z, c.rb / c.b.z);
   if (width < 0.75) {
     draw_line(c);
@@ -19,6 +18,10 @@ void main() {
   float reach = 1.0 + 1.05 * width;
   float nearest = max(min(c.a.z - c.ra, c.b.z - c.rb), view.near);
   if (hidden(min(p, q) - reach, max(p, q) + reach, nearest, 16u)) return;
+  if (2.0 * width < tube_width && distance(p, q) > 0.5 * width) {
+    draw_tube(c);
+    return;
+  }
   vec2 low = max(min(p, q) - reach, vec2(0.0)), high = min(max(p, q) + reach, vec2(view.width, view.height));
   if ((high.x - low.x) * (high.y - low.y) < large_area) {
     draw_capsule(c, 0, 1);
@@ -29,7 +32,7 @@ void main() {
     draw_capsule(c, 0, 1);
     return;
   }
-  large[at] = item * 64u + index;
+  large[at] = queue[thread_index()];
   atomicMax(large_x, min(at + 1u, 32768u));
   atomicMax(large_y, at / 32768u + 1u);
 }

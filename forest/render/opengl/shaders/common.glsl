@@ -7,7 +7,8 @@ layout(std430, binding = 2) readonly buffer Items { Item items[]; };
 layout(std430, binding = 3) buffer Keys { uint keys[]; };
 layout(std430, binding = 4) readonly buffer ColourClasses { uint colour_classes[]; };  // four a word
 
-// Items of this band that are not hidden, and the workgroups that draw them (as glDispatchComputeIndirect reads them).
+// Segments of this band's items that are not hidden, one thread each (item * 64 + index), and the workgroups that draw
+// them (as glDispatchComputeIndirect reads them).
 layout(std430, binding = 8) buffer Queue { uint groups_x, groups_y, groups_z, queued; uint queue[]; };
 // Segments so large that a workgroup shares each: item * 64 + index.
 layout(std430, binding = 9) buffer LargeQueue { uint large_x, large_y, large_z, large_queued; uint large[]; };
@@ -68,6 +69,7 @@ bool clip_near(inout Capsule c) {
 }
 
 uint group_index() { return gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x; }
+uint thread_index() { return group_index() * FOREST_GROUP + gl_LocalInvocationID.x; }
 
 bool fetch(uint item_index, uint index, out Capsule c) {
   Item item = items[item_index];
@@ -96,6 +98,12 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.rank = fract(float((s.meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
   return clip_near(c);
+}
+
+// What this thread has to draw, if anything.
+bool fetch_queued(out Capsule c) {
+  uint at = thread_index();
+  return at < queued && fetch(queue[at] / 64u, queue[at] % 64u, c);
 }
 
 // Whether all that lies in a rectangle of pixels, at this depth or behind, is hidden by earlier bands. Looks at no more

@@ -14,9 +14,10 @@ bool hidden(Item item) {
 void main() {
   uint at = gl_GlobalInvocationID.x;
   if (at >= view.item_count || hidden(items[view.first_item + at])) return;
-  uint place = atomicAdd(queued, 1u);
-  queue[place] = view.first_item + at;
-  uint group = (view.flags & FOREST_DOTS) != 0u ? place / 64u : place;
-  atomicMax(groups_x, min(group + 1u, 32768u));
-  atomicMax(groups_y, group / 32768u + 1u);
+  uint item = view.first_item + at, count = items[item].segment_count;
+  uint place = atomicAdd(queued, count);
+  for (uint i = 0u; i < count; ++i) queue[place + i] = item * 64u + i;
+  uint groups = (place + count + FOREST_GROUP - 1u) / FOREST_GROUP;
+  atomicMax(groups_x, min(groups, 32768u));
+  atomicMax(groups_y, (groups + 32767u) / 32768u);
 }

@@ -1,14 +1,13 @@
 // Small spheres (distant somata): one thread a sphere.
 
-layout(local_size_x = 64) in;
+layout(local_size_x = FOREST_GROUP) in;
 
 void main() {
   Capsule c;
-  uint at = group_index() * 64u + gl_LocalInvocationID.x;
-  if (at >= queued || !fetch(queue[at], 0u, c)) return;
+  if (!fetch_queued(c)) return;
   vec2 p = to_pixel(c.a);
   float r = view.focal * c.ra / c.a.z;
-  float rank = fract(float(queue[at]) * 0.7548777 + golden * float(view.subframe));
+  float rank = fract(float(queue[thread_index()] / 64u) * 0.7548777 + golden * float(view.subframe));
   if (r < 0.6) {  // less than a pixel: drawn for its share of subframes
     if (3.14159 * r * r <= rank) return;
     ivec2 pixel = ivec2(floor(p));

@@ -1,8 +1,8 @@
-// Thin runs: one workgroup an item, one thread a segment.
+// Thin runs: one thread a segment.
 
-layout(local_size_x = 64) in;
+layout(local_size_x = FOREST_GROUP) in;
 
 void main() {
   Capsule c;
-  if (group_index() < queued && fetch(queue[group_index()], gl_LocalInvocationID.x, c)) draw_line(c);
+  if (fetch_queued(c)) draw_line(c);
 }
