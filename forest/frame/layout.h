@@ -54,7 +54,7 @@ struct Constants {
 #define FOREST_DEPTH_BASE 4.3219281
 #define FOREST_DEPTH_MAX 1048574.0
 #define FOREST_KEY_EMPTY 0xffffffffu
-#define FOREST_CLUSTER_SIZE 64u
+#define FOREST_CLUSTER_SIZE 32u
 #define FOREST_GROUP 256u  // threads of a workgroup that draws
 
 // Constants::flags

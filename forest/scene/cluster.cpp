@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 
@@ -18,7 +19,8 @@ namespace {
 constexpr std::size_t limit = frame::cluster_size;
 constexpr float first_tolerance = .05f;  // µm
 constexpr float tolerance_step = 1.3f;
-constexpr float widest = 3.f;  // a coarse segment is at most this many times as thick as the original
+constexpr float hopeless = 1e4f;  // µm; no neuron needs a larger tolerance
+constexpr float widest = 3.f;     // a coarse segment is at most this many times as thick as the original
 
 // A run of vertices of one section, or of several joined end to end where nothing else leaves.
 struct Strip {
@@ -165,8 +167,12 @@ Draft parent_of(const Draft& a, const Draft& b, const std::vector<std::uint32_t>
   for (float tolerance = std::max(first_tolerance, .5f * std::max(a.error, b.error));
        segment_count(parent.strips) > limit; tolerance *= tolerance_step) {
     std::vector<Strip> candidate = coarsened(parent.strips, outside_degree, tolerance);
-    if (segment_count(candidate) > limit) continue;
-    parent.strips = std::move(candidate);
+    if (tolerance > hopeless) {
+      // A soma with very many stems: what joins two clusters cannot be simplified away. The largest strips stay.
+      std::ranges::stable_sort(candidate, std::greater{}, &Strip::area);
+      while (segment_count(candidate) > limit) candidate.pop_back();
+    }
+    if (segment_count(candidate) <= limit) parent.strips = std::move(candidate);
   }
   return parent;
 }

@@ -132,6 +132,24 @@ TEST(Cluster, BranchZeroIsTheLongestPath) {
     }
 }
 
+TEST(Cluster, ManyStemsAndManyRootsStillMakeATree) {
+  MorphologyBuilder builder;
+  builder.set_soma(
+      {.kind = SomaKind::sphere, .points = {{0, 0, 0, 10}}, .parents = {}, .contour_starts = {}});
+  for (int i = 0; i < 300; ++i) {
+    const float a = float(i);
+    builder.add_section({}, SectionKind::basal,
+                        std::vector<Point>{{10 * std::cos(a), float(i % 7), 10 * std::sin(a), 1},
+                                           {60 * std::cos(a), float(i % 11), 60 * std::sin(a), .5f}});
+  }
+  const ClusterTree tree = build_clusters(builder.build());
+  for (const Cluster& c : tree.clusters) {
+    EXPECT_GE(c.segment_count, 1u);
+    EXPECT_LE(c.segment_count, frame::cluster_size);
+  }
+  EXPECT_EQ(tree.clusters[0].leaf_count, tree.original_count);
+}
+
 TEST(Cluster, AnEmptyNeuronHasNone) { EXPECT_TRUE(build_clusters(Morphology()).clusters.empty()); }
 
 }  // namespace
