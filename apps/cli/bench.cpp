@@ -11,11 +11,13 @@
 namespace forest::cli {
 
 // One declaration and one row a benchmark.
+std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
+      {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
   });

@@ -22,7 +22,8 @@ std::function<void()> view(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
   static constexpr auto table = std::to_array<Verb>({
-      {"demo", "Do it all: grow, store, plant, pack, draw and film a forest", "brainforest demo --out demo", demo},
+      {"demo", "Do it all: grow, store, plant, pack, draw and film a forest", "brainforest demo --out demo",
+       demo},
       {"import", "Store traced neurons in a repository",
        "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
       {"list", "List the populations and neurons of a repository",
@@ -37,12 +38,14 @@ std::span<const Verb> verbs() {
        "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
-      {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
-      {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest", pack},
+      {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest",
+       pack},
       {"render", "Draw a forest as a picture, without a display",
        "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
-      {"movie", "Film a walk through a forest, without a display", "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
+      {"movie", "Film a walk through a forest, without a display",
+       "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
       {"view", "Open a forest in the studio", "brainforest view column.forest", view},
+      {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
   });
   return table;
 }

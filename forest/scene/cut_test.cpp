@@ -57,6 +57,17 @@ TEST(Eye, TheGazeIsSharpAndTheRestGrowsWithEccentricity) {
   EXPECT_GT(before, 2.f * detail.error);
 }
 
+TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
+  Budget budget(50.);
+  for (int i = 0; i < 50; ++i) budget.took(200.);
+  EXPECT_FLOAT_EQ(budget.error(), 6.f);
+  const float before = budget.error();
+  budget.took(30.);
+  EXPECT_LT(budget.error(), before);
+  for (int i = 0; i < 50; ++i) budget.took(10.);
+  EXPECT_FLOAT_EQ(budget.error(), 1.f);
+}
+
 TEST(Cut, DrawsEverySegmentInSightOnce) {
   const Forest forest = sample();
   const CameraPath path = walk(forest);

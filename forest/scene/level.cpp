@@ -33,4 +33,9 @@ float Eye::acceptable(const Sphere& sphere) const {
   return detail_.error * std::max(1.f, resolved / pixel_degrees_);
 }
 
+void Budget::took(double milliseconds) {
+  const double ratio = std::clamp(milliseconds / milliseconds_, .5, 2.);
+  error_ = std::clamp(error_ * float(std::sqrt(ratio)), 1.f, worst_);
+}
+
 }  // namespace forest::scene

@@ -47,4 +47,17 @@ class Eye {
   Vec3 gaze_ray_ = Vec3::Zero();  // unit, world
 };
 
+/// A frame-time budget that moves the acceptable error: pictures that took too long make it larger, quick ones smaller,
+/// between a pixel and `worst`.
+class Budget {
+ public:
+  explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
+  float error() const { return error_; }
+  void took(double milliseconds);
+
+ private:
+  double milliseconds_;
+  float worst_, error_ = 1.f;
+};
+
 }  // namespace forest::scene
