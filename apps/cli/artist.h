@@ -50,7 +50,7 @@ struct FilmFigures {
 };
 
 struct FilmPlan {
-  std::uint32_t width = 1280, height = 720, samples = 8;
+  std::uint32_t width = 1280, height = 720, samples = 4;
   int frames_per_second = 25;
   double seconds = 5.;
   std::filesystem::path pictures;  // when not empty: a folder for the single pictures as PNG files
