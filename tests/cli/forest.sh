@@ -1,0 +1,42 @@
+#!/usr/bin/env bash
+# From grown neurons to pictures: pack, render, movie.
+set -euo pipefail
+program=$BRAINFOREST
+fail() { echo "forest.sh: $*" >&2; exit 1; }
+refuses() {  # a command that must fail with status 1 and one sentence that holds the words
+  local words=$1 said status=0
+  shift
+  said=$("$@" 2>&1 >/dev/null) || status=$?
+  [[ $status == 1 ]] || fail "status $status instead of 1: $*"
+  [[ $said == *"$words"* && $(wc -l <<<"$said") == 1 ]] || fail "said '$said' instead of one sentence with '$words'"
+}
+
+for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 3 --seed 1 --repo r.db >/dev/null; done
+"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
+"$program" pack circuit -o a.forest --threads 1 >/dev/null
+"$program" pack circuit -o b.forest --threads 2 >/dev/null
+cmp a.forest b.forest || fail "the forest file depends on the number of threads"
+
+view='{"eye":[700,1500,900],"target":[0,1300,0],"samples":2}'
+"$program" render a.forest --view "$view" --size 320x200 -o a.png --threads 1 --json >a.json
+"$program" render b.forest --view "$view" --size 320x200 -o b.png --threads 2 >/dev/null
+cmp a.png b.png || fail "the picture depends on the number of threads"
+grep -q '"neurons"' a.json || fail "no figures in JSON"
+/usr/bin/python3 -c 'import json, sys; d = json.load(open("a.json")); sys.exit(not (0.05 < d["covered"] < 1 and d["segments"] > 10000))' ||
+  fail "the picture shows too little"
+echo "$view" >view.json
+"$program" render a.forest --view view.json --size 320x200 -o c.png >/dev/null
+cmp a.png c.png || fail "a view from a file is not the same view"
+
+"$program" movie a.forest --seconds 0.2 --size 160x90 --samples 1 -o walk.mp4 >/dev/null
+[[ $(head -c 8 walk.mp4 | tail -c 4) == ftyp ]] || fail "walk.mp4 is no MP4 file"
+
+refuses "forest file" "$program" render view.json -o x.png
+head -c 100000 a.forest >short.forest
+refuses "cut short" "$program" render short.forest -o x.png
+refuses "no size" "$program" render a.forest --size 12by9 -o x.png
+refuses "same point" "$program" render a.forest --view '{"eye":[1,2,3],"target":[1,2,3]}' -o x.png
+refuses "nowhere" "$program" render a.forest --size 64x64 -o /nowhere/x.png
+refuses "two views" "$program" movie a.forest --view "$view" -o x.mp4
+[[ ! -e x.png && ! -e x.mp4 ]] || fail "a refused command left a file behind"
+echo "forest.sh: all is well"
