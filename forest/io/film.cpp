@@ -51,6 +51,7 @@ struct Film::State {
       const int code = avcodec_receive_packet(encoder, packet);
       if (code == AVERROR(EAGAIN) || code == AVERROR_EOF) return;
       if (code < 0) fail("encoded", code);
+      packet->duration = 1;  // else the last picture has none and players drop it
       av_packet_rescale_ts(packet, encoder->time_base, stream->time_base);
       packet->stream_index = stream->index;
       if (const int wrote = av_interleaved_write_frame(format, packet); wrote < 0) fail("written", wrote);
