@@ -11,6 +11,8 @@
 #include "forest/core/error.h"
 #include "forest/lsystem/grow.h"
 
+#include "tests/zoo.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -82,6 +84,12 @@ RC_GTEST_PROP(MorphologyString, IsReadBackBitForBit, ()) {
   const Morphology back = morphology_from_string(text);
   RC_ASSERT(same_bits(back, m));
   RC_ASSERT(to_string(back) == text);
+}
+
+TEST(MorphologyString, HoldsEverySpecimenOfTheZoo) {
+  for (const Specimen& specimen : zoo())
+    EXPECT_TRUE(same_bits(morphology_from_string(to_string(specimen.morphology)), specimen.morphology))
+        << specimen.name;
 }
 
 TEST(MorphologyString, HoldsGrownNeurons) {
