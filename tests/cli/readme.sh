@@ -1,0 +1,17 @@
+# SPDX-License-Identifier: Apache-2.0
+# Every command of the README's first steps, in its order, works as it stands there; only the film is made smaller.
+ln -s "$FOREST_SOURCE_DIR/data" data
+export PATH="$(dirname "$BRAINFOREST"):$PATH"
+brainforest grow --grammar data/grammars/motoneuron.lsys --count 3 --seed 7 --out cells/  # the reader's own cells
+
+grep '^brainforest ' "$FOREST_SOURCE_DIR/README.md" | grep -v ' view ' |  # a window needs a display
+  sed 's/^brainforest movie .*/& --size 320x180 --fps 5 --samples 2/' >commands
+grep -q '^brainforest import' commands
+mv cells/motoneuron-7-00000.swc cells/cell7.swc
+
+while read -r command; do
+  bash -euo pipefail -c "$command" </dev/null || { echo "the README's command failed: $command"; exit 1; }
+  for made in $(grep -oP '(?<=--out |-o |--csv |--repo )\S+' <<<"$command"); do
+    [ -s "$made" ] || { echo "$made is not there after: $command"; exit 1; }
+  done
+done <commands
