@@ -1,12 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// The levels of detail of one neuron: a binary tree of clusters. A leaf holds a run of at most 64 original segments in
+// The levels of detail of one neuron: a binary tree of clusters. A leaf holds a run of at most 32 original segments in
 // depth-first order; a parent draws what its two children draw with at most 64 segments again and states how far, at
 // most, anything has moved. A set of clusters in which every leaf has exactly one ancestor (or itself) is a *cut*, and
 // draws the whole neuron once.
 //
-//             root (64 segments, error 30 µm)          Coarsening: tips shorter than the error are dropped, and what
+//             root (32 segments, error 30 µm)          Coarsening: tips shorter than the error are dropped, and what
 //            /                               \         stays is widened so that the area is kept; the rest is
-//      ≤ 64, 9 µm                         ≤ 64, 7 µm   simplified (Douglas & Peucker). Points where two clusters join
+//      ≤ 32, 9 µm                         ≤ 32, 7 µm   simplified (Douglas & Peucker). Points where two clusters join
 //      /        \                         /        \   are never moved or dropped: no cut comes apart.
 //   leaf, 0   leaf, 0                  leaf, 0   leaf, 0
 #pragma once
