@@ -62,6 +62,14 @@ void attach(soci::session& sql, const std::string& path, int flags) {
   sql << "pragma cache_size = -65536";  // KiB
 }
 
+/// Gives the file `part` the name `path` unless there is such a file; returns 0 or the error's number.
+int name_file(const std::string& part, const std::string& path) {
+  if (::link(part.c_str(), path.c_str()) == 0) return 0;
+  if (errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS)
+    return errno;  // else a file system without links
+  return ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+}
+
 /// Makes a repository without neurons at `path`. It is filled under another name and then linked into place,
 /// so that a killed program leaves no half of it and the first of two programs wins.
 void create(const std::string& path) {
@@ -86,17 +94,19 @@ void create(const std::string& path) {
         sql << "insert into section_kinds (id, name) values (:kind, :name)", soci::use(kind), soci::use(name);
     }
     sql << "commit";
+    begin_writing(
+        sql);  // whoever finds the file now waits, and none believes the journal of an earlier one to be its own
+    const int failed = name_file(part, path);
+    if (failed && failed != EEXIST)
+      throw InputError(
+          path, 0, fmt::format("cannot be made ({}); check the folder's permissions", std::strerror(failed)));
+    if (!failed) ::unlink((path + "-journal").c_str());
+    sql << "rollback";
   } catch (...) {
     clean();
     throw;
   }
-  int failed = ::link(part.c_str(), path.c_str()) == 0 ? 0 : errno;
-  if (failed == EPERM || failed == EOPNOTSUPP || failed == ENOSYS)  // a file system without links
-    failed = ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
   clean();
-  if (failed && failed != EEXIST)
-    throw InputError(
-        path, 0, fmt::format("cannot be made ({}); check the folder's permissions", std::strerror(failed)));
 }
 
 template <class T>

@@ -324,10 +324,11 @@ std::size_t whole_neurons(const std::string& file, const std::vector<Morphology>
 
 TEST_F(RepositoryTest, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) {
   std::vector<Morphology> source;
-  for (std::size_t i = 0; i < 150; ++i) source.push_back(neuron(i, 50 + i % 7 * 100));
+  for (std::size_t i = 0; i < 40; ++i) source.push_back(neuron(i, 50 + i % 7 * 150, 10));
   Random random(1);
-  std::size_t before = 0;
-  for (int round = 0; round < 60; ++round) {
+  std::size_t before = 0, interrupted = 0;
+  for (int round = 0; round < 200; ++round) {
+    if (round % 8 == 0) fs::remove(file_), before = 0;
     int pipe[2];
     ASSERT_EQ(::pipe(pipe), 0);
     const pid_t child = in_child([&] {
@@ -338,12 +339,16 @@ TEST_F(RepositoryTest, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) 
       }
     });
     ::close(pipe[1]);
-    ::usleep(std::uint32_t(random.exponential(20'000.)));
+    std::size_t said = 0;
+    char byte = 0;
+    for (std::size_t wanted = before + random.below(4); said < wanted && ::read(pipe[0], &byte, 1) == 1;)
+      ++said;
+    ::usleep(std::uint32_t(random.uniform(0., 4000.)));
     ::kill(child, SIGKILL);
     wait_for(child);
-    std::size_t said = 0;
-    for (char byte; ::read(pipe[0], &byte, 1) == 1;) ++said;
+    while (::read(pipe[0], &byte, 1) == 1) ++said;
     ::close(pipe[0]);
+    interrupted += fs::exists(file_ + "-journal");
     if (!fs::exists(file_)) {
       EXPECT_EQ(said, 0u);
       continue;
@@ -353,7 +358,36 @@ TEST_F(RepositoryTest, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) 
     EXPECT_GE(now, before);
     before = now;
   }
-  EXPECT_GT(before, 0u);
+  EXPECT_GT(interrupted, 0u) << "none was killed while it wrote, so this has tested nothing";
+}
+
+TEST_F(RepositoryTest, TheJournalOfARepositoryThatIsGoneDoesNoHarm) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 3; ++i) source.push_back(neuron(i, 3000));
+  const std::string journal = file_ + "-journal";
+  Repository::open(file_, Access::write).add(source[0], called("0"));
+  const std::string stored = bytes_of(file_);
+  std::string hot;  // as a program leaves it that is killed while it changes the file
+  for (int delay = 0; hot.size() < 600 && delay < 400; ++delay) {
+    write_file(file_, stored);
+    const pid_t child = in_child([&] {
+      for (;;) {
+        Repository repository = Repository::open(file_, Access::write);
+        repository.remove(NeuronId(1));
+        repository.add(source[0], called("0"));
+      }
+    });
+    ::usleep(5000);
+    ::kill(child, SIGKILL);
+    wait_for(child);
+    if (fs::exists(journal)) hot = bytes_of(journal);
+    fs::remove(journal);
+  }
+  ASSERT_GE(hot.size(), 600u);
+  fs::remove(file_);
+  write_file(journal, hot);
+  Repository::open(file_, Access::write).add(source[1], called("1"));
+  EXPECT_EQ(whole_neurons(file_, source), 1u);
 }
 
 TEST_F(RepositoryTest, AFullDiskIsASentenceAndLosesNothing) {
