@@ -117,7 +117,7 @@ void mark_selection(frame::Palette& palette, scene::Background background, bool 
     const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
     for (std::size_t i = 0; i < palette.size(); ++i)
       if (i != scene::highlight_entry && i != scene::outline_entry)
-        palette[i] = .28f * palette[i] + .72f * back;
+        palette[i] = .22f * palette[i] + .78f * back;
   }
   palette[section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
   palette[scene::highlight_entry] = light ? Vec3(.05f, .05f, .35f) : Vec3(.80f, .90f, 1.f);

@@ -16,7 +16,8 @@
 namespace forest::studio {
 namespace {
 
-constexpr int rest_milliseconds = 200;  // a view that stands still so long is drawn in full
+constexpr int rest_milliseconds = 200;      // a view that stands still so long is drawn in full
+constexpr float slice_milliseconds = 60.f;  // of refining between two looks at the mouse
 constexpr float glide_seconds = .7f;
 constexpr float tap_seconds = .05f;            // of flight that a tap on a key makes, however short
 constexpr float turn_pixels_a_second = 400.f;  // of the arrow keys
@@ -37,6 +38,18 @@ bool is_flight_key(int key) {
   return std::ranges::any_of(flight_keys, [key](const FlightKey& k) { return k.key == key; });
 }
 
+// Marks that can be seen however far they are: no thinner than a few pixels, a section wider than its subarbor.
+std::vector<frame::Overlay> visible(std::vector<frame::Overlay> marks, const frame::Camera& camera,
+                                    float height) {
+  const Vec3 forward = -camera.axes().col(2);
+  const float pixel = 1.f / camera.focal(height);
+  for (frame::Overlay& mark : marks) {
+    const float depth = std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(forward));
+    mark.radius = std::max(mark.radius, (mark.colour == section_entry ? 1.9f : 1.3f) * pixel * depth);
+  }
+  return marks;
+}
+
 Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
 
 }  // namespace
@@ -55,7 +68,8 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, QWidget* paren
   rest_.setSingleShot(true);
   rest_.setInterval(rest_milliseconds);
   connect(&rest_, &QTimer::timeout, this, [this] {
-    stage_ = Stage::full;
+    stage_ = Stage::refining;
+    refined_ = 0;
     update();
   });
 }
@@ -121,7 +135,8 @@ std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
 
 frame::Image Viewport::picture() {
   makeCurrent();
-  draw_forest(std::max(settings_.view.samples, 16u), settings_.view.detail.error);
+  const std::uint32_t samples = std::max(settings_.view.samples, 16u);
+  draw_still(samples, 0, samples);
   frame::Image image = renderer_->read();
   doneCurrent();
   touch();
@@ -163,44 +178,59 @@ void Viewport::advance(float seconds) {
   set_camera(fly(look(settings_.view.camera, turn_pixels_a_second * seconds * turn), speed * seconds * way));
 }
 
-void Viewport::draw_forest(std::uint32_t samples, float error) {
+void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
-  scene::View view = settings_.view;
-  view.samples = samples;
-  view.detail.error = error;
-  const scene::Eye eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h));
-  const scene::Cut cut = scene::choose(forest_, eye, {float(w), float(h)});
-  std::vector<frame::Overlay> overlays = highlight_;
+  if (first == 0)
+    cut_ =
+        scene::choose(forest_, scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
+                      {float(w), float(h)});
+  std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
-  renderer_->draw(scene::compose(forest_, view, colouring, cut, w, h, overlays));
-  figures_.segments = cut.segments, figures_.neurons = cut.neurons;
-  figures_.samples = samples, figures_.error = error;
+  frame::Frame frame = scene::compose(forest_, view, colouring, cut_, w, h, overlays);
+  frame.first_subframe = first, frame.last_subframe = last;
+  renderer_->draw(frame);
+  figures_.segments = cut_.segments, figures_.neurons = cut_.neurons;
+  figures_.samples = last, figures_.error = view.detail.error;
+}
+
+void Viewport::draw_moving() {
+  scene::View view = settings_.view;
+  view.samples = 1;
+  view.detail.error = pace_.error(view.detail.error);
+  draw_part(view, 0, 1);
+}
+
+void Viewport::draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last) {
+  scene::View view = settings_.view;
+  view.samples = samples;
+  draw_part(view, first, last);
+}
+
+void Viewport::refine() {
+  QElapsedTimer clock;
+  clock.start();
+  const std::uint32_t samples = settings_.view.samples;
+  const auto affordable = std::uint32_t(std::max(1.f, slice_milliseconds / sample_milliseconds_));
+  const std::uint32_t until = std::min(samples, refined_ + affordable);
+  draw_still(samples, refined_, until);
+  sample_milliseconds_ = std::max(.5f, float(clock.nsecsElapsed()) * 1e-6f / float(until - refined_));
+  refined_ = until;
+  if (refined_ == samples) stage_ = Stage::finished;
 }
 
 void Viewport::paintGL() {
   if (!renderer_) return;
   advance(std::min(.1f, tick_.isValid() ? 1e-3f * float(tick_.restart()) : 0.f));
   if (!tick_.isValid()) tick_.start();
+  const Stage stage = stage_;
   try {
     QElapsedTimer clock;
     clock.start();
-    const scene::View& view = settings_.view;
-    switch (stage_) {
-      case Stage::moving:
-        draw_forest(1, pace_.error(view.detail.error));
-        break;
-      case Stage::full:
-        draw_forest(std::min(4u, view.samples), view.detail.error);
-        break;
-      case Stage::smooth:
-        draw_forest(view.samples, view.detail.error);
-        break;
-      case Stage::finished:
-        break;
-    }
+    if (stage == Stage::moving) draw_moving();
+    if (stage == Stage::refining) refine();
     QOpenGLFunctions* gl = context()->functions();
     gl->glDisable(GL_SCISSOR_TEST);
     renderer_->show(defaultFramebufferObject());
@@ -210,7 +240,7 @@ void Viewport::paintGL() {
     gl->glClear(GL_COLOR_BUFFER_BIT);
     gl->glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     annotate();
-    if (stage_ == Stage::moving) {
+    if (stage == Stage::moving) {
       pace_.drew(float(clock.nsecsElapsed()) * 1e-6f);
       figures_.frames_per_second = pace_.milliseconds() > 0.f ? 1000.f / pace_.milliseconds() : 0.f;
     }
@@ -220,14 +250,8 @@ void Viewport::paintGL() {
     return;
   }
   Q_EMIT drawn();
-  const bool moves = glide_ || flies();
-  if (moves) {
-    update();
-  } else if (stage_ == Stage::full || stage_ == Stage::smooth) {
-    stage_ = stage_ == Stage::full && settings_.view.samples > 4 ? Stage::smooth : Stage::finished;
-    if (stage_ == Stage::finished) Q_EMIT settled();
-    QTimer::singleShot(0, this, qOverload<>(&QWidget::update));
-  }
+  if (glide_ || flies() || stage_ == Stage::refining) update();
+  if (stage == Stage::refining && stage_ == Stage::finished) Q_EMIT settled();
 }
 
 void Viewport::annotate() {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture in the window: it draws the forest, takes the mouse and the keys, and picks.
 // A view that moves is drawn with one sample a pixel and as much detail as its pace allows; once it has stood still for
-// a moment it is drawn again in full, and then smoothly.
+// a moment it is drawn again in full, a few samples at a time so that nobody waits for it.
 #pragma once
 
 #include <QElapsedTimer>
@@ -76,8 +76,7 @@ class Viewport final : public QOpenGLWidget {
   void focusOutEvent(QFocusEvent* event) override;
 
  private:
-  // From a moving picture to a finished one.
-  enum class Stage { moving, full, smooth, finished };
+  enum class Stage { moving, refining, finished };
 
   struct Glide {
     scene::CameraPath path;
@@ -89,7 +88,10 @@ class Viewport final : public QOpenGLWidget {
   void touch();                 // something changed: draw, and refine once it stands still
   void advance(float seconds);  // glide and flight
   bool flies() const { return !held_.empty(); }
-  void draw_forest(std::uint32_t samples, float error);
+  void draw_moving();
+  void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last);
+  void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last);
+  void refine();
   void annotate();
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
@@ -102,6 +104,9 @@ class Viewport final : public QOpenGLWidget {
   QString renderer_name_;
 
   Stage stage_ = Stage::moving;
+  scene::Cut cut_;             // of the picture that is shown
+  std::uint32_t refined_ = 0;  // samples of it that are drawn
+  float sample_milliseconds_ = 20.f;
   Pace pace_;
   Figures figures_;
   QTimer rest_;         // runs out when the view has stood still

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/frame/frame.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -26,6 +27,8 @@ void check(const Frame& frame, const Geometry& geometry) {
   require(frame.width > 0 && frame.height > 0 && frame.width <= 16384 && frame.height <= 16384,
           "a picture must be 1 to 16384 pixels wide and high");
   require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");
+  require(frame.first_subframe < std::min(frame.subframes, frame.last_subframe),
+          "a part of a picture must have at least one of its subframes");
   require(frame.style.fog_length > 0.f, "the length of the fog must be positive");
   for (const Vec3& colour : frame.palette)
     require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");

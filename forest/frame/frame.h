@@ -54,6 +54,9 @@ struct Frame {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,
+  // and the image is the mean of all so far. The frames of the parts before must have shown the same.
+  std::uint32_t first_subframe = 0, last_subframe = 1024;
   Style style;
   Palette palette = black_palette();
   std::span<const std::uint8_t> colour_class;  // one an instance, 0–15

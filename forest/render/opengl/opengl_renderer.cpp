@@ -301,7 +301,8 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
 
   frame::Timing timing;
   d.constants = constants_of(f);
-  for (std::uint32_t subframe = 0; subframe < f.subframes; ++subframe) {
+  d.constants.last_subframe = std::min(f.last_subframe, f.subframes);
+  for (std::uint32_t subframe = f.first_subframe; subframe < d.constants.last_subframe; ++subframe) {
     auto start = std::chrono::steady_clock::now();
     const bool still = f.subframes == 1;
     d.constants.subframe = subframe;

@@ -73,6 +73,21 @@ TEST(OpenGLRenderer, AThinLineCoversItsAreaOnTheMean) {
   }
 }
 
+TEST(OpenGLRenderer, PictureDrawnInPartsIsThatDrawnAtOnce) {
+  Fixture f;
+  f.add({-20, 3, 0}, {15, -8, 0}, 2.f);
+  f.add({-20, -3, 5}, {15, 9, 5}, .1f);
+  f.frame.capsules = f.items;
+  f.frame.subframes = 16;
+  const frame::Image at_once = f.draw();
+  for (const auto& [first, last] : {std::pair(0u, 1u), std::pair(1u, 5u), std::pair(5u, 16u)}) {
+    f.frame.first_subframe = first, f.frame.last_subframe = last;
+    f.renderer.draw(f.frame);
+    EXPECT_EQ(f.renderer.read().pixels == at_once.pixels, last == 16u);
+    EXPECT_GT(f.renderer.read().covered, .5 * at_once.covered);
+  }
+}
+
 TEST(OpenGLRenderer, OverlaysAreSeenWhereverTheOriginIs) {
   for (const float beside : {0.f, 500.f}) {  // the origin in the picture, and far beside it
     Fixture f;

@@ -49,9 +49,9 @@ void main() {
     sums[at * 4u + 1u] = sum.y;
     sums[at * 4u + 2u] = sum.z;
     sums[at * 4u + 3u] = sum.w;
-    return;
   }
-  sum /= float(view.subframes);
+  if (view.subframe + 1u < view.last_subframe) return;
+  sum /= float(view.subframe + 1u);
   vec3 c = sum.xyz * view.exposure;
   uvec3 b = uvec3(255.0 * vec3(srgb(c.x), srgb(c.y), srgb(c.z)) + 0.5);
   image[at] = b.x | (b.y << 8) | (b.z << 16) | (uint(255.0 * sum.w + 0.5) << 24);
