@@ -145,7 +145,7 @@ void Window::add_menus() {
       if (action->text() == tr(name)) return action->menu();
     return menuBar()->addMenu(tr(name));
   };
-  const auto add = [this](QMenu* to, const char* name, const char* shortcut, const char* hint) {
+  const auto add = [](QMenu* to, const char* name, const char* shortcut, const char* hint) {
     QAction* action = to->addAction(tr(name));
     action->setShortcut(QKeySequence(shortcut));
     action->setStatusTip(tr(hint));
