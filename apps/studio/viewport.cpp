@@ -199,7 +199,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
   view.samples = 1;
-  view.detail.error = pace_.error(view.detail.error);
+  view.detail.error *= budget_.error();
   draw_part(view, 0, 1);
 }
 
@@ -221,6 +221,12 @@ void Viewport::refine() {
   if (refined_ == samples) stage_ = Stage::finished;
 }
 
+void Viewport::took(float milliseconds) {
+  budget_.took(double(milliseconds));
+  milliseconds_ = milliseconds_ > 0.f ? .8f * milliseconds_ + .2f * milliseconds : milliseconds;
+  figures_.frames_per_second = 1000.f / milliseconds_;
+}
+
 void Viewport::paintGL() {
   if (!renderer_) return;
   advance(std::min(.1f, tick_.isValid() ? 1e-3f * float(tick_.restart()) : 0.f));
@@ -240,10 +246,7 @@ void Viewport::paintGL() {
     gl->glClear(GL_COLOR_BUFFER_BIT);
     gl->glColorMask(GL_TRUE, GL_TRUE, GL_TRUE, GL_TRUE);
     annotate();
-    if (stage == Stage::moving) {
-      pace_.drew(float(clock.nsecsElapsed()) * 1e-6f);
-      figures_.frames_per_second = pace_.milliseconds() > 0.f ? 1000.f / pace_.milliseconds() : 0.f;
-    }
+    if (stage == Stage::moving && --warming_up_ < 0) took(float(clock.nsecsElapsed()) * 1e-6f);
   } catch (const std::exception& error) {
     renderer_.reset();
     Q_EMIT failed(QString::fromUtf8(error.what()));

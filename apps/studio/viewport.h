@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The picture in the window: it draws the forest, takes the mouse and the keys, and picks.
-// A view that moves is drawn with one sample a pixel and as much detail as its pace allows; once it has stood still for
+// A view that moves is drawn with one sample a pixel and as much detail as its time allows; once it has stood still for
 // a moment it is drawn again in full, a few samples at a time so that nobody waits for it.
 #pragma once
 
@@ -14,7 +14,6 @@
 #include "forest/render/opengl/opengl_renderer.h"
 #include "forest/scene/path.h"
 
-#include "apps/studio/pace.h"
 #include "apps/studio/selection.h"
 #include "apps/studio/settings.h"
 
@@ -92,6 +91,7 @@ class Viewport final : public QOpenGLWidget {
   void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last);
   void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last);
   void refine();
+  void took(float milliseconds);
   void annotate();
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
@@ -107,7 +107,9 @@ class Viewport final : public QOpenGLWidget {
   scene::Cut cut_;             // of the picture that is shown
   std::uint32_t refined_ = 0;  // samples of it that are drawn
   float sample_milliseconds_ = 20.f;
-  Pace pace_;
+  float milliseconds_ = 0.f;   // of a moving picture, smoothed
+  scene::Budget budget_{45.};  // of a moving picture
+  int warming_up_ = 2;         // the first pictures make programs and buffers: they are no measure
   Figures figures_;
   QTimer rest_;         // runs out when the view has stood still
   QElapsedTimer tick_;  // since the last step of flight
