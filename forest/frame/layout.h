@@ -44,7 +44,8 @@ struct Constants {
   float fog_red, fog_green, fog_blue, fog_start;          // linear light; µm
   float top_red, top_green, top_blue, fog_length;         // background above; µm
   float bottom_red, bottom_green, bottom_blue, exposure;  // background below
-  uint subframes, item_count, flags, last_subframe;  // the items first_item … first_item + item_count are drawn
+  uint subframes, item_count, flags,
+      last_subframe;  // the items first_item … first_item + item_count are drawn
 };
 
 // A pixel's key: depth (20 bits, logarithmic), palette entry (7 bits), shade (5 bits). The smallest key wins, so the
