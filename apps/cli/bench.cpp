@@ -14,12 +14,15 @@ namespace forest::cli {
 std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
+std::function<void()> bench_repository(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
       {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
+      {"repository", "How many neurons are stored in a repository in a second, and read back",
+       bench_repository},
   });
   return table;
 }
