@@ -9,7 +9,8 @@
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace forest;
   try {
-    const circuit::Recipe recipe = circuit::parse_recipe({reinterpret_cast<const char*>(data), size}, "input");
+    const circuit::Recipe recipe =
+        circuit::parse_recipe({reinterpret_cast<const char*>(data), size}, "input");
     circuit::check(recipe);
     (void)circuit::counts(recipe);
   } catch (const Error&) {

@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any configuration and table of types beside sound neurons are a circuit or an error with a sentence. The input is the
 // configuration, a zero byte, and the table.
-#include <unistd.h>
-
 #include <cstdint>
 #include <filesystem>
 #include <string>
 #include <string_view>
+#include <unistd.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -19,7 +18,9 @@ namespace {
 struct Folder {
   std::filesystem::path path =
       std::filesystem::temp_directory_path() / ("forest-sonata-fuzz." + std::to_string(::getpid()));
-  Folder() { forest::io::write_sonata(path, forest::testing::sample_circuit(4), forest::testing::sample_neurons()); }
+  Folder() {
+    forest::io::write_sonata(path, forest::testing::sample_circuit(4), forest::testing::sample_neurons());
+  }
   ~Folder() { std::filesystem::remove_all(path); }
 };
 

@@ -19,11 +19,17 @@ using frame::Constants;
 using frame::Item;
 using frame::Segment;
 
+// What shaders wrote is read by others as storage or as texels.
+constexpr GLbitfield written_for_readers = GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT;
+
 // A buffer on the device that grows and never shrinks.
 class Buffer {
  public:
   Buffer() { glCreateBuffers(1, &name_); }
-  ~Buffer() { glDeleteBuffers(1, &name_); }
+  ~Buffer() {
+    glDeleteTextures(1, &texels_);
+    glDeleteBuffers(1, &name_);
+  }
   Buffer(const Buffer&) = delete;
   Buffer& operator=(const Buffer&) = delete;
 
@@ -38,10 +44,16 @@ class Buffer {
     if (!values.empty()) glNamedBufferSubData(name_, 0, GLsizeiptr(values.size_bytes()), values.data());
   }
   void bind(GLuint slot) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, slot, name_); }
+  /// For reading as a texture of `format`, at a unit of shaders/common.glsl.
+  void bind_texels(GLuint unit, GLenum format) {
+    if (!texels_) glCreateTextures(GL_TEXTURE_BUFFER, 1, &texels_);
+    glTextureBuffer(texels_, format, name_);
+    glBindTextureUnit(unit, texels_);
+  }
   GLuint name() const { return name_; }
 
  private:
-  GLuint name_ = 0;
+  GLuint name_ = 0, texels_ = 0;
   std::size_t size_ = 0;
 };
 
@@ -164,11 +176,9 @@ struct OpenGLRenderer::Device {
     overlay_segments.upload(std::span<const Segment>(marks));
     set(lists[overlay_list], mark_items);
 
-    std::vector<std::uint32_t> classes((f.colour_class.size() + 3) / 4);
-    if (!classes.empty()) std::memcpy(classes.data(), f.colour_class.data(), f.colour_class.size());
-    colour_classes.upload(std::span<const std::uint32_t>(classes));
-    std::array<float, 3 * std::tuple_size_v<frame::Palette>> colours;
-    for (std::size_t i = 0; i < f.palette.size(); ++i) Vec3::Map(&colours[3 * i]) = f.palette[i];
+    colour_classes.upload(f.colour_class);
+    std::array<float, 4 * std::tuple_size_v<frame::Palette>> colours{};
+    for (std::size_t i = 0; i < f.palette.size(); ++i) Vec3::Map(&colours[4 * i]) = f.palette[i];
     palette.upload(std::span<const float>(colours));
   }
 
@@ -183,15 +193,19 @@ struct OpenGLRenderer::Device {
     for (const List& list : lists) longest = std::max(longest, list.segments);
     queue.reserve(16 + 4 * longest);
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
-    instances.bind(1);
-    keys.bind(3);
-    colour_classes.bind(4);
-    palette.bind(5);
-    sums.bind(6);
-    image.bind(7);
-    queue.bind(8);
-    large_queue.bind(9);
-    tiles.bind(10);
+    instances.bind_texels(1, GL_RGBA32UI);
+    keys.bind_texels(3, GL_R32UI);
+    colour_classes.bind_texels(4, GL_R8UI);
+    palette.bind_texels(5, GL_RGBA32F);
+    queue.bind_texels(6, GL_R32UI);
+    large_queue.bind_texels(7, GL_R32UI);
+    tiles.bind_texels(8, GL_R32UI);
+    keys.bind(0);
+    sums.bind(1);
+    image.bind(2);
+    queue.bind(3);
+    large_queue.bind(4);
+    tiles.bind(5);
   }
 
   void set_constants() {
@@ -200,7 +214,7 @@ struct OpenGLRenderer::Device {
   }
 
   // Draws the items [first, last) of a list that earlier bands do not hide.
-  void draw(const List& list, std::uint32_t first, std::uint32_t last, bool first_band) {
+  void draw(List& list, std::uint32_t first, std::uint32_t last, bool first_band) {
     if (first >= last) return;
     const std::uint32_t nothing[4] = {0, 1, 1, 0};
     glNamedBufferSubData(queue.name(), 0, sizeof nothing, nothing);
@@ -209,8 +223,8 @@ struct OpenGLRenderer::Device {
     constants.item_count = last - first;
     constants.flags = list.flags | (first_band ? FOREST_FIRST_BAND : 0);
     set_constants();
-    list.items.bind(2);
-    (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind(0);
+    list.items.bind_texels(2, GL_RGBA32UI);
+    (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind_texels(0, GL_RGBA32UI);
     cull.use();
     glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
     run_queue(*list.program, queue);
@@ -218,14 +232,14 @@ struct OpenGLRenderer::Device {
   }
 
   void run_queue(const Program& program, const Buffer& groups) {
-    glMemoryBarrier(GL_COMMAND_BARRIER_BIT | GL_SHADER_STORAGE_BARRIER_BIT);
+    glMemoryBarrier(GL_COMMAND_BARRIER_BIT | written_for_readers);
     program.use();
     glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups.name());
     glDispatchComputeIndirect(0);
   }
 
   void find_tiles() {
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glMemoryBarrier(written_for_readers);
     tile.use();
     std::uint32_t count =
         ((width + FOREST_TILE - 1) / FOREST_TILE) * ((height + FOREST_TILE - 1) / FOREST_TILE);
@@ -233,7 +247,7 @@ struct OpenGLRenderer::Device {
       constants.flags = flags;
       set_constants();
       glDispatchCompute((count + 63) / 64, 1, 1);
-      glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+      glMemoryBarrier(written_for_readers);
     }
   }
 
@@ -248,7 +262,7 @@ struct OpenGLRenderer::Device {
       from = to;
     }
     draw(lists[overlay_list], 0, lists[overlay_list].count, true);
-    glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT);
+    glMemoryBarrier(written_for_readers);
   }
 
   void draw_texture() {

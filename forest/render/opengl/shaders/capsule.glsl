@@ -50,7 +50,8 @@ void draw_capsule(Capsule c, int lane, int lanes) {
     int low = max(int(floor(min(y0, y1) - w)), 0), high = min(int(ceil(max(y0, y1) + w)), limit_y);
     for (int y = low; y < high; ++y) {
       int px = steep ? y : x, py = steep ? x : y;
-      if (keys[uint(py) * view.width + uint(px)] < nearest) continue;
+      uint pixel = uint(py) * view.width + uint(px), seen = texelFetch(keys_seen, int(pixel)).x;
+      if (seen < nearest) continue;
       vec3 ray = normalize(vec3((float(px) + 0.5 - view.centre_x) / view.focal,
                                 (view.centre_y - float(py) - 0.5) / view.focal, 1.0));
       Hit hit = Hit(1e30, vec3(0.0));
@@ -63,7 +64,8 @@ void draw_capsule(Capsule c, int lane, int lanes) {
         float B = -c2 * oy * dy - k0 * k1;
         float C = c2 * (dot(o, o) - oy * oy) - k0 * k0;
         float root = B * B - A * C;
-        if (root >= 0.0 && A > 1e-9) {
+        if (root < 0.0) continue;  // beside the cone, within which both spheres lie
+        if (A > 1e-9) {
           float local = (-B - sqrt(root)) / A, along = oy + local * dy;
           if (along >= s * c.ra && along <= len + s * c.rb && local + shift > 0.0) {
             hit.t = local + shift;
@@ -79,7 +81,8 @@ void draw_capsule(Capsule c, int lane, int lanes) {
       if (hit.t > 1e29) continue;
       float z = max(hit.t * ray.z, view.near);
       float facing = dot(hit.normal, light());
-      put(px, py, depth_code(z), payload_of(c.entry, 0.5 + 0.5 * facing, noise_at(px, py)));
+      uint key = key_of(depth_code(z), payload_of(c.entry, 0.5 + 0.5 * facing, noise_at(px, py)));
+      if (key < seen) atomicMin(keys[pixel], key);
     }
   }
 }

@@ -4,7 +4,7 @@
 layout(local_size_x = FOREST_GROUP) in;
 
 const float tube_width = 7.0;     // pixels; below, a capsule is shaded by its distance from the axis on screen
-const float large_area = 3000.0;  // pixels of the rectangle around it
+const float large_area = 300.0;  // pixels of the rectangle around it
 
 void main() {
   Capsule c;
@@ -32,7 +32,7 @@ void main() {
     draw_capsule(c, 0, 1);
     return;
   }
-  large[at] = queue[thread_index()];
+  large[at] = texelFetch(queue_seen, int(4u + thread_index())).x;
   atomicMax(large_x, min(at + 1u, 32768u));
   atomicMax(large_y, at / 32768u + 1u);
 }

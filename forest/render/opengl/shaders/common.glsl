@@ -1,18 +1,24 @@
 // What every shader shares: the buffers, the camera, the key of a pixel, and the drawing of one line.
 
 layout(std140, binding = 0) uniform Picture { Constants view; };
-layout(std430, binding = 0) readonly buffer Segments { Segment segments[]; };
-layout(std430, binding = 1) readonly buffer Instances { Instance instances[]; };
-layout(std430, binding = 2) readonly buffer Items { Item items[]; };
-layout(std430, binding = 3) buffer Keys { uint keys[]; };
-layout(std430, binding = 4) readonly buffer ColourClasses { uint colour_classes[]; };  // four a word
+// What is only read comes as texels: llvmpipe gathers them for eight threads at once, and loads from storage buffers one by one.
+layout(binding = 0) uniform usamplerBuffer segments;        // two a Segment
+layout(binding = 1) uniform usamplerBuffer instances;       // two an Instance
+layout(binding = 2) uniform usamplerBuffer items;           // two an Item
+layout(binding = 3) uniform usamplerBuffer keys_seen;       // a pixel: perhaps an older and so a farther key
+layout(binding = 4) uniform usamplerBuffer colour_classes;  // an instance
+layout(binding = 5) uniform samplerBuffer palette;          // linear
+layout(binding = 6) uniform usamplerBuffer queue_seen;
+layout(binding = 7) uniform usamplerBuffer large_seen;
+layout(binding = 8) uniform usamplerBuffer tiles_seen;
 
+layout(std430, binding = 0) buffer Keys { uint keys[]; };
 // Segments of this band's items that are not hidden, one thread each (item * 64 + index), and the workgroups that draw
 // them (as glDispatchComputeIndirect reads them).
-layout(std430, binding = 8) buffer Queue { uint groups_x, groups_y, groups_z, queued; uint queue[]; };
+layout(std430, binding = 3) buffer Queue { uint groups_x, groups_y, groups_z, queued; uint queue[]; };
 // Segments so large that a workgroup shares each: item * 64 + index.
-layout(std430, binding = 9) buffer LargeQueue { uint large_x, large_y, large_z, large_queued; uint large[]; };
-layout(std430, binding = 10) buffer Tiles { uint tiles[]; };  // farthest key of each tile; coarse ones after the fine
+layout(std430, binding = 4) buffer LargeQueue { uint large_x, large_y, large_z, large_queued; uint large[]; };
+layout(std430, binding = 5) writeonly buffer Tiles { uint tiles[]; };  // farthest key of each tile; coarse ones after the fine
 
 const float golden = 0.61803399;
 
@@ -39,10 +45,11 @@ vec2 to_pixel(vec3 p) {
 
 float depth_code(float z) { return clamp((log2(z) + FOREST_DEPTH_BASE) * FOREST_DEPTH_STEPS, 0.0, FOREST_DEPTH_MAX); }
 
+uint key_of(float code, uint payload) { return (uint(code) << 12) | payload; }
+
 void put(int x, int y, float code, uint payload) {
-  uint at = uint(y) * view.width + uint(x);
-  uint key = (uint(code) << 12) | payload;
-  if (key < keys[at]) atomicMin(keys[at], key);  // the plain look first: most of a dense forest is hidden
+  uint at = uint(y) * view.width + uint(x), key = key_of(code, payload);
+  if (key < texelFetch(keys_seen, int(at)).x) atomicMin(keys[at], key);  // the plain look first: most of a dense forest is hidden
 }
 
 // Shade 0–1 in five bits, the rounding moved from subframe to subframe so that their mean is smooth.
@@ -72,12 +79,13 @@ uint group_index() { return gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x; }
 uint thread_index() { return group_index() * FOREST_GROUP + gl_LocalInvocationID.x; }
 
 bool fetch(uint item_index, uint index, out Capsule c) {
-  Item item = items[item_index];
-  if (index >= item.segment_count) return false;
-  Segment s = segments[item.first_segment + index];
-  vec2 radii = unpackHalf2x16(s.radii);
-  c.a = vec3(s.ax, s.ay, s.az);
-  c.b = vec3(s.bx, s.by, s.bz);
+  uvec4 item = texelFetch(items, int(2u * item_index));  // instance, first segment, count
+  if (index >= item.z) return false;
+  uvec4 at_a = texelFetch(segments, int(2u * (item.y + index))), at_b = texelFetch(segments, int(2u * (item.y + index) + 1u));
+  vec2 radii = unpackHalf2x16(at_a.w);
+  uint meta = at_b.w;
+  c.a = uintBitsToFloat(at_a.xyz);
+  c.b = uintBitsToFloat(at_b.xyz);
   c.ra = radii.x;
   c.rb = radii.y;
   if ((view.flags & FOREST_OVERLAY) != 0u) {  // overlays: in the world, at least two pixels wide, entry in the meta word
@@ -85,25 +93,23 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.b = to_camera(c.b);
     c.ra = max(c.ra, c.a.z / view.focal);
     c.rb = max(c.rb, c.b.z / view.focal);
-    c.entry = s.meta >> 16;
+    c.entry = meta >> 16;
     c.rank = 0.0;
   } else {
-    Instance neuron = instances[item.instance];
-    vec4 q = vec4(neuron.qx, neuron.qy, neuron.qz, neuron.qw);
-    vec3 at = vec3(neuron.x, neuron.y, neuron.z);
+    vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
+    vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
     c.a = to_camera(at + turned(q, c.a));
     c.b = to_camera(at + turned(q, c.b));
-    uint colour = (colour_classes[item.instance >> 2] >> (8u * (item.instance & 3u))) & 15u;
-    c.entry = colour * 8u + (s.meta & 7u);
-    c.rank = fract(float((s.meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
+    c.entry = texelFetch(colour_classes, int(item.x)).x * 8u + (meta & 7u);
+    c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
   return clip_near(c);
 }
 
 // What this thread has to draw, if anything.
 bool fetch_queued(out Capsule c) {
-  uint at = thread_index();
-  return at < queued && fetch(queue[at] / 64u, queue[at] % 64u, c);
+  uint at = thread_index(), entry = texelFetch(queue_seen, int(4u + at)).x;
+  return at < queued && fetch(entry / 64u, entry % 64u, c);
 }
 
 // Whether all that lies in a rectangle of pixels, at this depth or behind, is hidden by earlier bands. Looks at no more
@@ -126,7 +132,7 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
   uint code = uint(depth_code(nearest)) << 12;
   for (uint y = first.y; y <= last.y; ++y)
     for (uint x = first.x; x <= last.x; ++x)
-      if (tiles[start + y * wide + x] >= code) return false;
+      if (texelFetch(tiles_seen, int(start + y * wide + x)).x >= code) return false;
   return true;
 }
 

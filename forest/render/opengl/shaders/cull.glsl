@@ -2,19 +2,20 @@
 
 layout(local_size_x = 64) in;
 
-bool hidden(Item item) {
-  vec3 centre = to_camera(vec3(item.x, item.y, item.z));
-  float nearest = centre.z - item.radius;
+bool hidden(vec4 sphere) {
+  vec3 centre = to_camera(sphere.xyz);
+  float nearest = centre.z - sphere.w;
   if (nearest <= view.near) return false;
-  float reach = view.focal * item.radius / nearest + 2.0;
+  float reach = view.focal * sphere.w / nearest + 2.0;
   vec2 at = to_pixel(centre);
   return hidden(at - reach, at + reach, nearest, 64u);
 }
 
 void main() {
   uint at = gl_GlobalInvocationID.x;
-  if (at >= view.item_count || hidden(items[view.first_item + at])) return;
-  uint item = view.first_item + at, count = items[item].segment_count;
+  uint item = view.first_item + at;
+  if (at >= view.item_count || hidden(uintBitsToFloat(texelFetch(items, int(2u * item + 1u))))) return;
+  uint count = texelFetch(items, int(2u * item)).z;
   uint place = atomicAdd(queued, count);
   for (uint i = 0u; i < count; ++i) queue[place + i] = item * 64u + i;
   uint groups = (place + count + FOREST_GROUP - 1u) / FOREST_GROUP;

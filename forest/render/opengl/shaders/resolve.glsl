@@ -3,14 +3,13 @@
 
 layout(local_size_x = 64) in;
 
-layout(std430, binding = 5) readonly buffer PaletteBuffer { float palette[]; };  // three floats an entry, linear
-layout(std430, binding = 6) buffer Sums { float sums[]; };               // four floats a pixel
-layout(std430, binding = 7) writeonly buffer Output { uint image[]; };
+layout(std430, binding = 1) buffer Sums { float sums[]; };               // four floats a pixel
+layout(std430, binding = 2) writeonly buffer Output { uint image[]; };
 
 float depth_at(int x, int y) {
   x = clamp(x, 0, int(view.width) - 1);
   y = clamp(y, 0, int(view.height) - 1);
-  return float(keys[uint(y) * view.width + uint(x)] >> 12) / FOREST_DEPTH_STEPS;  // octaves
+  return float(texelFetch(keys_seen, int(uint(y) * view.width + uint(x))).x >> 12) / FOREST_DEPTH_STEPS;  // octaves
 }
 
 float srgb(float c) {
@@ -22,7 +21,7 @@ void main() {
   uint x = gl_GlobalInvocationID.x, y = gl_GlobalInvocationID.y;
   if (x >= view.width) return;
   uint at = y * view.width + x;
-  uint key = keys[at];
+  uint key = texelFetch(keys_seen, int(at)).x;
   vec3 colour = mix(vec3(view.top_red, view.top_green, view.top_blue),
                     vec3(view.bottom_red, view.bottom_green, view.bottom_blue), (float(y) + 0.5) / float(view.height));
   float covered = 0.0;
@@ -38,7 +37,7 @@ void main() {
       for (int i = 0; i < 8; ++i) rim += clamp((octave - depth_at(ix + ring[i].x, iy + ring[i].y)) * 40.0, 0.0, 1.0);
       rim *= view.halo / 8.0;
     }
-    vec3 base = vec3(palette[entry * 3u], palette[entry * 3u + 1u], palette[entry * 3u + 2u]);
+    vec3 base = texelFetch(palette, int(entry)).rgb;
     float fog = 1.0 - exp(-max(0.0, z - view.fog_start) / view.fog_length);
     colour = mix(base * (0.16 + 1.05 * shade * shade) * exp(-1.1 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
   }

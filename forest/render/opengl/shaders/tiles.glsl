@@ -11,14 +11,14 @@ void main() {
     uint left = at % wide * FOREST_TILE, top = at / wide * FOREST_TILE;
     uint right = min(left + FOREST_TILE, view.width), bottom = min(top + FOREST_TILE, view.height);
     for (uint y = top; y < bottom; ++y)
-      for (uint x = left; x < right; ++x) farthest = max(farthest, keys[y * view.width + x]);
+      for (uint x = left; x < right; ++x) farthest = max(farthest, texelFetch(keys_seen, int(y * view.width + x)).x);
     tiles[at] = farthest;
   } else {
     if (at >= coarse_wide * coarse_high) return;
     uint left = at % coarse_wide * FOREST_TILE, top = at / coarse_wide * FOREST_TILE;
     uint right = min(left + FOREST_TILE, wide), bottom = min(top + FOREST_TILE, high);
     for (uint y = top; y < bottom; ++y)
-      for (uint x = left; x < right; ++x) farthest = max(farthest, tiles[y * wide + x]);
+      for (uint x = left; x < right; ++x) farthest = max(farthest, texelFetch(tiles_seen, int(y * wide + x)).x);
     tiles[wide * high + at] = farthest;
   }
 }
