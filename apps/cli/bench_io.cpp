@@ -83,9 +83,10 @@ WorkByFormat grown() {
 WorkByFormat collected(const std::vector<std::filesystem::path>& places) {
   WorkByFormat all;
   const auto add = [&](const std::filesystem::path& path) {
-    Work& work = all[&io::format_of(path)];
+    const MappedFile file(path);
+    Work& work = all[&io::format_of(path, file.text())];
     work.names.push_back(path.string());
-    work.files.emplace_back(MappedFile(path).text());
+    work.files.emplace_back(file.text());
   };
   const auto known = [](const std::filesystem::path& path) {
     return std::ranges::any_of(io::formats(), [&](const io::Format& format) {

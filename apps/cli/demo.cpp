@@ -87,7 +87,8 @@ void import_into(const std::string& repo, const fs::path& folder, Console& conso
     try {
       const MappedFile bytes(paths[i]);
       files[i].hash = hash_hex(bytes.bytes());
-      files[i].morphology = io::format_of(paths[i]).read(bytes.text(), paths[i].string()).morphology;
+      files[i].morphology =
+          io::format_of(paths[i], bytes.text()).read(bytes.text(), paths[i].string()).morphology;
       if (files[i].morphology.sections().empty())
         files[i].error = paths[i].string() + ": has no neurite and is not planted";
     } catch (const Error& error) {

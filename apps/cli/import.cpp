@@ -50,7 +50,7 @@ void read(Arrival& file) {
   try {
     const MappedFile bytes(file.path);
     file.hash = hash_hex(bytes.bytes());
-    file.read = io::format_of(file.path).read(bytes.text(), escaped(file.path.string()));
+    file.read = io::format_of(file.path, bytes.text()).read(bytes.text(), escaped(file.path.string()));
     file.sections = file.read.morphology.sections().size();
     file.warnings = file.read.warnings.size();
   } catch (const Error& error) {

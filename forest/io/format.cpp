@@ -16,8 +16,37 @@ namespace {
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 
 constexpr std::array table{
-    Format{"swc", "SWC (INCF v1 and its dialects)", swc_extensions, read_swc, write_swc},
+    Format{.name = "swc",
+           .title = "SWC (INCF v1 and its dialects)",
+           .extensions = swc_extensions,
+           .recognises = recognises_swc,
+           .read = read_swc,
+           .read_all = nullptr,
+           .write = write_swc,
+           .keeps = {}},
 };
+
+std::string lower_extension(const std::filesystem::path& path) {
+  std::string extension = path.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  return extension;
+}
+
+bool has(const Format& format, std::string_view extension) {
+  return std::ranges::find(format.extensions, extension) != format.extensions.end();
+}
+
+[[noreturn]] void refuse_extension(const std::filesystem::path& path, bool written) {
+  std::string known;
+  for (const Format& format : table)
+    if (!written || format.write)
+      for (const std::string_view extension : format.extensions)
+        if (known.find(std::string(extension) + ",") == known.npos) known += std::string(extension) + ", ";
+  known.resize(known.size() - 2);
+  throw InputError(path.string(), 0,
+                   fmt::format("the extension '{}' belongs to no known format; known are {}",
+                               lower_extension(path), known));
+}
 
 }  // namespace
 
@@ -29,32 +58,61 @@ const Format* find_format(std::string_view name) {
 }
 
 const Format& format_of(const std::filesystem::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-  std::string known;
+  const std::string extension = lower_extension(path);
+  const Format* only_read = nullptr;
   for (const Format& format : table)
-    for (const std::string_view candidate : format.extensions) {
-      if (candidate == extension) return format;
-      known += known.empty() ? "" : ", ";
-      known += candidate;
+    if (has(format, extension)) {
+      if (format.write) return format;
+      only_read = &format;
     }
-  throw InputError(
-      path.string(), 0,
-      fmt::format("the extension '{}' belongs to no known format; known are {}", extension, known));
+  if (only_read) return *only_read;
+  refuse_extension(path, true);
+}
+
+const Format& format_of(const std::filesystem::path& path, std::string_view bytes) {
+  const std::string extension = lower_extension(path);
+  const auto readers = [&](bool any_extension) {
+    std::vector<const Format*> rows;
+    for (const Format& format : table)
+      if (format.read && (any_extension || has(format, extension))) rows.push_back(&format);
+    return rows;
+  };
+  const auto recognised = [&](const std::vector<const Format*>& rows) -> const Format* {
+    const auto row = std::ranges::find_if(rows, [&](const Format* f) { return f->recognises(bytes); });
+    return row == rows.end() ? nullptr : *row;
+  };
+  const std::vector<const Format*> own = readers(false);
+  if (own.size() == 1) return *own[0];  // it says what is wrong with other bytes
+  if (const Format* format = recognised(own)) return *format;
+  if (!own.empty()) return *own[0];
+  if (const Format* format = recognised(readers(true))) return *format;
+  for (const Format& format : table)
+    if (has(format, extension))
+      throw InputError(
+          path.string(), 0,
+          fmt::format("{} can be written but not read; give the file it was made from", format.title));
+  refuse_extension(path, false);
 }
 
 ReadResult read(const std::filesystem::path& path) {
-  const Format& format = format_of(path);
   const MappedFile file(path);
-  return format.read(file.text(), path.string());
+  return format_of(path, file.text()).read(file.text(), path.string());
 }
 
-void write(const std::filesystem::path& path, const Morphology& m) {
+std::vector<Cell> read_all(const Format& format, std::string_view bytes, const std::string& name) {
+  if (format.read_all) return format.read_all(bytes, name);
+  std::vector<Cell> one;
+  one.push_back({{}, format.read(bytes, name)});
+  return one;
+}
+
+std::vector<Warning> write(const std::filesystem::path& path, const Morphology& m) {
   const Format& format = format_of(path);
   if (!format.write)
     throw InputError(path.string(), 0,
                      fmt::format("{} can be read but not written; choose another extension", format.title));
   write_file(path, format.write(m));
+  return losses(m, format.keeps);
 }
 
 }  // namespace forest::io

@@ -10,16 +10,10 @@
 #include <string_view>
 #include <vector>
 
+#include "forest/io/keeps.h"
 #include "forest/morphology/morphology.h"
 
 namespace forest::io {
-
-/// A deviation from a format that was read all the same, and how.
-struct Warning {
-  std::size_t line = 0;   // 1-based; 0 when the whole file is meant
-  std::string_view code;  // a stable word, for example "negative-radius"
-  std::string sentence;   // what stands there and how it was read
-};
 
 /// A kind of deviation: a format that reads dialects has a table of these.
 struct Oddity {
@@ -33,22 +27,41 @@ struct ReadResult {
   std::vector<Warning> warnings;  // in the order of lines
 };
 
+/// A neuron of a file that holds several.
+struct Cell {
+  std::string name;  // as the file has it
+  ReadResult read;
+};
+
 struct Format {
   std::string_view name;                         // "swc"
-  std::string_view title;                        // "SWC (INCF v1 and dialects)"
-  std::span<const std::string_view> extensions;  // with the dot, lower case
-  /// Throws InputError (file `name`, line, remedy) when nothing sensible can be read.
+  std::string_view title;                        // "SWC (INCF v1 and its dialects)"
+  std::span<const std::string_view> extensions;  // with the dot, lower case; the first one is written
+  /// Whether these bytes look like this format. Asked where formats share an extension, or none has it.
+  bool (*recognises)(std::string_view bytes);
+  /// Throws InputError (file `name`, line, remedy) when nothing sensible can be read. Of a file with several cells the
+  /// first, with a warning. Null when the format is only written.
   ReadResult (*read)(std::string_view bytes, const std::string& name);
+  /// All cells of a file; null when a file of this format holds one.
+  std::vector<Cell> (*read_all)(std::string_view bytes, const std::string& name);
   /// The same neuron gives the same bytes. Null when the format is only read.
   std::string (*write)(const Morphology& morphology);
+  Keeps keeps;
 };
 
 std::span<const Format> formats();
 const Format* find_format(std::string_view name);  // null when unknown
-const Format& format_of(
-    const std::filesystem::path& path);  // by extension; throws InputError naming the known ones
 
-ReadResult read(const std::filesystem::path& path);                  // throws InputError
-void write(const std::filesystem::path& path, const Morphology& m);  // whole or not at all
+/// By extension, for writing; throws InputError naming the known ones.
+const Format& format_of(const std::filesystem::path& path);
+/// For reading: by extension and, where that does not decide, by content; throws InputError.
+const Format& format_of(const std::filesystem::path& path, std::string_view bytes);
+
+ReadResult read(const std::filesystem::path& path);  // throws InputError
+/// Never empty; the only cell of a file has no name. Throws InputError.
+std::vector<Cell> read_all(const Format& format, std::string_view bytes, const std::string& name);
+
+/// Whole or not at all. Returns what was lost.
+std::vector<Warning> write(const std::filesystem::path& path, const Morphology& m);
 
 }  // namespace forest::io

@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
@@ -621,6 +622,32 @@ class Assembler {
 }  // namespace
 
 std::span<const Oddity> swc_oddities() { return table; }
+
+bool recognises_swc(std::string_view bytes) {
+  const auto columns = [](std::string_view line) {  // of numbers; 0 when anything else stands there
+    std::size_t count = 0;
+    bool inside = false;
+    for (const char c : line) {
+      if (c == '#') break;
+      if (is_blank(c) || c == ',' || c == '\r') {
+        inside = false;
+      } else if (is_digit(c) || c == '.' || c == '-' || c == '+' || c == 'e' || c == 'E') {
+        count += !inside;
+        inside = true;
+      } else {
+        return std::size_t(0);
+      }
+    }
+    return count;
+  };
+  bytes = bytes.substr(0, 1 << 16);
+  for (int lines = 0; lines < 500 && !bytes.empty(); ++lines) {
+    const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
+    if (columns(bytes.substr(0, end)) >= 7) return true;
+    bytes.remove_prefix(std::min(end + 1, bytes.size()));
+  }
+  return false;
+}
 
 ReadResult read_swc(std::string_view bytes, const std::string& name) {
   OddityList<SwcOddity> oddities(table);

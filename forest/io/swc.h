@@ -21,6 +21,9 @@
 
 namespace forest::io {
 
+/// Whether the first lines that are no comments are rows of numbers.
+bool recognises_swc(std::string_view bytes);
+
 /// Throws InputError when a row is no row, when a point is its own ancestor, or when there is no point.
 ReadResult read_swc(std::string_view bytes, const std::string& name);
 

@@ -1,0 +1,168 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/keeps.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace forest::io {
+namespace {
+
+// Whether a section is the only daughter, and of its parent's kind as far as kinds are kept.
+bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
+  const Section& d = m.section(daughter);
+  if (!d.parent.valid() || m.children(d.parent).size() != 1) return false;
+  const Section& parent = m.section(d.parent);
+  return !keeps.kinds || (parent.kind == d.kind && (!keeps.tags || parent.tag == d.tag));
+}
+
+// A row for each thing that can be lost.
+struct Loss {
+  bool Keeps::*kept;
+  std::string_view code;
+  std::size_t (*count)(const Morphology& m, const Keeps& keeps);  // how many of it the neuron has
+  std::string_view sentence;                  // {} is the number
+};
+
+std::size_t count_sections(const Morphology& m, bool (*has_it)(const Morphology&, SectionId)) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < m.sections().size(); ++i) count += has_it(m, SectionId(i));
+  return count;
+}
+
+constexpr Loss loss_table[] = {
+    {&Keeps::kinds, "kinds-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(
+           m, [](const Morphology& n, SectionId s) { return n.section(s).kind != SectionKind::undefined; });
+     },
+     "the kinds of {} sections are left out"},
+    {&Keeps::tags, "tags-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(m, [](const Morphology& n, SectionId s) {
+         return n.section(s).kind == SectionKind::custom && n.section(s).tag != int(SectionKind::custom);
+       });
+     },
+     "the numbers of {} sections of a custom kind are left out"},
+    {&Keeps::cylinders, "soma-simplified",
+     [](const Morphology& m, const Keeps&) { return std::size_t(m.soma().kind == SomaKind::cylinders ? m.soma().points.size() : 0); },
+     "the soma of {} points becomes a sphere of its mean size"},
+    {&Keeps::contours, "soma-simplified",
+     [](const Morphology& m, const Keeps&) { return std::size_t(m.soma().kind == SomaKind::contours ? m.soma().contour_starts.size() : 0); },
+     "the outline of the soma ({} loops) becomes a sphere of its mean radius"},
+    {&Keeps::loose_roots, "roots-joined",
+     [](const Morphology& m, const Keeps&) {
+       if (m.soma().kind == SomaKind::none) return m.roots().size() < 2 ? 0 : m.roots().size() - 1;
+       return count_sections(m, [](const Morphology& n, SectionId s) {
+         return !n.section(s).parent.valid() && n.section(s).soma_point < 0;
+       });
+     },
+     "{} neurites that leave from no soma are joined to it"},
+    {&Keeps::joints, "joint-radii-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(m, [](const Morphology& n, SectionId s) {
+         const SectionId parent = n.section(s).parent;
+         return parent.valid() && n.points(s).front().radius != n.points(parent).back().radius;
+       });
+     },
+     "the radius at the branch point is the parent's for {} sections with one of their own"},
+    {&Keeps::single_daughters, "sections-joined",
+     [](const Morphology& m, const Keeps& keeps) {
+       std::size_t count = 0;
+       for (std::size_t i = 0; i < m.sections().size(); ++i) count += joins(m, SectionId(i), keeps);
+       return count;
+     },
+     "{} sections that are their parent's only daughter, of its kind, are joined to it"},
+    {&Keeps::stumps, "stumps-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(m, [](const Morphology& n, SectionId s) { return n.points(s).size() == 1; });
+     },
+     "{} neurites of a single point are left out"},
+    {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
+     "{} spines are left out"},
+    {&Keeps::annotations, "annotations-lost", [](const Morphology& m, const Keeps&) { return m.annotations().size(); },
+     "{} annotations are left out"},
+};
+
+Soma kept_soma(const Soma& soma, const Keeps& keeps) {
+  const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
+                       (soma.kind == SomaKind::contours && !keeps.contours);
+  if (!simpler) return soma;
+  return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
+}
+
+}  // namespace
+
+std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
+  std::vector<Warning> warnings;
+  for (const Loss& loss : loss_table)
+    if (!(keeps.*loss.kept))
+      if (const std::size_t count = loss.count(m, keeps))
+        warnings.push_back({0, loss.code, fmt::format(fmt::runtime(loss.sentence), count)});
+  return warnings;
+}
+
+Morphology as_kept(const Morphology& m, const Keeps& keeps) {
+  const auto rounded = [&](float value) {
+    return keeps.step > 0.f ? float(std::round(double(value) / double(keeps.step)) * double(keeps.step)) : value;
+  };
+  const auto kept_point = [&](const Point& p) {
+    return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
+  };
+  MorphologyBuilder builder;
+  Soma soma = kept_soma(m.soma(), keeps);
+  for (Point& p : soma.points) p = kept_point(p);
+  const bool has_soma = soma.kind != SomaKind::none;
+  builder.set_soma(std::move(soma));
+
+  constexpr std::uint32_t gone = 0xffffffffu;
+  struct Place {
+    std::uint32_t section = gone;  // in the neuron that is left
+    float offset = 0.f;            // where it begins in that section, µm
+  };
+  std::vector<Place> places(m.sections().size());
+  std::vector<Point> points;
+  std::uint32_t count = 0;
+  for (std::size_t i = 0; i < m.sections().size(); ++i) {
+    const SectionId id(i);
+    if (!keeps.single_daughters && joins(m, id, keeps)) continue;  // taken along below
+    const Section& s = m.section(id);
+    if (!keeps.stumps && m.points(id).size() == 1) continue;
+    points.clear();
+    float length = 0.f;
+    for (SectionId at = id;;) {
+      places[at.value()] = {count, length};
+      for (std::size_t k = at == id ? 0 : 1; k < m.points(at).size(); ++k) {
+        points.push_back(kept_point(m.points(at)[k]));
+        if (points.size() > 1) length += (points.back().position() - points[points.size() - 2].position()).norm();
+      }
+      if (keeps.single_daughters || m.children(at).size() != 1 || !joins(m, m.children(at)[0], keeps)) break;
+      at = m.children(at)[0];
+    }
+    SectionId parent;
+    if (s.parent.valid() && places[s.parent.value()].section != gone) {
+      parent = SectionId(places[s.parent.value()].section);
+      if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back()).radius;
+    }
+    const SectionKind kind = keeps.kinds ? s.kind : SectionKind::undefined;
+    const std::int32_t tag = keeps.tags && keeps.kinds ? s.tag : std::int32_t(kind);
+    std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
+    if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
+    builder.add_section(parent, kind, points, tag, soma_point);
+    ++count;
+  }
+  if (keeps.spines)
+    for (Spine spine : m.spines()) {
+      const Place place = places[spine.section.value()];
+      if (place.section == gone) continue;
+      spine.section = SectionId(place.section);
+      spine.position += place.offset;
+      builder.add_spine(spine);
+    }
+  if (keeps.annotations)
+    for (const auto& [key, value] : m.annotations()) builder.annotate(key, value);
+  return builder.build();
+}
+
+}  // namespace forest::io

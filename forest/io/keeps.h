@@ -1,0 +1,43 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a file format can hold of a neuron, as data: from it follow the warnings a person gets, the neuron that is left,
+// and what tests may expect back.
+#pragma once
+
+#include <cstddef>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "forest/morphology/morphology.h"
+
+namespace forest::io {
+
+/// A deviation from a format that was read all the same, and how; or what was lost in writing.
+struct Warning {
+  std::size_t line = 0;   // 1-based; 0 when the whole file is meant
+  std::string_view code;  // a stable word, for example "negative-radius"
+  std::string sentence;   // what stands there and how it was read
+};
+
+/// What of a neuron a format has words for. What it has none for is told when a neuron that has it is written.
+struct Keeps {
+  bool kinds = true;             // axon, basal, apical, glia
+  bool tags = true;              // the numbers of custom kinds
+  bool cylinders = true;         // a soma of several points; else a sphere of its mean size
+  bool contours = true;          // a soma of outlines; else a sphere of their mean radius
+  bool loose_roots = true;       // neurites that leave from no soma
+  bool joints = true;            // a daughter's own radius at the branch point
+  bool single_daughters = true;  // a node with one daughter; else the two are one section
+  bool stumps = true;            // a root of a single point
+  bool spines = true;
+  bool annotations = true;
+  float step = 0.f;  // coordinates and diameters are rounded to this, µm; 0: not at all
+};
+
+/// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.
+std::vector<Warning> losses(const Morphology& morphology, const Keeps& keeps);
+
+/// The neuron that is left: the same one when all is kept. Writers begin with it.
+Morphology as_kept(const Morphology& morphology, const Keeps& keeps);
+
+}  // namespace forest::io

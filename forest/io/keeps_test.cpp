@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/keeps.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forest/morphology/measure.h"
+
+#include "tests/zoo.h"
+
+namespace forest::io {
+namespace {
+
+constexpr Keeps nothing{.kinds = false,
+                        .tags = false,
+                        .cylinders = false,
+                        .contours = false,
+                        .loose_roots = false,
+                        .joints = false,
+                        .single_daughters = false,
+                        .stumps = false,
+                        .spines = false,
+                        .annotations = false};
+
+TEST(Keeps, AllKeptIsTheSameNeuronAndNothingIsLost) {
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    const Morphology left = as_kept(specimen.morphology, {});
+    EXPECT_EQ(left, specimen.morphology);
+    EXPECT_EQ(left.annotations(), specimen.morphology.annotations());
+    EXPECT_TRUE(losses(specimen.morphology, {}).empty());
+  }
+}
+
+TEST(Keeps, WhatIsLeftHasNothingMoreToLose) {
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    const Morphology left = as_kept(specimen.morphology, nothing);
+    EXPECT_EQ(as_kept(left, nothing), left);
+    for (const Warning& warning : losses(left, nothing)) EXPECT_EQ(warning.code, "roots-joined") << warning.sentence;
+  }
+}
+
+TEST(Keeps, JoinedSectionsKeepTheirLengthAndTheirSpines) {
+  MorphologyBuilder b;
+  b.set_soma(zoo_parts::sphere(5));
+  SectionId at = b.add_section({}, SectionKind::basal, zoo_parts::Points{{0, 5, 0, 1}, {0, 15, 0, 1}}, 3, 0);
+  at = b.add_section(at, SectionKind::basal, zoo_parts::Points{{0, 25, 0, 1}});
+  b.add_spine({at, 4.f, Vec3(1, 0, 0), .5f, .1f, SpineShape::thin});
+  b.add_section(at, SectionKind::axon, zoo_parts::Points{{0, 30, 0, 1}});
+  const Morphology m = b.build();
+  const Keeps keeps{.single_daughters = false};
+  const Morphology left = as_kept(m, keeps);
+  ASSERT_EQ(left.sections().size(), 2u);  // the axon is of another kind and stays its own
+  EXPECT_EQ(left.sections()[1].parent, SectionId(0));
+  EXPECT_DOUBLE_EQ(total_length(left), total_length(m));
+  ASSERT_EQ(left.spines().size(), 1u);
+  EXPECT_EQ(left.spines()[0].section, SectionId(0));
+  EXPECT_FLOAT_EQ(left.spines()[0].position, 14.f);
+  ASSERT_EQ(losses(m, keeps).size(), 1u);
+  EXPECT_EQ(losses(m, keeps)[0].code, "sections-joined");
+}
+
+TEST(Keeps, CoordinatesAreRoundedToTheStep) {
+  MorphologyBuilder b;
+  b.set_soma(zoo_parts::sphere(5.04f));
+  b.add_section({}, SectionKind::basal, zoo_parts::Points{{.26f, -.24f, 7, .33f}, {1.05f, 2, 3, .1f}}, 3, 0);
+  const Morphology left = as_kept(b.build(), {.step = .1f});
+  EXPECT_THAT(left.points()[0], testing::Eq(Point{.3f, -.2f, 7.f, .35f}));
+}
+
+}  // namespace
+}  // namespace forest::io
