@@ -11,6 +11,8 @@ std::function<void()> import_files(CLI::App&, Console&);
 std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
 std::function<void()> export_files(CLI::App&, Console&);
+std::function<void()> convert(CLI::App&, Console&);
+std::function<void()> check(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
 std::function<void()> plant(CLI::App&, Console&);
@@ -32,6 +34,12 @@ std::span<const Verb> verbs() {
        "brainforest show cell7 --repo cells.db", show},
       {"export", "Write neurons of a repository as files",
        "brainforest export --repo cells.db --population traced --format swc --out exported/", export_files},
+      {"convert", "Turn neuron files of one format into another",
+       "brainforest convert cell7.swc cell7.asc\n"
+       "  brainforest convert cells/ --format swc --out as_swc/",
+       convert},
+      {"check", "Say what is odd in neuron files, and mend them", "brainforest check cells/ --repair mended/",
+       check},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
        "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
       {"grow", "Grow neurons from a grammar",

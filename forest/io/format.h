@@ -18,8 +18,9 @@ namespace forest::io {
 /// A kind of deviation: a format that reads dialects has a table of these.
 struct Oddity {
   std::string_view code;
-  bool every_line = true;    // each line is told (up to a limit, then counted), or only the first one
-  std::string_view reading;  // how it is read, the second half of the sentence
+  bool every_line = true;         // each line is told (up to a limit, then counted), or only the first one
+  std::string_view reading;       // how it is read, the second half of the sentence
+  std::string_view mending = {};  // what a person can do, where writing the file anew does not mend it
 };
 
 struct ReadResult {

@@ -22,7 +22,7 @@ struct Loss {
   bool Keeps::*kept;
   std::string_view code;
   std::size_t (*count)(const Morphology& m, const Keeps& keeps);  // how many of it the neuron has
-  std::string_view sentence;                  // {} is the number
+  std::string_view sentence;                                      // {} is the number
 };
 
 std::size_t count_sections(const Morphology& m, bool (*has_it)(const Morphology&, SectionId)) {
@@ -46,10 +46,14 @@ constexpr Loss loss_table[] = {
      },
      "the numbers of {} sections of a custom kind are left out"},
     {&Keeps::cylinders, "soma-simplified",
-     [](const Morphology& m, const Keeps&) { return std::size_t(m.soma().kind == SomaKind::cylinders ? m.soma().points.size() : 0); },
+     [](const Morphology& m, const Keeps&) {
+       return std::size_t(m.soma().kind == SomaKind::cylinders ? m.soma().points.size() : 0);
+     },
      "the soma of {} points becomes a sphere of its mean size"},
     {&Keeps::contours, "soma-simplified",
-     [](const Morphology& m, const Keeps&) { return std::size_t(m.soma().kind == SomaKind::contours ? m.soma().contour_starts.size() : 0); },
+     [](const Morphology& m, const Keeps&) {
+       return std::size_t(m.soma().kind == SomaKind::contours ? m.soma().contour_starts.size() : 0);
+     },
      "the outline of the soma ({} loops) becomes a sphere of its mean radius"},
     {&Keeps::loose_roots, "roots-joined",
      [](const Morphology& m, const Keeps&) {
@@ -81,8 +85,8 @@ constexpr Loss loss_table[] = {
      "{} neurites of a single point are left out"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
-    {&Keeps::annotations, "annotations-lost", [](const Morphology& m, const Keeps&) { return m.annotations().size(); },
-     "{} annotations are left out"},
+    {&Keeps::annotations, "annotations-lost",
+     [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
 };
 
 Soma kept_soma(const Soma& soma, const Keeps& keeps) {
@@ -105,7 +109,8 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
 
 Morphology as_kept(const Morphology& m, const Keeps& keeps) {
   const auto rounded = [&](float value) {
-    return keeps.step > 0.f ? float(std::round(double(value) / double(keeps.step)) * double(keeps.step)) : value;
+    return keeps.step > 0.f ? float(std::round(double(value) / double(keeps.step)) * double(keeps.step))
+                            : value;
   };
   const auto kept_point = [&](const Point& p) {
     return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
@@ -135,7 +140,8 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
       places[at.value()] = {count, length};
       for (std::size_t k = at == id ? 0 : 1; k < m.points(at).size(); ++k) {
         points.push_back(kept_point(m.points(at)[k]));
-        if (points.size() > 1) length += (points.back().position() - points[points.size() - 2].position()).norm();
+        if (points.size() > 1)
+          length += (points.back().position() - points[points.size() - 2].position()).norm();
       }
       if (keeps.single_daughters || m.children(at).size() != 1 || !joins(m, m.children(at)[0], keeps)) break;
       at = m.children(at)[0];

@@ -14,9 +14,10 @@ namespace forest::io {
 
 /// A deviation from a format that was read all the same, and how; or what was lost in writing.
 struct Warning {
-  std::size_t line = 0;   // 1-based; 0 when the whole file is meant
-  std::string_view code;  // a stable word, for example "negative-radius"
-  std::string sentence;   // what stands there and how it was read
+  std::size_t line = 0;           // 1-based; 0 when the whole file is meant
+  std::string_view code;          // a stable word, for example "negative-radius"
+  std::string sentence;           // what stands there and how it was read
+  std::string_view mending = {};  // as in Oddity
 };
 
 /// What of a neuron a format has words for. What it has none for is told when a neuron that has it is written.

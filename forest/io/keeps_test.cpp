@@ -37,7 +37,8 @@ TEST(Keeps, WhatIsLeftHasNothingMoreToLose) {
     SCOPED_TRACE(specimen.name);
     const Morphology left = as_kept(specimen.morphology, nothing);
     EXPECT_EQ(as_kept(left, nothing), left);
-    for (const Warning& warning : losses(left, nothing)) EXPECT_EQ(warning.code, "roots-joined") << warning.sentence;
+    for (const Warning& warning : losses(left, nothing))
+      EXPECT_EQ(warning.code, "roots-joined") << warning.sentence;
   }
 }
 

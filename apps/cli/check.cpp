@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest check: what is odd in neuron files, how it is read, what can be done; and mended copies, with a log from
+// which the original can be made again byte for byte.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/hash.h"
+#include "forest/core/parallel.h"
+#include "forest/io/difference.h"
+#include "forest/io/format.h"
+#include "forest/morphology/validate.h"
+#include "forest/repository/names.h"
+#include "forest/repository/repository.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using repository::escaped;
+using Json = nlohmann::ordered_json;
+
+constexpr std::string_view by_repair = "--repair writes it so";
+
+struct Options {
+  std::vector<std::string> files;
+  std::string repo;
+  fs::path repair;
+};
+
+/// A row of the table.
+struct Found {
+  std::size_t line = 0;
+  std::string cell, code, what, mend;
+};
+
+struct Checked {
+  fs::path path;
+  std::string format, error;
+  std::vector<Found> found;
+  fs::path mended;
+  bool can_be_mended() const {
+    return std::ranges::any_of(found, [](const Found& f) { return f.mend == by_repair; });
+  }
+};
+
+void look_at(const io::Cell& cell, Checked& checked) {
+  for (const io::Warning& w : cell.read.warnings)
+    checked.found.push_back({w.line, cell.name, std::string(w.code), w.sentence,
+                             std::string(w.mending.empty() ? by_repair : w.mending)});
+  for (const Finding& f : validate(cell.read.morphology)) {
+    if (f.severity == Severity::note) continue;
+    const std::string place = f.section.valid() ? fmt::format("section {}: ", f.section.value()) : "";
+    const std::size_t half = std::min(f.sentence.find("; "), f.sentence.size());
+    checked.found.push_back({0, cell.name, std::string(f.code), place + f.sentence.substr(0, half),
+                             half < f.sentence.size() ? f.sentence.substr(half + 2) : ""});
+  }
+}
+
+Json json_of(const Found& f) {
+  Json json{{"line", f.line}, {"code", f.code}, {"what", escaped(f.what)}, {"mend", f.mend}};
+  if (!f.cell.empty()) json["cell"] = escaped(f.cell);
+  return json;
+}
+
+/// The mended copy and its log: `passages` that, one after the other, are the original. A passage is a run of lines of the
+/// copy, [first, count] from line 1, or text as the repository's names are escaped (\xHH for bytes that are no UTF-8).
+void repair(const io::Format& format, const io::Cell& cell, std::string_view original, const fs::path& to,
+            Checked& checked) {
+  const io::Format& writer = format.write ? format : *io::find_format("swc");
+  fs::path mended = to;
+  if (!format.write) mended.replace_extension(std::string(writer.extensions[0]));
+  fs::create_directories(mended.parent_path());
+  const std::string copy = writer.write(cell.read.morphology);
+  Json passages = Json::array(), findings = Json::array();
+  for (const io::Passage& p : io::difference(copy, original))
+    passages.push_back(p.count ? Json{p.first + 1, p.count} : Json(escaped(p.text)));
+  for (const Found& f : checked.found) findings.push_back(json_of(f));
+  const Json log{{"original", escaped(checked.path.string())},
+                 {"hash", hash_hex(std::as_bytes(std::span(original)))},
+                 {"mended", escaped(mended.filename().string())},
+                 {"findings", findings},
+                 {"passages", passages}};
+  write_file(mended, std::string_view(copy));
+  write_file(mended.string() + ".log.json", log.dump(1) + "\n");
+  checked.mended = mended;
+}
+
+void check_file(Checked& checked, const fs::path& to) {
+  try {
+    const MappedFile file(checked.path);
+    const io::Format& format = io::format_of(checked.path, file.text());
+    checked.format = format.name;
+    const auto cells = io::read_all(format, file.text(), escaped(checked.path.string()));
+    for (const io::Cell& cell : cells) look_at(cell, checked);
+    if (to.empty() || !checked.can_be_mended()) return;
+    if (cells.size() > 1)
+      checked.error = fmt::format("{}: holds {} cells, which are not mended together; convert it first",
+                                  escaped(checked.path.string()), cells.size());
+    else
+      repair(format, cells[0], file.text(), to, checked);
+  } catch (const InputError& error) {
+    checked.error = error.what();
+  }
+}
+
+void report(const std::vector<Checked>& files, Console& console) {
+  Json list = Json::array();
+  std::vector<std::vector<std::string>> rows;
+  std::size_t sound = 0, odd = 0, failed = 0, mended = 0;
+  for (const Checked& file : files) {
+    const std::string path = escaped(file.path.string());
+    (!file.error.empty() ? failed : file.found.empty() ? sound : odd) += 1;
+    mended += !file.mended.empty();
+    Json entry{{"file", path}, {"format", file.format}, {"findings", Json::array()}};
+    for (const Found& f : file.found) {
+      entry["findings"].push_back(json_of(f));
+      rows.push_back({path, f.line ? std::to_string(f.line) : "", f.code, escaped(f.what), f.mend});
+    }
+    if (!file.error.empty()) {
+      entry["error"] = file.error;
+      rows.push_back({path, "", "not-read", file.error, ""});
+    }
+    if (!file.mended.empty()) entry["mended"] = escaped(file.mended.string());
+    list.push_back(std::move(entry));
+  }
+  if (!rows.empty()) console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
+  console.say(fmt::format("{} files without a finding, {} with some, {} not read{}", sound, odd, failed,
+                          mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
+  console.print({{"sound", sound}, {"odd", odd}, {"failed", failed}, {"mended", mended}, {"files", list}});
+  if (failed) throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
+}
+
+void check_repository(const std::string& repo, Console& console) {
+  const auto findings = repository::Repository::open(repo, repository::Access::read).check(console.progress());
+  for (const std::string& finding : findings) console.warn(finding);
+  console.print({{"repository", repo}, {"findings", findings}});
+  if (!findings.empty())
+    throw Error(fmt::format("{}: {} findings; the sentences above say what to do", repo, findings.size()));
+  console.say(fmt::format("{}: all is well", repo));
+}
+
+void run(const Options& options, Console& console) {
+  if (!options.repo.empty()) check_repository(options.repo, console);
+  if (options.files.empty()) {
+    if (options.repo.empty()) throw Error("name files or folders to check, or a repository with --repo");
+    return;
+  }
+  std::vector<Checked> files;
+  std::vector<fs::path> to;
+  std::map<fs::path, fs::path> taken;
+  for (const fs::path& path : neuron_files(options.files)) {
+    files.emplace_back().path = path;
+    to.push_back(options.repair.empty() ? fs::path() : options.repair / path.filename());
+    for (int number = 2; !options.repair.empty() && !taken.try_emplace(to.back(), path).second; ++number)
+      to.back() = options.repair / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
+  }
+  console.progress().begin("checking", files.size());
+  parallel_for(files.size(), 1, [&](std::size_t i) {
+    check_file(files[i], to[i]);
+    console.progress().advance();
+  });
+  console.progress().end();
+  report(files, console);
+}
+
+}  // namespace
+
+std::function<void()> check(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command.add_option("files", options->files, "Neuron files, or folders with such files below them")
+      ->check(CLI::ExistingPath)
+      ->type_name("FILES");
+  command.add_option("--repo", options->repo, "A repository to look through: its tables and the checksum of every neuron")
+      ->type_name("FILE");
+  command
+      .add_option("--repair", options->repair,
+                  "Write a mended copy of every file that deviates from its format into this folder, and beside each a "
+                  "log from which the original can be made again")
+      ->type_name("DIR");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

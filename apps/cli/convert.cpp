@@ -1,0 +1,177 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest convert: neurons from one file format to another. What the other format has no words for is told.
+#include <algorithm>
+#include <filesystem>
+#include <map>
+#include <memory>
+#include <mutex>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/parallel.h"
+#include "forest/io/format.h"
+#include "forest/repository/names.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using repository::escaped;
+
+struct Options {
+  std::vector<std::string> files;
+  std::string format;
+  fs::path out;
+  bool verbose = false;
+};
+
+/// A neuron on its way from one file to another.
+struct Conversion {
+  fs::path from, to;
+  std::vector<io::Warning> warnings;  // oddities of the file that was read
+  std::vector<io::Warning> losses;    // what the other one cannot hold
+  std::string error;                  // why it could not be read; empty when it could
+};
+
+/// The conversions of one file: one, or one for each of its cells.
+std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const io::Format& format) {
+  std::vector<Conversion> done;
+  try {
+    const MappedFile file(from);
+    const std::string name = escaped(from.string());
+    const auto cells = io::read_all(io::format_of(from, file.text()), file.text(), name);
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      Conversion& conversion = done.emplace_back();
+      conversion.from = from;
+      conversion.to = to;
+      if (cells.size() > 1) {
+        const std::string cell = cells[i].name.empty() ? std::to_string(i + 1) : repository::file_name(cells[i].name);
+        conversion.to.replace_filename(to.stem().string() + "-" + cell + to.extension().string());
+      }
+      conversion.warnings = cells[i].read.warnings;
+      conversion.losses = io::losses(cells[i].read.morphology, format.keeps);
+      write_file(conversion.to, std::string_view(format.write(cells[i].read.morphology)));
+    }
+  } catch (const InputError& error) {
+    done.emplace_back(Conversion{from, {}, {}, {}, error.what()});
+  }
+  return done;
+}
+
+void tell(const Conversion& conversion, const Options& options, Console& console) {
+  const std::string from = escaped(conversion.from.string());
+  if (!conversion.error.empty()) {
+    console.warn(conversion.error);
+    return;
+  }
+  if (options.verbose)
+    for (const io::Warning& w : conversion.warnings)
+      console.warn(fmt::format("{}{}: {}: {}", from, w.line ? fmt::format(":{}", w.line) : "", w.code, w.sentence));
+  for (const io::Warning& w : conversion.losses)
+    console.warn(fmt::format("{}: {}: {}", escaped(conversion.to.string()), w.code, w.sentence));
+}
+
+nlohmann::ordered_json json_of(const std::vector<io::Warning>& warnings) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const io::Warning& w : warnings)
+    list.push_back({{"line", w.line}, {"code", w.code}, {"sentence", escaped(w.sentence)}});
+  return list;
+}
+
+/// Where each file goes: beside its name with another extension, folders as they lie below the one that was named.
+std::vector<fs::path> targets(const Options& options, const std::vector<fs::path>& files, const io::Format& format) {
+  std::vector<fs::path> targets;
+  std::map<fs::path, fs::path> taken;
+  for (const fs::path& file : files) {
+    fs::path below = file.filename();
+    for (const std::string& named : options.files)
+      if (fs::is_directory(named))
+        if (const fs::path relative = file.lexically_relative(named); !relative.empty() && *relative.begin() != "..")
+          below = relative;
+    fs::path to = options.out / below.replace_extension(std::string(format.extensions[0]));
+    if (const auto [other, fresh] = taken.try_emplace(to, file); !fresh)
+      throw Error(fmt::format("{} and {} would both become {}; convert them into different folders",
+                              other->second.string(), file.string(), to.string()));
+    targets.push_back(std::move(to));
+  }
+  return targets;
+}
+
+void run(Options options, Console& console) {
+  // `convert A B`: the second name is the target when it is no file that could be read.
+  fs::path single;
+  if (options.out.empty()) {
+    if (options.files.size() != 2 || fs::is_directory(options.files[0]))
+      throw Error("say where the files go: convert A B for two files, or --format NAME --out DIR for many");
+    single = options.files[1];
+    options.files.pop_back();
+  } else if (options.format.empty()) {
+    throw Error("say which format the files are to have, with --format NAME");
+  }
+  const io::Format& format = single.empty() ? *io::find_format(options.format) : io::format_of(single);
+  if (!format.write)
+    throw Error(fmt::format("{} can be read but not written; choose another format", format.title));
+  const std::vector<fs::path> files = neuron_files(options.files);
+  const std::vector<fs::path> to = single.empty() ? targets(options, files, format) : std::vector{single};
+  std::error_code error;
+  for (const fs::path& path : to)
+    if (!path.parent_path().empty() && (fs::create_directories(path.parent_path(), error), error))
+      throw Error(fmt::format("{}: the folder cannot be made ({}); name one that can be written",
+                              path.parent_path().string(), error.message()));
+
+  std::vector<std::vector<Conversion>> done(files.size());
+  console.progress().begin("converting", files.size());
+  parallel_for(files.size(), 1, [&](std::size_t i) {
+    done[i] = convert_file(files[i], to[i], format);
+    console.progress().advance();
+  });
+  console.progress().end();
+
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  std::size_t written = 0, failed = 0, oddities = 0, lost = 0;
+  for (const auto& conversions : done)
+    for (const Conversion& c : conversions) {
+      tell(c, options, console);
+      (c.error.empty() ? written : failed) += 1;
+      oddities += c.warnings.size(), lost += c.losses.size();
+      nlohmann::ordered_json entry{{"from", escaped(c.from.string())}};
+      if (c.error.empty())
+        entry.update({{"to", escaped(c.to.string())}, {"warnings", json_of(c.warnings)}, {"losses", json_of(c.losses)}});
+      else
+        entry["error"] = c.error;
+      list.push_back(std::move(entry));
+    }
+  console.print({{"format", format.name}, {"written", written}, {"failed", failed}, {"files", list}});
+  console.say(fmt::format("{} written as {}, {} not read, {} kinds of loss told above{}", written, format.title, failed,
+                          lost, oddities && !options.verbose
+                                    ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
+                                    : ""));
+  if (failed)
+    throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed, files.size()));
+}
+
+}  // namespace
+
+std::function<void()> convert(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  std::vector<std::string> formats;
+  for (const io::Format& format : io::formats())
+    if (format.write) formats.emplace_back(format.name);
+  command.add_option("files", options->files, "A file and the one to make of it; or files and folders, with --out")
+      ->required();
+  command.add_option("--format", options->format, "Format of the files that are made")->check(CLI::IsMember(formats));
+  command.add_option("--out", options->out, "Folder for the files that are made; made when there is none")
+      ->type_name("DIR");
+  command.add_flag("--verbose", options->verbose, "Show every oddity of the files that are read");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,51 @@
+#!/usr/bin/env bash
+# Files of one format become files of another, odd files are told and mended, and no byte of them is lost.
+set -euo pipefail
+program=$BRAINFOREST
+fail() { echo "convert.sh: $*" >&2; exit 1; }
+refuses() {
+  local words=$1 said status=0
+  shift
+  said=$("$@" 2>&1 >/dev/null) || status=$?
+  [[ $status == 1 ]] || fail "status $status instead of 1: $*"
+  [[ $said == *"$words"* ]] || fail "said '$said' instead of a sentence with '$words'"
+}
+
+"$program" grow --grammar motoneuron --count 2 --seed 3 --out cells >/dev/null
+first=$(ls cells | head -1)
+"$program" convert "cells/$first" copy.swc >/dev/null
+cmp "cells/$first" copy.swc || fail "a file converted to its own format has changed"
+"$program" convert cells --format swc --out deep/er --json >report.json
+/usr/bin/python3 -c 'import json; d = json.load(open("report.json")); assert d["written"] == 2 and d["failed"] == 0, d'
+cmp "cells/$first" "deep/er/$first" || fail "a converted folder has changed"
+refuses "say where" "$program" convert cells
+refuses "no known format" "$program" convert "cells/$first" cell.doc
+refuses "say which format" "$program" convert cells --out x
+
+# An odd file: extra columns, CR LF, a type change and an unknown radius. And a broken one.
+printf '# CREATURE rat\r\n1 1 0 0 0 5 -1 9\r\n\r\n3 3 0 5 0 1 1\r\n4 3 0 9 0 NaN 3\r\n7 2 0 19 0 1 4\xff\r\n' | sed 's/\xff//' >odd.swc
+printf '1 1 0 0\n' >broken.swc
+cp odd.swc kept.swc
+refuses "1 of 3" "$program" check odd.swc broken.swc "cells/$first" --repair mended --json
+"$program" check odd.swc "cells/$first" --repair mended --json >check.json
+/usr/bin/python3 - <<'PY'
+import json
+report = json.load(open("check.json"))
+codes = {f["code"]: f for f in report["files"][0]["findings"]}
+for code, line in {"line-ends": 1, "extra-columns": 2, "blank-line": 3, "unknown-radius": 5, "type-change": 6}.items():
+    assert codes[code]["line"] == line and codes[code]["mend"], (code, codes.get(code))
+assert report["mended"] == 1 and report["files"][1]["findings"] == [], report
+# The log gives the original back, byte for byte.
+log = json.load(open("mended/odd.swc.log.json"))
+lines = open("mended/odd.swc", newline="\n").read().splitlines(keepends=True)
+text = ""
+for passage in log["passages"]:
+    text += passage.encode().decode("unicode_escape") if isinstance(passage, str) else "".join(lines[passage[0] - 1:passage[0] - 1 + passage[1]])
+assert text.encode("latin-1") == open("odd.swc", "rb").read(), text
+PY
+cmp odd.swc kept.swc || fail "checking changed the file"
+"$program" check mended/odd.swc --json >again.json
+/usr/bin/python3 -c 'import json; f = json.load(open("again.json"))["files"][0]["findings"]; assert not [x for x in f if "--repair" in x["mend"]], f'
+"$program" grow --grammar motoneuron --count 1 --seed 3 --repo r.db >/dev/null
+[[ $("$program" check --repo r.db) == *"all is well"* ]] || fail "a sound repository is not said to be one"
+echo "convert.sh: all is well"
