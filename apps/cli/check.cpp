@@ -135,15 +135,18 @@ void report(const std::vector<Checked>& files, Console& console) {
     if (!file.mended.empty()) entry["mended"] = escaped(file.mended.string());
     list.push_back(std::move(entry));
   }
-  if (!rows.empty()) console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
+  if (!rows.empty())
+    console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
   console.say(fmt::format("{} files without a finding, {} with some, {} not read{}", sound, odd, failed,
                           mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
   console.print({{"sound", sound}, {"odd", odd}, {"failed", failed}, {"mended", mended}, {"files", list}});
-  if (failed) throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
+  if (failed)
+    throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
 }
 
 void check_repository(const std::string& repo, Console& console) {
-  const auto findings = repository::Repository::open(repo, repository::Access::read).check(console.progress());
+  const auto findings =
+      repository::Repository::open(repo, repository::Access::read).check(console.progress());
   for (const std::string& finding : findings) console.warn(finding);
   console.print({{"repository", repo}, {"findings", findings}});
   if (!findings.empty())
@@ -164,7 +167,8 @@ void run(const Options& options, Console& console) {
     files.emplace_back().path = path;
     to.push_back(options.repair.empty() ? fs::path() : options.repair / path.filename());
     for (int number = 2; !options.repair.empty() && !taken.try_emplace(to.back(), path).second; ++number)
-      to.back() = options.repair / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
+      to.back() =
+          options.repair / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
   }
   console.progress().begin("checking", files.size());
   parallel_for(files.size(), 1, [&](std::size_t i) {
@@ -182,11 +186,14 @@ std::function<void()> check(CLI::App& command, Console& console) {
   command.add_option("files", options->files, "Neuron files, or folders with such files below them")
       ->check(CLI::ExistingPath)
       ->type_name("FILES");
-  command.add_option("--repo", options->repo, "A repository to look through: its tables and the checksum of every neuron")
+  command
+      .add_option("--repo", options->repo,
+                  "A repository to look through: its tables and the checksum of every neuron")
       ->type_name("FILE");
   command
       .add_option("--repair", options->repair,
-                  "Write a mended copy of every file that deviates from its format into this folder, and beside each a "
+                  "Write a mended copy of every file that deviates from its format into this folder, and "
+                  "beside each a "
                   "log from which the original can be made again")
       ->type_name("DIR");
   return [options, &console] { run(*options, console); };

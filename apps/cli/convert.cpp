@@ -53,7 +53,8 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
       conversion.from = from;
       conversion.to = to;
       if (cells.size() > 1) {
-        const std::string cell = cells[i].name.empty() ? std::to_string(i + 1) : repository::file_name(cells[i].name);
+        const std::string cell =
+            cells[i].name.empty() ? std::to_string(i + 1) : repository::file_name(cells[i].name);
         conversion.to.replace_filename(to.stem().string() + "-" + cell + to.extension().string());
       }
       conversion.warnings = cells[i].read.warnings;
@@ -74,7 +75,8 @@ void tell(const Conversion& conversion, const Options& options, Console& console
   }
   if (options.verbose)
     for (const io::Warning& w : conversion.warnings)
-      console.warn(fmt::format("{}{}: {}: {}", from, w.line ? fmt::format(":{}", w.line) : "", w.code, w.sentence));
+      console.warn(
+          fmt::format("{}{}: {}: {}", from, w.line ? fmt::format(":{}", w.line) : "", w.code, w.sentence));
   for (const io::Warning& w : conversion.losses)
     console.warn(fmt::format("{}: {}: {}", escaped(conversion.to.string()), w.code, w.sentence));
 }
@@ -87,14 +89,16 @@ nlohmann::ordered_json json_of(const std::vector<io::Warning>& warnings) {
 }
 
 /// Where each file goes: beside its name with another extension, folders as they lie below the one that was named.
-std::vector<fs::path> targets(const Options& options, const std::vector<fs::path>& files, const io::Format& format) {
+std::vector<fs::path> targets(const Options& options, const std::vector<fs::path>& files,
+                              const io::Format& format) {
   std::vector<fs::path> targets;
   std::map<fs::path, fs::path> taken;
   for (const fs::path& file : files) {
     fs::path below = file.filename();
     for (const std::string& named : options.files)
       if (fs::is_directory(named))
-        if (const fs::path relative = file.lexically_relative(named); !relative.empty() && *relative.begin() != "..")
+        if (const fs::path relative = file.lexically_relative(named);
+            !relative.empty() && *relative.begin() != "..")
           below = relative;
     fs::path to = options.out / below.replace_extension(std::string(format.extensions[0]));
     if (const auto [other, fresh] = taken.try_emplace(to, file); !fresh)
@@ -144,18 +148,21 @@ void run(Options options, Console& console) {
       oddities += c.warnings.size(), lost += c.losses.size();
       nlohmann::ordered_json entry{{"from", escaped(c.from.string())}};
       if (c.error.empty())
-        entry.update({{"to", escaped(c.to.string())}, {"warnings", json_of(c.warnings)}, {"losses", json_of(c.losses)}});
+        entry.update({{"to", escaped(c.to.string())},
+                      {"warnings", json_of(c.warnings)},
+                      {"losses", json_of(c.losses)}});
       else
         entry["error"] = c.error;
       list.push_back(std::move(entry));
     }
   console.print({{"format", format.name}, {"written", written}, {"failed", failed}, {"files", list}});
-  console.say(fmt::format("{} written as {}, {} not read, {} kinds of loss told above{}", written, format.title, failed,
-                          lost, oddities && !options.verbose
-                                    ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
-                                    : ""));
+  console.say(fmt::format(
+      "{} written as {}, {} not read, {} kinds of loss told above{}", written, format.title, failed, lost,
+      oddities && !options.verbose ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
+                                   : ""));
   if (failed)
-    throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed, files.size()));
+    throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
+                            files.size()));
 }
 
 }  // namespace
@@ -165,9 +172,12 @@ std::function<void()> convert(CLI::App& command, Console& console) {
   std::vector<std::string> formats;
   for (const io::Format& format : io::formats())
     if (format.write) formats.emplace_back(format.name);
-  command.add_option("files", options->files, "A file and the one to make of it; or files and folders, with --out")
+  command
+      .add_option("files", options->files,
+                  "A file and the one to make of it; or files and folders, with --out")
       ->required();
-  command.add_option("--format", options->format, "Format of the files that are made")->check(CLI::IsMember(formats));
+  command.add_option("--format", options->format, "Format of the files that are made")
+      ->check(CLI::IsMember(formats));
   command.add_option("--out", options->out, "Folder for the files that are made; made when there is none")
       ->type_name("DIR");
   command.add_flag("--verbose", options->verbose, "Show every oddity of the files that are read");

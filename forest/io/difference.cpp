@@ -45,10 +45,12 @@ std::vector<std::size_t> unique_matches(const std::vector<std::string_view>& fro
 
 // Leaves of the matches the longest sequence that rises in both texts.
 void keep_rising(std::vector<std::size_t>& match) {
-  std::vector<std::size_t> tails, before(match.size(), none);  // tails[k]: last line of a rising sequence of k + 1
+  std::vector<std::size_t> tails,
+      before(match.size(), none);  // tails[k]: last line of a rising sequence of k + 1
   for (std::size_t i = 0; i < match.size(); ++i) {
     if (match[i] == none) continue;
-    const auto tail = std::ranges::lower_bound(tails, match[i], {}, [&](std::size_t line) { return match[line]; });
+    const auto tail =
+        std::ranges::lower_bound(tails, match[i], {}, [&](std::size_t line) { return match[line]; });
     if (tail != tails.begin()) before[i] = *(tail - 1);
     if (tail == tails.end())
       tails.push_back(i);
@@ -56,7 +58,8 @@ void keep_rising(std::vector<std::size_t>& match) {
       *tail = i;
   }
   std::vector<std::size_t> kept(match.size(), none);
-  for (std::size_t at = tails.empty() ? none : tails.back(); at != none; at = before[at]) kept[at] = match[at];
+  for (std::size_t at = tails.empty() ? none : tails.back(); at != none; at = before[at])
+    kept[at] = match[at];
   match = std::move(kept);
 }
 
@@ -68,10 +71,12 @@ std::vector<Passage> difference(std::string_view from_text, std::string_view to_
   keep_rising(match);
   for (std::size_t i = 1, last = none; i < to.size(); ++i) {  // equal lines after a match
     if (match[i - 1] != none) last = match[i - 1];
-    if (match[i] == none && last != none && match[i - 1] == last && last + 1 < from.size() && from[last + 1] == to[i])
+    if (match[i] == none && last != none && match[i - 1] == last && last + 1 < from.size() &&
+        from[last + 1] == to[i])
       match[i] = last + 1;
   }
-  for (std::size_t i = 0; i < to.size() && match[i] == none && i < from.size() && from[i] == to[i]; ++i) match[i] = i;
+  for (std::size_t i = 0; i < to.size() && match[i] == none && i < from.size() && from[i] == to[i]; ++i)
+    match[i] = i;
   keep_rising(match);
 
   std::vector<Passage> passages;

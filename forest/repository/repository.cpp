@@ -13,17 +13,18 @@
 
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
-#include "forest/repository/connection.h"
+#include "forest/repository/database.h"
+#include "forest/repository/insert.h"
 #include "forest/repository/names.h"
+#include "forest/repository/packing.h"
 #include "forest/repository/rows.h"
+#include "forest/statistics/metric.h"
 
 namespace forest::repository {
 namespace {
 
 using soci::into;
 using soci::use;
-using Ints = std::vector<int>;
-using Reals = std::vector<double>;
 
 /// How long the vectors must be that receive `count` rows. SOCI 4.0 leaves a vector of length 1 unfilled when
 /// the question has a parameter; it shortens longer ones to the number of rows that came.
@@ -50,59 +51,50 @@ std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
 /// The statements that store one neuron, prepared once, with the variables they are bound to.
 class Insert {
  public:
-  explicit Insert(soci::session& sql)
-      : soma_points_(sql),
-        soma_links_(sql),
-        points_(sql),
-        neuron_((sql.prepare << "insert into neurons (id, population, name, fingerprint, species, region, "
-                                "layer, type, stems, "
-                                "sections, points, spines, length, checksum) values (:id, :population, "
-                                ":name, :fingerprint, "
-                                ":species, :region, :layer, :type, :stems, :sections, :points, :spines, "
-                                ":length, :checksum)",
-                 use(id), use(population), use(name), use(fingerprint), use(about.species), use(about.region),
-                 use(about.layer), use(about.type), use(stems_), use(section_count_), use(point_count_),
-                 use(spine_count_), use(length_), use(checksum))),
-        provenance_((
-            sql.prepare
-                << "insert into provenance (neuron, origin, source_file, source_hash, grammar, seed, number, "
-                   "program) values (:neuron, :origin, :file, :hash, :grammar, :seed, :number, :program)",
-            use(id), use(origin_), use(file_, if_traced_), use(hash_, if_traced_), use(grammar, if_grown_),
-            use(seed_, if_grown_), use(index_, if_grown_), use(program_))),
-        soma_((sql.prepare << "insert into somata (neuron, kind, x, y, z, radius, area, points, links) "
-                              "values (:neuron, :kind, "
-                              ":x, :y, :z, :radius, :area, :points, :links)",
-               use(id), use(soma_kind_), use(sphere_[0]), use(sphere_[1]), use(sphere_[2]), use(sphere_[3]),
-               use(area_), use(soma_points_, if_soma_), use(soma_links_, if_links_))),
-        data_((sql.prepare << "insert into points (neuron, data) values (:neuron, :data)", use(id),
-               use(points_))),
-        arbors_((
-            sql.prepare << "insert into arbors (neuron, number, root, kind, sections, terminals, max_order, "
-                           "length) values "
-                           "(:neuron, :number, :root, :kind, :sections, :terminals, :max_order, :length)",
-            use(ids_), use(numbers_), use(rows.arbors.root), use(rows.arbors.kind), use(rows.arbors.sections),
-            use(rows.arbors.terminals), use(rows.arbors.order), use(rows.arbors.length))),
-        sections_(
-            (sql.prepare
-                 << "insert into sections (neuron, number, parent, arbor, branch_order, length, kind, tag, "
-                    "soma_point, first_point, point_count) values (:neuron, :number, :parent, :arbor, "
-                    ":branch_order, :length, :kind, :tag, :soma_point, :first_point, :point_count)",
-             use(ids_), use(numbers_), use(rows.sections.parent, if_parent_), use(rows.sections.arbor),
-             use(rows.sections.order), use(rows.sections.length), use(rows.sections.kind),
-             use(rows.sections.tag), use(rows.sections.soma_point), use(rows.sections.first_point),
-             use(rows.sections.point_count))),
-        spines_((sql.prepare << "insert into spines (neuron, number, section, position, head_x, head_y, "
-                                "head_z, head_diameter, "
-                                "neck_diameter, shape) values (:neuron, :number, :section, :position, :x, "
-                                ":y, :z, :head, :neck, "
-                                ":shape)",
-                 use(ids_), use(numbers_), use(spine_section_), use(spine_[0]), use(spine_[1]),
-                 use(spine_[2]), use(spine_[3]), use(spine_[4]), use(spine_[5]), use(spine_shape_))),
-        annotations_(
-            (sql.prepare
-                 << "insert into annotations (neuron, number, name, value) values (:neuron, :number, :name, "
-                    ":value)",
-             use(ids_), use(numbers_), use(key_), use(value_))) {}
+  explicit Insert(Database& database)
+      : neuron_(database, "neurons"),
+        provenance_(database, "provenance"),
+        soma_(database, "somata"),
+        points_(database, "points"),
+        arbors_(database, "arbors"),
+        sections_(database, "sections"),
+        metrics_(database, "neuron_metrics"),
+        spines_(database, "spines"),
+        annotations_(database, "annotations") {
+    neuron_.with("id", id).with("population", population).with("name", name).with("fingerprint", fingerprint);
+    neuron_.with("species", about.species).with("region", about.region).with("layer", about.layer);
+    neuron_.with("type", about.type).with("stems", stems_).with("sections", section_count_);
+    neuron_.with("points", point_count_).with("spines", spine_count_).with("length", length_);
+    neuron_.with("checksum", checksum);
+    provenance_.with("neuron", id).with("origin", origin_).with("source_file", file_, &if_traced_);
+    provenance_.with("source_hash", hash_, &if_traced_).with("grammar", grammar, &if_grown_);
+    provenance_.with("seed", seed_, &if_grown_).with("number", index_, &if_grown_).with("program", program_);
+    soma_.with("neuron", id).with("kind", soma_kind_).with("x", sphere_[0]).with("y", sphere_[1]);
+    soma_.with("z", sphere_[2]).with("radius", sphere_[3]).with("area", area_);
+    soma_.with_bytes("points", rows.soma_points).with_bytes("links", rows.soma_links);
+    points_.with("neuron", id).with_bytes("data", data_).with("packing", packing_);
+    arbors_.with("neuron", ids_).with("number", numbers_).with("root", rows.arbors.root);
+    arbors_.with("kind", rows.arbors.kind).with("sections", rows.arbors.sections);
+    arbors_.with("terminals", rows.arbors.terminals).with("max_order", rows.arbors.order);
+    arbors_.with("length", rows.arbors.length);
+    auto& s = rows.sections;
+    sections_.with("neuron", ids_).with("number", numbers_).with("parent", s.parent, &if_parent_);
+    sections_.with("arbor", s.arbor)
+        .with("branch_order", s.order)
+        .with("length", s.length)
+        .with("kind", s.kind);
+    sections_.with("tag", s.tag).with("soma_point", s.soma_point).with("first_point", s.first_point);
+    sections_.with("point_count", s.point_count).with("daughters", s.daughters).with("area", s.area);
+    sections_.with("start_diameter", s.start_diameter).with("end_diameter", s.end_diameter);
+    sections_.with("end_x", s.end_x).with("end_y", s.end_y).with("end_z", s.end_z);
+    metrics_.with("neuron", ids_).with("metric", rows.metric).with("value", rows.metric_value);
+    spines_.with("neuron", ids_).with("number", numbers_).with("section", spine_section_);
+    constexpr const char* spine_columns[] = {"position", "head_x",        "head_y",
+                                             "head_z",   "head_diameter", "neck_diameter"};
+    for (std::size_t i = 0; i < spine_.size(); ++i) spines_.with(spine_columns[i], spine_[i]);
+    spines_.with("shape", spine_shape_);
+    annotations_.with("neuron", ids_).with("number", numbers_).with("name", key_).with("value", value_);
+  }
 
   // What the caller sets before run().
   int id = 0, population = 0, grammar = 0;
@@ -111,14 +103,15 @@ class Insert {
   Rows rows;
   long long checksum = 0;
 
-  void run(const Morphology& m) {
+  /// False when the population has the name or the fingerprint by now, from another program.
+  bool run(const Morphology& m) {
     stems_ = int(m.roots().size());
     section_count_ = int(m.sections().size());
     point_count_ = int(m.points().size());
     spine_count_ = int(m.spines().size());
     length_ = 0.;
     for (const double length : rows.arbors.length) length_ += length;
-    neuron_.execute(true);
+    if (!neuron_.run()) return false;
 
     const auto* traced = std::get_if<Traced>(&about.provenance);
     const auto* grown = std::get_if<Grown>(&about.provenance);
@@ -127,22 +120,14 @@ class Insert {
     if_grown_ = grown ? soci::i_ok : soci::i_null;
     if (traced) file_ = escaped(traced->file), hash_ = escaped(traced->hash);
     if (grown) seed_ = std::bit_cast<long long>(grown->seed), index_ = std::bit_cast<long long>(grown->index);
-    provenance_.execute(true);
+    provenance_.run();
 
     const Point sphere = m.soma().sphere();
     soma_kind_ = name_of(rows.soma_kind);
     sphere_ = {sphere.x, sphere.y, sphere.z, sphere.radius};
     area_ = m.soma().area();
-    if_soma_ = fill(soma_points_, rows.soma_points);
-    if_links_ = fill(soma_links_, rows.soma_links);
-    soma_.execute(true);
-    if (fill(points_, rows.points) == soci::i_ok) data_.execute(true);
-
-    run(arbors_, rows.arbors.size());
-    if_parent_.assign(rows.sections.size(), soci::i_ok);
-    for (std::size_t i = 0; i < rows.sections.size(); ++i)
-      if (rows.sections.parent[i] < 0) if_parent_[i] = soci::i_null;
-    run(sections_, rows.sections.size());
+    soma_.run();
+    run_shape(m);
 
     spine_section_.clear(), spine_shape_.clear();
     for (Reals& column : spine_) column.clear();
@@ -159,49 +144,78 @@ class Insert {
     for (const auto& [key, value] : rows.annotations)
       key_.push_back(escaped(key)), value_.push_back(escaped(value));
     run(annotations_, rows.annotations.size());
+    return true;
+  }
+
+  /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
+  void run_shape(const Morphology& m) {
+    data_ = packed(m.points());
+    packing_ = data_.empty() ? 0 : 1;
+    if (!packing_) data_ = rows.points;
+    if (!data_.empty()) points_.run();
+    run(arbors_, rows.arbors.size());
+    if_parent_.assign(rows.sections.size(), soci::i_ok);
+    for (std::size_t i = 0; i < rows.sections.size(); ++i)
+      if (rows.sections.parent[i] < 0) if_parent_[i] = soci::i_null;
+    run(sections_, rows.sections.size());
+    run(metrics_, rows.metric.size());
   }
 
  private:
   /// A table with `count` rows of this neuron.
-  void run(soci::statement& statement, std::size_t count) {
+  void run(RowsInsert& insert, std::size_t count) {
     if (count == 0) return;
     ids_.assign(count, id);
     for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(int(i));
     numbers_.resize(count);
-    statement.execute(true);
+    insert.run(count);
   }
 
-  static soci::indicator fill(soci::blob& blob, const std::string& bytes) {
-    blob.trim(0);
-    if (bytes.empty()) return soci::i_null;
-    blob.append(bytes.data(), bytes.size());
-    return soci::i_ok;
-  }
-
-  int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0;
+  int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0, packing_ = 0;
   double length_ = 0., area_ = 0.;
-  std::string origin_, file_, hash_, program_ = FOREST_VERSION, soma_kind_;
-  soci::indicator if_traced_ = soci::i_ok, if_grown_ = soci::i_ok, if_soma_ = soci::i_ok,
-                  if_links_ = soci::i_ok;
+  std::string origin_, file_, hash_, program_ = FOREST_VERSION, soma_kind_, data_;
+  soci::indicator if_traced_ = soci::i_ok, if_grown_ = soci::i_ok;
   long long seed_ = 0, index_ = 0;
   std::array<double, 4> sphere_{};
-  soci::blob soma_points_, soma_links_, points_;
   Ints ids_, numbers_, spine_section_, spine_shape_;
   std::vector<soci::indicator> if_parent_;
   std::array<Reals, 6> spine_;
-  std::vector<std::string> key_, value_;
-  soci::statement neuron_, provenance_, soma_, data_, arbors_, sections_, spines_,
-      annotations_;  // after what they use
+  Texts key_, value_;
+  RowInsert neuron_, provenance_, soma_, points_;  // after what they use
+  RowsInsert arbors_, sections_, metrics_, spines_, annotations_;
 };
 
 }  // namespace
 
 struct Repository::Impl {
   std::string place;
-  mutable soci::session sql;
+  std::shared_ptr<Database> database;
+  soci::session& sql;
   std::unique_ptr<Insert> insert;  // prepared on first use
   bool writing = false;            // a transaction is open
   bool failed = false;             // and cannot be committed any more
+
+  Impl(const std::string& at, std::shared_ptr<Database> open)
+      : place(at), database(std::move(open)), sql(database->sql()) {}
+
+  /// What version 1 stored, with what version 2 knows of it besides.
+  static void refill(Database& database, int from) {
+    if (from != 1) return;
+    Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
+    impl.writing = true;
+    Insert insert(database);
+    std::vector<int> ids(room(std::size_t(impl.ask<int>("select count(*) from neurons").value_or(0))));
+    impl.sql << "select id from neurons order by id", into(ids);
+    for (const int id : ids) {
+      const Morphology m = morphology_of(impl.stored(NeuronId(std::size_t(id))));
+      for (const char* table : {"points", "arbors", "sections"})
+        impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
+      insert.id = id;
+      insert.rows = rows_of(m);
+      insert.run_shape(m);
+    }
+    impl.writing = false;
+  }
 
   /// Calls `body`; errors of the database become sentences.
   template <class Body>
@@ -209,16 +223,17 @@ struct Repository::Impl {
     try {
       return body();
     } catch (...) {
-      rethrow(place);
+      database->rethrow(place);
+      throw;  // not reached: compilers do not believe it of a virtual function
     }
   }
 
   void undo() noexcept {
-    insert.reset();  // a statement that failed is not used again
     try {
       sql << "rollback";
     } catch (const std::exception&) {  // the database has done so already
     }
+    insert.reset();  // a statement that failed is not used again
     writing = failed = false;
   }
 
@@ -236,7 +251,7 @@ struct Repository::Impl {
           throw;
         }
       }
-      begin_writing(sql);
+      database->begin_writing();
       writing = true;
       try {
         auto result = body();
@@ -263,7 +278,7 @@ struct Repository::Impl {
           }
         }
       };
-      if (!writing) begin_reading(sql);
+      if (!writing) database->begin_reading();
       const End end{writing ? nullptr : &sql};
       return body();
     });
@@ -283,8 +298,28 @@ struct Repository::Impl {
     return result;
   }
 
-  int next_id(const std::string& table) const {
-    return ask<int>(fmt::format("select max(id) from {}", table)).value_or(0) + 1;
+  /// Bytes in a column, by a question with one {} for it and one parameter.
+  std::string bytes(const char* question, const char* column, int id) const {
+    const bool text = database->as_text();
+    const std::string query =
+        fmt::format(fmt::runtime(question), text ? fmt::format("encode({}, 'hex')", column) : column);
+    if (text) return from_hexadecimal(ask<std::string>(query, id).value_or(""));
+    soci::blob blob(sql);
+    soci::indicator filled = soci::i_null;
+    sql << query, into(blob, filled), use(id);
+    std::string result(filled == soci::i_ok ? blob.get_len() : 0, '\0');
+    if (!result.empty()) blob.read(0, result.data(), result.size());
+    return result;
+  }
+
+  /// The number of a population, which is made when there is none.
+  int population(const std::string& name) {
+    const std::string find = "select id from populations where name = :name";
+    if (const auto id = ask<int>(find, name)) return *id;
+    const int id = database->next_id("populations");
+    sql << "insert into populations (id, name) values (:id, :name) on conflict do nothing", use(id),
+        use(name);
+    return *ask<int>(find, name);  // another program may have been quicker
   }
 
   std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
@@ -298,10 +333,7 @@ Repository::Repository(Repository&&) noexcept = default;
 Repository& Repository::operator=(Repository&&) noexcept = default;
 
 Repository Repository::open(const std::string& place, Access access) {
-  auto impl = std::make_unique<Impl>();
-  impl->place = place;
-  impl->guarded([&] { connect(impl->sql, place, access == Access::write); });
-  return Repository(std::move(impl));
+  return Repository(std::make_unique<Impl>(place, connect(place, access == Access::write, Impl::refill)));
 }
 
 Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
@@ -312,28 +344,16 @@ Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
   const std::uint64_t sum = checksum(rows);
 
   return impl.write([&] {
-    if (!impl.insert) impl.insert = std::make_unique<Insert>(impl.sql);
+    if (!impl.insert) impl.insert = std::make_unique<Insert>(*impl.database);
     Insert& insert = *impl.insert;
     insert.fingerprint = fingerprint(neuron.provenance, sum);
-    insert.name = neuron.name;
-    const auto population = impl.ask<int>("select id from populations where name = :name", neuron.population);
-    if (population) {
-      const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
-      if (const auto there = impl.ask<int>("select id " + same, *population, insert.fingerprint))
-        return Added{NeuronId(std::size_t(*there)),
-                     *impl.ask<std::string>("select name " + same, *population, insert.fingerprint), true};
-      const auto taken = [&] {
-        return impl.ask<int>("select id from neurons where population = :population and name = :name",
-                             *population, insert.name);
-      };
-      for (int number = 2; taken(); ++number) {
-        if (!neuron.number_if_taken)
-          throw Error(
-              fmt::format("another neuron of population {} is called {}; choose another name or population",
-                          shown(neuron.population), shown(neuron.name)));
-        insert.name = fmt::format("{}-{}", neuron.name, number);
-      }
-    }
+    insert.about = neuron;
+    for (std::string* text :
+         {&insert.about.species, &insert.about.region, &insert.about.layer, &insert.about.type})
+      *text = escaped(*text);
+    insert.rows = std::move(rows);
+    insert.checksum = std::bit_cast<long long>(sum);
+    insert.population = impl.population(neuron.population);
     if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
       const auto grammar = impl.ask<int>("select id from grammars where hash = :hash and name = :name",
                                          grown->grammar_hash, grown->grammar);
@@ -343,21 +363,27 @@ Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
             shown(grown->grammar), shown(neuron.name)));
       insert.grammar = *grammar;
     }
-    insert.population = population.value_or(0);
-    if (!population) {
-      insert.population = impl.next_id("populations");
-      impl.sql << "insert into populations (id, name) values (:id, :name)", use(insert.population),
-          use(neuron.population);
+    insert.name = neuron.name;
+    for (int number = 2;;) {
+      const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
+      if (const auto there = impl.ask<int>("select id " + same, insert.population, insert.fingerprint))
+        return Added{NeuronId(std::size_t(*there)),
+                     *impl.ask<std::string>("select name " + same, insert.population, insert.fingerprint),
+                     true};
+      if (const auto other = impl.ask<std::string>(
+              "select fingerprint from neurons where population = :population and name = :name",
+              insert.population, insert.name)) {
+        if (*other == insert.fingerprint) continue;  // another program stored it since we looked
+        if (!neuron.number_if_taken)
+          throw Error(
+              fmt::format("another neuron of population {} is called {}; choose another name or population",
+                          shown(neuron.population), shown(neuron.name)));
+        insert.name = fmt::format("{}-{}", neuron.name, number++);
+        continue;
+      }
+      insert.id = impl.database->next_id("neurons");
+      if (insert.run(morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
     }
-    insert.id = impl.next_id("neurons");
-    insert.about = neuron;
-    for (std::string* text :
-         {&insert.about.species, &insert.about.region, &insert.about.layer, &insert.about.type})
-      *text = escaped(*text);
-    insert.rows = std::move(rows);
-    insert.checksum = std::bit_cast<long long>(sum);
-    insert.run(morphology);
-    return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
   });
 }
 
@@ -366,9 +392,10 @@ std::string Repository::add_grammar(std::string_view name, std::string_view text
   return impl_->write([&] {
     const std::string hash = hash_of(text), kept_name(name), kept_text = escaped(text);
     if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {
-      const int id = impl_->next_id("grammars");
-      impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text)", use(id),
-          use(kept_name), use(hash), use(kept_text);
+      const int id = impl_->database->next_id("grammars");
+      impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on "
+                    "conflict do nothing",
+          use(id), use(kept_name), use(hash), use(kept_text);
     }
     return hash;
   });
@@ -384,7 +411,7 @@ std::optional<std::string> Repository::grammar(std::string_view hash) const {
 
 Repository::Transaction Repository::begin() {
   if (impl_->writing) throw Error(impl_->place + ": a transaction is open already; commit it first");
-  impl_->guarded([&] { begin_writing(impl_->sql); });
+  impl_->guarded([&] { impl_->database->begin_writing(); });
   impl_->writing = true;
   return Transaction(*impl_);
 }
@@ -482,6 +509,74 @@ std::vector<NeuronRow> Repository::neurons(std::string_view population) const {
   return impl_->rows("(p.name = :population or :every = '') and :unused = 0", name, name, 0);
 }
 
+namespace {
+
+/// A condition whose names of metrics have become columns of joined tables, and the joins.
+struct Condition {
+  std::string text, joins;
+};
+
+Condition condition_of(std::string_view text) {
+  Condition condition;
+  std::vector<int> joined;
+  for (std::size_t at = 0; at < text.size();) {
+    const char c = text[at];
+    const auto word_char = [](char d) {
+      return (d >= 'a' && d <= 'z') || (d >= 'A' && d <= 'Z') || (d >= '0' && d <= '9') || d == '_' || d < 0;
+    };
+    if (c == '\'' || c == '"') {  // a text or a quoted name stays as it is
+      const std::size_t end = std::min(text.find(c, at + 1), text.size() - 1) + 1;
+      condition.text += text.substr(at, end - at);
+      at = end;
+    } else if (word_char(c)) {
+      std::size_t end = at;
+      while (end < text.size() && word_char(text[end])) ++end;
+      const std::string_view word = text.substr(at, end - at);
+      if (const statistics::Metric* metric = statistics::find_metric(word)) {
+        const int number = int(metric - statistics::metrics().data()) + 1;
+        if (std::ranges::find(joined, number) == joined.end()) {
+          joined.push_back(number);
+          condition.joins += fmt::format(
+              " left join neuron_metrics m{0} on m{0}.neuron = v.id and m{0}.metric = {0}", number);
+        }
+        condition.text += fmt::format("m{}.value", number);
+      } else {
+        condition.text += word;
+      }
+      at = end;
+    } else {
+      condition.text += c;
+      ++at;
+    }
+  }
+  return condition;
+}
+
+}  // namespace
+
+std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::string_view population) const {
+  const Condition condition = condition_of(text);
+  // Asked alone first: what is wrong with it is the person's, not the database's.
+  const std::string ids =
+      fmt::format("select v.id from neuron v{} where ({})", condition.joins, condition.text);
+  const Answer found = impl_->read([&] { return impl_->database->ask(ids); });
+  std::vector<NeuronRow> rows;
+  if (found.rows.empty()) return rows;
+  std::vector<std::int64_t> chosen;
+  for (const auto& row : found.rows) chosen.push_back(std::get<std::int64_t>(row[0]));
+  std::ranges::sort(chosen);
+  for (NeuronRow& row : neurons(population))
+    if (std::ranges::binary_search(chosen, std::int64_t(row.id.value()))) rows.push_back(std::move(row));
+  return rows;
+}
+
+Answer Repository::query(const std::string& question) {
+  return impl_->guarded([&] {
+    impl_->database->forbid_writing();
+    return impl_->database->ask(question);
+  });
+}
+
 std::vector<NeuronRow> Repository::find(std::string_view name, std::string_view population) const {
   const std::string where =
       population.empty() ? "n.name = :name and :population = ''" : "n.name = :name and p.name = :population";
@@ -522,24 +617,18 @@ Rows Repository::Impl::stored(NeuronId id) const {
     return std::size_t(
         ask<int>(fmt::format("select count(*) from {} where neuron = :id", table), neuron).value_or(0));
   };
-  const auto text = [](soci::blob& blob, soci::indicator filled) {
-    std::string bytes(filled == soci::i_ok ? blob.get_len() : 0, '\0');
-    if (!bytes.empty()) blob.read(0, bytes.data(), bytes.size());
-    return bytes;
-  };
   Rows rows;
-  std::string kind;
-  soci::blob points(sql), soma_points(sql), soma_links(sql);
-  soci::indicator has_points = soci::i_null, has_soma = soci::i_null, has_links = soci::i_null;
-  sql << "select kind, points, links from somata where neuron = :id", into(kind), into(soma_points, has_soma),
-      into(soma_links, has_links), use(neuron);
-  sql << "select data from points where neuron = :id", into(points, has_points), use(neuron);
-  const auto known = soma_kind(kind);
+  const auto known =
+      soma_kind(ask<std::string>("select kind from somata where neuron = :id", neuron).value_or(""));
   if (!known) throw Error("its soma is of no known kind");
   rows.soma_kind = *known;
-  rows.points = text(points, has_points);
-  rows.soma_points = text(soma_points, has_soma);
-  rows.soma_links = text(soma_links, has_links);
+  rows.soma_points = bytes("select {} from somata where neuron = :id", "points", neuron);
+  rows.soma_links = bytes("select {} from somata where neuron = :id", "links", neuron);
+  rows.points = bytes("select {} from points where neuron = :id", "data", neuron);
+  if (ask<int>("select packing from points where neuron = :id", neuron).value_or(0)) {
+    const std::vector<Point> points = unpacked(rows.points);
+    rows.points.assign(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Point));
+  }
 
   if (const std::size_t n = count("sections")) {
     auto& s = rows.sections;
@@ -620,12 +709,8 @@ std::vector<std::string> Repository::check(Progress& progress) const {
   std::vector<std::string> findings;
   try {
     impl_->guarded([&] {
-      soci::rowset<std::string> lines = (impl_->sql.prepare << "pragma integrity_check");
-      for (const std::string& line : lines)
-        if (line != "ok") findings.push_back(fmt::format("{}: is damaged ({})", impl_->place, line));
-      const int strays = impl_->ask<int>("select count(*) from pragma_foreign_key_check").value_or(0);
-      if (strays)
-        findings.push_back(fmt::format("{}: is damaged ({} rows belong to nothing)", impl_->place, strays));
+      for (const std::string& finding : impl_->database->examine_structure())
+        findings.push_back(fmt::format("{}: {}", impl_->place, finding));
     });
     const auto rows = neurons();
     progress.begin("checking", rows.size());

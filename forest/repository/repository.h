@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Neurons in a SQL database: who they are, what they look like, where they come from. Today the database is
-// one SQLite file; docs/repository/schema.md draws its tables, for people who want to ask it in SQL.
+// Neurons in a SQL database: who they are, what they look like, where they come from. The database is one
+// SQLite file or lies on a PostgreSQL server; docs/repository/schema.md draws its tables, for people who want to ask it in SQL.
 //
 //   auto repository = Repository::open("cells.db", Access::write);
 //   repository.add(morphology, {.name = "cell7", .population = "L5", .provenance = Traced{"cell7.swc",
@@ -23,6 +23,7 @@
 
 #include "forest/core/progress.h"
 #include "forest/morphology/morphology.h"
+#include "forest/repository/answer.h"
 
 namespace forest::repository {
 
@@ -92,7 +93,7 @@ enum class Access : std::uint8_t { read, write };
 
 class Repository {
  public:
-  /// Opens the repository at `place`: a path, or later a `postgresql://…` address. With Access::write it is
+  /// Opens the repository at `place`: a path, or a `postgresql://…` address. With Access::write it is
   /// made on first use. Throws InputError when there is none, when the file is something else, newer than
   /// this program, cut off or damaged.
   static Repository open(const std::string& place, Access access);
@@ -119,6 +120,10 @@ class Repository {
   std::vector<PopulationRow> populations() const;  // by name
   std::vector<NeuronRow> neurons(
       std::string_view population = "") const;  // in the order of storing; "": of all populations
+  /// Those for which a condition in SQL holds, on the columns of the view `neuron` and the names of metrics:
+  ///   "type = 'L5 pyramidal' and total_length > 5000"
+  /// Throws Error that says what is not understood.
+  std::vector<NeuronRow> neurons_where(const std::string& condition, std::string_view population = "") const;
   std::vector<NeuronRow> find(std::string_view name,
                               std::string_view population = "") const;  // every neuron of that name
   std::optional<NeuronRow> neuron(NeuronId id) const;
@@ -129,6 +134,10 @@ class Repository {
   Morphology morphology(NeuronId id) const;
 
   bool remove(NeuronId id);  // false when there was none
+
+  /// One question in SQL, on the views neuron, section, junction, metric and the tables (docs/repository/schema.md).
+  /// From then on this object can only read. Throws Error that says what is not understood.
+  Answer query(const std::string& question);
 
   /// Looks at every byte that matters: the database's own structure and the checksum of every neuron. Returns
   /// one sentence for each thing found; empty when all is well.

@@ -19,8 +19,11 @@
 #include "forest/core/file.h"
 #include "forest/core/hash.h"
 #include "forest/core/random.h"
+#include "forest/morphology/measure.h"
 #include "forest/repository/names.h"
 #include "forest/repository/schema.h"
+
+#include "tests/postgresql.h"
 
 namespace forest::repository {
 namespace {
@@ -43,6 +46,31 @@ class RepositoryTest : public testing::Test {
   fs::path folder_;
   std::string file_;
 };
+
+/// The same of every database: place_ names a repository that does not exist yet.
+class EveryDatabase : public RepositoryTest, public testing::WithParamInterface<std::string> {
+ protected:
+  void SetUp() override {
+    RepositoryTest::SetUp();
+    place_ = file_;
+    if (GetParam() == "sqlite") return;
+    const auto& server = PostgresqlServer::get();
+    if (!server.runs()) {
+      if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
+      GTEST_SKIP() << "there is no PostgreSQL here";
+    }
+    static int count = 0;
+    const std::string name = fmt::format("cells{}", ++count);
+    ASSERT_TRUE(server.run("create database " + name));
+    place_ = server.address(name);
+  }
+  bool is_file() const { return place_ == file_; }
+
+  std::string place_;
+};
+
+INSTANTIATE_TEST_SUITE_P(Databases, EveryDatabase, testing::Values("sqlite", "postgresql"),
+                         [](const auto& row) { return row.param; });
 
 std::string bytes_of(const fs::path& path) { return std::string(MappedFile(path).text()); }
 
@@ -98,18 +126,18 @@ NewNeuron called(std::string name, std::string population = "default") {
           .provenance = Traced{name + ".swc", "hash of " + name}};
 }
 
-TEST_F(RepositoryTest, GivesBackExactlyWhatWasStored) {
+TEST_P(EveryDatabase, GivesBackExactlyWhatWasStored) {
   std::vector<Morphology> neurons;
   for (std::size_t i = 0; i < 24; ++i) neurons.push_back(neuron(i, i * i));
   {
-    Repository repository = Repository::open(file_, Access::write);
+    Repository repository = Repository::open(place_, Access::write);
     for (std::size_t i = 0; i < neurons.size(); ++i) {
       const Added added = repository.add(neurons[i], called(fmt::format("n{}", i)));
       EXPECT_EQ(added.id.value(), i + 1);
       EXPECT_FALSE(added.already_there);
     }
   }
-  const Repository repository = Repository::open(file_, Access::read);
+  const Repository repository = Repository::open(place_, Access::read);
   const auto rows = repository.neurons();
   ASSERT_EQ(rows.size(), neurons.size());
   for (std::size_t i = 0; i < neurons.size(); ++i) {
@@ -130,8 +158,8 @@ TEST_F(RepositoryTest, GivesBackExactlyWhatWasStored) {
   EXPECT_THAT(repository.check(), testing::IsEmpty());
 }
 
-TEST_F(RepositoryTest, KeepsWhereANeuronComesFrom) {
-  Repository repository = Repository::open(file_, Access::write);
+TEST_P(EveryDatabase, KeepsWhereANeuronComesFrom) {
+  Repository repository = Repository::open(place_, Access::write);
   const Traced traced{"folder/Zelle \xe4 'x'.swc", "00ff"};
   const std::string text = "#axiom\nF(1)\n\xff";
   const Grown grown{"purkinje", repository.add_grammar("purkinje", text), 0xffffffffffffffffu, 41};
@@ -191,8 +219,8 @@ TEST_F(RepositoryTest, TheSameCallsGiveTheSameBytes) {
   EXPECT_TRUE(bytes_of(file_) == bytes_of(file_ + "2"));
 }
 
-TEST_F(RepositoryTest, ANameTakenByAnotherNeuronIsRefusedOrNumbered) {
-  Repository repository = Repository::open(file_, Access::write);
+TEST_P(EveryDatabase, ANameTakenByAnotherNeuronIsRefusedOrNumbered) {
+  Repository repository = Repository::open(place_, Access::write);
   repository.add(neuron(1), called("cell"));
   NewNeuron other = called("cell");
   other.provenance = Traced{"other/cell.swc", "another hash"};
@@ -208,8 +236,8 @@ TEST_F(RepositoryTest, ANameTakenByAnotherNeuronIsRefusedOrNumbered) {
   EXPECT_EQ(repository.find("cell", "elsewhere").size(), 1u);
 }
 
-TEST_F(RepositoryTest, HostileNamesAreJustNames) {
-  Repository repository = Repository::open(file_, Access::write);
+TEST_P(EveryDatabase, HostileNamesAreJustNames) {
+  Repository repository = Repository::open(place_, Access::write);
   const std::vector<std::string> names{"'",
                                        "\"",
                                        "'); DROP TABLE neurons; --",
@@ -245,17 +273,20 @@ TEST_F(RepositoryTest, HostileNamesAreJustNames) {
   EXPECT_THAT(repository.check(), testing::IsEmpty());
 }
 
-TEST_F(RepositoryTest, ATransactionIsAllOrNothing) {
-  Repository repository = Repository::open(file_, Access::write);
-  const std::string before = bytes_of(file_);
+TEST_P(EveryDatabase, ATransactionIsAllOrNothing) {
+  Repository repository = Repository::open(place_, Access::write);
+  const std::string before = is_file() ? bytes_of(place_) : "";
   {
     auto transaction = repository.begin();
     repository.add(neuron(1), called("one"));
     repository.add(neuron(2), called("two"));
     EXPECT_EQ(repository.neurons().size(), 2u) << "seen inside it";
-    EXPECT_EQ(Repository::open(file_, Access::read).neurons().size(), 0u) << "but not by others";
+    EXPECT_EQ(Repository::open(place_, Access::read).neurons().size(), 0u) << "but not by others";
   }
-  EXPECT_EQ(bytes_of(file_), before);
+  if (is_file()) {
+    EXPECT_EQ(bytes_of(place_), before);
+  }
+  EXPECT_TRUE(repository.neurons().empty());
   auto transaction = repository.begin();
   repository.add(neuron(1), called("one"));
   EXPECT_THROW(repository.add(neuron(2), called("")), Error);
@@ -263,8 +294,8 @@ TEST_F(RepositoryTest, ATransactionIsAllOrNothing) {
   EXPECT_EQ(repository.neurons().size(), 1u) << "a refused neuron does not spoil the others";
 }
 
-TEST_F(RepositoryTest, RemovingLeavesNothingOfANeuron) {
-  Repository repository = Repository::open(file_, Access::write);
+TEST_P(EveryDatabase, RemovingLeavesNothingOfANeuron) {
+  Repository repository = Repository::open(place_, Access::write);
   for (std::size_t i = 0; i < 3; ++i) repository.add(neuron(i + 1), called(fmt::format("n{}", i)));
   EXPECT_TRUE(repository.remove(NeuronId(2)));
   EXPECT_FALSE(repository.remove(NeuronId(2)));
@@ -275,8 +306,8 @@ TEST_F(RepositoryTest, RemovingLeavesNothingOfANeuron) {
   EXPECT_THAT(repository.check(), testing::IsEmpty());
 }
 
-TEST_F(RepositoryTest, PopulationsAreSummedUp) {
-  Repository repository = Repository::open(file_, Access::write);
+TEST_P(EveryDatabase, PopulationsAreSummedUp) {
+  Repository repository = Repository::open(place_, Access::write);
   EXPECT_TRUE(repository.populations().empty());
   for (std::size_t i = 0; i < 6; ++i)
     repository.add(neuron(i), called(fmt::format("n{}", i), i % 3 ? "many" : "few"));
@@ -425,19 +456,168 @@ TEST_F(RepositoryTest, AFullDiskIsASentenceAndLosesNothing) {
   }
 }
 
-TEST_F(RepositoryTest, TwoProgramsStoreAtOnce) {
+TEST_P(EveryDatabase, TwoProgramsStoreAtOnce) {
   std::vector<Morphology> source;
   for (std::size_t i = 0; i < 80; ++i) source.push_back(neuron(i));
   std::array<pid_t, 3> children{};
   for (std::size_t c = 0; c < children.size(); ++c)
     children[c] = in_child([&] {
-      Repository repository = Repository::open(file_, Access::write);  // all three make the file
+      Repository repository = Repository::open(place_, Access::write);  // all three make the file
       for (std::size_t i = 0; i < source.size(); ++i)
         if (c == 2 || i % 2 == c)
           repository.add(source[i], called(std::to_string(i)));  // the third stores what the others do
     });
   for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
-  EXPECT_EQ(whole_neurons(file_, source), source.size());
+  EXPECT_EQ(whole_neurons(place_, source), source.size());
+}
+
+TEST_P(EveryDatabase, IsSearchedByWhatIsKnownAndMeasured) {
+  Repository repository = Repository::open(place_, Access::write);
+  std::vector<double> lengths;
+  for (std::size_t i = 0; i < 20; ++i) {
+    NewNeuron about = called(fmt::format("n{}", i), i % 2 ? "odd" : "even");
+    about.type = i % 4 ? "L5 pyramidal" : "a 'basket' cell";
+    repository.add(neuron(i, 10 + 7 * i), about);
+    lengths.push_back(total_length(neuron(i, 10 + 7 * i)));
+  }
+  const auto found = repository.neurons_where("total_length > 9000 and type = 'L5 pyramidal'");
+  std::size_t expected = 0;
+  for (std::size_t i = 0; i < 20; ++i) expected += lengths[i] > 9000. && i % 4;
+  ASSERT_GT(expected, 0u);
+  ASSERT_LT(expected, 15u);
+  EXPECT_EQ(found.size(), expected);
+  for (const NeuronRow& row : found) EXPECT_GT(row.length, 9000.);
+  EXPECT_EQ(repository.neurons_where("type = 'a ''basket'' cell'").size(), 5u);
+  EXPECT_EQ(repository.neurons_where("name in ('n3', 'n4')", "odd").size(), 1u);
+  EXPECT_EQ(
+      repository.neurons_where("total_length / sections > 0 and max_branch_order >= 0 or name = 'x'").size(),
+      20u);
+  EXPECT_EQ(repository.neurons_where("type = 'total_length'").size(), 0u) << "a text is no metric";
+  EXPECT_THAT(message([&] { repository.neurons_where("colour = 'red'"); }), HasSubstr("not understood"));
+  EXPECT_THAT(message([&] { repository.neurons_where("1 = 1); delete from neurons; --"); }),
+              testing::Ne("no error"));
+  EXPECT_EQ(repository.neurons().size(), 20u);
+}
+
+TEST_P(EveryDatabase, AnswersQuestionsInSqlAndLetsNothingBeWritten) {
+  Repository::open(place_, Access::write).add(neuron(5), called("five"));
+  Repository repository = Repository::open(place_, Access::write);
+  const auto one = [&](const std::string& question) { return repository.query(question).rows.at(0).at(0); };
+  const Answer row = repository.query("select name, sections, length, species, null as none from neuron");
+  EXPECT_THAT(row.columns, testing::ElementsAre("name", "sections", "length", "species", "none"));
+  EXPECT_EQ(row.rows.at(0).at(0), Answer::Value("five"));
+  EXPECT_EQ(row.rows[0][1], Answer::Value(std::int64_t(40)));
+  EXPECT_EQ(std::get<double>(row.rows[0][2]), repository.neurons().at(0).length);
+  EXPECT_EQ(row.rows[0][4], Answer::Value());
+  EXPECT_EQ(one("select count(*) from section"), Answer::Value(std::int64_t(40)));
+  EXPECT_EQ(one("select count(*) from junction where junction = 'terminal'"),
+            one("select cast(value as integer) from metric where metric = 'number_of_leaves'"));
+  EXPECT_NEAR(std::get<double>(one("select value from metric where metric = 'total_length'")),
+              repository.neurons()[0].length, 1e-9 * repository.neurons()[0].length);
+  const Morphology m = neuron(5);
+  const Answer ends = repository.query("select x, y, z, diameter from junction where section = 7");
+  const Point end = m.points(SectionId(7)).back();
+  EXPECT_EQ(ends.rows.at(0), (std::vector<Answer::Value>{double(end.x), double(end.y), double(end.z),
+                                                         2. * double(end.radius)}));
+  for (const char* question :
+       {"delete from neurons", "update neurons set name = 'x'", "drop table neurons",
+        "create table t (x integer)", "insert into populations (id, name) values (9, 'x')",
+        "pragma query_only = off", "vacuum", "attach database '/tmp/forest-attached.db' as other",
+        "select 1; delete from neurons", "", "select * from nowhere", "copy neurons to '/tmp/forest-copied'",
+        "with x as (select 1) delete from neurons", "set transaction read write",
+        "set session characteristics as transaction read write"})
+    message([&] { repository.query(question); });
+  for (const char* question : {"delete from neurons", "create table t (x integer)", "drop view metric"})
+    EXPECT_THAT(message([&] { repository.query(question); }), HasSubstr("read and not write")) << question;
+  EXPECT_EQ(Repository::open(place_, Access::read).morphology(NeuronId(1)), m);
+  EXPECT_FALSE(fs::exists("/tmp/forest-attached.db") || fs::exists("/tmp/forest-copied"));
+}
+
+/// As version 1 stored it.
+std::string as_version_1(const std::string& file) {
+  return fmt::format(
+      "sqlite3 '{}' 'begin; drop view neuron; drop view section; drop view junction; drop view metric; "
+      "drop table neuron_metrics; drop table metrics; drop table distributions; "
+      "alter table points drop column packing; alter table sections drop column daughters; "
+      "alter table sections drop column area; alter table sections drop column start_diameter; "
+      "alter table sections drop column end_diameter; alter table sections drop column end_x; "
+      "alter table sections drop column end_y; alter table sections drop column end_z; "
+      "pragma user_version = 1; commit'",
+      file);
+}
+
+TEST_F(RepositoryTest, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 30; ++i) source.push_back(neuron(i, 60));
+  std::vector<NeuronRow> rows;
+  {
+    Repository repository = Repository::open(file_, Access::write);
+    for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+    rows = repository.neurons();
+  }
+  ASSERT_EQ(std::system(as_version_1(file_).c_str()), 0);
+  const std::string old = bytes_of(file_);
+  Random random(3);
+  for (int round = 0; round < 12; ++round) {
+    write_file(file_, old);
+    const pid_t child = in_child([&] { Repository::open(file_, Access::read); });
+    ::usleep(std::uint32_t(random.uniform(0., 30'000.)));
+    ::kill(child, SIGKILL);
+    wait_for(child);
+    EXPECT_EQ(whole_neurons(file_, source), source.size()) << "opening it again ends what was begun";
+  }
+  Repository repository = Repository::open(file_, Access::read);
+  EXPECT_EQ(repository.neurons_where("total_length > 0").size(), source.size());
+  EXPECT_EQ(repository.query("select sum(end_x + daughters) from sections where neuron = 5").rows.size(), 1u);
+  const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
+  EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
+}
+
+TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
+  const auto& server = PostgresqlServer::get();
+  if (!server.runs()) {
+    if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
+    GTEST_SKIP() << "there is no PostgreSQL here";
+  }
+  ASSERT_TRUE(server.run("create database shared"));
+  ASSERT_TRUE(server.run("create role reader login"));
+  const std::string mine = server.address("shared"), theirs = server.address("shared", "reader");
+  EXPECT_THAT(message([&] { Repository::open(theirs, Access::read); }), HasSubstr("holds no repository"));
+  EXPECT_THAT(message([&] { Repository::open(theirs, Access::write); }), HasSubstr("may not write"));
+  Repository::open(mine, Access::write).add(neuron(3), called("three"));
+  ASSERT_TRUE(server.run("grant select on all tables in schema public to reader", "shared"));
+  Repository reader = Repository::open(theirs, Access::read);
+  EXPECT_EQ(reader.morphology(NeuronId(1)), neuron(3));
+  EXPECT_THAT(message([&] { reader.add(neuron(4), called("four")); }), HasSubstr("may not write"));
+  EXPECT_THAT(message([&] { Repository::open(theirs, Access::write); }), HasSubstr("may not write"));
+  EXPECT_THAT(message([&] { Repository::open(server.address("nowhere"), Access::read); }),
+              HasSubstr("the server cannot be reached"));
+}
+
+TEST(Postgresql, AKilledProgramLeavesWholeNeurons) {
+  const auto& server = PostgresqlServer::get();
+  if (!server.runs()) GTEST_SKIP() << "there is no PostgreSQL here";
+  ASSERT_TRUE(server.run("create database killed"));
+  const std::string place = server.address("killed");
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 40; ++i) source.push_back(neuron(i, 50 + i % 7 * 50));
+  Random random(2);
+  std::size_t before = 0;
+  for (int round = 0; round < 25; ++round) {
+    const pid_t child = in_child([&] {
+      Repository repository = Repository::open(place, Access::write);
+      for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+    });
+    ::usleep(std::uint32_t(random.uniform(0., 60'000.)));
+    ::kill(child, SIGKILL);
+    wait_for(child);
+    std::size_t now = before;
+    const std::string said = message([&] { now = whole_neurons(place, source); });
+    EXPECT_TRUE(said == "no error" || (before == 0 && said.find("holds no repository") != said.npos)) << said;
+    EXPECT_GE(now, before);
+    before = now;
+  }
+  EXPECT_GT(before, 0u);
 }
 
 TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
@@ -455,8 +635,7 @@ TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
       {std::string(100'000, '\0'), "is no repository"},
       {patched(0, "SQLite format 4"), "is no repository"},
       {patched(68, "\0\0\0\0"s), "another SQLite database"},
-      {patched(60, "\0\0\0\x02"s),
-       "was made by a newer Brain Forest (its tables are of version 2, this program knows 1)"},
+      {patched(60, "\0\0\0\x63"s), "was made by a newer Brain Forest (its tables are of version 99"},
       {patched(60, "\0\0\0\0"s), "damaged"},
   };
   for (const auto& [bytes, sentence] : wrong)
@@ -473,8 +652,14 @@ TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
     EXPECT_THAT(message([&] { Repository::open("", access); }), HasSubstr("is no path"));
     EXPECT_THAT(message([&] { Repository::open(std::string(10'000'000, 'x'), access); }).size(),
                 testing::Lt(300u));
-    EXPECT_THAT(message([&] { Repository::open("postgresql://host/cells", access); }),
-                HasSubstr("is a server"));
+    EXPECT_THAT(message([&] { Repository::open("postgresql://127.0.0.1:1/cells", access); }),
+                HasSubstr("the server cannot be reached"));
+    for (const char* secret :
+         {"postgresql://me:Rosebud@host/cells", "postgresql://host/cells?password=Rosebud"}) {
+      const std::string said = message([&] { Repository::open(secret, access); });
+      EXPECT_THAT(said, HasSubstr("PGPASSWORD"));
+      EXPECT_THAT(said, testing::Not(HasSubstr("Rosebud")));
+    }
   }
   EXPECT_THAT(message([&] { Repository::open(file_ + "x", Access::read); }),
               HasSubstr("there is no such repository"));

@@ -4,12 +4,15 @@
 #include <algorithm>
 #include <array>
 #include <bit>
+#include <cmath>
 #include <cstring>
 #include <span>
 
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
 #include "forest/morphology/measure.h"
+#include "forest/statistics/metric.h"
+#include "forest/statistics/summary.h"
 
 namespace forest::repository {
 namespace {
@@ -31,6 +34,18 @@ std::vector<T> values_of(const std::string& blob) {
   return values;
 }
 
+void measure(const Morphology& m, Rows& rows) {
+  const statistics::Arbors arbors(m);
+  int number = 0;
+  for (const statistics::Metric& metric : statistics::metrics()) {
+    ++number;
+    const double value = statistics::summarize(metric.values(arbors)).mean;
+    if (!std::isfinite(value)) continue;
+    rows.metric.push_back(number);
+    rows.metric_value.push_back(value);
+  }
+}
+
 }  // namespace
 
 std::string_view name_of(SomaKind kind) { return soma_kinds[std::size_t(kind)]; }
@@ -41,7 +56,7 @@ std::optional<SomaKind> soma_kind(std::string_view name) {
   return SomaKind(found - soma_kinds.begin());
 }
 
-Rows rows_of(const Morphology& m) {
+Rows rows_of(const Morphology& m, bool measured) {
   Rows rows;
   rows.points = blob_of(m.points());
   const Soma& soma = m.soma();
@@ -52,10 +67,11 @@ Rows rows_of(const Morphology& m) {
 
   auto& s = rows.sections;
   auto& a = rows.arbors;
-  for (auto* column :
-       {&s.parent, &s.arbor, &s.order, &s.kind, &s.tag, &s.soma_point, &s.first_point, &s.point_count})
+  for (auto* column : {&s.parent, &s.arbor, &s.order, &s.kind, &s.tag, &s.soma_point, &s.first_point,
+                       &s.point_count, &s.daughters})
     column->reserve(m.sections().size());
-  s.length.reserve(m.sections().size());
+  for (auto* column : {&s.length, &s.area, &s.start_diameter, &s.end_diameter, &s.end_x, &s.end_y, &s.end_z})
+    column->reserve(m.sections().size());
   for (std::size_t i = 0; i < m.sections().size(); ++i) {
     const SectionId id(i);
     const Section& section = m.section(id);
@@ -81,8 +97,15 @@ Rows rows_of(const Morphology& m) {
     s.soma_point.push_back(section.soma_point);
     s.first_point.push_back(std::int32_t(section.first_point));
     s.point_count.push_back(std::int32_t(section.point_count));
+    s.daughters.push_back(std::int32_t(m.children(id).size()));
     s.length.push_back(length);
+    s.area.push_back(section_area(m, id));
+    const Point &begin = m.points(id).front(), &end = m.points(id).back();
+    s.start_diameter.push_back(2. * double(begin.radius));
+    s.end_diameter.push_back(2. * double(end.radius));
+    s.end_x.push_back(double(end.x)), s.end_y.push_back(double(end.y)), s.end_z.push_back(double(end.z));
   }
+  if (measured) measure(m, rows);
   rows.spines.assign(m.spines().begin(), m.spines().end());
   rows.annotations = m.annotations();
   return rows;

@@ -14,14 +14,14 @@ namespace forest::repository {
 
 /// Bytes are little-endian, as on every machine this runs on: a blob is the array itself.
 struct Rows {
-  std::string points;                   // blob: x, y, z, radius as float32, section after section
+  std::string points;  // blob: x, y, z, radius as float32, section after section; see packing.h
   std::string soma_points, soma_links;  // blobs
   SomaKind soma_kind = SomaKind::none;
 
   struct {  // one entry a section
-    std::vector<std::int32_t> parent, arbor, order, kind, tag, soma_point, first_point,
-        point_count;  // parent: -1 for a root
-    std::vector<double> length;
+    std::vector<std::int32_t> parent, arbor, order, kind, tag, soma_point, first_point, point_count,
+        daughters;  // parent: -1 for a root
+    std::vector<double> length, area, start_diameter, end_diameter, end_x, end_y, end_z;
     std::size_t size() const { return parent.size(); }
   } sections;
   struct {  // one entry a root
@@ -29,11 +29,14 @@ struct Rows {
     std::vector<double> length;
     std::size_t size() const { return root.size(); }
   } arbors;
+  std::vector<int> metric;           // number of a statistics::Metric from 1, of those that are defined
+  std::vector<double> metric_value;  // of the neuron, or the mean over its sections, bifurcations, shells
   std::vector<Spine> spines;
   Annotations annotations;
 };
 
-Rows rows_of(const Morphology& morphology);
+/// With `measured` the metrics too, which take most of the time.
+Rows rows_of(const Morphology& morphology, bool measured = true);
 
 /// The inverse; reads no length, arbor or order, which follow from the rest. Throws Error when the rows fit
 /// no neuron.

@@ -1,29 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// The tables of a repository; docs/repository/schema.md draws them. Plain SQL that PostgreSQL understands
-// too, but for two words: its name for `blob` is `bytea`, and `without rowid` (keep the rows in the order of
-// their key) is SQLite's alone.
+// The tables of a repository, as steps from version to version; docs/repository/schema.md draws them. Plain SQL but for
+// words in @, for which each database has its own: @id (a whole number that names a row), @bytes, and @by_key (rows kept in
+// the order of their key).
 #pragma once
+
+#include <array>
 
 namespace forest::repository {
 
 inline constexpr int application_id =
     0x42466f72;  // "BFor": how `file` and we tell a repository from other SQLite files
-inline constexpr int schema_version = 1;  // raised when an older program could no longer read what is stored
 
-inline constexpr const char* schema = R"sql(
+struct Migration {
+  int to;  // the version these statements lead to
+  const char* sql;
+};
+
+inline constexpr std::array migrations{
+    Migration{1, R"sql(
 create table populations (
-  id   integer primary key,
+  id   @id,
   name text not null unique
 );
 create table grammars (
-  id   integer primary key,
+  id   @id,
   name text not null,
   hash text not null,
   text text not null,
   unique (hash, name)
 );
 create table neurons (
-  id          integer primary key,
+  id          @id,
   population  integer not null references populations (id),
   name        text    not null,
   fingerprint text    not null,           -- the same source has the same one
@@ -59,11 +66,11 @@ create table somata (
   z      double precision not null,
   radius double precision not null,
   area   double precision not null,       -- square micrometres
-  points blob,                            -- x, y, z, radius: float32, little-endian; null when there are none
-  links  blob                             -- cylinders: parent of each point; contours: first point of each; int32
+  points @bytes,                            -- x, y, z, radius: float32, little-endian; null when there are none
+  links  @bytes                             -- cylinders: parent of each point; contours: first point of each; int32
 );
 create table section_kinds (
-  id   integer primary key,               -- numbers of SWC
+  id   @id,               -- numbers of SWC
   name text not null unique
 );
 create table arbors (
@@ -76,7 +83,7 @@ create table arbors (
   max_order integer not null,
   length    double precision not null,    -- micrometres
   primary key (neuron, number)
-) without rowid;
+) @by_key;
 create table sections (
   neuron      integer not null references neurons (id) on delete cascade,
   number      integer not null,           -- parents before children, from 0
@@ -90,10 +97,10 @@ create table sections (
   first_point integer not null,           -- into points.data
   point_count integer not null,
   primary key (neuron, number)
-) without rowid;
+) @by_key;
 create table points (
   neuron integer primary key references neurons (id) on delete cascade,
-  data   blob not null                    -- x, y, z, radius of every point of every section: float32, little-endian
+  data   @bytes not null                    -- x, y, z, radius of every point of every section: float32, little-endian
 );
 create table spines (
   neuron        integer not null references neurons (id) on delete cascade,
@@ -107,14 +114,70 @@ create table spines (
   neck_diameter double precision not null,
   shape         integer not null,         -- 0 unknown, 1 stubby, 2 thin, 3 mushroom, 4 filopodium, 5 branched
   primary key (neuron, number)
-) without rowid;
+) @by_key;
 create table annotations (
   neuron integer not null references neurons (id) on delete cascade,
   number integer not null,                -- order in the file
   name   text not null,                   -- bytes that are no text are written \xHH, a backslash \\
   value  text not null,
   primary key (neuron, number)
-) without rowid;
-)sql";
+) @by_key;
+)sql"},
+    // Points may be packed; sections tell their ends; metrics, distributions, and views for people.
+    Migration{2, R"sql(
+alter table points add column packing integer not null default 0;
+alter table sections add column daughters integer not null default 0;
+alter table sections add column area double precision not null default 0;
+alter table sections add column start_diameter double precision not null default 0;
+alter table sections add column end_diameter double precision not null default 0;
+alter table sections add column end_x double precision not null default 0;
+alter table sections add column end_y double precision not null default 0;
+alter table sections add column end_z double precision not null default 0;
+create table metrics (
+  id         integer primary key,
+  name       text not null unique,
+  level      text not null,           -- neuron, section, bifurcation, shell; of all but the first the mean is kept
+  unit       text not null,
+  definition text not null
+);
+create table neuron_metrics (
+  metric integer not null references metrics (id),
+  neuron integer not null references neurons (id) on delete cascade,
+  value  double precision not null,   -- no row where the metric is not defined
+  primary key (metric, value, neuron)
+) @by_key;
+create unique index metrics_of_neuron on neuron_metrics (neuron, metric);
+create table distributions (
+  id         @id,
+  population integer references populations (id),
+  name       text    not null,
+  version    integer not null,        -- counted from 1; an earlier one is never changed
+  text       text    not null,
+  unique (population, name, version)
+);
+create view neuron as
+  select n.id, n.name, p.name as population, n.species, n.region, n.layer, n.type, n.stems, n.sections, n.points,
+         n.spines, n.length, s.kind as soma, s.x as soma_x, s.y as soma_y, s.z as soma_z, s.radius as soma_radius,
+         s.area as soma_area, o.origin, o.source_file, o.source_hash, g.name as grammar, o.seed, o.number, o.program
+  from neurons n join populations p on p.id = n.population left join somata s on s.neuron = n.id
+       left join provenance o on o.neuron = n.id left join grammars g on g.id = o.grammar;
+create view section as
+  select n.id as neuron, n.name as name, p.name as population, s.number as section, s.parent, s.arbor, s.branch_order,
+         k.name as kind, s.tag, s.point_count as points, s.length, s.area, s.start_diameter, s.end_diameter
+  from sections s join neurons n on n.id = s.neuron join populations p on p.id = n.population
+       left join section_kinds k on k.id = s.kind;
+create view junction as
+  select n.id as neuron, n.name as name, p.name as population, s.number as section,
+         case s.daughters when 0 then 'terminal' when 1 then 'node' when 2 then 'bifurcation' else 'multifurcation' end
+           as junction,
+         s.daughters, s.branch_order, s.end_x as x, s.end_y as y, s.end_z as z, s.end_diameter as diameter
+  from sections s join neurons n on n.id = s.neuron join populations p on p.id = n.population;
+create view metric as
+  select n.id as neuron, n.name as name, p.name as population, m.name as metric, v.value, m.unit
+  from neuron_metrics v join metrics m on m.id = v.metric join neurons n on n.id = v.neuron
+       join populations p on p.id = n.population;
+)sql"}};
+
+inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository
 
 }  // namespace forest::repository

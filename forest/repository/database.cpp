@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/repository/database.h"
+
+#include "forest/morphology/morphology.h"
+#include "forest/repository/schema.h"
+#include "forest/statistics/metric.h"
+
+namespace forest::repository {
+namespace {
+
+void run_script(Database& database, std::string_view script) {
+  for (std::size_t end; (end = script.find(";\n")) != std::string_view::npos; script.remove_prefix(end + 2))
+    database.sql() << database.dialect(script.substr(0, end));
+}
+
+void fill_section_kinds(soci::session& sql) {
+  for (int kind = 0; kind < 256; ++kind) {
+    const std::string name(forest::name_of(SectionKind(kind)));
+    if (forest::section_kind(name) == SectionKind(kind))
+      sql << "insert into section_kinds (id, name) values (:kind, :name)", soci::use(kind), soci::use(name);
+  }
+}
+
+void fill_metrics(soci::session& sql) {
+  int id = 0;
+  for (const statistics::Metric& m : statistics::metrics()) {
+    const std::string name(m.name), level(statistics::name_of(m.level)), unit(m.unit), definition(m.definition);
+    sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, :definition)",
+        soci::use(++id), soci::use(name), soci::use(level), soci::use(unit), soci::use(definition);
+  }
+}
+
+}  // namespace
+
+bool is_postgresql(std::string_view place) {
+  return place.starts_with("postgresql://") || place.starts_with("postgres://");
+}
+
+std::unique_ptr<Database> connect(const std::string& place, bool write, Refill refill) {
+  return is_postgresql(place) ? connect_postgresql(place, write, refill) : connect_sqlite(place, write, refill);
+}
+
+void migrate(Database& database, int from) {
+  for (const Migration& step : migrations) {
+    if (step.to <= from) continue;
+    run_script(database, step.sql);
+    if (step.to == 1) fill_section_kinds(database.sql());
+    if (step.to == 2) fill_metrics(database.sql());
+  }
+}
+
+}  // namespace forest::repository

@@ -1,0 +1,89 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/repository/packing.h"
+
+#include <array>
+#include <bit>
+#include <cmath>
+#include <cstdint>
+
+#include "forest/core/error.h"
+
+namespace forest::repository {
+namespace {
+
+constexpr std::array<double, 6> scales{1., 10., 100., 1e3, 1e4, 1e5};  // steps a micrometre
+constexpr double most_steps = 1e15;                                   // whole numbers a double holds, and some room
+
+std::array<float, 4> numbers(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
+
+float number_of(std::int64_t steps, double scale) { return float(double(steps) / scale); }
+
+bool is_decimal(float value, double scale) {
+  const double steps = std::round(double(value) * scale);
+  return std::abs(steps) < most_steps &&
+         std::bit_cast<std::uint32_t>(number_of(std::int64_t(steps), scale)) == std::bit_cast<std::uint32_t>(value);
+}
+
+// The decimals that all numbers need; scales.size() when some needs more.
+std::size_t decimals(std::span<const Point> points) {
+  std::size_t places = 0;
+  for (const Point& p : points)
+    for (const float value : numbers(p))
+      while (places < scales.size() && !is_decimal(value, scales[places])) ++places;
+  if (places == scales.size()) return places;
+  // More places may not hold what fewer do: large numbers have no room for them.
+  for (const Point& p : points)
+    for (const float value : numbers(p))
+      if (!is_decimal(value, scales[places])) return scales.size();
+  return places;
+}
+
+}  // namespace
+
+std::string packed(std::span<const Point> points) {
+  const std::size_t places = decimals(points);
+  if (places == scales.size() || points.empty()) return {};
+  std::string bytes(1, char(places));
+  bytes.reserve(8 * points.size());
+  std::array<std::int64_t, 4> before{};
+  for (const Point& p : points) {
+    const std::array<float, 4> values = numbers(p);
+    for (std::size_t k = 0; k < 4; ++k) {
+      const std::int64_t steps = std::int64_t(std::round(double(values[k]) * scales[places]));
+      const std::int64_t difference = steps - before[k];
+      before[k] = steps;
+      std::uint64_t zigzag = (std::uint64_t(difference) << 1) ^ std::uint64_t(difference >> 63);
+      for (; zigzag > 127; zigzag >>= 7) bytes += char(zigzag | 128);
+      bytes += char(zigzag);
+    }
+  }
+  return bytes.size() < points.size() * sizeof(Point) ? bytes : std::string();
+}
+
+std::vector<Point> unpacked(const std::string& bytes) {
+  const auto damaged = [] { return Error("its packed points are damaged"); };
+  if (bytes.empty() || static_cast<unsigned char>(bytes[0]) >= scales.size()) throw damaged();
+  const double scale = scales[static_cast<unsigned char>(bytes[0])];
+  std::vector<Point> points;
+  points.reserve(bytes.size() / 6);
+  std::array<std::int64_t, 4> before{};
+  for (std::size_t at = 1; at < bytes.size();) {
+    std::array<float, 4> values{};
+    for (std::size_t k = 0; k < 4; ++k) {
+      std::uint64_t zigzag = 0;
+      for (int shift = 0;; shift += 7) {
+        if (at == bytes.size() || shift > 63) throw damaged();
+        const auto byte = static_cast<unsigned char>(bytes[at++]);
+        zigzag |= std::uint64_t(byte & 127) << shift;
+        if (byte < 128) break;
+      }
+      const std::int64_t difference = std::int64_t(zigzag >> 1) ^ -std::int64_t(zigzag & 1);
+      before[k] = std::int64_t(std::uint64_t(before[k]) + std::uint64_t(difference));
+      values[k] = number_of(before[k], scale);
+    }
+    points.push_back({values[0], values[1], values[2], values[3]});
+  }
+  return points;
+}
+
+}  // namespace forest::repository

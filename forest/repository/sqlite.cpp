@@ -1,0 +1,306 @@
+// SPDX-License-Identifier: Apache-2.0
+// A repository as one SQLite file.
+
+#include <algorithm>
+#include <array>
+#include <cerrno>
+#include <cstring>
+#include <fcntl.h>
+#include <filesystem>
+#include <new>
+#include <unistd.h>
+
+#include <fmt/format.h>
+#include <soci/sqlite3/soci-sqlite3.h>
+#include <sys/stat.h>
+
+#include "forest/core/error.h"
+#include "forest/repository/database.h"
+#include "forest/repository/insert.h"
+#include "forest/repository/names.h"
+#include "forest/repository/schema.h"
+
+namespace forest::repository {
+namespace {
+
+namespace fs = std::filesystem;
+namespace sqlite = sqlite_api;
+
+struct Sentence {
+  int code;
+  const char* text;
+};
+
+constexpr std::array<Sentence, 9> sentences{{
+    {SQLITE_FULL, "the disk is full and nothing of this was stored; make room and try again"},
+    {SQLITE_IOERR, "the disk is full or failing and nothing of this was stored; make room and try again"},
+    {SQLITE_BUSY, "another program has been writing to it for over a minute; try again when it is done"},
+    {SQLITE_LOCKED, "another program has been writing to it for over a minute; try again when it is done"},
+    {SQLITE_READONLY,
+     "cannot be written; check the permissions of the file and its folder, and that it was opened for "
+     "writing"},
+    {SQLITE_PERM, "cannot be opened; check the permissions of the file and its folder"},
+    {SQLITE_CANTOPEN, "cannot be opened; check the path and the permissions of the file and its folder"},
+    {SQLITE_NOTADB, "is no repository; name another file, or one that does not exist yet"},
+    {SQLITE_CORRUPT, "is damaged or cut off; restore it from a backup, or make it again from its sources"},
+}};
+
+/// SOCI's own connection string knows no quotes in a path and makes a file where there is none; so the file
+/// is opened here and handed to a session that was opened on nothing.
+void attach(soci::session& sql, const std::string& path, int flags) {
+  sql.open(soci::sqlite3, ":memory:");
+  auto& backend = static_cast<soci::sqlite3_session_backend&>(*sql.get_backend());
+  sqlite::sqlite3* file = nullptr;
+  const int result = sqlite::sqlite3_open_v2(path.c_str(), &file, flags | SQLITE_OPEN_NOMUTEX, nullptr);
+  if (result != SQLITE_OK) {
+    sqlite::sqlite3_close(file);
+    throw soci::sqlite3_soci_error("open", result);
+  }
+  sqlite::sqlite3_close(backend.conn_);
+  backend.conn_ = file;
+  sqlite::sqlite3_busy_timeout(file, 60'000);
+  sql << "pragma foreign_keys = on";
+  sql << "pragma cache_size = -65536";  // KiB
+}
+
+std::string dialect_of(std::string_view text) {
+  constexpr std::pair<std::string_view, std::string_view> words[] = {
+      {"@id", "integer primary key"}, {"@bytes", "blob"}, {"@by_key", "without rowid"}};
+  std::string sql(text);
+  for (const auto& [word, ours] : words)
+    for (std::size_t at; (at = sql.find(word)) != sql.npos;) sql.replace(at, word.size(), ours);
+  return sql;
+}
+
+// What a person may ask with brainforest query: to read, and nothing else.
+int only_reading(void*, int action, const char*, const char*, const char*, const char*) {
+  switch (action) {
+    case SQLITE_SELECT:
+    case SQLITE_READ:
+    case SQLITE_FUNCTION:
+    case SQLITE_RECURSIVE:
+    case SQLITE_TRANSACTION:
+      return SQLITE_OK;
+    default:
+      return SQLITE_DENY;
+  }
+}
+
+class Sqlite final : public Database {
+ public:
+  void begin_reading() override { sql_ << "begin"; }
+  void begin_writing() override { sql_ << "begin immediate"; }  // waits a minute for other writers
+  std::string dialect(std::string_view text) const override { return dialect_of(text); }
+  int next_id(const std::string& table) override {
+    return value<int>(sql_, fmt::format("select coalesce(max(id), 0) + 1 from {}", table));
+  }
+  bool as_text() const override { return false; }
+  Answer ask(const std::string& question) override;
+  void forbid_writing() override { sqlite::sqlite3_set_authorizer(handle(), only_reading, nullptr); }
+
+  std::vector<std::string> examine_structure() override {
+    std::vector<std::string> findings;
+    soci::rowset<std::string> lines = (sql_.prepare << "pragma integrity_check");
+    for (const std::string& line : lines)
+      if (line != "ok") findings.push_back(fmt::format("is damaged ({})", line));
+    const int strays = value<int>(sql_, "select count(*) from pragma_foreign_key_check");
+    if (strays) findings.push_back(fmt::format("is damaged ({} rows belong to nothing)", strays));
+    return findings;
+  }
+
+  void rethrow(const std::string& place) const override;
+
+  void open(const std::string& path, int flags) { attach(sql_, path, flags); }
+  sqlite::sqlite3* handle() { return static_cast<soci::sqlite3_session_backend&>(*sql_.get_backend()).conn_; }
+};
+
+Answer Sqlite::ask(const std::string& question) {
+  sqlite::sqlite3_stmt* prepared = nullptr;
+  const char* rest = nullptr;
+  const int result =
+      sqlite::sqlite3_prepare_v2(handle(), question.c_str(), int(question.size()), &prepared, &rest);
+  const std::unique_ptr<sqlite::sqlite3_stmt, int (*)(sqlite::sqlite3_stmt*)> statement(
+      prepared, sqlite::sqlite3_finalize);
+  if (result == SQLITE_AUTH) throw Error("a question can read and not write; ask with select");
+  if (result == SQLITE_ERROR)
+    throw Error(
+        fmt::format("the question is not understood ({}); docs/repository/schema.md has the tables and views",
+                    sqlite::sqlite3_errmsg(handle())));
+  if (result != SQLITE_OK) throw soci::sqlite3_soci_error("ask", result);
+  if (!statement) throw Error("there is no question; ask with select");
+  if (std::string_view(rest).find_first_not_of("; \t\r\n") != std::string_view::npos)
+    throw Error("one question at a time; leave out what follows the first semicolon");
+  Answer answer;
+  const int columns = sqlite::sqlite3_column_count(prepared);
+  for (int c = 0; c < columns; ++c) answer.columns.emplace_back(sqlite::sqlite3_column_name(prepared, c));
+  int step;
+  while ((step = sqlite::sqlite3_step(prepared)) == SQLITE_ROW) {
+    auto& row = answer.rows.emplace_back();
+    for (int c = 0; c < columns; ++c) {
+      const auto text = [&] {
+        const auto* bytes = static_cast<const char*>(sqlite::sqlite3_column_blob(prepared, c));
+        return std::string(bytes ? bytes : "", std::size_t(sqlite::sqlite3_column_bytes(prepared, c)));
+      };
+      switch (sqlite::sqlite3_column_type(prepared, c)) {
+        case SQLITE_INTEGER:
+          row.emplace_back(std::int64_t(sqlite::sqlite3_column_int64(prepared, c)));
+          break;
+        case SQLITE_FLOAT:
+          row.emplace_back(sqlite::sqlite3_column_double(prepared, c));
+          break;
+        case SQLITE_TEXT:
+          row.emplace_back(text());
+          break;
+        case SQLITE_BLOB:
+          row.emplace_back("\\x" + hexadecimal(text()));
+          break;
+        default:
+          row.emplace_back();
+      }
+    }
+  }
+  if (step == SQLITE_ERROR)
+    throw Error(fmt::format("the question cannot be answered ({})", sqlite::sqlite3_errmsg(handle())));
+  if (step != SQLITE_DONE) throw soci::sqlite3_soci_error("ask", step);
+  return answer;
+}
+
+/// Gives the file `part` the name `path` unless there is such a file; returns 0 or the error's number.
+int name_file(const std::string& part, const std::string& path) {
+  if (::link(part.c_str(), path.c_str()) == 0) return 0;
+  if (errno != EPERM && errno != EOPNOTSUPP && errno != ENOSYS)
+    return errno;  // else a file system without links
+  return ::renameat2(AT_FDCWD, part.c_str(), AT_FDCWD, path.c_str(), RENAME_NOREPLACE) == 0 ? 0 : errno;
+}
+
+/// Makes a repository without neurons at `path`. It is filled under another name and then linked into place,
+/// so that a killed program leaves no half of it and the first of two programs wins.
+void create(const std::string& path) {
+  const std::string part = fmt::format("{}.new-{}", path, ::getpid());
+  const auto clean = [&] {
+    for (const char* end : {"", "-journal"}) ::unlink((part + end).c_str());
+  };
+  clean();
+  try {
+    Sqlite database;
+    database.open(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
+    soci::session& sql = database.sql();
+    sql << "pragma page_size = 4096";  // not whatever this SQLite was built with
+    database.begin_writing();
+    sql << fmt::format("pragma application_id = {}", application_id);
+    sql << fmt::format("pragma user_version = {}", schema_version);
+    migrate(database, 0);
+    sql << "commit";
+    database
+        .begin_writing();  // whoever finds the file now waits, and none believes the journal of an earlier one to be its own
+    const int failed = name_file(part, path);
+    if (failed && failed != EEXIST)
+      throw InputError(
+          path, 0, fmt::format("cannot be made ({}); check the folder's permissions", std::strerror(failed)));
+    if (!failed) ::unlink((path + "-journal").c_str());
+    sql << "rollback";
+  } catch (...) {
+    clean();
+    throw;
+  }
+  clean();
+}
+
+/// The version of its tables. Throws InputError when the open file is not a whole repository of one we know.
+int examine(Sqlite& database, const std::string& place, const std::string& path) {
+  soci::session& sql = database.sql();
+  database.begin_reading();
+  value<long long>(sql, "select count(*) from sqlite_master");  // undoes what a killed program left half done
+  if (const int id = value<int>(sql, "pragma application_id"); id != application_id)
+    throw InputError(
+        place, 0,
+        "is no repository but another SQLite database; name another file, or one that does not exist yet");
+  const int version = value<int>(sql, "pragma user_version");
+  if (version > schema_version)
+    throw InputError(
+        place, 0,
+        fmt::format("was made by a newer Brain Forest (its tables are of version {}, this program knows {}); "
+                    "use the newer program",
+                    version, schema_version));
+  const auto whole = value<long long>(sql, "pragma page_count") * value<long long>(sql, "pragma page_size");
+  std::error_code ignored;
+  const auto size = fs::file_size(path, ignored);
+  if (version < 1 || ignored || size < std::uintmax_t(whole))
+    throw soci::sqlite3_soci_error("size", SQLITE_CORRUPT);
+  for (const char* table : {"populations", "grammars", "neurons", "provenance", "somata", "section_kinds",
+                            "arbors", "sections", "points", "spines", "annotations"})
+    value<int>(sql, fmt::format("select 1 from {} where 1 = 0", table));
+  sql << "commit";
+  return version;
+}
+
+/// Brings an older repository to today's tables, whole or not at all.
+void bring_up_to_date(Sqlite& database, Refill refill) {
+  database.begin_writing();
+  const int from =
+      value<int>(database.sql(), "pragma user_version");  // another program may have been quicker
+  migrate(database, from);
+  refill(database, from);
+  database.sql() << fmt::format("pragma user_version = {}", schema_version);
+  database.sql() << "commit";
+}
+
+}  // namespace
+
+std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, Refill refill) {
+  if (place.empty() || place.size() > 4000 || place.find('\0') != std::string::npos)
+    throw InputError(shown(place), 0, "is no path; name a file");
+  auto database = std::make_unique<Sqlite>();
+  try {
+    std::error_code error;
+    const std::string path = fs::absolute(place, error).string();  // so that ":memory:" is a file's name too
+    auto status = fs::status(path, error);
+    if (status.type() == fs::file_type::not_found) {
+      if (!write)
+        throw InputError(place, 0,
+                         "there is no such repository; check the path, or make it with brainforest import");
+      create(path);
+      status = fs::status(path, error);
+    }
+    if (status.type() != fs::file_type::regular)
+      throw InputError(place, 0,
+                       "is not a regular file that can be read; name a file, not a folder or device");
+    database->open(path, SQLITE_OPEN_READWRITE);  // SQLite reads only when that is all the permissions allow
+    const int version = examine(*database, place, path);
+    const bool fixed = sqlite::sqlite3_db_readonly(database->handle(), "main");
+    if (write && fixed) throw soci::sqlite3_soci_error("open", SQLITE_READONLY);
+    if (version < schema_version) {
+      if (fixed)
+        throw InputError(
+            place, 0,
+            fmt::format("its tables are of version {} and this program reads version {}; open it once "
+                        "for writing, with 'brainforest import', where that is allowed",
+                        version, schema_version));
+      bring_up_to_date(*database, refill);
+    }
+    if (!write) database->sql() << "pragma query_only = on";
+  } catch (...) {
+    database->rethrow(place);
+  }
+  return database;
+}
+
+void Sqlite::rethrow(const std::string& place) const {
+  try {
+    throw;
+  } catch (const soci::sqlite3_soci_error& error) {
+    const int code = error.result() & 0xff;  // the rest of it only says where in SQLite
+    if (code == SQLITE_NOMEM) throw std::bad_alloc();
+    const auto row = std::ranges::find(sentences, code, &Sentence::code);
+    if (row != sentences.end()) throw InputError(place, 0, row->text);
+    throw InputError(
+        place, 0,
+        fmt::format("the database refuses ({}); restore it from a backup if this comes again", error.what()));
+  } catch (const soci::soci_error& error) {
+    throw InputError(
+        place, 0,
+        fmt::format("the database holds what it should not ({}); restore it from a backup", error.what()));
+  }
+}
+
+}  // namespace forest::repository
