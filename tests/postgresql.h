@@ -25,8 +25,8 @@ class PostgresqlServer {
   }
   /// SQL as the superuser, by the server's own client.
   bool run(const std::string& sql, const std::string& database = "postgres") const {
-    return command("psql -X -q -v ON_ERROR_STOP=1 -h 127.0.0.1 -p " + port_ + " -U forest -d " + database + " -c \"" +
-                   sql + "\" >/dev/null 2>&1")
+    return command("psql -X -q -v ON_ERROR_STOP=1 -h 127.0.0.1 -p " + port_ + " -U forest -d " + database +
+                   " -c \"" + sql + "\" >/dev/null 2>&1")
         .second;
   }
 
@@ -38,7 +38,8 @@ class PostgresqlServer {
     if (good) port_ = said.substr(0, said.find('\n'));
   }
   ~PostgresqlServer() {
-    if (runs() && owner_ == ::getpid()) command(FOREST_SOURCE_DIR "/tests/postgresql.sh stop " + folder_.string());
+    if (runs() && owner_ == ::getpid())
+      command(FOREST_SOURCE_DIR "/tests/postgresql.sh stop " + folder_.string());
   }
 
   static std::pair<std::string, bool> command(const std::string& line) {

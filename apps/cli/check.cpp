@@ -189,7 +189,7 @@ std::function<void()> check(CLI::App& command, Console& console) {
   command
       .add_option("--repo", options->repo,
                   "A repository to look through: its tables and the checksum of every neuron")
-      ->type_name("FILE");
+      ->type_name("REPO");
   command
       .add_option("--repair", options->repair,
                   "Write a mended copy of every file that deviates from its format into this folder, and "

@@ -16,15 +16,23 @@ using namespace repository;
 
 std::function<void()> list(CLI::App& command, Console& console) {
   struct Options {
-    std::string repo, population;
+    std::string repo, population, where;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("--repo", options->repo, "The repository")->required()->type_name("FILE");
+  command.add_option("--repo", options->repo, "The repository")->required()->type_name("REPO");
   must_be_name(
       *command.add_option("--population", options->population, "Only the neurons of this population"));
+  command
+      .add_option("--where", options->where,
+                  "Only the neurons for which this holds: a condition in SQL on the columns of the view "
+                  "neuron and on "
+                  "the names of metrics (measure --list)")
+      ->type_name("CONDITION");
   return [options, &console] {
     const Repository repository = Repository::open(options->repo, Access::read);
-    const auto neurons = pick_neurons(repository, {}, options->population);
+    const auto neurons = options->where.empty()
+                             ? pick_neurons(repository, {}, options->population)
+                             : repository.neurons_where(options->where, options->population);
     nlohmann::ordered_json out{{"populations", nlohmann::ordered_json::array()},
                                {"neurons", nlohmann::ordered_json::array()}};
     std::vector<std::vector<std::string>> lines;
@@ -40,6 +48,11 @@ std::function<void()> list(CLI::App& command, Console& console) {
       console.say("");
     }
     lines.clear();
+    if (!options->where.empty()) {
+      console.say(fmt::format("{} neurons", neurons.size()));
+      console.print(out);
+      return;
+    }
     for (const PopulationRow& row : repository.populations()) {
       if (!options->population.empty() && row.name != options->population) continue;
       out["populations"].push_back(

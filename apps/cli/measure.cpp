@@ -322,7 +322,7 @@ std::function<void()> measure(CLI::App& command, Console& console) {
   CLI::Option* repo =
       command.add_option("--repo", options->repo, "Measure the neurons of this repository instead")
           ->excludes(files)
-          ->type_name("FILE");
+          ->type_name("REPO");
   command.add_option("--population", options->population, "Only those of this population")->needs(repo);
   command
       .add_option("--metric", options->metrics,

@@ -58,7 +58,7 @@ std::function<void()> plant(CLI::App& command, Console& console) {
       ->type_name("FILE|NAME");
   command.add_option("--repo", options->repo, "The repository the neurons come from")
       ->required()
-      ->type_name("FILE");
+      ->type_name("REPO");
   command
       .add_option("--out", options->out,
                   "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")

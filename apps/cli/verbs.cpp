@@ -10,6 +10,7 @@ std::function<void()> demo(CLI::App&, Console&);
 std::function<void()> import_files(CLI::App&, Console&);
 std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
+std::function<void()> query(CLI::App&, Console&);
 std::function<void()> export_files(CLI::App&, Console&);
 std::function<void()> convert(CLI::App&, Console&);
 std::function<void()> check(CLI::App&, Console&);
@@ -29,9 +30,12 @@ std::span<const Verb> verbs() {
       {"import", "Store traced neurons in a repository",
        "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
       {"list", "List the populations and neurons of a repository",
-       "brainforest list --repo cells.db --population traced", list},
+       "brainforest list --repo cells.db --where \"type = 'L5 pyramidal' and total_length > 5000\"", list},
       {"show", "Show all that is known of a neuron: soma, arbors, sections, where it comes from",
        "brainforest show cell7 --repo cells.db", show},
+      {"query", "Ask a repository a question in SQL",
+       "brainforest query \"select kind, count(*), sum(length) from section group by kind\" --repo cells.db",
+       query},
       {"export", "Write neurons of a repository as files",
        "brainforest export --repo cells.db --population traced --format swc --out exported/", export_files},
       {"convert", "Turn neuron files of one format into another",

@@ -24,8 +24,10 @@ void fill_section_kinds(soci::session& sql) {
 void fill_metrics(soci::session& sql) {
   int id = 0;
   for (const statistics::Metric& m : statistics::metrics()) {
-    const std::string name(m.name), level(statistics::name_of(m.level)), unit(m.unit), definition(m.definition);
-    sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, :definition)",
+    const std::string name(m.name), level(statistics::name_of(m.level)), unit(m.unit),
+        definition(m.definition);
+    sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, "
+           ":definition)",
         soci::use(++id), soci::use(name), soci::use(level), soci::use(unit), soci::use(definition);
   }
 }
@@ -37,7 +39,8 @@ bool is_postgresql(std::string_view place) {
 }
 
 std::unique_ptr<Database> connect(const std::string& place, bool write, Refill refill) {
-  return is_postgresql(place) ? connect_postgresql(place, write, refill) : connect_sqlite(place, write, refill);
+  return is_postgresql(place) ? connect_postgresql(place, write, refill)
+                              : connect_sqlite(place, write, refill);
 }
 
 void migrate(Database& database, int from) {

@@ -12,16 +12,21 @@ namespace forest::repository {
 namespace {
 
 constexpr std::array<double, 6> scales{1., 10., 100., 1e3, 1e4, 1e5};  // steps a micrometre
-constexpr double most_steps = 1e15;                                   // whole numbers a double holds, and some room
+constexpr std::uint64_t minus_zero = 1ull << 63;                       // no difference is so large
+constexpr double most_steps = 1e15;  // whole numbers a double holds, and some room
 
 std::array<float, 4> numbers(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
 
 float number_of(std::int64_t steps, double scale) { return float(double(steps) / scale); }
 
+bool is_minus_zero(float value) { return std::bit_cast<std::uint32_t>(value) == 0x80000000u; }
+
 bool is_decimal(float value, double scale) {
+  if (is_minus_zero(value)) return true;
   const double steps = std::round(double(value) * scale);
   return std::abs(steps) < most_steps &&
-         std::bit_cast<std::uint32_t>(number_of(std::int64_t(steps), scale)) == std::bit_cast<std::uint32_t>(value);
+         std::bit_cast<std::uint32_t>(number_of(std::int64_t(steps), scale)) ==
+             std::bit_cast<std::uint32_t>(value);
 }
 
 // The decimals that all numbers need; scales.size() when some needs more.
@@ -53,6 +58,7 @@ std::string packed(std::span<const Point> points) {
       const std::int64_t difference = steps - before[k];
       before[k] = steps;
       std::uint64_t zigzag = (std::uint64_t(difference) << 1) ^ std::uint64_t(difference >> 63);
+      if (is_minus_zero(values[k])) zigzag = minus_zero;
       for (; zigzag > 127; zigzag >>= 7) bytes += char(zigzag | 128);
       bytes += char(zigzag);
     }
@@ -76,6 +82,10 @@ std::vector<Point> unpacked(const std::string& bytes) {
         const auto byte = static_cast<unsigned char>(bytes[at++]);
         zigzag |= std::uint64_t(byte & 127) << shift;
         if (byte < 128) break;
+      }
+      if (zigzag == minus_zero) {
+        before[k] = 0, values[k] = -0.f;
+        continue;
       }
       const std::int64_t difference = std::int64_t(zigzag >> 1) ^ -std::int64_t(zigzag & 1);
       before[k] = std::int64_t(std::uint64_t(before[k]) + std::uint64_t(difference));

@@ -4,7 +4,8 @@
 // floats that come back are the very same. Neurons of other numbers are kept as they are.
 //
 //   packed: decimals (a byte, 0–5), then x, y, z and radius of every point: difference from the point before in steps,
-//   zigzag (0, -1, 1, -2, …), seven bits a byte, the lowest first, the eighth bit set on all but the last
+//   zigzag (0, -1, 1, -2, …), seven bits a byte, the lowest first, the eighth bit set on all but the last;
+//   2⁶³ stands for the number -0, from which the next difference is that from 0
 #pragma once
 
 #include <span>

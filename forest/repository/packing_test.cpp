@@ -35,13 +35,20 @@ TEST(Packing, GivesBackEveryBitInEightBytesAPoint) {
   }
 }
 
+TEST(Packing, MinusZeroStaysItself) {
+  auto points = traced(1);
+  points[3].x = points[4].x = points[7].radius = -0.f;
+  const auto back = unpacked(packed(points));
+  ASSERT_EQ(back, points);
+  EXPECT_TRUE(std::signbit(back[3].x) && std::signbit(back[4].x) && std::signbit(back[7].radius));
+  EXPECT_FALSE(std::signbit(back[5].x) != std::signbit(points[5].x));
+}
+
 TEST(Packing, NumbersThatAreNoDecimalsAreNotPacked) {
   auto points = traced(2);
   points[77].y = std::nextafter(points[77].y, 1e9f);
   EXPECT_TRUE(packed(points).empty());
   points = traced(1);
-  points[3].x = -0.f;  // a bit that would be lost
-  EXPECT_TRUE(packed(points).empty());
   points[3].x = NAN;
   EXPECT_TRUE(packed(points).empty());
   points[3].x = 3e38f;

@@ -43,14 +43,29 @@ cmp one.db two.db
 [ "$(ls one.db*)" = one.db ]
 
 # An independent reader finds what the schema's page says.
-[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n1' ]
+[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n2' ]
 [ "$(sqlite3 one.db 'select count(*), sum(sections), min(name), max(name) from neurons')" = '40|'"$(sqlite3 one.db 'select count(*) from sections')"'|cell00|cell39' ]
 [ "$(sqlite3 one.db "select count(*) from neurons join provenance on neuron = id where origin = 'traced' and length(source_hash) = 32 and source_file like 'cells/%.swc'")" = 40 ]
 python3 - <<'PY'
 import math, sqlite3, struct
 db = sqlite3.connect("one.db")
-for neuron, blob in db.execute("select neuron, data from points"):
-    points = list(struct.iter_unpack("<4f", blob))
+def unpacked(blob):  # docs/repository/schema.md
+    numbers, before, at, points = [], [0] * 4, 1, []
+    while at < len(blob):
+        value = shift = 0
+        while True:
+            byte = blob[at]; at += 1
+            value |= (byte & 127) << shift; shift += 7
+            if byte < 128: break
+        numbers.append(None if value == 1 << 63 else (value >> 1) ^ -(value & 1))
+    for i in range(0, len(numbers), 4):
+        before = [0 if b is None else a + b for a, b in zip(before, numbers[i:i + 4])]
+        points.append([b / 10 ** blob[0] for b in before])
+    return points
+
+for neuron, packing, blob in db.execute("select neuron, packing, data from points"):
+    assert packing == 1 and len(blob) < 10 * db.execute("select points from neurons where id = ?", (neuron,)).fetchone()[0]
+    points = unpacked(blob)
     for parent, first, count, length in db.execute(
             "select parent, first_point, point_count, length from sections where neuron = ? order by number", (neuron,)):
         run = points[first:first + count]
@@ -175,3 +190,16 @@ both = [subprocess.Popen([program, "import", f"cells/{half}", "cells", "--repo",
 assert [child.wait() for child in both] == [0, 0]
 assert sqlite3.connect("both.db").execute("select count(*) from neurons").fetchone() == (40,)
 PY
+
+# Questions in SQL and searches by anything.
+[ "$($BRAINFOREST query 'select count(*) from section' --repo one.db --json | json 'd["rows"][0][0]')" = "$(sqlite3 one.db 'select count(*) from sections')" ]
+[ "$($BRAINFOREST list --repo one.db --where "total_length > 3000 and name like 'cell%'" --json | json 'len(d["neurons"])')" = "$(sqlite3 one.db 'select count(*) from neurons where length > 3000')" ]
+$BRAINFOREST query "select name, 'a \"b\", c' as odd from neuron where id = 1" --repo one.db --csv answer.csv >out.txt
+[ "$(cat answer.csv)" = $'name,odd\r\ncell01,"a ""b"", c"\r' ]
+cp one.db kept.db
+fails_with 1 "read and not write" $BRAINFOREST query "delete from neurons" --repo one.db
+fails_with 1 "not understood" $BRAINFOREST query "select colour from neuron" --repo one.db
+fails_with 1 "not understood" $BRAINFOREST list --repo one.db --where "colour = 3"
+cmp one.db kept.db
+fails_with 1 "PGPASSWORD" $BRAINFOREST list --repo postgresql://me:secret@localhost/cells
+! grep -q secret err.txt
