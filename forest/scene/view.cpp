@@ -16,6 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
+
 constexpr std::array<std::string_view, 4> colour_names{"type", "layer", "kind", "neuron"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 
@@ -297,7 +299,10 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
     const float depth = -axes.col(2).dot(bounds.centre() - view.camera.eye);
     const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
     s.fog_start = std::max(20.f, depth - size);
-    s.fog_length = std::max(60.f, std::min(2.f * size, extent) * .9f) / view.fog;
+    // Within the forest one sees a hundred micrometres or two, whatever its size.
+    const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
+    const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
+    s.fog_length = (length + inside * (std::min(length, seen_inside) - length)) / view.fog;
   }
   return f;
 }
