@@ -39,7 +39,8 @@ struct Options {
 /// A file on its way into the repository.
 struct Arrival {
   fs::path path;
-  io::ReadResult read;
+  std::vector<io::Warning> oddities;
+  std::optional<Prepared> prepared;
   std::string hash;
   std::string error;  // why it could not be read; empty when it could
   std::optional<Added> added;
@@ -50,9 +51,12 @@ void read(Arrival& file) {
   try {
     const MappedFile bytes(file.path);
     file.hash = hash_hex(bytes.bytes());
-    file.read = io::format_of(file.path, bytes.text()).read(bytes.text(), escaped(file.path.string()));
-    file.sections = file.read.morphology.sections().size();
-    file.warnings = file.read.warnings.size();
+    io::ReadResult read =
+        io::format_of(file.path, bytes.text()).read(bytes.text(), escaped(file.path.string()));
+    file.sections = read.morphology.sections().size();
+    file.warnings = read.warnings.size();
+    file.oddities = std::move(read.warnings);
+    file.prepared.emplace(std::move(read.morphology));
   } catch (const Error& error) {
     file.error = error.what();
   }
@@ -120,7 +124,7 @@ void run(const Options& options, Console& console) {
         continue;
       }
       if (options.verbose)
-        for (const io::Warning& w : file.read.warnings) {
+        for (const io::Warning& w : file.oddities) {
           const std::string place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
           console.warn(fmt::format("{}: {}: {}", place, w.code, w.sentence));
         }
@@ -130,7 +134,7 @@ void run(const Options& options, Console& console) {
       neuron.provenance = Traced{file.path.string(), file.hash};
       try {
         if (!repository) repository = Repository::open(options.repo, Access::write);
-        file.added = repository->add(file.read.morphology, neuron);
+        file.added = repository->add(std::move(*file.prepared), neuron);
       } catch (const Error& error) {  // the repository's trouble, not the file's
         throw Error(fmt::format("{} ({} of {} files are stored)", error.what(), done, files.size()));
       }
@@ -141,7 +145,7 @@ void run(const Options& options, Console& console) {
                                        escaped(file.path.string()), file.added->name)
                          : fmt::format("{}: another neuron is called '{}', so this one is stored as '{}'",
                                        escaped(file.path.string()), neuron.name, file.added->name));
-      file.read = {};
+      file.prepared.reset();
     }
   }
   console.progress().end();
