@@ -8,12 +8,16 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/neuron.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+
+constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
+constexpr std::array<std::string_view, 1> python_extensions{".py"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -24,6 +28,22 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_swc,
            .keeps = {}},
+    Format{.name = "hoc",
+           .title = "NEURON cell template (hoc)",
+           .extensions = hoc_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_neuron_hoc,
+           .keeps = neuron_keeps},
+    Format{.name = "neuron-python",
+           .title = "NEURON cell class (Python)",
+           .extensions = python_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_neuron_python,
+           .keeps = neuron_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {
