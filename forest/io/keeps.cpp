@@ -19,7 +19,7 @@ bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
   return !keeps.kinds || (parent.kind == d.kind && (!keeps.tags || parent.tag == d.tag));
 }
 
-constexpr double shortest = 1e-6;  // µm
+constexpr double shortest = .99e-6;  // µm; the float next to 1e-6 is below it
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
@@ -138,7 +138,7 @@ Point next_place(Point point) {
   for (float* other : {&point.y, &point.z})
     if (std::abs(*other) < std::abs(*axis)) axis = other;
   const double from = *axis;
-  for (double step = shortest;; step *= 2.)  // towards zero, where steps are finer
+  for (double step = 1e-6;; step *= 2.)  // towards zero, where steps are finer
     if (const float to = float(from > 0. ? from - step : from + step);
         std::abs(double(to) - from) >= shortest) {
       *axis = to;

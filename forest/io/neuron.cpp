@@ -26,9 +26,11 @@ struct Cable {
   std::size_t array = 0, index = 0;  // it is array[index]
   std::int32_t parent = -1;          // a cable before it
   double at = 1.;                    // where on the parent, 0…1 of its length
-  bool wired = false;                // it begins elsewhere than at that place
-  Vec3 place = Vec3::Zero();         // that place
-  std::vector<Point> points;         // two or more, of some length
+  // Where shape plots take that place to be, on the straight line between the parent's ends; told to NEURON where the cable
+  // begins elsewhere, since a plot moves it there else.
+  bool wired = false;
+  Vec3 place = Vec3::Zero();
+  std::vector<Point> points;  // two or more, of some length
 };
 
 struct Array {
@@ -73,7 +75,6 @@ class Plan {
   struct Place {
     std::size_t cable = 0;
     double at = .5;
-    Vec3 position = Vec3::Zero();
   };
 
   Cable& add(const std::pair<std::string, std::string_view>& array) {
@@ -85,6 +86,15 @@ class Plan {
     return cable;
   }
 
+  void hang(Cable& cable, const Place& place) {
+    cable.parent = std::int32_t(place.cable);
+    cable.at = place.at;
+    const std::vector<Point>& parent = cables[place.cable].points;
+    const Vec3 begin = parent.front().position(), end = parent.back().position();
+    cable.place = begin + float(place.at) * (end - begin);
+    cable.wired = cable.points.front().position() != cable.place;
+  }
+
   void neurite(SectionId id) {
     const Section& section = m_.section(id);
     const auto points = m_.points(id);
@@ -94,11 +104,7 @@ class Plan {
     if (section.parent.valid()) {
       cable.parent = std::int32_t(first_neurite_ + section.parent.value());
     } else if (place >= 0) {
-      const Place& on = soma_places_[std::size_t(place)];
-      cable.parent = std::int32_t(on.cable);
-      cable.at = on.at;
-      cable.place = on.position;
-      cable.wired = points.front().position() != on.position;
+      hang(cable, soma_places_[std::size_t(place)]);
     }
   }
 
@@ -111,7 +117,7 @@ class Plan {
       low.y -= p.radius, high.y += p.radius;
       if (segment_length(low, high) < 1e-6) high = next_place(low);
       add({"soma", lists[0]}).points = {low, high};
-      soma_places_.push_back({0, .5, p.position()});
+      soma_places_.push_back({0, .5});
     } else if (soma.kind == SomaKind::cylinders) {
       soma_paths(soma);
     }
@@ -130,7 +136,7 @@ class Plan {
       while (!daughters[path.back()].empty()) path.push_back(daughters[path.back()][0]);
       return path;
     };
-    const auto lay = [&](const std::vector<std::size_t>& path, std::int32_t parent, std::size_t known) {
+    const auto lay = [&](const std::vector<std::size_t>& path, std::size_t known) {
       const std::size_t number = cables.size();
       Cable& cable = add({"soma", lists[0]});
       for (const std::size_t i : path) cable.points.push_back(soma.points[i]);
@@ -142,26 +148,21 @@ class Plan {
       for (std::size_t k = 0; k < path.size(); ++k) {
         if (k > 0) so_far += segment_length(soma.points[path[k - 1]], soma.points[path[k]]);
         if (path[k] != known)
-          soma_places_[path[k]] = {number, length > 0. ? std::min(1., so_far / length) : 1.,
-                                   soma.points[path[k]].position()};
+          soma_places_[path[k]] = {number, length > 0. ? std::min(1., so_far / length) : 1.};
       }
-      if (parent >= 0) {
-        cable.parent = parent;
-        cable.at = soma_places_[known].at;
-        cable.place = soma_places_[known].position;
-      }
+      if (known < count) hang(cable, soma_places_[known]);
     };
     std::vector<std::size_t> first = path_from(0);
     if (daughters[0].size() > 1) {
       const std::vector<std::size_t> other = path_from(daughters[0][1]);
       first.insert(first.begin(), other.rbegin(), other.rend());
     }
-    lay(first, -1, count);
+    lay(first, count);
     for (std::size_t i = 0; i < count; ++i)
       for (std::size_t k = i == 0 ? 2 : 1; k < daughters[i].size(); ++k) {
         std::vector<std::size_t> path = path_from(daughters[i][k]);
         path.insert(path.begin(), i);
-        lay(path, std::int32_t(soma_places_[i].cable), i);
+        lay(path, i);
       }
   }
 
@@ -238,6 +239,18 @@ class Procedures {
   std::size_t lines_ = 0, count_ = 0;
 };
 
+/// What the file says of its cell, a line each, in plain letters.
+std::string comments(const Morphology& m, std::string_view mark) {
+  std::string text;
+  for (const auto& [key, value] : m.annotations()) {
+    std::string line = key == "comment" ? value : key + ' ' + value;
+    for (char& c : line) c = c >= ' ' && c <= '~' ? c : c == '\n' || c == '\r' || c == '\t' ? ' ' : '?';
+    line.resize(std::min<std::size_t>(line.size(), 500));
+    text += fmt::format("{} {}\n", mark, line);
+  }
+  return text;
+}
+
 std::string joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, ", "));
 }
@@ -288,7 +301,9 @@ constexpr std::string_view python_head =
 
 Lists of sections: all, somatic, axonal, basal, apical; and one for each name, such as soma and dend.
 """
-from math import pi, sqrt
+)";
+
+constexpr std::string_view python_sections = R"(from math import pi, sqrt
 
 from neuron import h
 
@@ -348,7 +363,8 @@ std::string write_neuron_hoc(const Morphology& morphology) {
     names.push_back(array.name);
     arrays.push_back(fmt::format("{}[{}]", array.name, array.size));
   }
-  std::string text = fmt::format("public {}, geom_nseg, fill_diameters, init\n", joined(objects));
+  std::string text = comments(kept, "//");
+  text += fmt::format("public {}, geom_nseg, fill_diameters, init\n", joined(objects));
   text += fmt::format("objref {}\n", joined(objects));
   // One line each, since hoc's lines have an end.
   for (const std::string& name : names) text += fmt::format("public {}\n", name);
@@ -394,6 +410,8 @@ std::string write_neuron_python(const Morphology& morphology) {
   const Morphology kept = as_kept(morphology, neuron_keeps);
   const Plan cell(kept);
   std::string text(python_head);
+  text += comments(kept, "#");
+  text += python_sections;
   for (const Cable& cable : cell.cables) {
     const Array& array = cell.arrays[cable.array];
     text += fmt::format("    (\"{}\", {}, {}, {}, ", array.name,

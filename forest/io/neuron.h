@@ -10,8 +10,10 @@
 
 namespace forest::io {
 
-inline constexpr Keeps neuron_keeps{
-    .contours = false, .lengthless = false, .zero_radii = false, .spines = false, .annotations = false};
+inline constexpr Keeps neuron_keeps{.contours = false,
+                                    .lengthless = false,
+                                    .zero_radii = false,
+                                    .spines = false};  // annotations are comments
 
 /// A template of a name of its own (from a checksum of what it holds, so that many load side by side).
 std::string write_neuron_hoc(const Morphology& morphology);
