@@ -8,6 +8,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/genesis.h"
 #include "forest/io/neuron.h"
 #include "forest/io/swc.h"
 
@@ -18,6 +19,8 @@ constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 
 constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
 constexpr std::array<std::string_view, 1> python_extensions{".py"};
+
+constexpr std::array<std::string_view, 1> genesis_extensions{".p"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -44,6 +47,14 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_neuron_python,
            .keeps = neuron_keeps},
+    Format{.name = "genesis",
+           .title = "GENESIS cell parameters (readcell)",
+           .extensions = genesis_extensions,
+           .recognises = recognises_genesis,
+           .read = read_genesis,
+           .read_all = read_genesis_cells,
+           .write = write_genesis,
+           .keeps = genesis_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

@@ -161,6 +161,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
                             : value;
   };
   const auto kept_point = [&](const Point& p) {
+    if (!(keeps.step > 0.f)) return p;
     return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
   };
   MorphologyBuilder builder;
