@@ -8,6 +8,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/acc.h"
 #include "forest/io/genesis.h"
 #include "forest/io/neuron.h"
 #include "forest/io/swc.h"
@@ -21,6 +22,7 @@ constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
 constexpr std::array<std::string_view, 1> python_extensions{".py"};
 
 constexpr std::array<std::string_view, 1> genesis_extensions{".p"};
+constexpr std::array<std::string_view, 1> acc_extensions{".acc"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -55,6 +57,14 @@ constexpr std::array table{
            .read_all = read_genesis_cells,
            .write = write_genesis,
            .keeps = genesis_keeps},
+    Format{.name = "acc",
+           .title = "Arbor component (ACC)",
+           .extensions = acc_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_acc,
+           .keeps = acc_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

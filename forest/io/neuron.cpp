@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/hash.h"
+#include "forest/io/comments.h"
 #include "forest/io/numbers.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/swc_rows.h"
@@ -239,18 +240,6 @@ class Procedures {
   std::size_t lines_ = 0, count_ = 0;
 };
 
-/// What the file says of its cell, a line each, in plain letters.
-std::string comments(const Morphology& m, std::string_view mark) {
-  std::string text;
-  for (const auto& [key, value] : m.annotations()) {
-    std::string line = key == "comment" ? value : key + ' ' + value;
-    for (char& c : line) c = c >= ' ' && c <= '~' ? c : c == '\n' || c == '\r' || c == '\t' ? ' ' : '?';
-    line.resize(std::min<std::size_t>(line.size(), 500));
-    text += fmt::format("{} {}\n", mark, line);
-  }
-  return text;
-}
-
 std::string joined(const std::vector<std::string>& words) {
   return fmt::format("{}", fmt::join(words, ", "));
 }
@@ -363,7 +352,7 @@ std::string write_neuron_hoc(const Morphology& morphology) {
     names.push_back(array.name);
     arrays.push_back(fmt::format("{}[{}]", array.name, array.size));
   }
-  std::string text = comments(kept, "//");
+  std::string text = comment_lines(kept.annotations(), "//");
   text += fmt::format("public {}, geom_nseg, fill_diameters, init\n", joined(objects));
   text += fmt::format("objref {}\n", joined(objects));
   // One line each, since hoc's lines have an end.
@@ -410,7 +399,7 @@ std::string write_neuron_python(const Morphology& morphology) {
   const Morphology kept = as_kept(morphology, neuron_keeps);
   const Plan cell(kept);
   std::string text(python_head);
-  text += comments(kept, "#");
+  text += comment_lines(kept.annotations(), "#");
   text += python_sections;
   for (const Cable& cable : cell.cables) {
     const Array& array = cell.arrays[cable.array];
