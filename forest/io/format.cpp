@@ -80,7 +80,7 @@ bool has(const Format& format, std::string_view extension) {
 [[noreturn]] void refuse_extension(const std::filesystem::path& path, bool written) {
   std::string known;
   for (const Format& format : table)
-    if (!written || format.write)
+    if (written ? format.write != nullptr : format.read != nullptr)
       for (const std::string_view extension : format.extensions)
         if (known.find(std::string(extension) + ",") == known.npos) known += std::string(extension) + ", ";
   known.resize(known.size() - 2);
