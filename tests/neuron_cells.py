@@ -22,9 +22,10 @@ metrics = ["number_of_sections", "total_length", "total_area", "soma_surface_are
 
 
 def hoc_cell(path):
-    if not h.load_file(1, path):
+    name = re.search(r"^begintemplate (\w+)", open(path).read(), re.M)[1]
+    if not h.name_declared(name) and not h.load_file(1, path):  # the same cell from another file is there already
         raise RuntimeError("NEURON cannot load it")
-    return getattr(h, re.search(r"^begintemplate (\w+)", open(path).read(), re.M)[1])()
+    return getattr(h, name)()
 
 
 def python_cell(path):
@@ -72,7 +73,8 @@ def look(cell, expected):
     h.finitialize(-60)
     for _ in range(3):
         h.fadvance()
-    if not all(math.isfinite(segment.v) for section in cell.all for segment in section):
+    alone = {s.name() for s in cell.all if s.L < 1e-5 and s.parentseg() is None and not s.children()}  # lost single points
+    if not all(math.isfinite(segment.v) for s in cell.all if s.name() not in alone for segment in s):
         wrong.append("the voltage is not a number after three steps")
     for section in cell.all:
         section.nseg = 1

@@ -37,11 +37,9 @@ class Writer {
   void soma() {
     const Soma& soma = m_.soma();
     if (soma.kind == SomaKind::sphere) {
-      const Point p = soma.points[0];
-      Point low = p, high = p;
-      low.y -= p.radius, high.y += p.radius;
-      branch(-1, std::vector{low, p}, swc_soma_type);
-      branch(0, std::vector{p, high}, swc_soma_type);
+      const auto [low, middle, high] = cylinder_of(soma.points[0]);
+      branch(-1, std::vector{low, middle}, swc_soma_type);
+      branch(0, std::vector{middle, high}, swc_soma_type);
       soma_branches_ = {0};
     } else if (soma.kind == SomaKind::cylinders) {
       soma_branches_ = {-1};  // the first point begins the cell

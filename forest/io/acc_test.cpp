@@ -124,6 +124,19 @@ TEST(Acc, HasTheBranchesLengthsAreasAndJointsOfTheNeuron) {
   }
 }
 
+TEST(Acc, ASphereFarFromTheOriginKeepsItsArea) {
+  MorphologyBuilder b;
+  b.set_soma({.kind = SomaKind::sphere,
+              .points = {{-14881.317f, 11789.978f, -8017.575f, .311f}},
+              .parents = {},
+              .contour_starts = {}});
+  const Morphology m = b.build();
+  double area = 0.;
+  for (const Branch& branch : branches(write_acc(m)))
+    area += segment_area(branch.segments[0].from, branch.segments[0].to);
+  EXPECT_NEAR(area, m.soma().area(), 1e-6 * area);
+}
+
 TEST(Acc, NeuritesLeaveFromTheMiddleOfASphere) {
   MorphologyBuilder b;
   b.set_soma(zoo_parts::sphere(5));

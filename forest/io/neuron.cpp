@@ -109,14 +109,11 @@ class Plan {
     }
   }
 
-  /// A sphere is a cylinder as long as wide, of the same area; cylinders are paths of soma points.
+  /// A sphere is one cylinder; cylinders are paths of soma points.
   void soma() {
     const Soma& soma = m_.soma();
     if (soma.kind == SomaKind::sphere) {
-      const Point p = soma.points[0];
-      Point low = p, high = p;
-      low.y -= p.radius, high.y += p.radius;
-      if (segment_length(low, high) < 1e-6) high = next_place(low);
+      const auto [low, middle, high] = cylinder_of(soma.points[0]);
       add({"soma", lists[0]}).points = {low, high};
       soma_places_.push_back({0, .5});
     } else if (soma.kind == SomaKind::cylinders) {
@@ -223,7 +220,7 @@ class Procedures {
   }
 
  private:
-  static constexpr std::size_t most_lines = 200;
+  static constexpr std::size_t most_lines = 90;  // statements; some open and close a block
 
   void close() {
     if (!owner_.empty()) text_ += "  }\n";

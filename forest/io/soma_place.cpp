@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "forest/io/keeps.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
@@ -24,6 +25,16 @@ std::int32_t SomaPlaces::operator()(SectionId root) const {
   const auto nearest =
       std::ranges::min_element(soma.points, {}, [&](const Point& p) { return segment_length(p, begin); });
   return std::int32_t(nearest - soma.points.begin());
+}
+
+std::array<Point, 3> cylinder_of(const Point& sphere) {
+  Point low = sphere, high = sphere;
+  low.y -= sphere.radius, high.y += sphere.radius;
+  if (segment_length(low, high) < .99e-6) high = next_place(low);
+  const double length = segment_length(low, high);
+  const float radius = float(2. * double(sphere.radius) * double(sphere.radius) / length);
+  low.radius = high.radius = radius;
+  return {low, {sphere.x, sphere.y, sphere.z, radius}, high};
 }
 
 }  // namespace forest::io

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// Where a neurite hangs on the soma, for formats that must say it.
+// The soma of a simulator: where a neurite hangs on it, and a sphere where there are cylinders only.
 #pragma once
 
+#include <array>
 #include <cstdint>
 
 #include "forest/morphology/morphology.h"
@@ -20,5 +21,9 @@ class SomaPlaces {
   const Morphology& m_;
   bool known_ = false;  // of some root
 };
+
+/// A sphere as a cylinder of its area, as long as wide: its lower end, its middle, its upper end (along y). Where the floats
+/// of its place are too coarse for that length, the width makes up for it.
+std::array<Point, 3> cylinder_of(const Point& sphere);
 
 }  // namespace forest::io
