@@ -17,6 +17,7 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/tables.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -31,12 +32,21 @@ struct Options {
   fs::path out;
 };
 
+void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Console& console) {
+  const auto files = export_tables(options.repo, rows, options.out, options.format == "csv", console);
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const fs::path& file : files) list.push_back(file.string());
+  console.print({{"format", options.format}, {"neurons", rows.size()}, {"files", list}});
+  console.say(fmt::format("{} neurons are written to {}", rows.size(), options.out.string()));
+}
+
 void run(const Options& options, Console& console) {
-  const io::Format& format = *io::find_format(options.format);
   const auto rows =
       pick_neurons(Repository::open(options.repo, Access::read), options.names, options.population);
   if (rows.empty())
     throw Error(fmt::format("{} holds no neuron to export; import or grow some first", options.repo));
+  if (options.format == "xlsx" || options.format == "csv") return run_tables(options, rows, console);
+  const io::Format& format = *io::find_format(options.format);
 
   // Names are unique in a population only, so several populations get a folder each.
   std::set<std::string> populations;
@@ -75,19 +85,24 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> export_files(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  std::vector<std::string> formats;
+  std::vector<std::string> formats{"xlsx", "csv"};  // tables
   for (const io::Format& format : io::formats())
     if (format.write) formats.emplace_back(format.name);
   command.add_option("neurons", options->names,
                      "Neurons, by name or by the id that list shows; all when none is named");
   command.add_option("--repo", options->repo, "The repository")->required()->type_name("REPO");
   must_be_name(*command.add_option("--population", options->population, "Only those of this population"));
-  command.add_option("--format", options->format, "Format of the files")
+  command
+      .add_option(
+          "--format", options->format,
+          "Format of the files; xlsx is one workbook of tables and charts, csv a file for each of its sheets")
       ->capture_default_str()
       ->check(CLI::IsMember(formats));
-  command.add_option("--out", options->out, "Folder the files are written to; made when there is none")
+  command
+      .add_option("--out", options->out,
+                  "Folder the files are written to, or the workbook; made when there is none")
       ->required()
-      ->type_name("DIR");
+      ->type_name("PATH");
   return [options, &console] { run(*options, console); };
 }
 

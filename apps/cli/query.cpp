@@ -1,14 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest query: a question in SQL to a repository, which nothing can be written by.
-#include <iterator>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/workbook.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
 
@@ -39,29 +38,13 @@ struct ToJson {
   nlohmann::ordered_json operator()(const std::string& value) const { return repository::escaped(value); }
 };
 
-/// As RFC 4180 has it.
-std::string csv_of(const Answer& answer) {
-  std::string csv;
-  const auto line = [&](const std::vector<std::string>& cells) {
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      if (i) csv += ',';
-      if (cells[i].find_first_of(",\"\r\n") == std::string::npos) {
-        csv += cells[i];
-        continue;
-      }
-      csv += '"';
-      for (const char c : cells[i]) csv.append(c == '"' ? 2 : 1, c);
-      csv += '"';
-    }
-    csv += "\r\n";
-  };
-  line(answer.columns);
-  for (const auto& row : answer.rows) {
-    std::vector<std::string> cells;
-    for (const Answer::Value& value : row) cells.push_back(std::visit(ToText{}, value));
-    line(cells);
-  }
-  return csv;
+std::string csv_of(Answer answer) {
+  io::TableSheet sheet{"answer", {}, std::move(answer.rows)};
+  for (std::string& column : answer.columns) sheet.columns.push_back({std::move(column), ""});
+  for (auto& row : sheet.rows)
+    for (Answer::Value& value : row)
+      if (auto* text = std::get_if<std::string>(&value)) *text = repository::escaped(*text);
+  return io::csv_of(sheet);
 }
 
 void run(const Options& options, Console& console) {

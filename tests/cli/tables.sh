@@ -1,0 +1,36 @@
+# SPDX-License-Identifier: Apache-2.0
+# A population as a workbook and as CSV files: an independent reader finds the neurons, their units and the charts.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+for grammar in motoneuron pyramidal; do $BRAINFOREST grow --grammar $grammar --count 4 --seed 2 --repo r.db >out.txt; done
+$BRAINFOREST export --repo r.db --population motoneuron --format xlsx --out cells.xlsx >out.txt
+$BRAINFOREST export --repo r.db --population motoneuron --format csv --out tables/ --json >files.json
+$BRAINFOREST export --repo r.db --population motoneuron --format xlsx --out again.xlsx >out.txt
+cmp cells.xlsx again.xlsx
+/usr/bin/python3 - <<'PY'
+import csv, json, sqlite3, zipfile
+import openpyxl
+book = openpyxl.load_workbook("cells.xlsx")
+assert book.sheetnames == ["summary", "neurons", "sections", "junctions", "metrics"], book.sheetnames
+db = sqlite3.connect("r.db")
+count = lambda view: db.execute(f"select count(*) from {view} where population = 'motoneuron'").fetchone()[0]
+assert book["neurons"].max_row == 1 + 4 and book["sections"].max_row == 1 + count("section")
+assert book["junctions"].max_row == 1 + count("junction")
+header = [cell.value for cell in book["sections"][1]]
+assert "length (µm)" in header and "area (µm²)" in header and "kind" in header, header
+length = header.index("length (µm)")
+total = sum(row[length].value for row in book["sections"].iter_rows(min_row=2))
+assert abs(total - db.execute("select sum(length) from neuron where population = 'motoneuron'").fetchone()[0]) < 1e-6 * total
+metrics = {c.value: c.column for c in book["metrics"][1]}
+column = metrics["total_length (µm)"]
+values = [book["metrics"].cell(row, column).value for row in range(2, 6)]
+assert abs(sum(values) - total) < 1e-6 * total
+summary = {row[0].value: row for row in book["summary"].iter_rows(min_row=2)}
+assert abs(summary["total_length"][3].value - total / 4) < 1e-6 * total and summary["total_length"][2].value == 4
+assert len([n for n in zipfile.ZipFile("cells.xlsx").namelist() if n.startswith("xl/charts/chart")]) == 4
+files = json.load(open("files.json"))["files"]
+assert len(files) == 5, files
+rows = list(csv.reader(open("tables/sections.csv", newline="", encoding="utf-8")))
+assert rows[0] == header and len(rows) == book["sections"].max_row
+PY
+! $BRAINFOREST export --repo r.db --format xlsx --out /nowhere/cells.xlsx 2>err.txt
+[ ! -e /nowhere ]
