@@ -8,12 +8,14 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/h5.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+constexpr std::array<std::string_view, 2> h5_extensions{".h5", ".hdf5"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -23,6 +25,14 @@ constexpr std::array table{
            .read = read_swc,
            .read_all = nullptr,
            .write = write_swc,
+           .keeps = {}},
+    Format{.name = "h5",
+           .title = "HDF5 morphology (MorphIO 1.0 to 1.3, containers)",
+           .extensions = h5_extensions,
+           .recognises = recognises_h5,
+           .read = read_h5,
+           .read_all = read_all_h5,
+           .write = write_h5,
            .keeps = {}},
 };
 
