@@ -30,6 +30,7 @@ enum class H5Oddity : std::uint8_t {
   several_cells,
   version_2,
   unused_points,
+  empty_section,
   soma_two_points,
   root_marker,
   self_parent,
@@ -51,11 +52,13 @@ constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"several-cells", false, "only the first is read here; import the file to have all"},
     {"version-2", false, "converted to what version 1 has"},
     {"unused-points", false, "they are skipped"},
+    {"empty-section", false, "left out; daughters go to the parent"},
     {"soma-two-points", false, "read as a cylinder between them"},
     {"root-marker", false, "read as roots that leave from no soma"},
     {"self-parent", false, "read as roots"},
     {"missing-parent", false, "read as roots"},
-    {"child-first", false, "the order of rows does not matter; sections that organelles name keep their old numbers"},
+    {"child-first", false,
+     "the order of rows does not matter; sections that organelles name keep their old numbers"},
     {"joint-missing", false, "the parent's last point is put in front"},
     {"single-daughter", false, "kept as sections of their own"},
     {"unknown-place", false, "read as those of the point before"},
@@ -167,6 +170,7 @@ class CellReader {
       read_version_1();
     }
     mend_points();
+    drop_empty_rows();
     find_soma();
     sections();
     annotate();
@@ -181,12 +185,14 @@ class CellReader {
   Array required(const Members& members, std::string_view name, std::size_t columns, bool whole) {
     const auto object = members.find(name);
     if (!object || !object->is_array())
-      image_.refuse(fmt::format("holds no neuron: there is no array {}; a neuron has points and structure", name));
+      image_.refuse(
+          fmt::format("holds no neuron: there is no array {}; a neuron has points and structure", name));
     Array array = image_.array(*object, name);
     if (array.shape.size() != 2 || array.shape[1] != columns)
-      image_.refuse(fmt::format("array {} has not {} columns; points have x y z diameter, structure has first point, "
-                                "type and parent",
-                                name, columns));
+      image_.refuse(
+          fmt::format("array {} has not {} columns; points have x y z diameter, structure has first point, "
+                      "type and parent",
+                      name, columns));
     if (whole && array.real)
       image_.refuse(fmt::format("array {} holds real numbers; write whole ones", name));
     return array;
@@ -208,8 +214,9 @@ class CellReader {
     if (const auto metadata = members_.find("metadata")) {
       const auto version = image_.integers(*metadata, "version");
       if (!version.empty() && (version[0] != 1 || version.size() < 2 || version[1] < 0 || version[1] > 3))
-        image_.refuse(fmt::format("is of version {} of the format; 1.0 to 1.3 and 2 are read, write one of those",
-                                  fmt::join(version, ".")));
+        image_.refuse(
+            fmt::format("is of version {} of the format; 1.0 to 1.3 and 2 are read, write one of those",
+                        fmt::join(version, ".")));
       const auto family = image_.integers(*metadata, "cell_family");
       if (!family.empty()) family_ = family[0];
       if (family_ < neuron || family_ > spine)
@@ -233,12 +240,11 @@ class CellReader {
     read_perimeters();
   }
 
-  std::size_t checked_offset(std::int64_t offset, std::size_t row) const {
-    const std::size_t least = row ? offsets_[row - 1] : 0;
-    if (offset < 0 || std::size_t(offset) < least || std::size_t(offset) > points_.size())
-      image_.refuse(fmt::format("row {} of structure begins at point {} of {}; rows must follow one another", row,
-                                offset, points_.size()));
-    return std::size_t(offset);
+  std::size_t checked_offset(std::int64_t offset, std::size_t row) {
+    if (offset < last_offset_ || std::size_t(offset) > points_.size())
+      image_.refuse(fmt::format("row {} of structure begins at point {} of {}; rows must follow one another",
+                                row, offset, points_.size()));
+    return std::size_t(last_offset_ = offset);
   }
 
   std::int32_t checked_type(std::int64_t type, std::size_t row) const {
@@ -266,20 +272,15 @@ class CellReader {
       types.copy(std::span(kinds));
       const std::size_t count = kinds.size();
       if (2 * count != cells.size())
-        image_.refuse(fmt::format("has {} sections but {} types; the file is damaged", cells.size() / 2, count));
+        image_.refuse(
+            fmt::format("has {} sections but {} types; the file is damaged", cells.size() / 2, count));
       std::size_t somata = 0;
       while (somata < count && kinds[somata] == soma_type) ++somata;
       const std::size_t extra = somata > 1 ? somata - 1 : 0;  // rows that the one of the soma takes in
       for (std::size_t row = 0; row < count; ++row) {
         if (row > 0 && row <= extra) continue;
-        offsets_.push_back(0);
-        offsets_.back() = 0;
-        const std::int64_t offset = cells[2 * row], parent = cells[2 * row + 1];
-        const std::size_t least = offsets_.size() > 1 ? offsets_[offsets_.size() - 2] : 0;
-        if (offset < std::int64_t(least) || offset > std::int64_t(points_.size()))
-          image_.refuse(fmt::format("row {} of structure begins at point {} of {}; rows must follow one another", row,
-                                    offset, points_.size()));
-        offsets_.back() = std::size_t(offset);
+        const std::int64_t parent = cells[2 * row + 1];
+        offsets_.push_back(checked_offset(cells[2 * row], row));
         types_.push_back(checked_type(kinds[row], row));
         parents_.push_back(parent <= std::int64_t(extra) ? std::min<std::int64_t>(parent, 0)
                                                          : parent - std::int64_t(extra));
@@ -294,11 +295,14 @@ class CellReader {
     const bool neurites = rows() > (rows() && is_soma(0) ? 1u : 0u);
     if (!object) {
       if (family_ == glia && neurites)
-        image_.refuse("is a glia cell without perimeters, which such files must have; add them or set cell_family to 0");
+        image_.refuse(
+            "is a glia cell without perimeters, which such files must have; add them or set cell_family to "
+            "0");
       return;
     }
     const Array array = image_.array(*object, perimeters_key);
-    if (array.shape.size() != 1) image_.refuse("has perimeters in several columns; there is one for each point");
+    if (array.shape.size() != 1)
+      image_.refuse("has perimeters in several columns; there is one for each point");
     if (array.count() != points_.size()) {
       oddities_.add(H5Oddity::perimeters_size, 0, [&] {
         return fmt::format("there are {} perimeters for {} points", array.count(), points_.size());
@@ -341,15 +345,59 @@ class CellReader {
                     [&] { return fmt::format("the diameters of {} points are negative", negative); });
   }
 
+  /// Rows without points, but for a soma's.
+  void drop_empty_rows() {
+    const auto empty = [&](std::size_t row) {
+      return offsets_[row] == end_of(row) && !(row == 0 && is_soma(0));
+    };
+    std::vector<std::int64_t> places(rows());  // of rows that stay
+    std::size_t stay = 0;
+    for (std::size_t row = 0; row < rows(); ++row) places[row] = empty(row) ? -1 : std::int64_t(stay++);
+    const std::size_t dropped = rows() - stay;
+    if (dropped == 0) return;
+    oddities_.add(H5Oddity::empty_section, 0,
+                  [&] { return fmt::format("{} rows of structure have no point", dropped); });
+    const auto inside = [&](std::int64_t row) { return row >= 0 && std::size_t(row) < rows(); };
+    // What the first row without points on the way to a root leads to is kept for the others: the way is gone once.
+    std::vector<std::int64_t> parents = parents_;
+    std::vector<std::size_t> way;
+    for (std::size_t row = 0; row < rows(); ++row) {
+      std::int64_t at = parents[row];
+      way.assign(1, row);
+      for (; inside(at) && places[std::size_t(at)] < 0; at = parents[std::size_t(at)]) {
+        if (way.size() > dropped + 1)
+          image_.refuse(
+              fmt::format("row {} of structure is its own ancestor; correct one of the parents", at));
+        way.push_back(std::size_t(at));
+      }
+      for (const std::size_t w : way) parents[w] = at;
+    }
+    for (std::size_t row = 0; row < rows(); ++row) {
+      if (places[row] < 0) continue;
+      const std::size_t place = std::size_t(places[row]);
+      const std::int64_t parent = parents[row];
+      parents_[place] = inside(parent) ? places[std::size_t(parent)]
+                        : parent < 0   ? parent
+                                       : std::numeric_limits<std::int64_t>::max();  // still missing
+      offsets_[place] = offsets_[row];
+      types_[place] = types_[row];
+    }
+    offsets_.resize(stay), types_.resize(stay), parents_.resize(stay);
+  }
+
   void find_soma() {
     for (std::size_t row = 1; row < rows(); ++row)
       if (is_soma(row))
         image_.refuse(fmt::format("row {} of structure is of type 1; only row 0 may be the soma", row));
-    if (rows() == 0 && !members_.has(own_group)) image_.refuse("holds no section; a neuron has one or a soma");
+    if (rows() == 0 && !members_.has(own_group))
+      image_.refuse("holds no section; a neuron has one or a soma");
     has_soma_ = rows() && is_soma(0);
     if (!has_soma_) return;
     const std::span<const Point> points = std::span(points_).subspan(offsets_[0], end_of(0) - offsets_[0]);
-    Soma soma{.kind = SomaKind::contours, .points = {points.begin(), points.end()}, .parents = {}, .contour_starts = {0}};
+    Soma soma{.kind = SomaKind::contours,
+              .points = {points.begin(), points.end()},
+              .parents = {},
+              .contour_starts = {0}};
     if (points.size() == 1)
       image_.refuse("has a soma of one point; the format needs an outline of three and more");
     if (points.empty()) soma = {};
@@ -377,7 +425,8 @@ class CellReader {
     if (parent == -1 && !has_soma_) return -1;
     if (parent < 0) return told(H5Oddity::root_marker, "has no parent");
     if (std::size_t(parent) == row) return told(H5Oddity::self_parent, "is its own parent");
-    if (std::size_t(parent) >= rows()) return told(H5Oddity::missing_parent, "has a parent that is not there");
+    if (std::size_t(parent) >= rows())
+      return told(H5Oddity::missing_parent, "has a parent that is not there");
     return parent;
   }
 
@@ -405,7 +454,6 @@ class CellReader {
       parents[i] = parent_of(row, s.soma_point);
       if (parents[i] >= 0) parents[i] -= std::int64_t(first_row);
       const std::size_t size = end_of(row) - offsets_[row];
-      if (size == 0) image_.refuse(fmt::format("row {} of structure has no point; remove it", row));
       s.first_point = std::uint32_t(offsets_[row] - base);
       s.point_count = std::uint32_t(size);
       if (parents[i] < 0) continue;
@@ -420,17 +468,20 @@ class CellReader {
       const Point &joint = points_[end_of(parent + first_row) - 1], &first = points_[offsets_[row]];
       if (size < 2 || first.x != joint.x || first.y != joint.y || first.z != joint.z) {
         joints = false;
-        oddities_.add(H5Oddity::joint_missing, 0,
-                      [&] { return fmt::format("row {} of structure does not begin at its parent's last point", row); });
+        oddities_.add(H5Oddity::joint_missing, 0, [&] {
+          return fmt::format("row {} of structure does not begin at its parent's last point", row);
+        });
       }
     }
     if (const auto single = std::ranges::find(daughters, 1); single != daughters.end())
-      oddities_.add(H5Oddity::single_daughter, 0,
-                    [&] { return fmt::format("{} sections are their parent's only daughter", std::ranges::count(daughters, 1)); });
+      oddities_.add(H5Oddity::single_daughter, 0, [&] {
+        return fmt::format("{} sections are their parent's only daughter", std::ranges::count(daughters, 1));
+      });
 
     read_own(sections);
     builder_.set_soma(std::move(soma_));
-    if (!perimeters_.empty()) perimeters_.erase(perimeters_.begin(), perimeters_.begin() + std::ptrdiff_t(base));
+    if (!perimeters_.empty())
+      perimeters_.erase(perimeters_.begin(), perimeters_.begin() + std::ptrdiff_t(base));
     if (!forward && joints) {
       points_.erase(points_.begin(), points_.begin() + std::ptrdiff_t(base));
       builder_.add_sections(std::move(points_), std::move(sections));
@@ -441,8 +492,9 @@ class CellReader {
     for (const std::size_t i : order) {
       const Section& s = sections[i];
       const SectionId parent = parents[i] < 0 ? SectionId() : ids[std::size_t(parents[i])];
-      ids[i] = builder_.add_section(parent, s.kind, std::span(points_).subspan(base + s.first_point, s.point_count),
-                                    s.tag, s.soma_point);
+      ids[i] = builder_.add_section(parent, s.kind,
+                                    std::span(points_).subspan(base + s.first_point, s.point_count), s.tag,
+                                    s.soma_point);
     }
     for (Spine& s : spines_)
       if (s.section.value() < count) s.section = ids[s.section.value()];
@@ -451,12 +503,14 @@ class CellReader {
     perimeters_.clear();
   }
 
-  std::vector<std::size_t> parents_first(const std::vector<std::int64_t>& parents, std::size_t first_row) const {
+  std::vector<std::size_t> parents_first(const std::vector<std::int64_t>& parents,
+                                         std::size_t first_row) const {
     enum : std::uint8_t { unseen, waiting, placed };
     std::vector<std::uint8_t> state(parents.size(), unseen);
     std::vector<std::size_t> order, path;
     for (std::size_t i = 0; i < parents.size(); ++i) {
-      for (std::int64_t at = std::int64_t(i); at >= 0 && state[std::size_t(at)] != placed; at = parents[std::size_t(at)]) {
+      for (std::int64_t at = std::int64_t(i); at >= 0 && state[std::size_t(at)] != placed;
+           at = parents[std::size_t(at)]) {
         if (state[std::size_t(at)] == waiting)
           image_.refuse(fmt::format("row {} of structure is its own ancestor; correct one of the parents",
                                     std::size_t(at) + first_row));
@@ -477,7 +531,8 @@ class CellReader {
     if (!group || !group->is_group()) return;
     const Members own(image_, *group);
     const auto misfit = [&](std::string_view what) {
-      image_.refuse(fmt::format("{}/{} does not fit the neuron; remove the group {}", own_group, what, own_group));
+      image_.refuse(
+          fmt::format("{}/{} does not fit the neuron; remove the group {}", own_group, what, own_group));
     };
     const auto integers = [&](std::string_view name) {
       std::vector<std::int64_t> values;
@@ -486,7 +541,8 @@ class CellReader {
         values.resize(array.count());
         array.copy(std::span(values));
         for (const std::int64_t value : values)
-          if (value < std::numeric_limits<std::int32_t>::min() || value > std::numeric_limits<std::int32_t>::max())
+          if (value < std::numeric_limits<std::int32_t>::min() ||
+              value > std::numeric_limits<std::int32_t>::max())
             misfit(name);
       }
       return values;
@@ -511,15 +567,20 @@ class CellReader {
     if (own.has("soma")) {
       const auto numbers = reals("soma");
       if (numbers.empty() || numbers.size() % 4) misfit("soma");
-      soma_ = {.kind = numbers.size() == 4 ? SomaKind::sphere : SomaKind::cylinders, .points = {}, .parents = {}, .contour_starts = {}};
+      soma_ = {.kind = numbers.size() == 4 ? SomaKind::sphere : SomaKind::cylinders,
+               .points = {},
+               .parents = {},
+               .contour_starts = {}};
       for (std::size_t i = 0; i < numbers.size(); i += 4)
         soma_.points.push_back({numbers[i], numbers[i + 1], numbers[i + 2], .5f * numbers[i + 3]});
       if (soma_.kind == SomaKind::cylinders)
-        for (const std::int64_t parent : integers("soma_parents")) soma_.parents.push_back(std::int32_t(parent));
+        for (const std::int64_t parent : integers("soma_parents"))
+          soma_.parents.push_back(std::int32_t(parent));
     }
     if (own.has("contour_starts") && soma_.kind == SomaKind::contours) {
       soma_.contour_starts.clear();
-      for (const std::int64_t start : integers("contour_starts")) soma_.contour_starts.push_back(std::uint32_t(start));
+      for (const std::int64_t start : integers("contour_starts"))
+        soma_.contour_starts.push_back(std::uint32_t(start));
     }
     if (own.has("root_soma_points")) {
       const auto places = integers("root_soma_points");
@@ -562,7 +623,8 @@ class CellReader {
     for (const Spine& s : spines_) builder_.add_spine(s);
     if (auto comment = image_.text(group_, comment_key); comment && !comment->empty())
       builder_.annotate(std::string(comment_key), std::move(*comment));
-    if (family_ != neuron) builder_.annotate(std::string(family_key), std::string(family_names[std::size_t(family_)]));
+    if (family_ != neuron)
+      builder_.annotate(std::string(family_key), std::string(family_names[std::size_t(family_)]));
     if (!perimeters_.empty()) {
       std::string text;
       text.reserve(10 * perimeters_.size());
@@ -575,11 +637,12 @@ class CellReader {
     if (const auto organelles = members_.find("organelles"); organelles && organelles->is_group())
       read_organelles(Members(image_, *organelles));
     for (auto& [key, value] : own_annotations_) builder_.annotate(std::move(key), std::move(value));
-    constexpr std::array<std::string_view, 7> known{"points",     "structure",  "metadata", "perimeters",
+    constexpr std::array<std::string_view, 7> known{"points",     "structure",    "metadata", "perimeters",
                                                     "organelles", "brain_forest", "neuron1"};
     std::string others;
     for (const Image::Link& link : members_.links())
-      if (std::ranges::find(known, link.name) == known.end()) others += (others.empty() ? "" : ", ") + link.name;
+      if (std::ranges::find(known, link.name) == known.end())
+        others += (others.empty() ? "" : ", ") + link.name;
     if (!others.empty()) {
       constexpr std::size_t enough = 200;
       if (others.size() > enough) others = others.substr(0, enough) + "…";
@@ -590,7 +653,8 @@ class CellReader {
   void read_organelles(const Members& organelles) {
     std::string others;
     for (const Image::Link& link : organelles.links()) {
-      const auto row = std::ranges::find(organelle_tables, std::string_view(link.name), &OrganelleTable::group);
+      const auto row =
+          std::ranges::find(organelle_tables, std::string_view(link.name), &OrganelleTable::group);
       const Image::Object group = image_.open(link.address);
       if (!group.is_group()) continue;
       if (row != organelle_tables.end())
@@ -641,8 +705,10 @@ class CellReader {
   void read_mitochondria(const Members& members) {
     const auto points_object = members.find("points"), structure_object = members.find("structure");
     if (!points_object || !structure_object) return odd_organelles("mitochondria");
-    const Array points = image_.array(*points_object, "points"), structure = image_.array(*structure_object, "structure");
-    if (points.shape.size() != 2 || points.shape[1] != 3 || structure.shape.size() != 2 || structure.shape[1] != 2)
+    const Array points = image_.array(*points_object, "points"),
+                structure = image_.array(*structure_object, "structure");
+    if (points.shape.size() != 2 || points.shape[1] != 3 || structure.shape.size() != 2 ||
+        structure.shape[1] != 2)
       return odd_organelles("mitochondria");
     std::vector<float> numbers(points.count());
     std::vector<std::int64_t> rows(structure.count());
@@ -652,7 +718,8 @@ class CellReader {
     for (std::int64_t i = 0; i < count; ++i) {
       const std::int64_t begin = rows[std::size_t(2 * i)];
       const std::int64_t end = i + 1 < count ? rows[std::size_t(2 * i + 2)] : total;
-      if (begin < 0 || begin > end || end > total || (i == 0 && begin != 0)) return odd_organelles("mitochondria");
+      if (begin < 0 || begin > end || end > total || (i == 0 && begin != 0))
+        return odd_organelles("mitochondria");
     }
     for (std::int64_t i = 0; i < count; ++i) {
       const std::size_t begin = std::size_t(rows[std::size_t(2 * i)]);
@@ -669,7 +736,7 @@ class CellReader {
   const Members& members_;
   Oddities& oddities_;
   MorphologyBuilder builder_;
-  std::int64_t family_ = neuron;
+  std::int64_t family_ = neuron, last_offset_ = 0;
   std::vector<Point> points_;
   std::vector<float> perimeters_;
   std::vector<std::size_t> offsets_;
@@ -714,8 +781,8 @@ void cells(const Image& image, Visit visit) {
   }
 }
 
-ReadResult read_cell(const Image& image, const Image::Object& group, const Members& members, Oddities& oddities,
-                     const std::string& name) {
+ReadResult read_cell(const Image& image, const Image::Object& group, const Members& members,
+                     Oddities& oddities, const std::string& name) {
   try {
     Morphology morphology = CellReader(image, group, members, oddities).read();
     return {std::move(morphology), oddities.take()};
@@ -747,15 +814,16 @@ std::vector<Point> circle(const Point& sphere) {
   std::vector<Point> points;
   for (int i = 0; i < corners; ++i) {
     const double angle = 2. * std::numbers::pi * i / corners;
-    points.push_back({float(sphere.x + sphere.radius * std::cos(angle)), float(sphere.y + sphere.radius * std::sin(angle)),
-                      sphere.z, 0.f});
+    points.push_back({float(sphere.x + sphere.radius * std::cos(angle)),
+                      float(sphere.y + sphere.radius * std::sin(angle)), sphere.z, 0.f});
   }
   return points;
 }
 
 class Writer {
  public:
-  Writer(hdf5::NewFile& file, std::string prefix, const Morphology& m) : file_(file), prefix_(std::move(prefix)), m_(m) {}
+  Writer(hdf5::NewFile& file, std::string prefix, const Morphology& m)
+      : file_(file), prefix_(std::move(prefix)), m_(m) {}
 
   void write() {
     if (!prefix_.empty()) file_.group(prefix_);
@@ -776,13 +844,13 @@ class Writer {
 
   void choose_family() {
     const auto all = [&](SectionKind kind) {
-      return !m_.sections().empty() &&
-             std::ranges::all_of(m_.sections(), [&](const Section& s) { return s.kind == kind; });
+      return std::ranges::all_of(m_.sections(), [&](const Section& s) { return s.kind == kind; });
     };
-    const auto said = std::ranges::find(m_.annotations(), family_key, &Annotations::value_type::first);
-    if (all(SectionKind::glia))
+    const auto found = std::ranges::find(m_.annotations(), family_key, &Annotations::value_type::first);
+    const std::string_view said = found == m_.annotations().end() ? "" : std::string_view(found->second);
+    if (all(SectionKind::glia) && (!m_.sections().empty() || said == family_names[glia]))
       family_ = glia;
-    else if (said != m_.annotations().end() && said->second == family_names[spine] && all(SectionKind::custom))
+    else if (all(SectionKind::custom) && said == family_names[spine])
       family_ = spine;
   }
 
@@ -852,7 +920,8 @@ class Writer {
         file_.attribute(root(), "comment", value);
         comment = placed[i] = true;
       } else if (key == family_key && family_ != neuron && value == family_names[std::size_t(family_)] &&
-                 std::ranges::find(all, family_key, &Annotations::value_type::first) - all.begin() == std::ptrdiff_t(i)) {
+                 std::ranges::find(all, family_key, &Annotations::value_type::first) - all.begin() ==
+                     std::ptrdiff_t(i)) {
         placed[i] = true;
       } else if (key == perimeters_key && perimeters.empty()) {
         placed[i] = parse_perimeters(value, perimeters);
@@ -876,7 +945,8 @@ class Writer {
           sizes.push_back(std::int32_t(part.size()));
         }
     if (sizes.empty()) return;
-    file_.write(own("annotations"), std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+    file_.write(own("annotations"),
+                std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
     file_.write(own("annotation_sizes"), sizes);
   }
 
@@ -902,7 +972,8 @@ class Writer {
       if (key != kind.group) continue;
       Numbers numbers(value);
       for (std::size_t c = 0; c < kind.count; ++c)
-        if (kind.columns[c].whole ? !numbers.next(whole[c].emplace_back()) : !numbers.next(real[c].emplace_back()))
+        if (kind.columns[c].whole ? !numbers.next(whole[c].emplace_back())
+                                  : !numbers.next(real[c].emplace_back()))
           return;
       if (!numbers.at_end()) return;
     }
@@ -945,8 +1016,8 @@ class Writer {
     std::vector<std::int32_t> owners;
     for (const Spine& s : m_.spines()) {
       owners.push_back(std::int32_t(s.section.value()));
-      for (const float number : {s.position, s.head.x(), s.head.y(), s.head.z(), s.head_diameter, s.neck_diameter,
-                                 float(s.shape)})
+      for (const float number :
+           {s.position, s.head.x(), s.head.y(), s.head.z(), s.head_diameter, s.neck_diameter, float(s.shape)})
         numbers.push_back(number);
     }
     file_.write(own("spines"), numbers, 7);
@@ -1015,7 +1086,8 @@ std::string write_h5(std::span<const NamedMorphology> cells) {
   std::set<std::string_view> names;
   for (const auto& [name, morphology] : cells) {
     if (name.empty() || !names.insert(name).second)
-      throw Error(fmt::format("a container needs different names for its cells; '{}' is empty or stands twice", name));
+      throw Error(fmt::format(
+          "a container needs different names for its cells; '{}' is empty or stands twice", name));
     Writer(file, '/' + name, morphology).write();
   }
   return file.bytes();
