@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/h5.h"
+#include "forest/io/neuroml.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
@@ -16,6 +17,7 @@ namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 constexpr std::array<std::string_view, 2> h5_extensions{".h5", ".hdf5"};
+constexpr std::array<std::string_view, 2> neuroml_extensions{".nml", ".xml"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -34,6 +36,14 @@ constexpr std::array table{
            .read_all = read_all_h5,
            .write = write_h5,
            .keeps = {}},
+    Format{.name = "neuroml",
+           .title = "NeuroML 2",
+           .extensions = neuroml_extensions,
+           .recognises = recognises_neuroml,
+           .read = read_neuroml,
+           .read_all = read_all_neuroml,
+           .write = write_neuroml,
+           .keeps = neuroml_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

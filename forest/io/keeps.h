@@ -31,6 +31,7 @@ struct Keeps {
   bool stumps = true;            // a root of a single point
   bool spines = true;
   bool annotations = true;
+  float least_diameter = 0.f;    // a diameter of 0 becomes this, µm, where a format refuses it
   float step = 0.f;  // coordinates and diameters are rounded to this, µm; 0: not at all
 };
 
