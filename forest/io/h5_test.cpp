@@ -205,6 +205,7 @@ TEST(H5, EveryLayoutOfTheLibraryHoldsTheSameNeuron) {
   };
   EXPECT_EQ(cells("container.h5").size(), 2u);
   EXPECT_EQ(cells("container.h5")[0].name, "a/b");
+  EXPECT_EQ(cells("many.h5").size(), 12u);
   const Morphology organelles = read(folder / "glia_organelles.h5").morphology;
   EXPECT_EQ(annotation(organelles, "mitochondrion"), "-1 0 0.5 10 1 0.2 3");
   EXPECT_EQ(annotation(organelles, "endoplasmic_reticulum"), "1 0.5 2 1");

@@ -8,7 +8,6 @@
 #include <cstring>
 #include <limits>
 #include <utility>
-
 #include <zlib.h>
 
 #include <fmt/format.h>
@@ -20,7 +19,8 @@ namespace {
 
 constexpr std::string_view signature("\x89HDF\r\n\x1a\n", 8);
 constexpr std::uint64_t nowhere = ~0ull;
-constexpr std::uint64_t most_deflated = 1100;  // bytes that one deflated byte can stand for, and a little more
+constexpr std::uint64_t most_deflated =
+    1100;  // bytes that one deflated byte can stand for, and a little more
 
 // Messages of object headers (section IV.A.2 of the specification).
 enum : std::uint16_t {
@@ -69,14 +69,22 @@ void convert(const Array& array, std::span<To> values) {
 template <class To>
 void convert_integers(const Array& array, std::span<To> values) {
   switch (array.width * 2 + array.is_signed) {
-    case 2: return convert<std::uint8_t>(array, values);
-    case 3: return convert<std::int8_t>(array, values);
-    case 4: return convert<std::uint16_t>(array, values);
-    case 5: return convert<std::int16_t>(array, values);
-    case 8: return convert<std::uint32_t>(array, values);
-    case 9: return convert<std::int32_t>(array, values);
-    case 16: return convert<std::uint64_t>(array, values);
-    default: return convert<std::int64_t>(array, values);
+    case 2:
+      return convert<std::uint8_t>(array, values);
+    case 3:
+      return convert<std::int8_t>(array, values);
+    case 4:
+      return convert<std::uint16_t>(array, values);
+    case 5:
+      return convert<std::int16_t>(array, values);
+    case 8:
+      return convert<std::uint32_t>(array, values);
+    case 9:
+      return convert<std::int32_t>(array, values);
+    case 16:
+      return convert<std::uint64_t>(array, values);
+    default:
+      return convert<std::int64_t>(array, values);
   }
 }
 
@@ -122,8 +130,7 @@ class Cursor {
   std::uint64_t number(std::size_t size) {
     const std::string_view field = take(size);
     std::uint64_t value = 0;
-    for (std::size_t i = field.size(); i-- > 0;)
-      value = value << 8 | static_cast<unsigned char>(field[i]);
+    for (std::size_t i = field.size(); i-- > 0;) value = value << 8 | static_cast<unsigned char>(field[i]);
     return value;
   }
   std::uint8_t byte() { return static_cast<std::uint8_t>(number(1)); }
@@ -142,6 +149,11 @@ struct Image::Type {
   enum Class { integer, real, text, variable_text, other } kind = other;
   bool is_signed = false, big_endian = false;
   std::size_t width = 0;
+};
+
+struct Image::FractalHeap {
+  std::size_t id_size = 0, columns = 0, rows = 0, offset_bits = 0;
+  std::uint64_t first_block = 0, largest_direct = 0, root = 0;
 };
 
 struct Image::Attribute {
@@ -184,7 +196,8 @@ Image::Image(std::string_view bytes, const std::string& name) : bytes_(bytes), n
   if (version < 2) block.skip(4);
   const std::uint8_t offset_size = block.byte(), length_size = block.byte();
   if (offset_size != 8 || length_size != 8)
-    refuse(fmt::format("has addresses of {} bytes instead of 8; write it again with `h5repack`", offset_size));
+    refuse(
+        fmt::format("has addresses of {} bytes instead of 8; write it again with `h5repack`", offset_size));
   block.skip(version == 0 ? 9 : version == 1 ? 13 : 1);
   block.skip(8 + 8);  // the base address, free space or the superblock's extension
   const std::uint64_t end = block.eight();
@@ -285,7 +298,8 @@ void Image::symbols(std::string_view message, std::vector<Link>& links) const {
     nodes.pop_back();
     if (++visited > bytes_.size() / 8 + 1) damaged(what);
     if (level == -2) {
-      Cursor entries(*this, bytes_.substr(std::size_t(std::min<std::uint64_t>(address, bytes_.size()))), what);
+      Cursor entries(*this, bytes_.substr(std::size_t(std::min<std::uint64_t>(address, bytes_.size()))),
+                     what);
       entries.expect("SNOD");
       entries.skip(2);
       for (std::uint16_t left = entries.two(); left > 0; --left) {
@@ -335,8 +349,112 @@ void Image::dense_links(std::string_view message, std::vector<Link>& links) cons
   if (flags & 1) info.skip(8);
   const std::uint64_t heap_address = info.eight(), tree_address = info.eight();
   if (heap_address == nowhere || tree_address == nowhere) return;
-  (void)links;
-  refuse("has a large group in the newest layout; write it again with `h5repack`");
+
+  Cursor heap(*this, at(heap_address, 146, what), what);
+  heap.expect("FRHP");
+  heap.skip(1);
+  FractalHeap objects;
+  objects.id_size = heap.two();
+  if (heap.two() != 0) refuse("has a packed group; write it again with `h5repack`");
+  heap.skip(1 + 4 + 8 + 8 + 8 + 8 + 8 + 8 + 8 + 8 + 8 + 8 + 8 + 8);
+  objects.columns = heap.two();
+  objects.first_block = heap.eight();
+  objects.largest_direct = heap.eight();
+  objects.offset_bits = heap.two();
+  heap.skip(2);
+  objects.root = heap.eight();
+  objects.rows = heap.two();
+  if (!objects.columns || !std::has_single_bit(objects.first_block) ||
+      !std::has_single_bit(objects.largest_direct) || objects.offset_bits > 64 || objects.id_size < 5 ||
+      objects.id_size > 64)
+    damaged(what);
+
+  Cursor tree(*this, at(tree_address, 34, what), what);
+  tree.expect("BTHD");
+  tree.skip(1);
+  if (tree.byte() != 5) damaged(what);  // records of names
+  const std::uint32_t node_size = tree.four();
+  const std::size_t record = tree.two();
+  const int depth = tree.two();
+  tree.skip(2);
+  const std::uint64_t root = tree.eight();
+  const std::size_t root_count = tree.two();
+  if (root == nowhere) return;
+  if (record != 4u + objects.id_size || node_size < record + 10 || depth > 20) damaged(what);
+  // How many records a node of each level and all below it hold at most: the counts beside its addresses take as few
+  // bytes as that needs.
+  const auto bytes_for = [](std::uint64_t most) { return std::size_t(std::bit_width(most) + 7) / 8; };
+  std::vector<std::uint64_t> most{(node_size - 10) / record}, below{most[0]};
+  for (int level = 1; level <= depth; ++level) {
+    const std::size_t pointer = 8 + bytes_for(most[0]) + (level > 1 ? bytes_for(below.back()) : 0);
+    if (node_size < 10 + pointer + record) damaged(what);
+    most.push_back((node_size - 10 - pointer) / (record + pointer));
+    if (below.back() > (1ull << 40)) damaged(what);
+    below.push_back((most.back() + 1) * below.back() + most.back());
+  }
+
+  struct Node {
+    std::uint64_t address;
+    std::size_t count;
+    int level;
+  };
+  std::vector<Node> nodes{{root, root_count, depth}};
+  for (std::size_t visited = 0; !nodes.empty(); ++visited) {
+    const Node node = nodes.back();
+    nodes.pop_back();
+    if (visited > bytes_.size() / 16) damaged(what);
+    Cursor fields(*this, at(node.address, node_size, what), what);
+    fields.expect(node.level ? "BTIN" : "BTLF");
+    fields.skip(2);
+    for (std::size_t i = 0; i < node.count; ++i) {
+      fields.skip(4);  // the name's hash
+      if (auto one = link(heap_object(objects, fields.take(objects.id_size))))
+        links.push_back(std::move(*one));
+      if (links.size() > bytes_.size()) damaged(what);
+    }
+    for (std::size_t i = 0; node.level && i <= node.count; ++i) {
+      const std::uint64_t address = fields.eight();
+      const std::size_t count = std::size_t(fields.number(bytes_for(most[0])));
+      if (node.level > 1) fields.skip(bytes_for(below[std::size_t(node.level) - 1]));
+      nodes.push_back({address, count, node.level - 1});
+    }
+  }
+}
+
+/// An object by its id: the heap is a table of blocks that double in size every second row, some of them tables again.
+std::string_view Image::heap_object(const FractalHeap& heap, std::string_view id) const {
+  constexpr std::string_view what = "the list of a large group";
+  Cursor fields(*this, id, what);
+  if (fields.byte() & 0xf0) refuse("has links of great length; write the file again with `h5repack`");
+  const std::size_t offset_size = (heap.offset_bits + 7) / 8;
+  std::uint64_t offset = fields.number(offset_size);
+  const std::uint64_t largest = std::min<std::uint64_t>(heap.largest_direct, 1ull << 32);
+  const std::uint64_t length =
+      fields.number(std::min<std::size_t>(std::size_t(std::bit_width(largest) + 7) / 8, fields.left()));
+  std::uint64_t block = heap.root, block_size = heap.first_block;
+  std::size_t rows = heap.rows;
+  for (int level = 0; rows > 0; ++level) {
+    if (level > 40) damaged(what);
+    // The row that holds the offset: rows 0 and 1 have blocks of the first size, every later one of twice the last.
+    std::uint64_t begin = 0, size = heap.first_block;
+    std::size_t row = 0;
+    while (offset - begin >= size * heap.columns) {
+      begin += size * heap.columns;
+      if (row++ > 0) size *= 2;
+      if (row >= rows || size > (1ull << 48)) damaged(what);
+    }
+    const std::uint64_t index = (offset - begin) / size;
+    offset -= begin + index * size;
+    Cursor table(*this, bytes_.substr(std::size_t(std::min<std::uint64_t>(block, bytes_.size()))), what);
+    table.expect("FHIB");
+    table.skip(1 + 8 + offset_size + 8 * (row * heap.columns + index));
+    block = table.eight();
+    block_size = size;
+    if (size <= heap.largest_direct) break;
+    rows = std::size_t(std::bit_width(size / heap.first_block / heap.columns));  // of a block that is a table
+  }
+  if (offset > block_size || length > block_size - offset) damaged(what);
+  return at(block, block_size, what).substr(std::size_t(offset), std::size_t(length));
 }
 
 // Values
@@ -376,9 +494,6 @@ Image::Type Image::type(std::string_view message) const {
     }
     case 1: {
       const std::uint64_t layout = fields.eight();
-      const bool single = width == 4 && layout == 0x1708'1f00'2000'0000ull;
-      (void)single;
-      fields.skip(0);
       const auto field = [&](int byte) { return std::uint8_t(layout >> (8 * byte)); };
       const bool plain = field(0) == 0 && field(1) == 0 && !(bits & 0x40);
       if (plain && width == 4 && field(5) == 8 && field(7) == 23) type.kind = Type::real;
@@ -420,7 +535,8 @@ Array Image::array(const Object& object, std::string_view path) const {
     if (message.type == layout_message) layout_found = &message;
   }
   if (!type_found || !shape_found || !layout_found)
-    refuse(fmt::format("has no array {}, but something else of that name; the file is of another kind", path));
+    refuse(
+        fmt::format("has no array {}, but something else of that name; the file is of another kind", path));
   const Type kind = type(resolved(*type_found));
   if (kind.kind != Type::integer && kind.kind != Type::real)
     refuse(fmt::format("array {} holds something other than plain numbers; write numbers", path));
@@ -442,7 +558,8 @@ Array Image::array(const Object& object, std::string_view path) const {
   Cursor layout(*this, layout_found->data, what);
   const std::uint8_t version = layout.byte();
   if (version == 0 || version > 4)
-    refuse(fmt::format("array {} is laid out in a way not known; write the file again with `h5repack`", path));
+    refuse(
+        fmt::format("array {} is laid out in a way not known; write the file again with `h5repack`", path));
   std::uint8_t rank = 0;
   if (version < 3) rank = layout.byte();
   const std::uint8_t storage = layout.byte();  // 0 in the header itself, 1 in one piece, 2 in chunks
@@ -482,7 +599,8 @@ std::optional<Image::Attribute> Image::attribute(const Object& object, std::stri
     const std::string_view own_name = part(name_size);
     if (own_name.substr(0, own_name.find('\0')) != name) continue;
     const std::string_view type_data = part(type_size), shape_data = part(shape_size);
-    if (version > 1 && (flags & 3)) return std::nullopt;  // a type that others share: never of what is asked here
+    if (version > 1 && (flags & 3))
+      return std::nullopt;  // a type that others share: never of what is asked here
     return Attribute{type(type_data), shape(shape_data), fields.rest()};
   }
   return std::nullopt;
@@ -532,8 +650,8 @@ std::optional<std::string> Image::text(const Object& object, std::string_view na
     const std::uint64_t length = heap.eight();
     if (own == 0) break;
     if (own == index) return until_null(heap.take(std::min<std::uint64_t>(length, size)));
-    heap.skip(std::min<std::uint64_t>(length > heap.left() ? length : padded(std::size_t(length)),
-                                      std::max<std::uint64_t>(length, heap.left())));
+    const std::size_t held = std::size_t(std::min<std::uint64_t>(length, heap.left()));
+    heap.skip(std::min(padded(held), heap.left()));
   }
   damaged(what);
 }

@@ -71,6 +71,7 @@ class Image {
   friend class Cursor;
   struct Type;
   struct Attribute;
+  struct FractalHeap;
   std::string_view bytes_;
   const std::string& name_;
   std::uint64_t root_ = 0;
@@ -84,6 +85,7 @@ class Image {
   void symbols(std::string_view message, std::vector<Link>& links) const;
   std::optional<Link> link(std::string_view message) const;
   void dense_links(std::string_view message, std::vector<Link>& links) const;
+  std::string_view heap_object(const FractalHeap& heap, std::string_view id) const;
   std::string chunks(const Object& object, std::string_view layout, const Array& array) const;
 };
 

@@ -257,12 +257,16 @@ TEST(NeuromlRealData, CellsOfTheStandardsExamplesAreRead) {
           read(folder / ("cvapp_cases/caseExamples__NeuroML2__" + stem + "_morphOnly.cell.nml")).morphology;
       const Morphology swc = read(folder / ("cvapp_cases/caseExamples__" + stem + ".swc")).morphology;
       EXPECT_EQ(nml, only) << stem;
-      std::printf("  %s: %zu and %zu sections, %.3f and %.3f um, soma %.3f and %.3f um2\n", stem.c_str(),
-                  nml.sections().size(), swc.sections().size(), total_length(nml), total_length(swc),
-                  nml.soma().area(), swc.soma().area());
+      if (stem == "Case1_orig") continue;  // its conversion left the dendrites out
+      EXPECT_EQ(nml.sections().size(), swc.sections().size()) << stem;
+      EXPECT_NEAR(total_length(nml), total_length(swc), 1e-6 * total_length(swc)) << stem;
+      if (kind == "new") {
+        EXPECT_NEAR(nml.soma().area(), swc.soma().area(), 1e-6 * swc.soma().area()) << stem;
+      }
     }
   const Morphology l23 = read(folder / "smith_l23/L23_morph.cell.nml").morphology;
-  std::printf("  L23: %zu sections, %.1f um\n", l23.sections().size(), total_length(l23));
+  EXPECT_EQ(l23.sections().size(), 105u);
+  EXPECT_EQ(l23.roots().size(), 5u);
 }
 
 }  // namespace
