@@ -143,12 +143,7 @@ class Members {
     return image_.open(link->address);
   }
   bool has(std::string_view name) const {
-    return std::ranges::binary_search(links_, name, {}, [](const auto& link) {
-      if constexpr (requires { link.name; })
-        return std::string_view(link.name);
-      else
-        return std::string_view(link);
-    });
+    return std::ranges::binary_search(links_, name, {}, &Image::Link::name);
   }
   const std::vector<Image::Link>& links() const { return links_; }
 

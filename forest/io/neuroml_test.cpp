@@ -228,6 +228,13 @@ TEST(Neuroml, WhatIsWrittenIsValidAndComesBack) {
   }
 }
 
+TEST(Neuroml, WhatIsLostIsTold) {
+  std::set<std::string_view> codes;
+  for (const Specimen& specimen : zoo())
+    for (const Warning& warning : losses(specimen.morphology, neuroml_keeps)) codes.insert(warning.code);
+  EXPECT_EQ(codes, (std::set<std::string_view>{"diameters-lifted", "soma-simplified"}));
+}
+
 TEST(NeuromlRealData, CellsOfTheStandardsExamplesAreRead) {
   FOREST_REAL_DATA(folder, "neuroml");
   std::size_t cells = 0;
