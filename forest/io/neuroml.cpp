@@ -706,7 +706,7 @@ class Assembler {
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       auto& splits = segments_[i].splits;
       std::ranges::sort(splits);
-      splits.erase(std::ranges::unique(splits).begin(), splits.end());
+      splits.erase(std::unique(splits.begin(), splits.end()), splits.end());
       places[i].resize(splits.size() + 1);
       for (std::size_t k = 0; k < splits.size(); ++k)
         places[i][k].children = 1;  // what is left of the segment
