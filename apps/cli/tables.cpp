@@ -27,9 +27,10 @@ using repository::Repository;
 
 /// Units of the columns of the views (docs/repository/schema.md).
 constexpr std::pair<std::string_view, std::string_view> units[] = {
-    {"length", "µm"},         {"area", "µm²"},   {"soma_area", "µm²"}, {"soma_x", "µm"}, {"soma_y", "µm"},
-    {"soma_z", "µm"},         {"diameter", "µm"}, {"x", "µm"},          {"y", "µm"},      {"z", "µm"},
-    {"start_diameter", "µm"}, {"end_diameter", "µm"}, {"soma_radius", "µm"}};
+    {"length", "µm"},     {"area", "µm²"},  {"soma_area", "µm²"},     {"soma_x", "µm"},
+    {"soma_y", "µm"},     {"soma_z", "µm"}, {"diameter", "µm"},       {"x", "µm"},
+    {"y", "µm"},          {"z", "µm"},      {"start_diameter", "µm"}, {"end_diameter", "µm"},
+    {"soma_radius", "µm"}};
 
 /// A sheet for each view: its columns in the order of the page, of the neurons that were chosen.
 struct Sheet {
@@ -37,19 +38,21 @@ struct Sheet {
 };
 constexpr Sheet sheets[] = {
     {"neurons",
-     "id, name, population, species, region, layer, type, stems, sections, points, spines, length, soma, soma_x, soma_y, "
+     "id, name, population, species, region, layer, type, stems, sections, points, spines, length, soma, "
+     "soma_x, soma_y, "
      "soma_z, soma_radius, soma_area, origin, source_file, grammar, seed, number",
      "neuron", "id"},
     {"sections",
-     "neuron, name, section, parent, arbor, branch_order, kind, tag, points, length, area, start_diameter, end_diameter",
+     "neuron, name, section, parent, arbor, branch_order, kind, tag, points, length, area, start_diameter, "
+     "end_diameter",
      "section", "neuron, section"},
     {"junctions", "neuron, name, section, junction, daughters, branch_order, x, y, z, diameter", "junction",
      "neuron, section"}};
 
 TableSheet sheet_of(Repository& repository, const Sheet& sheet, const std::string& ids) {
   const std::string_view key = std::string_view(sheet.id).substr(0, std::string_view(sheet.id).find(','));
-  repository::Answer answer = repository.query(fmt::format("select {} from {} where {} in ({}) order by {}", sheet.columns,
-                                                           sheet.from, key, ids, sheet.id));
+  repository::Answer answer = repository.query(fmt::format("select {} from {} where {} in ({}) order by {}",
+                                                           sheet.columns, sheet.from, key, ids, sheet.id));
   TableSheet table{sheet.name, {}, std::move(answer.rows)};
   for (const std::string& column : answer.columns) {
     const auto unit = std::ranges::find(units, column, &std::pair<std::string_view, std::string_view>::first);
@@ -115,13 +118,20 @@ std::vector<std::pair<double, std::int64_t>> histogram(const std::vector<double>
   return counts;
 }
 
-constexpr std::array<std::string_view, 3> shown_as_histogram{"total_length", "number_of_leaves", "max_branch_order"};
+constexpr std::array<std::string_view, 3> shown_as_histogram{"total_length", "number_of_leaves",
+                                                             "max_branch_order"};
 
 /// The mean, spread and range of every metric, and below them the numbers of the charts.
 void add_summary(io::Workbook& book, const TableSheet& metrics, const std::vector<double>& sholl) {
   TableSheet summary{"summary",
-                     {{"metric", ""}, {"unit", ""}, {"neurons", ""}, {"mean", ""}, {"sd", ""}, {"min", ""},
-                      {"median", ""}, {"max", ""}},
+                     {{"metric", ""},
+                      {"unit", ""},
+                      {"neurons", ""},
+                      {"mean", ""},
+                      {"sd", ""},
+                      {"min", ""},
+                      {"median", ""},
+                      {"max", ""}},
                      {}};
   const auto values_of = [&](std::size_t column) {
     std::vector<double> values;
@@ -132,10 +142,11 @@ void add_summary(io::Workbook& book, const TableSheet& metrics, const std::vecto
   for (std::size_t c = 2; c < metrics.columns.size(); ++c) {
     const std::vector<double> values = values_of(c);
     const statistics::Summary s = statistics::summarize(values);
-    summary.rows.push_back({metrics.columns[c].name, metrics.columns[c].unit, std::int64_t(s.count), s.mean, s.sd, s.min,
-                            s.median, s.max});
+    summary.rows.push_back({metrics.columns[c].name, metrics.columns[c].unit, std::int64_t(s.count), s.mean,
+                            s.sd, s.min, s.median, s.max});
   }
-  const auto chart = [&](std::string title, std::string x, std::string y, io::Chart::Kind kind, const auto& numbers) {
+  const auto chart = [&](std::string title, std::string x, std::string y, io::Chart::Kind kind,
+                         const auto& numbers) {
     summary.rows.emplace_back(summary.columns.size());
     summary.rows.push_back({title, {}, {}, x, y, {}, {}, {}});
     book.charts.push_back({title, x, y, kind, 0, 3, 4, summary.rows.size(), numbers.size()});
@@ -150,8 +161,7 @@ void add_summary(io::Workbook& book, const TableSheet& metrics, const std::vecto
   std::vector<std::pair<double, double>> curve;
   for (std::size_t k = 0; k < sholl.size(); ++k)
     curve.emplace_back(double(k + 1) * statistics::sholl_step, sholl[k]);
-  if (!curve.empty())
-    chart("Sholl analysis", "radius (µm)", "mean crossings", io::Chart::Kind::line, curve);
+  if (!curve.empty()) chart("Sholl analysis", "radius (µm)", "mean crossings", io::Chart::Kind::line, curve);
   book.sheets.insert(book.sheets.begin(), std::move(summary));
 }
 
@@ -159,7 +169,8 @@ void add_summary(io::Workbook& book, const TableSheet& metrics, const std::vecto
 
 std::vector<std::filesystem::path> export_tables(const std::string& repo,
                                                  const std::vector<repository::NeuronRow>& neurons,
-                                                 const std::filesystem::path& out, bool csv, Console& console) {
+                                                 const std::filesystem::path& out, bool csv,
+                                                 Console& console) {
   std::string ids;
   for (const auto& neuron : neurons) ids += fmt::format("{}{}", ids.empty() ? "" : ", ", neuron.id.value());
   Repository repository = Repository::open(repo, repository::Access::read);
@@ -175,7 +186,8 @@ std::vector<std::filesystem::path> export_tables(const std::string& repo,
   std::error_code error;
   std::filesystem::create_directories(out, error);
   if (error)
-    throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written", out.string(), error.message()));
+    throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written", out.string(),
+                            error.message()));
   std::vector<std::filesystem::path> files;
   for (const TableSheet& sheet : book.sheets) {
     files.push_back(out / (sheet.name + ".csv"));

@@ -17,6 +17,7 @@ class Console;
 /// Returns the files written. Throws Error.
 std::vector<std::filesystem::path> export_tables(const std::string& repo,
                                                  const std::vector<repository::NeuronRow>& neurons,
-                                                 const std::filesystem::path& out, bool csv, Console& console);
+                                                 const std::filesystem::path& out, bool csv,
+                                                 Console& console);
 
 }  // namespace forest::cli

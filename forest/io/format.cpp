@@ -10,6 +10,8 @@
 #include "forest/core/file.h"
 #include "forest/io/acc.h"
 #include "forest/io/genesis.h"
+#include "forest/io/h5.h"
+#include "forest/io/neuroml.h"
 #include "forest/io/neuron.h"
 #include "forest/io/swc.h"
 
@@ -17,6 +19,8 @@ namespace forest::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+constexpr std::array<std::string_view, 2> h5_extensions{".h5", ".hdf5"};
+constexpr std::array<std::string_view, 2> neuroml_extensions{".nml", ".xml"};
 
 constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
 constexpr std::array<std::string_view, 1> python_extensions{".py"};
@@ -65,6 +69,22 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_acc,
            .keeps = acc_keeps},
+    Format{.name = "h5",
+           .title = "HDF5 morphology (MorphIO 1.0 to 1.3, containers)",
+           .extensions = h5_extensions,
+           .recognises = recognises_h5,
+           .read = read_h5,
+           .read_all = read_all_h5,
+           .write = write_h5,
+           .keeps = {}},
+    Format{.name = "neuroml",
+           .title = "NeuroML 2",
+           .extensions = neuroml_extensions,
+           .recognises = recognises_neuroml,
+           .read = read_neuroml,
+           .read_all = read_all_neuroml,
+           .write = write_neuroml,
+           .keeps = neuroml_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

@@ -2,6 +2,7 @@
 #include "forest/io/hdf5.h"
 
 #include <algorithm>
+#include <array>
 #include <hdf5.h>
 #include <memory>
 #include <mutex>
@@ -252,6 +253,18 @@ NewFile::NewFile(const std::filesystem::path& path) : path_(path.string()) {
   check(file_ >= 0, "created");
 }
 
+NewFile::NewFile() : path_("a file in memory") {
+  const Turn turn;
+  const Properties access(H5Pcreate(H5P_FILE_ACCESS));
+  constexpr std::size_t growth = 1 << 16;
+  H5Pset_fapl_core(access, growth, false);
+  H5Pset_meta_block_size(access, 256);  // by default 2 kB are set aside, most of a small neuron's file
+  H5Pset_small_data_block_size(access, 256);
+  // Never a file of this name: the core driver keeps all in memory.
+  file_ = H5Fcreate("brainforest-memory", H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  check(file_ >= 0, "created");
+}
+
 NewFile::~NewFile() {
   const Turn turn;
   if (file_ >= 0) H5Fclose(file_);
@@ -271,21 +284,31 @@ void NewFile::group(const std::string& path) {
 }
 
 void NewFile::write(const std::string& path, std::int64_t file_type, std::int64_t memory_type,
-                    const void* values, std::size_t count) {
+                    const void* values, std::size_t count, std::size_t columns) {
   const Properties links(H5Pcreate(H5P_LINK_CREATE)), create(H5Pcreate(H5P_DATASET_CREATE));
   H5Pset_create_intermediate_group(links, 1);
   H5Pset_obj_track_times(create, false);
-  const hsize_t size = count;
-  const Space space(H5Screate_simple(1, &size, nullptr));
+  const std::array<hsize_t, 2> shape{columns ? count / columns : count, columns};
+  const Space space(H5Screate_simple(columns ? 2 : 1, shape.data(), nullptr));
   const Dataset set(H5Dcreate2(file_, path.c_str(), file_type, space, links, create, H5P_DEFAULT));
   check(set.good() && (!count || H5Dwrite(set, memory_type, H5S_ALL, H5S_ALL, H5P_DEFAULT, values) >= 0),
         "written");
 }
 
 // Stored little-endian on every machine.
-void NewFile::write(const std::string& path, std::span<const float> values) {
+void NewFile::write(const std::string& path, std::span<const float> values, std::size_t columns) {
   const Turn turn;
-  write(path, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size());
+  write(path, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size(), columns);
+}
+
+void NewFile::write(const std::string& path, std::span<const std::int32_t> values, std::size_t columns) {
+  const Turn turn;
+  write(path, H5T_STD_I32LE, H5T_NATIVE_INT32, values.data(), values.size(), columns);
+}
+
+void NewFile::write(const std::string& path, std::span<const std::uint8_t> values) {
+  const Turn turn;
+  write(path, H5T_STD_U8LE, H5T_NATIVE_UINT8, values.data(), values.size());
 }
 
 void NewFile::write(const std::string& path, std::span<const std::uint32_t> values) {
@@ -324,6 +347,28 @@ void NewFile::attribute(const std::string& object, const std::string& name,
   const Attribute open(H5Acreate_by_name(file_, object.c_str(), name.c_str(), H5T_STD_U32LE, space,
                                          H5P_DEFAULT, H5P_DEFAULT, H5P_DEFAULT));
   check(open.good() && H5Awrite(open, H5T_NATIVE_UINT32, values.data()) >= 0, "written");
+}
+
+void NewFile::attribute(const std::string& object, const std::string& name, const std::string& text) {
+  const Turn turn;
+  const Type type(H5Tcopy(H5T_C_S1));
+  H5Tset_size(type, text.size() + 1);
+  H5Tset_cset(type, H5T_CSET_UTF8);
+  const Space space(H5Screate(H5S_SCALAR));
+  const Attribute open(H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT,
+                                         H5P_DEFAULT, H5P_DEFAULT));
+  check(open.good() && H5Awrite(open, type, text.c_str()) >= 0, "written");
+}
+
+std::string NewFile::bytes() {
+  const Turn turn;
+  check(H5Fflush(file_, H5F_SCOPE_LOCAL) >= 0, "written");
+  const auto size = H5Fget_file_image(file_, nullptr, 0);
+  check(size > 0, "written");
+  std::string image(std::size_t(size), '\0');
+  check(H5Fget_file_image(file_, image.data(), image.size()) == size, "written");
+  close();
+  return image;
 }
 
 void NewFile::close() {

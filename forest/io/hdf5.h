@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// The part of HDF5 that circuits and reports need: groups, one-dimensional arrays of numbers and texts, and
-// attributes. For the formats of this room; no type of the HDF5 library is seen here. Objects are named by their
+// The part of HDF5 that circuits and reports need: groups, arrays of numbers and texts, and attributes; neurons are
+// read without the library (hdf5_image.h). For the formats of this room; no type of the HDF5 library is seen here. Objects are named by their
 // path, "/nodes/column/0/x". The library is not safe in several threads: calls take turns.
 #pragma once
 
@@ -47,24 +47,30 @@ class File {
 class NewFile {
  public:
   explicit NewFile(const std::filesystem::path& path);
+  NewFile();  // in memory: bytes() ends it
   ~NewFile();
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
   void group(const std::string& path);
-  void write(const std::string& path, std::span<const float> values);
+  /// Rows of `columns` values; 0: a single row of all of them.
+  void write(const std::string& path, std::span<const float> values, std::size_t columns = 0);
+  void write(const std::string& path, std::span<const std::int32_t> values, std::size_t columns = 0);
+  void write(const std::string& path, std::span<const std::uint8_t> values);
   void write(const std::string& path, std::span<const std::uint32_t> values);
   void write(const std::string& path, std::span<const std::uint64_t> values);
   void write(const std::string& path, std::span<const std::string> values);  // UTF-8, of variable length
   void attribute(const std::string& object, const std::string& name, std::uint32_t value);
+  void attribute(const std::string& object, const std::string& name, const std::string& text);  // UTF-8
   void attribute(const std::string& object, const std::string& name, std::span<const std::uint32_t> values);
 
   /// Must be the last call; the destructor throws nothing and so cannot say that the disk was full.
   void close();
+  std::string bytes();  // of a file in memory, which it closes
 
  private:
   void write(const std::string& path, std::int64_t file_type, std::int64_t memory_type, const void* values,
-             std::size_t count);
+             std::size_t count, std::size_t columns = 0);
   void check(bool good, const std::string& what) const;
 
   std::string path_;

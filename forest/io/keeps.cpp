@@ -152,6 +152,13 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
     if (!(keeps.*loss.kept))
       if (const std::size_t count = loss.count(m, keeps))
         warnings.push_back({0, loss.code, fmt::format(fmt::runtime(loss.sentence), count)});
+  if (keeps.least_diameter > 0.f) {
+    const auto flat = [](const Point& p) { return p.radius == 0.f; };
+    const auto count = std::ranges::count_if(m.points(), flat) + std::ranges::count_if(m.soma().points, flat);
+    if (count)
+      warnings.push_back({0, "diameters-lifted",
+                          fmt::format("{} diameters of 0 become {} µm", count, keeps.least_diameter)});
+  }
   return warnings;
 }
 
@@ -161,8 +168,10 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
                             : value;
   };
   const auto kept_point = [&](const Point& p) {
-    if (!(keeps.step > 0.f)) return p;
-    return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
+    if (!(keeps.step > 0.f) && (p.radius > 0.f || !(keeps.least_diameter > 0.f))) return p;
+    const float radius = .5f * rounded(2.f * p.radius);
+    return Point{rounded(p.x), rounded(p.y), rounded(p.z),
+                 radius > 0.f ? radius : .5f * keeps.least_diameter};
   };
   MorphologyBuilder builder;
   Soma soma = kept_soma(m.soma(), keeps);

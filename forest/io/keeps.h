@@ -36,7 +36,8 @@ struct Keeps {
   bool zero_radii = true;  // kept in any case, but told where a simulator cannot compute with them
   bool spines = true;
   bool annotations = true;
-  float step = 0.f;  // coordinates and diameters are rounded to this, µm; 0: not at all
+  float least_diameter = 0.f;  // a diameter of 0 becomes this, µm, where a format refuses it
+  float step = 0.f;            // coordinates and diameters are rounded to this, µm; 0: not at all
 };
 
 /// 1e-6 µm from this point, or where its coordinates have no such step the next they have: no length that counts in a

@@ -5,9 +5,9 @@
 #include <cmath>
 #include <memory>
 #include <unistd.h>
+#include <xlsxwriter.h>
 
 #include <fmt/format.h>
-#include <xlsxwriter.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -15,8 +15,8 @@
 namespace forest::io {
 namespace {
 
-constexpr std::size_t most_rows = 1048575;  // and a header
-constexpr std::size_t longest_text = 32767;  // Excel's limit of a cell, characters
+constexpr std::size_t most_rows = 1048575;            // and a header
+constexpr std::size_t longest_text = 32767;           // Excel's limit of a cell, characters
 constexpr int chart_width = 480, chart_height = 288;  // pixels, libxlsxwriter's own
 
 std::string text_of(const Value& value) {
@@ -50,10 +50,11 @@ double width_of(const TableSheet& sheet, std::size_t column) {
 void write_sheet(lxw_workbook* book, const TableSheet& sheet) {
   if (sheet.rows.size() > most_rows)
     throw Error(fmt::format(
-        "the sheet {} would have {} rows, and a spreadsheet holds {}; choose fewer neurons, or --format csv", sheet.name,
-        sheet.rows.size(), most_rows));
+        "the sheet {} would have {} rows, and a spreadsheet holds {}; choose fewer neurons, or --format csv",
+        sheet.name, sheet.rows.size(), most_rows));
   lxw_worksheet* page = workbook_add_worksheet(book, sheet.name.c_str());
-  if (!page) throw Error(fmt::format("'{}' is no name for a sheet; this is an error of the program", sheet.name));
+  if (!page)
+    throw Error(fmt::format("'{}' is no name for a sheet; this is an error of the program", sheet.name));
   lxw_format* header = workbook_add_format(book);
   format_set_bold(header);
   format_set_bottom(header, LXW_BORDER_THIN);
@@ -76,8 +77,10 @@ void add_chart(lxw_workbook* book, const Workbook& workbook, const Chart& chart,
   const std::string& name = workbook.sheets[chart.sheet].name;
   const auto first = lxw_row_t(chart.first_row + 1), last = lxw_row_t(chart.first_row + chart.count);
   lxw_chart_series* series = chart_add_series(drawn, nullptr, nullptr);
-  chart_series_set_categories(series, name.c_str(), first, lxw_col_t(chart.x_column), last, lxw_col_t(chart.x_column));
-  chart_series_set_values(series, name.c_str(), first, lxw_col_t(chart.y_column), last, lxw_col_t(chart.y_column));
+  chart_series_set_categories(series, name.c_str(), first, lxw_col_t(chart.x_column), last,
+                              lxw_col_t(chart.x_column));
+  chart_series_set_values(series, name.c_str(), first, lxw_col_t(chart.y_column), last,
+                          lxw_col_t(chart.y_column));
   chart_title_set_name(drawn, chart.title.c_str());
   chart_axis_set_name(drawn->x_axis, chart.x_title.c_str());
   chart_axis_set_name(drawn->y_axis, chart.y_title.c_str());
@@ -103,7 +106,8 @@ void write_workbook(const std::filesystem::path& path, const Workbook& workbook)
     }
   } const remove{part};
   lxw_workbook_options options{.constant_memory = LXW_FALSE, .tmpdir = nullptr, .use_zip64 = LXW_FALSE};
-  std::unique_ptr<lxw_workbook, void (*)(lxw_workbook*)> owner(workbook_new_opt(part.c_str(), &options), lxw_workbook_free);
+  std::unique_ptr<lxw_workbook, void (*)(lxw_workbook*)> owner(workbook_new_opt(part.c_str(), &options),
+                                                               lxw_workbook_free);
   if (!owner) throw Error("a workbook cannot be made; there may be too little memory");
   lxw_workbook* book = owner.get();
   lxw_doc_properties properties{};

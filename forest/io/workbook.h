@@ -31,7 +31,7 @@ struct Chart {
   enum class Kind : std::uint8_t { columns, line };
   std::string title, x_title, y_title;
   Kind kind = Kind::columns;
-  std::size_t sheet = 0;                // in Workbook::sheets
+  std::size_t sheet = 0;  // in Workbook::sheets
   std::size_t x_column = 0, y_column = 0;
   std::size_t first_row = 0, count = 0;  // rows of the sheet
 };

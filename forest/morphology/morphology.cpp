@@ -154,6 +154,33 @@ SectionId MorphologyBuilder::add_section(SectionId parent, SectionKind kind, std
   return SectionId(data_->sections.size() - 1);
 }
 
+void MorphologyBuilder::add_sections(std::vector<Point> points, std::vector<Section> sections) {
+  if (!data_->sections.empty()) throw Error("sections all at once must be the first ones");
+  // Summed, a NaN or an infinity is never lost: a check without branches.
+  float sum = 0.f, least = 0.f;
+  for (const Point& p : points) {
+    sum += 0.f * p.x + 0.f * p.y + 0.f * p.z + 0.f * p.radius;
+    least = std::min(least, p.radius);
+  }
+  if (sum != 0.f || least < 0.f) check_points(points, "the sections");
+  std::size_t next = 0;
+  for (std::size_t i = 0; i < sections.size(); ++i) {
+    const Section& s = sections[i];
+    if (s.first_point != next || s.point_count == 0 || s.point_count > points.size() - next)
+      throw Error(fmt::format("section {} must begin where the one before it ends and have a point", i));
+    next += s.point_count;
+    if (!s.parent.valid()) continue;
+    if (s.parent.value() >= i) throw Error("a section must be added after its parent");
+    const Section& above = sections[s.parent.value()];
+    const Point& joint = points[above.first_point + above.point_count - 1];
+    if (s.point_count < 2 || !same_place(joint, points[s.first_point]))
+      throw Error(fmt::format("section {} must begin at its parent's last point and have two points", i));
+  }
+  if (next != points.size()) throw Error("there are points after the last section");
+  data_->points = std::move(points);
+  data_->sections = std::move(sections);
+}
+
 void MorphologyBuilder::add_spine(const Spine& spine) {
   if (!spine.section.valid() || spine.section.value() >= data_->sections.size())
     throw Error("a spine must sit on a section that exists");

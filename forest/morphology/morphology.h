@@ -149,6 +149,9 @@ class MorphologyBuilder {
   SectionId add_section(SectionId parent, SectionKind kind, std::span<const Point> points);
   SectionId add_section(SectionId parent, SectionKind kind, std::span<const Point> points, std::int32_t tag,
                         std::int32_t soma_point = -1);
+  /// All sections of a neuron whose arrays lie as they will: points section after section, each child beginning at
+  /// its parent's last point. For readers of large files; the builder must have no section yet.
+  void add_sections(std::vector<Point> points, std::vector<Section> sections);
   void add_spine(const Spine& spine);
   void annotate(std::string key, std::string value);
 

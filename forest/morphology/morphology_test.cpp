@@ -48,6 +48,36 @@ TEST(Morphology, EmptyIsAValue) {
   EXPECT_EQ(m.segment_count(), 0u);
 }
 
+TEST(MorphologyBuilder, SectionsAllAtOnceAreThoseOneByOne) {
+  const Morphology m = bifurcating();
+  const std::vector<Point> points(m.points().begin(), m.points().end());
+  const std::vector<Section> sections(m.sections().begin(), m.sections().end());
+  MorphologyBuilder b;
+  b.set_soma(m.soma());
+  b.add_sections(points, sections);
+  EXPECT_EQ(b.build(), m);
+
+  const auto refused = [&](auto spoil) {
+    auto p = points;
+    auto s = sections;
+    spoil(p, s);
+    EXPECT_THROW(MorphologyBuilder().add_sections(p, s), Error);
+  };
+  const float inf = std::numeric_limits<float>::infinity();
+  refused([&](auto& p, auto&) { p[1].y = inf; });
+  refused([&](auto& p, auto&) { p[3].radius = -1.f; });
+  refused([&](auto& p, auto&) { p[2].x += 1.f; });  // a daughter elsewhere than its parent's end
+  refused([&](auto& p, auto&) { p.push_back({}); });
+  refused([&](auto& p, auto&) { p.pop_back(); });
+  refused([&](auto&, auto& s) { s[1].parent = SectionId(2); });
+  refused([&](auto&, auto& s) { s[1].parent = SectionId(1); });
+  refused([&](auto&, auto& s) { s[2].first_point = 3; });
+  refused([&](auto&, auto& s) { s[2].point_count = 0; });
+  refused([&](auto& p, auto& s) { p.pop_back(), s[2].point_count = 1; });
+  b.add_sections(points, sections);
+  EXPECT_THROW(b.add_sections(points, sections), Error);
+}
+
 TEST(MorphologyBuilder, RefusesWhatIsNotANeuron) {
   MorphologyBuilder b;
   const float nan = std::numeric_limits<float>::quiet_NaN();

@@ -1,0 +1,1091 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/h5.h"
+
+#include <algorithm>
+#include <array>
+#include <charconv>
+#include <cmath>
+#include <cstring>
+#include <limits>
+#include <map>
+#include <optional>
+#include <set>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/io/hdf5.h"
+#include "forest/io/hdf5_image.h"
+#include "forest/io/oddity.h"
+#include "forest/io/swc_rows.h"
+
+namespace forest::io {
+namespace {
+
+using hdf5::Array;
+using hdf5::Image;
+
+enum class H5Oddity : std::uint8_t {
+  several_cells,
+  version_2,
+  unused_points,
+  empty_section,
+  soma_two_points,
+  root_marker,
+  self_parent,
+  missing_parent,
+  child_first,
+  joint_missing,
+  single_daughter,
+  unknown_place,
+  negative_radius,
+  type_custom,
+  glia_unsaid,
+  perimeters_size,
+  organelles_odd,
+  not_kept,
+  count
+};
+
+constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
+    {"several-cells", false, "only the first is read here; import the file to have all"},
+    {"version-2", false, "converted to what version 1 has"},
+    {"unused-points", false, "they are skipped"},
+    {"empty-section", false, "left out; daughters go to the parent"},
+    {"soma-two-points", false, "read as a cylinder between them"},
+    {"root-marker", false, "read as roots that leave from no soma"},
+    {"self-parent", false, "read as roots"},
+    {"missing-parent", false, "read as roots"},
+    {"child-first", false,
+     "the order of rows does not matter; sections that organelles name keep their old numbers"},
+    {"joint-missing", false, "the parent's last point is put in front"},
+    {"single-daughter", false, "kept as sections of their own"},
+    {"unknown-place", false, "read as those of the point before"},
+    {"negative-radius", false, "read as those of the point before"},
+    {"type-custom", false, "read as neurites of custom kind, the numbers kept"},
+    {"glia-unsaid", false, "read as glia"},
+    {"perimeters-size", false, "left out"},
+    {"organelles-odd", false, "left out"},
+    {"not-kept", false, "left out"},
+}};
+
+using Oddities = OddityList<H5Oddity>;
+
+constexpr std::int64_t soma_type = 1;
+constexpr std::string_view own_group = "brain_forest", family_key = "cell_family", comment_key = "comment",
+                           perimeters_key = "perimeters", mitochondrion_key = "mitochondrion";
+enum Family : std::int64_t { neuron, glia, spine };
+constexpr std::array<std::string_view, 3> family_names{"neuron", "glia", "spine"};
+
+// What is known of organelles row by row, one annotation a row: the columns, separated by blanks.
+struct Column {
+  std::string_view name;
+  bool whole;
+};
+struct OrganelleTable {
+  std::string_view group;  // and key of the annotations
+  std::array<Column, 4> columns;
+  std::size_t count;
+};
+constexpr std::array<OrganelleTable, 2> organelle_tables{{
+    {"endoplasmic_reticulum",
+     {{{"section_index", true}, {"volume", false}, {"surface_area", false}, {"filament_count", true}}},
+     4},
+    {"postsynaptic_density", {{{"section_id", true}, {"segment_id", true}, {"offset", false}, {}}}, 3},
+}};
+
+// Numbers in annotations
+// ---------------------------------------------------------------------------
+
+void append(std::string& text, float value) {
+  std::array<char, 32> digits;
+  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
+void append(std::string& text, std::int64_t value) {
+  std::array<char, 24> digits;
+  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
+/// Numbers separated by single blanks; false at anything else.
+class Numbers {
+ public:
+  explicit Numbers(std::string_view text) : at_(text.data()), end_(text.data() + text.size()) {}
+  template <class T>
+  bool next(T& value) {
+    if (!first_ && (at_ == end_ || *at_++ != ' ')) return false;
+    first_ = false;
+    const auto [stop, error] = std::from_chars(at_, end_, value);
+    at_ = stop;
+    return error == std::errc();
+  }
+  bool at_end() const { return at_ == end_; }
+
+ private:
+  const char *at_, *end_;
+  bool first_ = true;
+};
+
+float perimeter_of(const Point& p) { return 2.f * std::numbers::pi_v<float> * p.radius; }
+
+// Reading
+// ---------------------------------------------------------------------------
+
+/// The members of a group by name.
+class Members {
+ public:
+  Members(const Image& image, const Image::Object& group) : image_(image), links_(image.links(group)) {}
+
+  std::optional<Image::Object> find(std::string_view name) const {
+    const auto link = std::ranges::lower_bound(links_, name, {}, &Image::Link::name);
+    if (link == links_.end() || link->name != name) return std::nullopt;
+    return image_.open(link->address);
+  }
+  bool has(std::string_view name) const {
+    return std::ranges::binary_search(links_, name, {}, &Image::Link::name);
+  }
+  const std::vector<Image::Link>& links() const { return links_; }
+
+ private:
+  const Image& image_;
+  std::vector<Image::Link> links_;
+};
+
+/// One cell of an image: a group with `points` and `structure`, or `neuron1`.
+class CellReader {
+ public:
+  CellReader(const Image& image, const Image::Object& group, const Members& members, Oddities& oddities)
+      : image_(image), group_(group), members_(members), oddities_(oddities) {}
+
+  Morphology read() {
+    if (const auto second = members_.find("neuron1")) {
+      read_version_2(Members(image_, *second));
+    } else {
+      read_version_1();
+    }
+    mend_points();
+    drop_empty_rows();
+    find_soma();
+    sections();
+    annotate();
+    return builder_.build();
+  }
+
+ private:
+  std::size_t rows() const { return offsets_.size(); }
+  std::size_t end_of(std::size_t row) const { return row + 1 < rows() ? offsets_[row + 1] : points_.size(); }
+  bool is_soma(std::size_t row) const { return types_[row] == soma_type && family_ != spine; }
+
+  Array required(const Members& members, std::string_view name, std::size_t columns, bool whole) {
+    const auto object = members.find(name);
+    if (!object || !object->is_array())
+      image_.refuse(
+          fmt::format("holds no neuron: there is no array {}; a neuron has points and structure", name));
+    Array array = image_.array(*object, name);
+    if (array.shape.size() != 2 || array.shape[1] != columns)
+      image_.refuse(
+          fmt::format("array {} has not {} columns; points have x y z diameter, structure has first point, "
+                      "type and parent",
+                      name, columns));
+    if (whole && array.real)
+      image_.refuse(fmt::format("array {} holds real numbers; write whole ones", name));
+    return array;
+  }
+
+  void take_points(const Array& array) {
+    static_assert(sizeof(Point) == 4 * sizeof(float));
+    points_.resize(array.count() / 4);
+    if (points_.size() > std::numeric_limits<std::int32_t>::max())
+      image_.refuse("has more than 2147483647 points; split it into several files");
+    // A Point is its four numbers, one after the other.
+    array.copy(std::span(reinterpret_cast<float*>(points_.data()), 4 * points_.size()));
+    for (Point& p : points_) p.radius *= .5f;
+  }
+
+  void read_version_1() {
+    if (members_.has("connectivity"))
+      image_.refuse("holds blood vessels (connectivity), not a neuron; vessels are not read");
+    if (const auto metadata = members_.find("metadata")) {
+      const auto version = image_.integers(*metadata, "version");
+      if (!version.empty() && (version[0] != 1 || version.size() < 2 || version[1] < 0 || version[1] > 3))
+        image_.refuse(
+            fmt::format("is of version {} of the format; 1.0 to 1.3 and 2 are read, write one of those",
+                        fmt::join(version, ".")));
+      const auto family = image_.integers(*metadata, "cell_family");
+      if (!family.empty()) family_ = family[0];
+      if (family_ < neuron || family_ > spine)
+        image_.refuse(fmt::format("cell_family is {}; it may be 0 (neuron), 1 (glia) or 2 (spine)", family_));
+    }
+    const Array points = required(members_, "points", 4, false);
+    const Array structure = required(members_, "structure", 3, true);
+    take_points(points);
+    std::vector<std::int64_t> cells(structure.count());
+    structure.copy(std::span(cells));
+    const std::size_t count = cells.size() / 3;
+    offsets_.resize(count), types_.resize(count), parents_.resize(count);
+    for (std::size_t row = 0; row < count; ++row) {
+      offsets_[row] = checked_offset(cells[3 * row], row);
+      types_[row] = checked_type(cells[3 * row + 1], row);
+      parents_[row] = cells[3 * row + 2];
+    }
+    if (count && !points_.empty() && offsets_[0] > 0)
+      oddities_.add(H5Oddity::unused_points, 0,
+                    [&] { return fmt::format("{} points belong to no section", offsets_[0]); });
+    read_perimeters();
+  }
+
+  std::size_t checked_offset(std::int64_t offset, std::size_t row) {
+    if (offset < last_offset_ || std::size_t(offset) > points_.size())
+      image_.refuse(fmt::format("row {} of structure begins at point {} of {}; rows must follow one another",
+                                row, offset, points_.size()));
+    return std::size_t(last_offset_ = offset);
+  }
+
+  std::int32_t checked_type(std::int64_t type, std::size_t row) const {
+    if (type < std::numeric_limits<std::int32_t>::min() || type > std::numeric_limits<std::int32_t>::max())
+      image_.refuse(fmt::format("row {} of structure has type {}; types are small numbers", row, type));
+    return std::int32_t(type);
+  }
+
+  /// /neuron1 of Brion: points by stage, offsets and parents apart from types; the soma may have several rows.
+  void read_version_2(const Members& root) {
+    oddities_.add(H5Oddity::version_2, 0, "the file is of version 2 of the format");
+    const auto folder = root.find("structure");
+    if (!folder) image_.refuse("holds no neuron: neuron1 has no structure");
+    const Members structures(image_, *folder);
+    for (const std::string_view stage : {"repaired", "unraveled", "raw"}) {
+      const auto group = root.find(stage);
+      if (!group) continue;
+      const Members members(image_, *group);
+      if (!members.has("points")) continue;
+      take_points(required(members, "points", 4, false));
+      const Array structure = required(structures, structures.has(stage) ? stage : "raw", 2, true);
+      const Array types = required(structures, "sectiontype", 1, true);
+      std::vector<std::int64_t> cells(structure.count()), kinds(types.count());
+      structure.copy(std::span(cells));
+      types.copy(std::span(kinds));
+      const std::size_t count = kinds.size();
+      if (2 * count != cells.size())
+        image_.refuse(
+            fmt::format("has {} sections but {} types; the file is damaged", cells.size() / 2, count));
+      std::size_t somata = 0;
+      while (somata < count && kinds[somata] == soma_type) ++somata;
+      const std::size_t extra = somata > 1 ? somata - 1 : 0;  // rows that the one of the soma takes in
+      for (std::size_t row = 0; row < count; ++row) {
+        if (row > 0 && row <= extra) continue;
+        const std::int64_t parent = cells[2 * row + 1];
+        offsets_.push_back(checked_offset(cells[2 * row], row));
+        types_.push_back(checked_type(kinds[row], row));
+        parents_.push_back(parent <= std::int64_t(extra) ? std::min<std::int64_t>(parent, 0)
+                                                         : parent - std::int64_t(extra));
+      }
+      return;
+    }
+    image_.refuse("holds no neuron: neuron1 has no points");
+  }
+
+  void read_perimeters() {
+    const auto object = members_.find("perimeters");
+    const bool neurites = rows() > (rows() && is_soma(0) ? 1u : 0u);
+    if (!object) {
+      if (family_ == glia && neurites)
+        image_.refuse(
+            "is a glia cell without perimeters, which such files must have; add them or set cell_family to "
+            "0");
+      return;
+    }
+    const Array array = image_.array(*object, perimeters_key);
+    if (array.shape.size() != 1)
+      image_.refuse("has perimeters in several columns; there is one for each point");
+    if (array.count() != points_.size()) {
+      oddities_.add(H5Oddity::perimeters_size, 0, [&] {
+        return fmt::format("there are {} perimeters for {} points", array.count(), points_.size());
+      });
+      return;
+    }
+    perimeters_.resize(array.count());
+    array.copy(std::span(perimeters_));
+    const bool told = std::ranges::any_of(perimeters_, [](float p) { return p > 0.f; });
+    if (family_ != neuron || !told || !neurites) return;
+    for (std::size_t row = 0; row < rows(); ++row)
+      if (!is_soma(row) && types_[row] != 2 && types_[row] != 3) return;
+    family_ = glia;
+    oddities_.add(H5Oddity::glia_unsaid, 0,
+                  "cell_family says neuron, but there are perimeters and only types 2 and 3, as of glia");
+  }
+
+  void mend_points() {
+    float sum = 0.f, least = 0.f;
+    for (const Point& p : points_) {
+      sum += 0.f * p.x + 0.f * p.y + 0.f * p.z + 0.f * p.radius;  // NaN as soon as one is not finite
+      least = std::min(least, p.radius);
+    }
+    if (sum == 0.f && least >= 0.f) return;
+    std::size_t unknown = 0, negative = 0;
+    Point before;
+    for (Point& p : points_) {
+      bool odd = false;
+      for (float Point::*number : {&Point::x, &Point::y, &Point::z, &Point::radius})
+        if (!std::isfinite(p.*number)) p.*number = before.*number, odd = true;
+      unknown += odd;
+      if (p.radius < 0.f) p.radius = before.radius, ++negative;
+      before = p;
+    }
+    if (unknown)
+      oddities_.add(H5Oddity::unknown_place, 0,
+                    [&] { return fmt::format("numbers of {} points are not finite", unknown); });
+    if (negative)
+      oddities_.add(H5Oddity::negative_radius, 0,
+                    [&] { return fmt::format("the diameters of {} points are negative", negative); });
+  }
+
+  /// Rows without points, but for a soma's.
+  void drop_empty_rows() {
+    const auto empty = [&](std::size_t row) {
+      return offsets_[row] == end_of(row) && !(row == 0 && is_soma(0));
+    };
+    std::vector<std::int64_t> places(rows());  // of rows that stay
+    std::size_t stay = 0;
+    for (std::size_t row = 0; row < rows(); ++row) places[row] = empty(row) ? -1 : std::int64_t(stay++);
+    const std::size_t dropped = rows() - stay;
+    if (dropped == 0) return;
+    oddities_.add(H5Oddity::empty_section, 0,
+                  [&] { return fmt::format("{} rows of structure have no point", dropped); });
+    const auto inside = [&](std::int64_t row) { return row >= 0 && std::size_t(row) < rows(); };
+    // What the first row without points on the way to a root leads to is kept for the others: the way is gone once.
+    std::vector<std::int64_t> parents = parents_;
+    std::vector<std::size_t> way;
+    for (std::size_t row = 0; row < rows(); ++row) {
+      std::int64_t at = parents[row];
+      way.assign(1, row);
+      for (; inside(at) && places[std::size_t(at)] < 0; at = parents[std::size_t(at)]) {
+        if (way.size() > dropped + 1)
+          image_.refuse(
+              fmt::format("row {} of structure is its own ancestor; correct one of the parents", at));
+        way.push_back(std::size_t(at));
+      }
+      for (const std::size_t w : way) parents[w] = at;
+    }
+    for (std::size_t row = 0; row < rows(); ++row) {
+      if (places[row] < 0) continue;
+      const std::size_t place = std::size_t(places[row]);
+      const std::int64_t parent = parents[row];
+      parents_[place] = inside(parent) ? places[std::size_t(parent)]
+                        : parent < 0   ? parent
+                                       : std::numeric_limits<std::int64_t>::max();  // still missing
+      offsets_[place] = offsets_[row];
+      types_[place] = types_[row];
+    }
+    offsets_.resize(stay), types_.resize(stay), parents_.resize(stay);
+  }
+
+  void find_soma() {
+    for (std::size_t row = 1; row < rows(); ++row)
+      if (is_soma(row))
+        image_.refuse(fmt::format("row {} of structure is of type 1; only row 0 may be the soma", row));
+    if (rows() == 0 && !members_.has(own_group))
+      image_.refuse("holds no section; a neuron has one or a soma");
+    has_soma_ = rows() && is_soma(0);
+    if (!has_soma_) return;
+    const std::span<const Point> points = std::span(points_).subspan(offsets_[0], end_of(0) - offsets_[0]);
+    Soma soma{.kind = SomaKind::contours,
+              .points = {points.begin(), points.end()},
+              .parents = {},
+              .contour_starts = {0}};
+    if (points.size() == 1)
+      image_.refuse("has a soma of one point; the format needs an outline of three and more");
+    if (points.empty()) soma = {};
+    if (points.size() == 2) {
+      soma.kind = SomaKind::cylinders;
+      soma.parents = {-1, 0};
+      soma.contour_starts.clear();
+      oddities_.add(H5Oddity::soma_two_points, 0, "the soma has two points, too few for an outline");
+    }
+    soma_ = std::move(soma);
+  }
+
+  /// The parent's row, or -1 for a root; soma_point is set for roots.
+  std::int64_t parent_of(std::size_t row, std::int32_t& soma_point) {
+    const std::int64_t parent = parents_[row];
+    soma_point = -1;
+    const auto told = [&](H5Oddity code, std::string_view what) {
+      oddities_.add(code, 0, [&] { return fmt::format("row {} of structure {}", row, what); });
+      return std::int64_t(-1);
+    };
+    if (has_soma_ && parent == 0) {
+      soma_point = soma_.kind == SomaKind::none ? -1 : 0;
+      return -1;
+    }
+    if (parent == -1 && !has_soma_) return -1;
+    if (parent < 0) return told(H5Oddity::root_marker, "has no parent");
+    if (std::size_t(parent) == row) return told(H5Oddity::self_parent, "is its own parent");
+    if (std::size_t(parent) >= rows())
+      return told(H5Oddity::missing_parent, "has a parent that is not there");
+    return parent;
+  }
+
+  Section section_of(std::size_t row) {
+    const std::int32_t type = types_[row];
+    if (family_ == neuron && (type < 0 || type > 19))
+      oddities_.add(H5Oddity::type_custom, 0,
+                    [&] { return fmt::format("row {} of structure has type {}", row, type); });
+    const SectionKind kind = family_ == glia    ? SectionKind::glia
+                             : family_ == spine ? SectionKind::custom
+                                                : swc_kind(type);
+    return {.parent = {}, .kind = kind, .tag = type};
+  }
+
+  void sections() {
+    const std::size_t first_row = has_soma_ ? 1 : 0, count = rows() - first_row;
+    const std::size_t base = count ? offsets_[first_row] : points_.size();
+    std::vector<Section> sections(count);
+    std::vector<std::int64_t> parents(count);
+    std::vector<std::uint8_t> daughters(count, 0);
+    bool forward = false, joints = true;
+    for (std::size_t i = 0; i < count; ++i) {
+      const std::size_t row = i + first_row;
+      Section& s = sections[i] = section_of(row);
+      parents[i] = parent_of(row, s.soma_point);
+      if (parents[i] >= 0) parents[i] -= std::int64_t(first_row);
+      const std::size_t size = end_of(row) - offsets_[row];
+      s.first_point = std::uint32_t(offsets_[row] - base);
+      s.point_count = std::uint32_t(size);
+      if (parents[i] < 0) continue;
+      const std::size_t parent = std::size_t(parents[i]);
+      daughters[parent] = std::uint8_t(std::min(2, daughters[parent] + 1));
+      s.parent = SectionId(parent);
+      if (parent > i) {
+        forward = true;
+        oddities_.add(H5Oddity::child_first, 0,
+                      [&] { return fmt::format("row {} of structure comes before its parent", row); });
+      }
+      const Point &joint = points_[end_of(parent + first_row) - 1], &first = points_[offsets_[row]];
+      if (size < 2 || first.x != joint.x || first.y != joint.y || first.z != joint.z) {
+        joints = false;
+        oddities_.add(H5Oddity::joint_missing, 0, [&] {
+          return fmt::format("row {} of structure does not begin at its parent's last point", row);
+        });
+      }
+    }
+    if (const auto single = std::ranges::find(daughters, 1); single != daughters.end())
+      oddities_.add(H5Oddity::single_daughter, 0, [&] {
+        return fmt::format("{} sections are their parent's only daughter", std::ranges::count(daughters, 1));
+      });
+
+    read_own(sections);
+    builder_.set_soma(std::move(soma_));
+    if (!perimeters_.empty())
+      perimeters_.erase(perimeters_.begin(), perimeters_.begin() + std::ptrdiff_t(base));
+    if (!forward && joints) {
+      points_.erase(points_.begin(), points_.begin() + std::ptrdiff_t(base));
+      builder_.add_sections(std::move(points_), std::move(sections));
+      return;
+    }
+    const std::vector<std::size_t> order = parents_first(parents, first_row);
+    std::vector<SectionId> ids(count);
+    for (const std::size_t i : order) {
+      const Section& s = sections[i];
+      const SectionId parent = parents[i] < 0 ? SectionId() : ids[std::size_t(parents[i])];
+      ids[i] = builder_.add_section(parent, s.kind,
+                                    std::span(points_).subspan(base + s.first_point, s.point_count), s.tag,
+                                    s.soma_point);
+    }
+    for (Spine& s : spines_)
+      if (s.section.value() < count) s.section = ids[s.section.value()];
+    if (!perimeters_.empty())
+      oddities_.add(H5Oddity::perimeters_size, 0, "perimeters belong to sections that had to be mended");
+    perimeters_.clear();
+  }
+
+  std::vector<std::size_t> parents_first(const std::vector<std::int64_t>& parents,
+                                         std::size_t first_row) const {
+    enum : std::uint8_t { unseen, waiting, placed };
+    std::vector<std::uint8_t> state(parents.size(), unseen);
+    std::vector<std::size_t> order, path;
+    for (std::size_t i = 0; i < parents.size(); ++i) {
+      for (std::int64_t at = std::int64_t(i); at >= 0 && state[std::size_t(at)] != placed;
+           at = parents[std::size_t(at)]) {
+        if (state[std::size_t(at)] == waiting)
+          image_.refuse(fmt::format("row {} of structure is its own ancestor; correct one of the parents",
+                                    std::size_t(at) + first_row));
+        state[std::size_t(at)] = waiting;
+        path.push_back(std::size_t(at));
+      }
+      for (; !path.empty(); path.pop_back()) {
+        state[path.back()] = placed;
+        order.push_back(path.back());
+      }
+    }
+    return order;
+  }
+
+  /// What write_h5 put into its own group.
+  void read_own(std::vector<Section>& sections) {
+    const auto group = members_.find(own_group);
+    if (!group || !group->is_group()) return;
+    const Members own(image_, *group);
+    const auto misfit = [&](std::string_view what) {
+      image_.refuse(
+          fmt::format("{}/{} does not fit the neuron; remove the group {}", own_group, what, own_group));
+    };
+    const auto integers = [&](std::string_view name) {
+      std::vector<std::int64_t> values;
+      if (const auto object = own.find(name)) {
+        const Array array = image_.array(*object, name);
+        values.resize(array.count());
+        array.copy(std::span(values));
+        for (const std::int64_t value : values)
+          if (value < std::numeric_limits<std::int32_t>::min() ||
+              value > std::numeric_limits<std::int32_t>::max())
+            misfit(name);
+      }
+      return values;
+    };
+    const auto reals = [&](std::string_view name) {
+      std::vector<float> values;
+      if (const auto object = own.find(name)) {
+        const Array array = image_.array(*object, name);
+        values.resize(array.count());
+        array.copy(std::span(values));
+      }
+      return values;
+    };
+    if (own.has("types")) {
+      const auto types = integers("types");
+      if (types.size() != sections.size()) misfit("types");
+      for (std::size_t i = 0; i < sections.size(); ++i) {
+        sections[i].tag = std::int32_t(types[i]);
+        if (family_ == neuron) sections[i].kind = swc_kind(sections[i].tag);
+      }
+    }
+    if (own.has("soma")) {
+      const auto numbers = reals("soma");
+      if (numbers.empty() || numbers.size() % 4) misfit("soma");
+      soma_ = {.kind = numbers.size() == 4 ? SomaKind::sphere : SomaKind::cylinders,
+               .points = {},
+               .parents = {},
+               .contour_starts = {}};
+      for (std::size_t i = 0; i < numbers.size(); i += 4)
+        soma_.points.push_back({numbers[i], numbers[i + 1], numbers[i + 2], .5f * numbers[i + 3]});
+      if (soma_.kind == SomaKind::cylinders)
+        for (const std::int64_t parent : integers("soma_parents"))
+          soma_.parents.push_back(std::int32_t(parent));
+    }
+    if (own.has("contour_starts") && soma_.kind == SomaKind::contours) {
+      soma_.contour_starts.clear();
+      for (const std::int64_t start : integers("contour_starts"))
+        soma_.contour_starts.push_back(std::uint32_t(start));
+    }
+    if (own.has("root_soma_points")) {
+      const auto places = integers("root_soma_points");
+      std::size_t next = 0;
+      for (Section& s : sections)
+        if (!s.parent.valid() && next < places.size())
+          s.soma_point = std::int32_t(std::max<std::int64_t>(places[next++], -1));
+    }
+    if (own.has("spines")) {
+      constexpr std::size_t columns = 7;
+      const auto numbers = reals("spines");
+      const auto owners = integers("spine_sections");
+      if (numbers.size() != columns * owners.size()) misfit("spines");
+      for (std::size_t i = 0; i < owners.size(); ++i) {
+        const float* n = numbers.data() + columns * i;
+        if (owners[i] < 0 || std::size_t(owners[i]) >= sections.size() ||
+            !(n[6] >= 0.f && n[6] <= float(SpineShape::branched)) ||
+            !std::ranges::all_of(std::span(n, columns), [](float v) { return std::isfinite(v); }))
+          misfit("spines");
+        spines_.push_back({SectionId(std::size_t(owners[i])), n[0], Vec3(n[1], n[2], n[3]), n[4], n[5],
+                           static_cast<SpineShape>(n[6])});
+      }
+    }
+    if (own.has("annotations")) {
+      const auto object = own.find("annotations");
+      const Array text = image_.array(*object, "annotations");
+      std::size_t at = 0;
+      std::vector<std::string> parts;
+      for (const std::int64_t length : integers("annotation_sizes")) {
+        if (length < 0 || std::size_t(length) > text.bytes.size() - at) misfit("annotation_sizes");
+        parts.emplace_back(text.bytes.substr(at, std::size_t(length)));
+        at += std::size_t(length);
+      }
+      for (std::size_t i = 0; i + 1 < parts.size(); i += 2)
+        own_annotations_.emplace_back(std::move(parts[i]), std::move(parts[i + 1]));
+    }
+  }
+
+  void annotate() {
+    for (const Spine& s : spines_) builder_.add_spine(s);
+    if (auto comment = image_.text(group_, comment_key); comment && !comment->empty())
+      builder_.annotate(std::string(comment_key), std::move(*comment));
+    if (family_ != neuron)
+      builder_.annotate(std::string(family_key), std::string(family_names[std::size_t(family_)]));
+    if (!perimeters_.empty()) {
+      std::string text;
+      text.reserve(10 * perimeters_.size());
+      for (const float perimeter : perimeters_) {
+        if (!text.empty()) text += ' ';
+        append(text, perimeter);
+      }
+      builder_.annotate(std::string(perimeters_key), std::move(text));
+    }
+    if (const auto organelles = members_.find("organelles"); organelles && organelles->is_group())
+      read_organelles(Members(image_, *organelles));
+    for (auto& [key, value] : own_annotations_) builder_.annotate(std::move(key), std::move(value));
+    constexpr std::array<std::string_view, 7> known{"points",     "structure",    "metadata", "perimeters",
+                                                    "organelles", "brain_forest", "neuron1"};
+    std::string others;
+    for (const Image::Link& link : members_.links())
+      if (std::ranges::find(known, link.name) == known.end())
+        others += (others.empty() ? "" : ", ") + link.name;
+    if (!others.empty()) {
+      constexpr std::size_t enough = 200;
+      if (others.size() > enough) others = others.substr(0, enough) + "…";
+      oddities_.add(H5Oddity::not_kept, 0, [&] { return "there is more in the file: " + others; });
+    }
+  }
+
+  void read_organelles(const Members& organelles) {
+    std::string others;
+    for (const Image::Link& link : organelles.links()) {
+      const auto row =
+          std::ranges::find(organelle_tables, std::string_view(link.name), &OrganelleTable::group);
+      const Image::Object group = image_.open(link.address);
+      if (!group.is_group()) continue;
+      if (row != organelle_tables.end())
+        read_table(*row, Members(image_, group));
+      else if (link.name == "mitochondria")
+        read_mitochondria(Members(image_, group));
+      else
+        oddities_.add(H5Oddity::not_kept, 0,
+                      [&] { return fmt::format("there are organelles of a kind not known, {}", link.name); });
+    }
+  }
+
+  void read_table(const OrganelleTable& kind, const Members& members) {
+    std::array<std::vector<std::int64_t>, 4> whole;
+    std::array<std::vector<float>, 4> real;
+    std::size_t rows = 0;
+    for (std::size_t c = 0; c < kind.count; ++c) {
+      const auto object = members.find(kind.columns[c].name);
+      if (!object) return odd_organelles(kind.group);
+      const Array array = image_.array(*object, kind.columns[c].name);
+      if (c == 0) rows = array.count();
+      if (array.count() != rows) return odd_organelles(kind.group);
+      if (kind.columns[c].whole)
+        whole[c].resize(rows), array.copy(std::span(whole[c]));
+      else
+        real[c].resize(rows), array.copy(std::span(real[c]));
+    }
+    std::string text;
+    for (std::size_t row = 0; row < rows; ++row) {
+      text.clear();
+      for (std::size_t c = 0; c < kind.count; ++c) {
+        if (c) text += ' ';
+        if (kind.columns[c].whole)
+          append(text, whole[c][row]);
+        else
+          append(text, real[c][row]);
+      }
+      builder_.annotate(std::string(kind.group), text);
+    }
+  }
+
+  void odd_organelles(std::string_view which) {
+    oddities_.add(H5Oddity::organelles_odd, 0,
+                  [&] { return fmt::format("the arrays of organelles/{} do not fit one another", which); });
+  }
+
+  /// One annotation each: the parent, then section, path (0 to 1) and diameter of every point.
+  void read_mitochondria(const Members& members) {
+    const auto points_object = members.find("points"), structure_object = members.find("structure");
+    if (!points_object || !structure_object) return odd_organelles("mitochondria");
+    const Array points = image_.array(*points_object, "points"),
+                structure = image_.array(*structure_object, "structure");
+    if (points.shape.size() != 2 || points.shape[1] != 3 || structure.shape.size() != 2 ||
+        structure.shape[1] != 2)
+      return odd_organelles("mitochondria");
+    std::vector<float> numbers(points.count());
+    std::vector<std::int64_t> rows(structure.count());
+    points.copy(std::span(numbers));
+    structure.copy(std::span(rows));
+    const std::int64_t total = std::int64_t(numbers.size() / 3), count = std::int64_t(rows.size() / 2);
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::int64_t begin = rows[std::size_t(2 * i)];
+      const std::int64_t end = i + 1 < count ? rows[std::size_t(2 * i + 2)] : total;
+      if (begin < 0 || begin > end || end > total || (i == 0 && begin != 0))
+        return odd_organelles("mitochondria");
+    }
+    for (std::int64_t i = 0; i < count; ++i) {
+      const std::size_t begin = std::size_t(rows[std::size_t(2 * i)]);
+      const std::size_t end = std::size_t(i + 1 < count ? rows[std::size_t(2 * i + 2)] : total);
+      std::string text;
+      append(text, rows[std::size_t(2 * i + 1)]);
+      for (std::size_t k = 3 * begin; k < 3 * end; ++k) text += ' ', append(text, numbers[k]);
+      builder_.annotate(std::string(mitochondrion_key), std::move(text));
+    }
+  }
+
+  const Image& image_;
+  const Image::Object& group_;
+  const Members& members_;
+  Oddities& oddities_;
+  MorphologyBuilder builder_;
+  std::int64_t family_ = neuron, last_offset_ = 0;
+  std::vector<Point> points_;
+  std::vector<float> perimeters_;
+  std::vector<std::size_t> offsets_;
+  std::vector<std::int32_t> types_;
+  std::vector<std::int64_t> parents_;
+  bool has_soma_ = false;
+  Soma soma_;
+  std::vector<Spine> spines_;
+  Annotations own_annotations_;
+};
+
+bool is_cell(const Members& members) {
+  return (members.has("points") && members.has("structure")) || members.has("neuron1");
+}
+
+/// Calls visit(name, group, members) for the cells of the file until it returns false.
+template <class Visit>
+void cells(const Image& image, Visit visit) {
+  struct Place {
+    std::string name;
+    std::uint64_t address;
+  };
+  std::vector<Place> stack{{"", image.root()}};
+  std::set<std::uint64_t> seen;  // links may lead back
+  while (!stack.empty()) {
+    const Place place = std::move(stack.back());
+    stack.pop_back();
+    if (!seen.insert(place.address).second) continue;
+    const Image::Object group = image.open(place.address);
+    if (!group.is_group()) continue;
+    const Members members(image, group);
+    // What has nothing but arrays in the file's root is told by the reader of cells what is missing.
+    const bool root = place.name.empty();
+    const bool cell = is_cell(members) || (root && (members.has("points") || members.has("structure")));
+    if (cell) {
+      if (!visit(place.name, group, members)) return;
+      continue;
+    }
+    const auto& links = members.links();
+    for (std::size_t i = links.size(); i-- > 0;)
+      stack.push_back({root ? links[i].name : place.name + '/' + links[i].name, links[i].address});
+  }
+}
+
+ReadResult read_cell(const Image& image, const Image::Object& group, const Members& members,
+                     Oddities& oddities, const std::string& name) {
+  try {
+    Morphology morphology = CellReader(image, group, members, oddities).read();
+    return {std::move(morphology), oddities.take()};
+  } catch (const InputError&) {
+    throw;
+  } catch (const Error& error) {
+    throw InputError(name, 0, error.what());
+  }
+}
+
+[[noreturn]] void refuse_without_cells(const Image& image) {
+  image.refuse("holds no neuron: no group of it has the arrays points and structure");
+}
+
+// Writing
+// ---------------------------------------------------------------------------
+
+float diameter(float radius) { return std::min(2.f * radius, std::numeric_limits<float>::max()); }
+
+void add_points(std::vector<float>& numbers, std::span<const Point> points) {
+  for (const Point& p : points) {
+    for (const float number : {p.x, p.y, p.z, diameter(p.radius)}) numbers.push_back(number);
+  }
+}
+
+/// Points on a circle around the soma's middle: the outline that other programs read.
+std::vector<Point> circle(const Point& sphere) {
+  constexpr int corners = 16;
+  std::vector<Point> points;
+  for (int i = 0; i < corners; ++i) {
+    const double angle = 2. * std::numbers::pi * i / corners;
+    points.push_back({float(sphere.x + sphere.radius * std::cos(angle)),
+                      float(sphere.y + sphere.radius * std::sin(angle)), sphere.z, 0.f});
+  }
+  return points;
+}
+
+class Writer {
+ public:
+  Writer(hdf5::NewFile& file, std::string prefix, const Morphology& m)
+      : file_(file), prefix_(std::move(prefix)), m_(m) {}
+
+  void write() {
+    if (!prefix_.empty()) file_.group(prefix_);
+    choose_family();
+    write_sections();
+    write_metadata();
+    write_annotations();
+    if (!m_.spines().empty()) write_spines();
+    if (m_.sections().empty() && m_.soma().kind == SomaKind::none) file_.group(own(""));
+  }
+
+ private:
+  std::string path(std::string_view name) const { return prefix_ + '/' + std::string(name); }
+  std::string own(std::string_view name) const {
+    return prefix_ + '/' + std::string(own_group) + (name.empty() ? "" : "/") + std::string(name);
+  }
+  std::string root() const { return prefix_.empty() ? "/" : prefix_; }
+
+  void choose_family() {
+    const auto all = [&](SectionKind kind) {
+      return std::ranges::all_of(m_.sections(), [&](const Section& s) { return s.kind == kind; });
+    };
+    const auto found = std::ranges::find(m_.annotations(), family_key, &Annotations::value_type::first);
+    const std::string_view said = found == m_.annotations().end() ? "" : std::string_view(found->second);
+    if (all(SectionKind::glia) && (!m_.sections().empty() || said == family_names[glia]))
+      family_ = glia;
+    else if (all(SectionKind::custom) && said == family_names[spine])
+      family_ = spine;
+  }
+
+  std::int32_t type_of(const Section& s) const {
+    if (family_ != neuron) return s.tag;
+    return swc_kind(s.tag) == s.kind ? s.tag : std::int32_t(s.kind);
+  }
+
+  void write_sections() {
+    const Soma& soma = m_.soma();
+    const bool has_soma = soma.kind != SomaKind::none;
+    std::vector<float> numbers;
+    std::vector<std::int32_t> rows, types, places;
+    if (has_soma) {
+      add_points(numbers, soma.kind == SomaKind::contours ? soma.points : circle(soma.sphere()));
+      rows = {0, std::int32_t(soma_type), -1};
+    }
+    first_point_ = std::int32_t(numbers.size() / 4);
+    numbers.reserve(numbers.size() + 4 * m_.points().size());
+    bool plain = true, usual = true;
+    for (std::size_t i = 0; i < m_.sections().size(); ++i) {
+      const Section& s = m_.sections()[i];
+      const std::int32_t type = type_of(s);
+      const bool known = type >= 0 && type <= 19 && type != soma_type;
+      plain = plain && known;
+      types.push_back(type);
+      rows.push_back(first_point_ + std::int32_t(s.first_point));
+      rows.push_back(known ? type : std::int32_t(SectionKind::custom));
+      rows.push_back(s.parent.valid() ? std::int32_t(s.parent.value()) + has_soma : has_soma ? 0 : -1);
+      if (s.parent.valid()) continue;
+      places.push_back(s.soma_point);
+      usual = usual && s.soma_point == (has_soma ? 0 : -1);
+    }
+    add_points(numbers, m_.points());
+    file_.write(path("points"), numbers, 4);
+    file_.write(path("structure"), rows, 3);
+    if (!plain) file_.write(own("types"), types);
+    if (!usual) file_.write(own("root_soma_points"), places);
+    if (soma.kind == SomaKind::sphere || soma.kind == SomaKind::cylinders) {
+      std::vector<float> exact;
+      add_points(exact, soma.points);
+      file_.write(own("soma"), exact, 4);
+    }
+    if (soma.kind == SomaKind::cylinders) file_.write(own("soma_parents"), soma.parents);
+    if (soma.contour_starts.size() > 1)
+      file_.write(own("contour_starts"),
+                  std::vector<std::int32_t>(soma.contour_starts.begin(), soma.contour_starts.end()));
+  }
+
+  void write_metadata() {
+    file_.group(path("metadata"));
+    file_.attribute(path("metadata"), "version", std::array<std::uint32_t, 2>{1, 3});
+    file_.attribute(path("metadata"), "cell_family", std::array<std::uint32_t, 1>{std::uint32_t(family_)});
+  }
+
+  /// Annotations that the format has words for go there, the others into the own group.
+  void write_annotations() {
+    const Annotations& all = m_.annotations();
+    std::vector<bool> placed(all.size(), false);
+    std::vector<float> perimeters;
+    bool comment = false;
+    constexpr std::size_t longest_attribute = 60000;
+    for (std::size_t i = 0; i < all.size(); ++i) {
+      const auto& [key, value] = all[i];
+      if (key == comment_key && !comment && !value.empty() && value.size() < longest_attribute &&
+          value.find('\0') == value.npos) {
+        file_.attribute(root(), "comment", value);
+        comment = placed[i] = true;
+      } else if (key == family_key && family_ != neuron && value == family_names[std::size_t(family_)] &&
+                 std::ranges::find(all, family_key, &Annotations::value_type::first) - all.begin() ==
+                     std::ptrdiff_t(i)) {
+        placed[i] = true;
+      } else if (key == perimeters_key && perimeters.empty()) {
+        placed[i] = parse_perimeters(value, perimeters);
+      }
+    }
+    if (perimeters.empty() && family_ == glia)
+      for (const Point& p : m_.points()) perimeters.push_back(perimeter_of(p));
+    if (!perimeters.empty()) {
+      perimeters.insert(perimeters.begin(), std::size_t(first_point_), 0.f);
+      file_.write(path(perimeters_key), perimeters);
+    }
+    for (const OrganelleTable& kind : organelle_tables) write_table(kind, placed);
+    write_mitochondria(placed);
+
+    std::string text;
+    std::vector<std::int32_t> sizes;
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (!placed[i])
+        for (const std::string& part : {all[i].first, all[i].second}) {
+          text += part;
+          sizes.push_back(std::int32_t(part.size()));
+        }
+    if (sizes.empty()) return;
+    file_.write(own("annotations"),
+                std::span(reinterpret_cast<const std::uint8_t*>(text.data()), text.size()));
+    file_.write(own("annotation_sizes"), sizes);
+  }
+
+  bool parse_perimeters(std::string_view text, std::vector<float>& values) const {
+    Numbers numbers(text);
+    const std::size_t count = m_.points().size();
+    for (std::size_t i = 0; i < count; ++i) {
+      float value = 0.f;
+      if (!numbers.next(value)) break;
+      values.push_back(value);
+    }
+    if (values.size() == count && numbers.at_end()) return true;
+    values.clear();
+    return false;
+  }
+
+  /// All rows or none: a reader finds them side by side.
+  void write_table(const OrganelleTable& kind, std::vector<bool>& placed) {
+    std::array<std::vector<std::int32_t>, 4> whole;
+    std::array<std::vector<float>, 4> real;
+    const Annotations& all = m_.annotations();
+    for (const auto& [key, value] : all) {
+      if (key != kind.group) continue;
+      Numbers numbers(value);
+      for (std::size_t c = 0; c < kind.count; ++c)
+        if (kind.columns[c].whole ? !numbers.next(whole[c].emplace_back())
+                                  : !numbers.next(real[c].emplace_back()))
+          return;
+      if (!numbers.at_end()) return;
+    }
+    if (whole[0].empty()) return;
+    for (std::size_t c = 0; c < kind.count; ++c) {
+      const std::string name = fmt::format("{}/{}/{}", path("organelles"), kind.group, kind.columns[c].name);
+      if (kind.columns[c].whole)
+        file_.write(name, whole[c]);
+      else
+        file_.write(name, real[c]);
+    }
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (all[i].first == kind.group) placed[i] = true;
+  }
+
+  void write_mitochondria(std::vector<bool>& placed) {
+    std::vector<float> points;
+    std::vector<std::int32_t> rows;
+    const Annotations& all = m_.annotations();
+    for (const auto& [key, value] : all) {
+      if (key != mitochondrion_key) continue;
+      Numbers numbers(value);
+      std::int32_t parent = 0;
+      if (!numbers.next(parent)) return;
+      rows.push_back(std::int32_t(points.size() / 3));
+      rows.push_back(parent);
+      while (!numbers.at_end())
+        if (!numbers.next(points.emplace_back())) return;
+      if (points.size() % 3) return;
+    }
+    if (rows.empty()) return;
+    file_.write(path("organelles/mitochondria/points"), points, 3);
+    file_.write(path("organelles/mitochondria/structure"), rows, 2);
+    for (std::size_t i = 0; i < all.size(); ++i)
+      if (all[i].first == mitochondrion_key) placed[i] = true;
+  }
+
+  void write_spines() {
+    std::vector<float> numbers;
+    std::vector<std::int32_t> owners;
+    for (const Spine& s : m_.spines()) {
+      owners.push_back(std::int32_t(s.section.value()));
+      for (const float number :
+           {s.position, s.head.x(), s.head.y(), s.head.z(), s.head_diameter, s.neck_diameter, float(s.shape)})
+        numbers.push_back(number);
+    }
+    file_.write(own("spines"), numbers, 7);
+    file_.write(own("spine_sections"), owners);
+  }
+
+  hdf5::NewFile& file_;
+  std::string prefix_;
+  const Morphology& m_;
+  Family family_ = neuron;
+  std::int32_t first_point_ = 0;  // of the first section
+};
+
+}  // namespace
+
+std::span<const Oddity> h5_oddities() { return table; }
+
+bool recognises_h5(std::string_view bytes) { return hdf5::is_hdf5(bytes); }
+
+ReadResult read_h5(std::string_view bytes, const std::string& name) {
+  const Image image(bytes, name);
+  std::optional<ReadResult> first;
+  bool several = false;
+  Oddities oddities(table);
+  cells(image, [&](const std::string& cell, const Image::Object& group, const Members& members) {
+    if (first) {
+      several = true;
+      first->warnings.insert(first->warnings.begin(),
+                             {0, table[std::size_t(H5Oddity::several_cells)].code,
+                              fmt::format("there are several cells, {} is another; {}", cell,
+                                          table[std::size_t(H5Oddity::several_cells)].reading)});
+      return false;
+    }
+    first = read_cell(image, group, members, oddities, name);
+    return true;
+  });
+  if (!first) refuse_without_cells(image);
+  return std::move(*first);
+}
+
+std::vector<Cell> read_all_h5(std::string_view bytes, const std::string& name) {
+  const Image image(bytes, name);
+  std::vector<Cell> all;
+  cells(image, [&](const std::string& cell, const Image::Object& group, const Members& members) {
+    Oddities oddities(table);
+    try {
+      all.push_back({cell, read_cell(image, group, members, oddities, name)});
+    } catch (const InputError& error) {
+      if (cell.empty()) throw;
+      throw InputError(name, 0, fmt::format("cell {}: {}", cell, error.sentence()));
+    }
+    return true;
+  });
+  if (all.empty()) refuse_without_cells(image);
+  return all;
+}
+
+std::string write_h5(const Morphology& morphology) {
+  hdf5::NewFile file;
+  Writer(file, "", morphology).write();
+  return file.bytes();
+}
+
+std::string write_h5(std::span<const NamedMorphology> cells) {
+  hdf5::NewFile file;
+  std::set<std::string_view> names;
+  for (const auto& [name, morphology] : cells) {
+    if (name.empty() || !names.insert(name).second)
+      throw Error(fmt::format(
+          "a container needs different names for its cells; '{}' is empty or stands twice", name));
+    Writer(file, '/' + name, morphology).write();
+  }
+  return file.bytes();
+}
+
+}  // namespace forest::io
