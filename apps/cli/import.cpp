@@ -104,7 +104,7 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
 
 void run(const Options& options, Console& console) {
   std::vector<Arrival> files;
-  for (const fs::path& path : neuron_files(options.files)) files.emplace_back().path = path;
+  for (const fs::path& path : neuron_files(options.files, console)) files.emplace_back().path = path;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
   const std::size_t window = 64;  // neurons in memory at a time
@@ -155,7 +155,6 @@ std::function<void()> import_files(CLI::App& command, Console& console) {
   command
       .add_option("files", options->files, "Files of traced neurons, or folders with such files below them")
       ->required()
-      ->check(CLI::ExistingPath)
       ->type_name("FILES");
   command.add_option("--repo", options->repo, "The repository; made when there is none")
       ->required()
