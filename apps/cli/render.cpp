@@ -13,6 +13,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
+#include "apps/view_text.h"
 
 namespace forest::cli {
 namespace {
