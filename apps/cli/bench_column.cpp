@@ -45,8 +45,8 @@ scene::Forest column(const Options& options, Console& console) {
   for (const Share& share : shares)
     for (const Morphology& m : lsystem::grow_population(find_grammar(share.grammar), share.count,
                                                         options.seed, console.progress())) {
-      candidates.push_back(
-          {fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar, m.soma().sphere().radius});
+      candidates.push_back({fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar,
+                            m.soma().sphere().radius, centred(m).bounds().high.y()});
       neurons.push_back(centred(m));
     }
   circuit::Recipe recipe = find_recipe("column-10000");

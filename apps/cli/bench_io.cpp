@@ -70,11 +70,11 @@ WorkByFormat grown() {
   for (std::size_t i = 0; i < neurons_grown; ++i) {
     const Morphology neuron = synthetic_neuron(i);
     for (const io::Format& format : io::formats()) {
-      if (!format.write) continue;
+      if (!format.write || !format.read) continue;
       Work& work = all[&format];
       work.names.push_back(fmt::format("neuron {}", i));
       work.files.push_back(format.write(neuron));
-      work.points.push_back(neuron.points().size());
+      work.points.push_back(io::as_kept(neuron, format.keeps).points().size());
     }
   }
   return all;
@@ -90,7 +90,8 @@ WorkByFormat collected(const std::vector<std::filesystem::path>& places) {
   };
   const auto known = [](const std::filesystem::path& path) {
     return std::ranges::any_of(io::formats(), [&](const io::Format& format) {
-      return std::ranges::find(format.extensions, path.extension().string()) != format.extensions.end();
+      return format.read &&
+             std::ranges::find(format.extensions, path.extension().string()) != format.extensions.end();
     });
   };
   for (const auto& place : places) {

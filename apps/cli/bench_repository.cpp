@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/repository/repository.h"
 
@@ -79,6 +80,22 @@ void run(const Options& options, Console& console) {
     for (std::uint64_t i = 0; i < options.neurons; ++i) add(i, 1);
     transaction.commit();
   });
+  const double parallel = seconds([&] {  // as import and grow do: prepared on all cores
+    auto transaction = repository.begin();
+    constexpr std::uint32_t window = 64;
+    for (std::uint32_t first = 0; first < options.neurons; first += window) {
+      const std::uint32_t count = std::min(window, options.neurons - first);
+      std::vector<std::optional<Prepared>> ready(count);
+      parallel_for(count, 1, [&](std::size_t i) { ready[i].emplace(cells[(first + i) % cells.size()]); });
+      for (std::uint32_t i = 0; i < count; ++i) {
+        NewNeuron neuron;
+        neuron.name = fmt::format("3-{}", first + i);
+        neuron.provenance = Grown{"bench", hash, 3, first + i};
+        repository.add(std::move(*ready[i]), neuron);
+      }
+    }
+    transaction.commit();
+  });
   const double single = seconds([&] {
     for (std::uint64_t i = 0; i < alone; ++i) add(i, 2);
   });
@@ -90,13 +107,14 @@ void run(const Options& options, Console& console) {
   });
   for (std::size_t i = 0; i < rows.size(); ++i)
     if (back[i] != cells[std::get<Grown>(rows[i].provenance).index % cells.size()] ||
-        rows.size() != options.neurons + alone)
+        rows.size() != 2 * options.neurons + alone)
       throw Error(
           "a neuron did not come back as it was stored; this is an error of the program, please report it");
 
   const double bytes = double(std::filesystem::file_size(path)) / double(rows.size());
   console.table({"neurons of " + std::to_string(options.sections) + " sections", "per second"},
                 {{"stored, all in one transaction", fmt::format("{:.0f}", options.neurons / batch)},
+                 {"the same, prepared on all cores", fmt::format("{:.0f}", options.neurons / parallel)},
                  {"stored, each in its own", fmt::format("{:.0f}", alone / single)},
                  {"read", fmt::format("{:.0f}", double(rows.size()) / read)},
                  {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
@@ -104,6 +122,7 @@ void run(const Options& options, Console& console) {
   console.print({{"sections_per_neuron", options.sections},
                  {"points_per_neuron", rows[0].points},
                  {"stored_per_second", options.neurons / batch},
+                 {"stored_on_all_cores_per_second", options.neurons / parallel},
                  {"stored_singly_per_second", alone / single},
                  {"read_per_second", double(rows.size()) / read},
                  {"listed_per_second", double(rows.size()) / list},

@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest demo: the main job, from nothing to a walk in the forest.
+#include <algorithm>
 #include <chrono>
+#include <cmath>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/circuit/plant.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/hash.h"
@@ -15,6 +18,7 @@
 #include "forest/io/png.h"
 #include "forest/io/sonata.h"
 #include "forest/lsystem/grow.h"
+#include "forest/morphology/transform.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/artist.h"
@@ -53,6 +57,7 @@ double seconds_since(Clock::time_point start) {
 struct Figures {
   std::size_t grown = 0, grown_segments = 0, traced = 0, unread = 0;
   double growing = 0.;
+  float lowest_traced = INFINITY;  // height of the lowest traced cell above its soma, µm
 };
 
 void grow_into(const std::string& repo, const Options& options, Console& console, Figures& figures) {
@@ -109,6 +114,8 @@ void import_into(const std::string& repo, const fs::path& folder, Console& conso
                                          .population = "traced",
                                          .provenance = repository::Traced{paths[i].string(), files[i].hash},
                                          .number_if_taken = true});
+    const Morphology& cell = files[i].morphology;
+    figures.lowest_traced = std::min(figures.lowest_traced, cell.bounds().high.y() - centre(cell).y());
     ++figures.traced;
   }
   if (!figures.traced)
@@ -136,7 +143,9 @@ void run(const Options& options, Console& console) {
       fmt::format("grown    {} neurons of {} types, stored in {}", figures.grown, std::size(shares), repo));
 
   circuit::Recipe recipe = find_recipe("column-1000");
-  if (figures.traced) recipe = circuit::with_type(recipe, {"traced cell", "traced", true}, traced_fraction);
+  if (figures.traced)
+    recipe = circuit::with_type(recipe, {"traced cell", "traced", true}, traced_fraction,
+                                figures.lowest_traced - circuit::pia_slack);
   const Planted planted = plant_from_repository(recipe, repo, options.seed, console.progress());
   io::write_sonata(circuit_folder, planted.circuit, planted.morphologies, console.progress());
   console.say(

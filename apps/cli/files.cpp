@@ -21,7 +21,7 @@ bool known(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
   return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
-    return std::ranges::find(f.extensions, extension) != f.extensions.end();
+    return f.read && std::ranges::find(f.extensions, extension) != f.extensions.end();
   });
 }
 

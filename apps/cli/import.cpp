@@ -3,6 +3,7 @@
 // a transaction of its own, so the bytes of the repository do not depend on the number of threads.
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 
@@ -36,26 +37,48 @@ struct Options {
   bool verbose = false;
 };
 
-/// A file on its way into the repository.
+/// A neuron on its way into the repository.
 struct Arrival {
   fs::path path;
-  io::ReadResult read;
+  std::string name;
+  std::vector<io::Warning> oddities;
+  std::optional<Prepared> prepared;
   std::string hash;
   std::string error;  // why it could not be read; empty when it could
   std::optional<Added> added;
   std::size_t sections = 0, warnings = 0;
 };
 
-void read(Arrival& file) {
+/// The neurons of a file: nearly always one.
+std::vector<Arrival> read(const fs::path& path) {
+  std::vector<Arrival> arrivals;
+  const std::string stem = escaped(path.stem().string());
   try {
-    const MappedFile bytes(file.path);
-    file.hash = hash_hex(bytes.bytes());
-    file.read = io::format_of(file.path, bytes.text()).read(bytes.text(), escaped(file.path.string()));
-    file.sections = file.read.morphology.sections().size();
-    file.warnings = file.read.warnings.size();
+    const MappedFile file(path);
+    const std::string hash = hash_hex(file.bytes());
+    auto cells = io::read_all(io::format_of(path, file.text()), file.text(), escaped(path.string()));
+    for (std::size_t i = 0; i < cells.size(); ++i) {
+      Arrival& arrival = arrivals.emplace_back();
+      arrival.path = path;
+      arrival.name = stem;
+      arrival.hash = hash;
+      if (cells.size() > 1) {  // cells of one file are told apart by their names in it
+        const std::string cell = escaped(cells[i].name);
+        arrival.name += "-" + (is_name(cell) ? cell : std::to_string(i + 1));
+        arrival.hash += fmt::format("#{}", i + 1);
+      }
+      arrival.sections = cells[i].read.morphology.sections().size();
+      arrival.warnings = cells[i].read.warnings.size();
+      arrival.oddities = std::move(cells[i].read.warnings);
+      arrival.prepared.emplace(std::move(cells[i].read.morphology));
+    }
   } catch (const Error& error) {
-    file.error = error.what();
+    arrivals.resize(1);
+    arrivals[0] = {};
+    arrivals[0].path = path;
+    arrivals[0].error = error.what();
   }
+  return arrivals;
 }
 
 const char* outcome(const Arrival& file) {
@@ -103,36 +126,40 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
 }
 
 void run(const Options& options, Console& console) {
+  const std::vector<fs::path> paths = neuron_files(options.files, console);
   std::vector<Arrival> files;
-  for (const fs::path& path : neuron_files(options.files, console)) files.emplace_back().path = path;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
-  const std::size_t window = 64;  // neurons in memory at a time
+  const std::size_t window = 64;  // files in memory at a time
   std::size_t done = 0;
-  console.progress().begin("importing", files.size());
-  for (std::size_t first = 0; first < files.size(); first += window) {
-    const std::size_t count = std::min(window, files.size() - first);
-    parallel_for(count, 1, [&](std::size_t i) { read(files[first + i]); });
-    for (Arrival& file : std::span(files).subspan(first, count)) {
+  console.progress().begin("importing", paths.size());
+  for (std::size_t first = 0; first < paths.size(); first += window) {
+    const std::size_t count = std::min(window, paths.size() - first), begin = files.size();
+    std::vector<std::vector<Arrival>> arrived(count);
+    parallel_for(count, 1, [&](std::size_t i) {
+      arrived[i] = read(paths[first + i]);
       console.progress().advance();
+    });
+    for (auto& arrivals : arrived) std::ranges::move(arrivals, std::back_inserter(files));
+    for (Arrival& file : std::span(files).subspan(begin)) {
       if (!file.error.empty()) {
         console.warn(file.error);
         continue;
       }
       if (options.verbose)
-        for (const io::Warning& w : file.read.warnings) {
+        for (const io::Warning& w : file.oddities) {
           const std::string place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
           console.warn(fmt::format("{}: {}: {}", place, w.code, w.sentence));
         }
       NewNeuron neuron = options.about;
-      neuron.name = escaped(file.path.stem().string());
+      neuron.name = file.name;
       neuron.number_if_taken = true;
       neuron.provenance = Traced{file.path.string(), file.hash};
       try {
         if (!repository) repository = Repository::open(options.repo, Access::write);
-        file.added = repository->add(file.read.morphology, neuron);
+        file.added = repository->add(std::move(*file.prepared), neuron);
       } catch (const Error& error) {  // the repository's trouble, not the file's
-        throw Error(fmt::format("{} ({} of {} files are stored)", error.what(), done, files.size()));
+        throw Error(fmt::format("{} ({} neurons are stored)", error.what(), done));
       }
       ++done;
       if (file.added->name != neuron.name)
@@ -141,7 +168,7 @@ void run(const Options& options, Console& console) {
                                        escaped(file.path.string()), file.added->name)
                          : fmt::format("{}: another neuron is called '{}', so this one is stored as '{}'",
                                        escaped(file.path.string()), neuron.name, file.added->name));
-      file.read = {};
+      file.prepared.reset();
     }
   }
   console.progress().end();

@@ -89,7 +89,8 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
     const Repository repository = Repository::open(repo, Access::read);  // an object belongs to one thread
     for (std::size_t i = begin; i < end; ++i) {
       neurons[i] = centred(repository.morphology(rows[i].id));
-      candidates[i] = {names[i], rows[i].population, neurons[i].soma().sphere().radius};
+      candidates[i] = {names[i], rows[i].population, neurons[i].soma().sphere().radius,
+                       neurons[i].bounds().empty() ? 0.f : neurons[i].bounds().high.y()};
       progress.advance();
     }
   });

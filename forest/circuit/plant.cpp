@@ -115,8 +115,49 @@ float cell_width(const cortex::Column& column, std::vector<float> radii, float g
       count, recipe.layers[layer].name, 100. * filled / column.volume(layer)));
 }
 
+/// The share of a layer's depth, from below, in which a neuron of this height ends under the pia.
+float share_that_fits(const cortex::Column& column, std::uint32_t layer, float height) {
+  const cortex::Slab& slab = column.layers()[layer];
+  const float ceiling = column.layers().front().top + pia_slack - height;
+  return std::clamp((ceiling - slab.bottom) / (slab.top - slab.bottom), 0.f, 1.f);
+}
+
+/// The candidates of one type in one layer, with the chance of each.
+class Lot {
+ public:
+  Lot(std::span<const std::uint32_t> choice, std::span<const Candidate> candidates,
+      const cortex::Column& column, std::uint32_t layer)
+      : choice_(choice) {
+    double sum = 0.;
+    for (const std::uint32_t c : choice) {
+      share_.push_back(share_that_fits(column, layer, candidates[c].height));
+      bounds_.push_back(sum += double(share_.back()));
+    }
+    if (choice.empty() || sum > 0.) return;
+    const auto lowest =
+        std::ranges::min_element(choice, {}, [&](std::uint32_t c) { return candidates[c].height; });
+    for (std::size_t i = std::size_t(lowest - choice.begin()); i < bounds_.size(); ++i) bounds_[i] = 1.;
+  }
+
+  struct Draw {
+    std::uint32_t candidate;
+    float share;  // of the layer's depth in which it may stand
+  };
+  Draw draw(Random random) const {
+    const auto chosen = std::ranges::upper_bound(bounds_, random.uniform(0., bounds_.back()));
+    const auto i = std::size_t(std::min(chosen, bounds_.end() - 1) - bounds_.begin());
+    return {choice_[i], share_[i]};
+  }
+
+ private:
+  std::span<const std::uint32_t> choice_;
+  std::vector<float> share_;
+  std::vector<double> bounds_;  // sums of the chances
+};
+
 void place(const Recipe& recipe, const cortex::Column& column, std::span<const float> radii,
-           std::uint64_t seed, std::span<Instance> instances, Progress& progress) {
+           std::span<const float> shares, std::uint64_t seed, std::span<Instance> instances,
+           Progress& progress) {
   if (instances.empty()) return;
   std::vector<std::uint32_t> order(instances.size());
   std::iota(order.begin(), order.end(), 0u);
@@ -132,7 +173,10 @@ void place(const Recipe& recipe, const cortex::Column& column, std::span<const f
     int trial = 0;
     do {
       if (trial++ == most_trials) refuse_layer(recipe, column, instances[i].layer, instances, radii);
-      instances[i].position = column.sample(instances[i].layer, random);
+      const float bottom = column.layers()[instances[i].layer].bottom;
+      Vec3 at = column.sample(instances[i].layer, random);
+      at.y() = bottom + (at.y() - bottom) * shares[i];
+      instances[i].position = at;
     } while (!spheres.free(instances[i].position, radii[i], recipe.soma_gap));
     spheres.add(instances[i].position, radii[i]);
     if (k % step == step - 1) progress.advance(step);
@@ -151,6 +195,8 @@ std::vector<std::vector<std::uint32_t>> choices(const Recipe& recipe, std::span<
     if (!std::isfinite(candidate.soma_radius) || candidate.soma_radius < 0.f)
       throw Error(fmt::format("the soma of {} has a radius of {} µm; correct the neuron", candidate.name,
                               candidate.soma_radius));
+    if (!std::isfinite(candidate.height))
+      throw Error(fmt::format("the points of {} are not finite; correct the neuron", candidate.name));
   }
   std::vector<std::vector<std::uint32_t>> result(recipe.types.size());
   for (std::size_t type = 0; type < recipe.types.size(); ++type) {
@@ -200,11 +246,16 @@ Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::
       circuit.instances.insert(circuit.instances.end(), wanted[layer][type],
                                Instance{.type = type, .layer = layer});
 
-  std::vector<float> radii(circuit.instances.size());
+  std::vector<std::vector<Lot>> lots(wanted.size());  // by layer and type
+  for (std::uint32_t layer = 0; layer < wanted.size(); ++layer)
+    for (std::uint32_t type = 0; type < wanted[layer].size(); ++type)
+      lots[layer].emplace_back(choice[type], candidates, tissue, layer);
+  std::vector<float> radii(circuit.instances.size()), shares(circuit.instances.size());
   parallel_for(circuit.instances.size(), 4096, [&](std::size_t i) {
     Instance& instance = circuit.instances[i];
-    const auto& mine = choice[instance.type];
-    instance.morphology = mine[Random(seed, i, morphology_stream).below(std::uint32_t(mine.size()))];
+    const Lot::Draw draw = lots[instance.layer][instance.type].draw(Random(seed, i, morphology_stream));
+    instance.morphology = draw.candidate;
+    shares[i] = draw.share > 0.f ? draw.share : 1.f;
     radii[i] = candidates[instance.morphology].soma_radius;
     if (recipe.rotate) {
       const double angle = Random(seed, i, rotation_stream).uniform(0., 2. * std::numbers::pi);
@@ -212,7 +263,7 @@ Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::
           Eigen::Quaterniond(Eigen::AngleAxisd(angle, Eigen::Vector3d::UnitY())).cast<float>();
     }
   });
-  place(recipe, tissue, radii, seed, circuit.instances, progress);
+  place(recipe, tissue, radii, shares, seed, circuit.instances, progress);
   name_morphologies(circuit, candidates);
   return circuit;
 }

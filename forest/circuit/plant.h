@@ -24,10 +24,15 @@ struct Candidate {
   std::string name;         // distinct among the candidates
   std::string population;   // as in CellType::population
   float soma_radius = 0.f;  // µm, >= 0
+  float height = 0.f;       // how far it reaches above the centre of its soma, towards the pia, µm
 };
 
+inline constexpr float pia_slack = 30.f;  // µm that a neuron may reach above the pia
+
 /// Circuit::morphologies holds the candidates that were planted, in their order; instances are in the order
-/// of layers, then types. Each instance has a candidate of its type's population, all with equal chance.
+/// of layers, then types. Each instance has a candidate of its type's population and stands where that does not reach
+/// above the pia: the chance of a candidate is the share of the layer's depth in which it fits. Where none fits at all
+/// it is the lowest one.
 /// Throws Error when a population has no candidate, and when somata do not fit into a layer (naming it).
 Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
               Progress& progress = Progress::none());

@@ -199,5 +199,28 @@ TEST(Check, NamesWhatIsWrong) {
   says([](Circuit& c) { c.morphologies[2].clear(); }, "has no name");
 }
 
+TEST(Plant, NeuronsEndUnderThePia) {
+  const Recipe recipe = dense_recipe();  // layers end 200 and 500 µm under the pia
+  const std::vector<Candidate> tall{{"short", "s", 4.f, 20.f},
+                                    {"middle", "s", 4.f, 130.f},
+                                    {"long", "s", 4.f, 330.f},
+                                    {"giant", "l", 9.f, 900.f},
+                                    {"big", "l", 9.f, 700.f}};
+  const Circuit circuit = plant(recipe, tall, 4);
+  std::array<int, 5> count{};
+  for (const Instance& instance : circuit.instances) {
+    const auto c = std::ranges::find(tall, circuit.morphologies[instance.morphology], &Candidate::name);
+    ++count[std::size_t(c - tall.begin())];
+    if (c->population == "s") {
+      EXPECT_LE(instance.position.y() + c->height, circuit.layers[0].top + pia_slack + .01f) << c->name;
+    } else {
+      EXPECT_EQ(c->name, "big") << "none fits, so the lowest";
+    }
+  }
+  EXPECT_GT(count[1], count[2]);
+  EXPECT_GT(count[0], count[1]);
+  EXPECT_GT(count[2], 0);
+}
+
 }  // namespace
 }  // namespace forest::circuit

@@ -296,12 +296,15 @@ std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe) {
   return result;
 }
 
-Recipe with_type(Recipe recipe, CellType type, double fraction) {
+Recipe with_type(Recipe recipe, CellType type, double fraction, float height) {
   if (!(fraction >= 0. && fraction <= 1.)) throw Error("the fraction of an added type must be from 0 to 1");
   recipe.types.push_back(std::move(type));
+  float depth = 0.f;
   for (Recipe::Layer& layer : recipe.layers) {
-    for (double& share : layer.mix) share *= 1. - fraction;
-    layer.mix.push_back(fraction);
+    depth += layer.thickness;
+    const double taken = depth >= height ? fraction : 0.;
+    for (double& share : layer.mix) share *= 1. - taken;
+    layer.mix.push_back(taken);
   }
   return recipe;
 }

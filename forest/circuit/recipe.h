@@ -57,7 +57,8 @@ std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe);
 /// shares of 0.
 std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double> weights);
 
-/// A recipe in which a new type takes `fraction` of every layer, the others making room in proportion.
-Recipe with_type(Recipe recipe, CellType type, double fraction);
+/// A recipe in which a new type takes `fraction` of every layer whose lower limit is at least `height` µm under the pia,
+/// the others making room in proportion.
+Recipe with_type(Recipe recipe, CellType type, double fraction, float height = 0.f);
 
 }  // namespace forest::circuit

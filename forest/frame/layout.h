@@ -14,7 +14,8 @@ struct Segment {
   uint radii;  // two half floats: radius at a (low), at b (high), µm
   float bx, by, bz;
   uint
-      meta;  // bits 0–2 section kind (1 soma, else as SectionKind), 8–15 rank: which share of thin branches goes first
+      meta;  // bits 0–2 section kind (1 soma, else as SectionKind), 8–15 rank: which share of thin branches goes first,
+             // 16–31 mean radius of its branch, a half float, µm: it goes as a whole
 };
 
 /// Where a neuron stands: position + rotation by the unit quaternion.

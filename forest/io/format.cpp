@@ -8,12 +8,21 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/acc.h"
+#include "forest/io/genesis.h"
+#include "forest/io/neuron.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+
+constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
+constexpr std::array<std::string_view, 1> python_extensions{".py"};
+
+constexpr std::array<std::string_view, 1> genesis_extensions{".p"};
+constexpr std::array<std::string_view, 1> acc_extensions{".acc"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -24,6 +33,38 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_swc,
            .keeps = {}},
+    Format{.name = "hoc",
+           .title = "NEURON cell template (hoc)",
+           .extensions = hoc_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_neuron_hoc,
+           .keeps = neuron_keeps},
+    Format{.name = "neuron-python",
+           .title = "NEURON cell class (Python)",
+           .extensions = python_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_neuron_python,
+           .keeps = neuron_keeps},
+    Format{.name = "genesis",
+           .title = "GENESIS cell parameters (readcell)",
+           .extensions = genesis_extensions,
+           .recognises = recognises_genesis,
+           .read = read_genesis,
+           .read_all = read_genesis_cells,
+           .write = write_genesis,
+           .keeps = genesis_keeps},
+    Format{.name = "acc",
+           .title = "Arbor component (ACC)",
+           .extensions = acc_extensions,
+           .recognises = nullptr,
+           .read = nullptr,
+           .read_all = nullptr,
+           .write = write_acc,
+           .keeps = acc_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {
@@ -39,7 +80,7 @@ bool has(const Format& format, std::string_view extension) {
 [[noreturn]] void refuse_extension(const std::filesystem::path& path, bool written) {
   std::string known;
   for (const Format& format : table)
-    if (!written || format.write)
+    if (written ? format.write != nullptr : format.read != nullptr)
       for (const std::string_view extension : format.extensions)
         if (known.find(std::string(extension) + ",") == known.npos) known += std::string(extension) + ", ";
   known.resize(known.size() - 2);

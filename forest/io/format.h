@@ -38,7 +38,8 @@ struct Format {
   std::string_view name;                         // "swc"
   std::string_view title;                        // "SWC (INCF v1 and its dialects)"
   std::span<const std::string_view> extensions;  // with the dot, lower case; the first one is written
-  /// Whether these bytes look like this format. Asked where formats share an extension, or none has it.
+  /// Whether these bytes look like this format. Asked where formats share an extension, or none has it. Null when the
+  /// format is only written.
   bool (*recognises)(std::string_view bytes);
   /// Throws InputError (file `name`, line, remedy) when nothing sensible can be read. Of a file with several cells the
   /// first, with a warning. Null when the format is only written.

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "forest/morphology/measure.h"
+
 namespace forest::io {
 namespace {
 
@@ -16,6 +18,10 @@ bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
   const Section& parent = m.section(d.parent);
   return !keeps.kinds || (parent.kind == d.kind && (!keeps.tags || parent.tag == d.tag));
 }
+
+constexpr double shortest = .99e-6;  // µm; the float next to 1e-6 is below it
+
+bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 // A row for each thing that can be lost.
 struct Loss {
@@ -83,11 +89,40 @@ constexpr Loss loss_table[] = {
        return count_sections(m, [](const Morphology& n, SectionId s) { return n.points(s).size() == 1; });
      },
      "{} neurites of a single point are left out"},
+    {&Keeps::still_points, "still-points-lost",
+     [](const Morphology& m, const Keeps&) {
+       std::size_t count = 0;
+       for (std::size_t i = 0; i < m.sections().size(); ++i) {
+         const auto points = m.points(SectionId(i));
+         for (std::size_t k = 1; k < points.size(); ++k) count += same_place(points[k - 1], points[k]);
+       }
+       return count;
+     },
+     "{} points at the place of the one before are left out, and with them a step of the radius there"},
+    {&Keeps::lengthless, "lengthless",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(
+           m, [](const Morphology& n, SectionId s) { return section_length(n, s) < shortest; });
+     },
+     "{} sections without length are given one of about 1e-6 µm, since a simulator divides by it"},
+    {&Keeps::zero_radii, "zero-radii",
+     [](const Morphology& m, const Keeps&) {
+       const auto zero = [](const Point& p) { return p.radius == 0.f; };
+       return std::size_t(std::ranges::count_if(m.points(), zero) +
+                          std::ranges::count_if(m.soma().points, zero));
+     },
+     "{} points have no diameter; they are written so, but a simulator needs one to compute"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
     {&Keeps::annotations, "annotations-lost",
      [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
 };
+
+bool has_length(std::span<const Point> points) {
+  double length = 0.;
+  for (std::size_t k = 1; k < points.size(); ++k) length += segment_length(points[k - 1], points[k]);
+  return length >= shortest;
+}
 
 Soma kept_soma(const Soma& soma, const Keeps& keeps) {
   const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
@@ -97,6 +132,19 @@ Soma kept_soma(const Soma& soma, const Keeps& keeps) {
 }
 
 }  // namespace
+
+Point next_place(Point point) {
+  float* axis = &point.x;  // the one with the finest step
+  for (float* other : {&point.y, &point.z})
+    if (std::abs(*other) < std::abs(*axis)) axis = other;
+  const double from = *axis;
+  for (double step = 1e-6;; step *= 2.)  // towards zero, where steps are finer
+    if (const float to = float(from > 0. ? from - step : from + step);
+        std::abs(double(to) - from) >= shortest) {
+      *axis = to;
+      return point;
+    }
+}
 
 std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
   std::vector<Warning> warnings;
@@ -113,6 +161,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
                             : value;
   };
   const auto kept_point = [&](const Point& p) {
+    if (!(keeps.step > 0.f)) return p;
     return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
   };
   MorphologyBuilder builder;
@@ -128,7 +177,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
   };
   std::vector<Place> places(m.sections().size());
   std::vector<Point> points;
-  std::uint32_t count = 0;
+  std::vector<Vec3> ends;  // of the sections that are left
   for (std::size_t i = 0; i < m.sections().size(); ++i) {
     const SectionId id(i);
     if (!keeps.single_daughters && joins(m, id, keeps)) continue;  // taken along below
@@ -137,7 +186,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     points.clear();
     float length = 0.f;
     for (SectionId at = id;;) {
-      places[at.value()] = {count, length};
+      places[at.value()] = {std::uint32_t(ends.size()), length};
       for (std::size_t k = at == id ? 0 : 1; k < m.points(at).size(); ++k) {
         points.push_back(kept_point(m.points(at)[k]));
         if (points.size() > 1)
@@ -150,13 +199,21 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     if (s.parent.valid() && places[s.parent.value()].section != gone) {
       parent = SectionId(places[s.parent.value()].section);
       if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back()).radius;
+      const Vec3 joint = ends[parent.value()];
+      points[0] = {joint.x(), joint.y(), joint.z(), points[0].radius};
     }
+    if (!keeps.still_points)
+      points.erase(std::unique(points.begin(), points.end(), same_place), points.end());
+    if (!keeps.lengthless && !has_length(points)) {
+      if (points.size() == 1) points.push_back(points[0]);
+      points.back() = next_place(points.back());
+    }
+    ends.push_back(points.back().position());
     const SectionKind kind = keeps.kinds ? s.kind : SectionKind::undefined;
     const std::int32_t tag = keeps.tags && keeps.kinds ? s.tag : std::int32_t(kind);
     std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
     if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
     builder.add_section(parent, kind, points, tag, soma_point);
-    ++count;
   }
   if (keeps.spines)
     for (Spine spine : m.spines()) {

@@ -30,10 +30,18 @@ struct Keeps {
   bool joints = true;            // a daughter's own radius at the branch point
   bool single_daughters = true;  // a node with one daughter; else the two are one section
   bool stumps = true;            // a root of a single point
+  bool still_points =
+      true;  // points at the place of the one before; else the first of them (needs !lengthless)
+  bool lengthless = true;  // sections without length; else their end is moved to the next_place
+  bool zero_radii = true;  // kept in any case, but told where a simulator cannot compute with them
   bool spines = true;
   bool annotations = true;
   float step = 0.f;  // coordinates and diameters are rounded to this, µm; 0: not at all
 };
+
+/// 1e-6 µm from this point, or where its coordinates have no such step the next they have: no length that counts in a
+/// neuron, yet one a simulator can divide by.
+Point next_place(Point point);
 
 /// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.
 std::vector<Warning> losses(const Morphology& morphology, const Keeps& keeps);

@@ -19,6 +19,9 @@ constexpr Keeps nothing{.kinds = false,
                         .joints = false,
                         .single_daughters = false,
                         .stumps = false,
+                        .still_points = false,
+                        .lengthless = false,
+                        .zero_radii = false,
                         .spines = false,
                         .annotations = false};
 
@@ -38,8 +41,23 @@ TEST(Keeps, WhatIsLeftHasNothingMoreToLose) {
     const Morphology left = as_kept(specimen.morphology, nothing);
     EXPECT_EQ(as_kept(left, nothing), left);
     for (const Warning& warning : losses(left, nothing))
-      EXPECT_EQ(warning.code, "roots-joined") << warning.sentence;
+      EXPECT_TRUE(warning.code == "roots-joined" || warning.code == "zero-radii") << warning.sentence;
   }
+}
+
+TEST(Keeps, ASectionWithoutLengthGetsAlmostNoneAndItsDaughtersFollow) {
+  MorphologyBuilder b;
+  b.set_soma(zoo_parts::sphere(5));
+  const auto stump = b.add_section({}, SectionKind::basal, zoo_parts::Points{{700, 0, 900, 1}}, 3, 0);
+  b.add_section(stump, SectionKind::basal, zoo_parts::Points{{710, 0, 900, 1}});
+  b.add_section(stump, SectionKind::basal, zoo_parts::Points{{700, 0, 900, 2}});
+  const Morphology left = as_kept(b.build(), {.lengthless = false});
+  ASSERT_EQ(left.sections().size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) EXPECT_GT(section_length(left, SectionId(i)), .99e-6);
+  EXPECT_NEAR(total_length(left), 10., 1e-5);
+  const Point end = next_place({700, 800, -900, 1});
+  EXPECT_EQ(end.y, 800.f);
+  EXPECT_NEAR(end.x, 700., 1e-4);
 }
 
 TEST(Keeps, JoinedSectionsKeepTheirLengthAndTheirSpines) {

@@ -292,6 +292,7 @@ class Assembler {
     for (const fs::path& folder : folders)
       for (const Format& format : formats())
         for (const std::string_view extension : format.extensions) {
+          if (!format.read) continue;
           if (fs::is_regular_file(folder / (name + std::string(extension))))
             return folder / (name + std::string(extension));
           if (relative.extension() == extension && fs::is_regular_file(folder / relative))

@@ -65,6 +65,12 @@ inline SectionKind swc_kind(std::int32_t type) {
   return type < 0 || type > 7 || type == swc_soma_type ? SectionKind::custom : SectionKind(type);
 }
 
+/// The number a section is written with: its tag where that says its kind.
+inline std::int32_t swc_type(const Section& section) {
+  const bool fits = swc_kind(section.tag) == section.kind && section.tag != swc_soma_type;
+  return fits ? section.tag : std::int32_t(section.kind);
+}
+
 /// The first line of a file that write_swc wrote. It is read to the letter: nothing is guessed about types
 /// and soma.
 inline constexpr std::string_view swc_marker = "Brain Forest SWC 1 (INCF v1)";

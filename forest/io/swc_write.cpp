@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "forest/io/numbers.h"
+#include "forest/io/soma_place.h"
 #include "forest/io/swc.h"
 #include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
@@ -14,16 +15,9 @@ namespace {
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
-std::int32_t type_of(const Section& section) {
-  const bool fits = swc_kind(section.tag) == section.kind && section.tag != swc_soma_type;
-  return fits ? section.tag : std::int32_t(section.kind);
-}
-
 class Writer {
  public:
-  explicit Writer(const Morphology& m) : m_(m) {
-    for (const SectionId root : m.roots()) places_known_ = places_known_ || m.section(root).soma_point >= 0;
-  }
+  explicit Writer(const Morphology& m) : m_(m), soma_place_(m) {}
 
   std::string write() {
     rows();  // first, since the header names ids
@@ -62,7 +56,8 @@ class Writer {
       std::int64_t parent = -1;
       std::size_t first = 0;
       if (!section.parent.valid()) {
-        parent = soma_id(section, points[0]);
+        const std::int32_t place = soma_place_(SectionId(s));
+        parent = place < 0 ? -1 : 1 + place;
       } else {
         parent = last_ids[section.parent.value()];
         // The joint is the parent's last row, unless reading could not tell this section's first point from
@@ -72,11 +67,11 @@ class Writer {
             points[0].radius == joint.radius && !(points.size() > 2 && same_place(points[0], points[1]));
         first = said ? 1 : 0;
         const bool only = m_.children(section.parent).size() == 1;
-        if (only && type_of(section) == type_of(m_.section(section.parent)))
+        if (only && swc_type(section) == swc_type(m_.section(section.parent)))
           header_ += fmt::format("# {} {}\n", swc_node_key, id_ + 1);
       }
       for (std::size_t i = first; i < points.size(); ++i)
-        row(type_of(section), points[i], i == first ? parent : id_);
+        row(swc_type(section), points[i], i == first ? parent : id_);
       last_ids[s] = id_;
     }
   }
@@ -99,24 +94,6 @@ class Writer {
       for (const float number : {p.x, p.y, p.z, p.radius}) header_ += ' ', append_number(header_, number);
       header_ += '\n';
     }
-  }
-
-  /// The soma row that a root hangs on. A root whose place on the soma is not known stays apart where other
-  /// roots know theirs; where none does (another format, a grown neuron), it hangs on the nearest soma point
-  /// if it begins near.
-  std::int64_t soma_id(const Section& root, const Point& begin) const {
-    const Soma& soma = m_.soma();
-    if (soma.kind == SomaKind::none) return -1;
-    const bool many = soma.kind == SomaKind::cylinders;
-    if (root.soma_point >= 0)
-      return many ? 1 + std::min<std::int64_t>(root.soma_point, std::int64_t(soma.points.size()) - 1) : 1;
-    if (places_known_) return -1;
-    const Point sphere = soma.sphere();
-    if (segment_length(sphere, begin) > 3. * double(sphere.radius) + double(begin.radius)) return -1;
-    if (!many) return 1;
-    const auto nearest =
-        std::ranges::min_element(soma.points, {}, [&](const Point& p) { return segment_length(p, begin); });
-    return 1 + (nearest - soma.points.begin());
   }
 
   /// A comment line for each line of the text, written as it will be read.
@@ -145,9 +122,9 @@ class Writer {
   }
 
   const Morphology& m_;
+  SomaPlaces soma_place_;
   std::string header_, rows_;
   std::int64_t id_ = 0;
-  bool places_known_ = false;  // of some root on the soma
 };
 
 }  // namespace

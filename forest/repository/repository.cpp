@@ -101,6 +101,7 @@ class Insert {
   std::string name, fingerprint;
   NewNeuron about;
   Rows rows;
+  std::string packed_points;  // empty: as in rows
   long long checksum = 0;
 
   /// False when the population has the name or the fingerprint by now, from another program.
@@ -127,7 +128,7 @@ class Insert {
     sphere_ = {sphere.x, sphere.y, sphere.z, sphere.radius};
     area_ = m.soma().area();
     soma_.run();
-    run_shape(m);
+    run_shape();
 
     spine_section_.clear(), spine_shape_.clear();
     for (Reals& column : spine_) column.clear();
@@ -148,10 +149,9 @@ class Insert {
   }
 
   /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
-  void run_shape(const Morphology& m) {
-    data_ = packed(m.points());
-    packing_ = data_.empty() ? 0 : 1;
-    if (!packing_) data_ = rows.points;
+  void run_shape() {
+    packing_ = packed_points.empty() ? 0 : 1;
+    data_ = packing_ ? packed_points : rows.points;
     if (!data_.empty()) points_.run();
     run(arbors_, rows.arbors.size());
     if_parent_.assign(rows.sections.size(), soci::i_ok);
@@ -212,7 +212,8 @@ struct Repository::Impl {
         impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
       insert.id = id;
       insert.rows = rows_of(m);
-      insert.run_shape(m);
+      insert.packed_points = packed(m.points());
+      insert.run_shape();
     }
     impl.writing = false;
   }
@@ -336,12 +337,34 @@ Repository Repository::open(const std::string& place, Access access) {
   return Repository(std::make_unique<Impl>(place, connect(place, access == Access::write, Impl::refill)));
 }
 
+struct Prepared::Data {
+  Morphology morphology;
+  Rows rows;
+  std::string packed_points;
+  std::uint64_t sum;
+};
+
+Prepared::Prepared(Morphology morphology) {
+  Rows rows = rows_of(morphology);
+  std::string points = packed(morphology.points());
+  const std::uint64_t sum = checksum(rows);
+  data_ = std::unique_ptr<Data>(new Data{std::move(morphology), std::move(rows), std::move(points), sum});
+}
+Prepared::~Prepared() = default;
+Prepared::Prepared(Prepared&&) noexcept = default;
+Prepared& Prepared::operator=(Prepared&&) noexcept = default;
+
 Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
+  check_name("neuron", neuron.name);  // before any work
+  return add(Prepared(morphology), neuron);
+}
+
+Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
   Impl& impl = *impl_;
   check_name("neuron", neuron.name);
   check_name("population", neuron.population);
-  Rows rows = rows_of(morphology);
-  const std::uint64_t sum = checksum(rows);
+  Prepared::Data& data = *prepared.data_;
+  const std::uint64_t sum = data.sum;
 
   return impl.write([&] {
     if (!impl.insert) impl.insert = std::make_unique<Insert>(*impl.database);
@@ -351,7 +374,8 @@ Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
     for (std::string* text :
          {&insert.about.species, &insert.about.region, &insert.about.layer, &insert.about.type})
       *text = escaped(*text);
-    insert.rows = std::move(rows);
+    insert.rows = std::move(data.rows);
+    insert.packed_points = std::move(data.packed_points);
     insert.checksum = std::bit_cast<long long>(sum);
     insert.population = impl.population(neuron.population);
     if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
@@ -382,7 +406,7 @@ Added Repository::add(const Morphology& morphology, const NewNeuron& neuron) {
         continue;
       }
       insert.id = impl.database->next_id("neurons");
-      if (insert.run(morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
+      if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
     }
   });
 }
@@ -705,6 +729,9 @@ bool Repository::remove(NeuronId id) {
   return impl_->write([&] {
     const int neuron = number_of(id);
     if (!impl_->ask<int>("select id from neurons where id = :id", neuron)) return false;
+    for (const char* table :
+         {"provenance", "somata", "arbors", "sections", "points", "spines", "annotations", "neuron_metrics"})
+      impl_->sql << fmt::format("delete from {} where neuron = :id", table), use(neuron);
     impl_->sql << "delete from neurons where id = :id", use(neuron);
     return true;
   });

@@ -91,6 +91,21 @@ struct ArborRow {
 
 enum class Access : std::uint8_t { read, write };
 
+/// A neuron made ready to be stored: its rows, metrics, packed points and checksum. Most of the work of storing one, and
+/// it needs no database, so many threads can do it.
+class Prepared {
+ public:
+  explicit Prepared(Morphology morphology);
+  ~Prepared();
+  Prepared(Prepared&&) noexcept;
+  Prepared& operator=(Prepared&&) noexcept;
+
+ private:
+  friend class Repository;
+  struct Data;
+  std::unique_ptr<Data> data_;
+};
+
 class Repository {
  public:
   /// Opens the repository at `place`: a path, or a `postgresql://…` address. With Access::write it is
@@ -103,6 +118,7 @@ class Repository {
 
   /// Stores one neuron, in a transaction of its own unless one is open. Throws Error when the name is taken
   /// by another neuron, is no name, or the disk is full; then nothing has changed.
+  Added add(Prepared prepared, const NewNeuron& neuron);
   Added add(const Morphology& morphology, const NewNeuron& neuron);
 
   /// Keeps the text of a grammar (once, however often it is given) and returns the hash Grown::grammar_hash

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <functional>
 #include <map>
+#include <numbers>
 #include <numeric>
 
 #include "forest/geometry/polyline.h"
@@ -26,6 +27,7 @@ constexpr float widest = 3.f;     // a coarse segment is at most this many times
 struct Strip {
   std::vector<Vec4> vertices;  // x, y, z, radius
   std::uint32_t kind = 0, rank = 0;
+  float mean = 0.f;                  // radius of its branch
   std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
   bool dropped = false;
 
@@ -105,7 +107,7 @@ void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_
     if (head == i || previous.end != next.begin || previous.kind != next.kind) continue;
     previous.vertices.insert(previous.vertices.end(), next.vertices.begin() + 1, next.vertices.end());
     previous.end = next.end;
-    previous.rank = std::min(previous.rank, next.rank);
+    if (next.rank < previous.rank) previous.rank = next.rank, previous.mean = next.mean;
     next.dropped = true;
     into[i] = head;
   }
@@ -148,8 +150,10 @@ std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::u
   const float after = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
   const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
   for (Strip& s : strips)
-    if (s.kind != 1)
+    if (s.kind != 1) {
       for (Vec4& v : s.vertices) v.w() = std::min(v.w() * widening, v.w() + tolerance);
+      s.mean = std::min(s.mean * widening, s.mean + tolerance);
+    }
   return strips;
 }
 
@@ -209,9 +213,11 @@ struct Drawn {
 };
 
 // The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
-// drawn when width > rank, and a diagonal one counts as 1.42 times as wide.
-float appears_at(const frame::Segment& s, float thickest) {
-  return float(s.meta >> 8 & 255) / (256.f * 2.f * 1.42f * std::max(thickest, 1e-6f));
+// drawn when it is a pixel wide or its branch is wider than its rank, and a diagonal one counts as 1.42 times as wide.
+float appears_at(const frame::Segment& s, float thickest, float mean) {
+  constexpr float diagonal = 2.f * 1.42f;  // widths, of radii
+  return std::min(float(s.meta >> 8 & 255) / 256.f / (diagonal * std::max(mean, 1e-6f)),
+                  1.f / (diagonal * std::max(thickest, 1e-6f)));
 }
 
 // Writes the segments of a draft in the order in which they appear, `section` (one entry each, of a leaf) with them.
@@ -228,9 +234,10 @@ Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out,
     for (std::size_t i = 1; i < s.vertices.size(); ++i) {
       const Vec4 &a = s.vertices[i - 1], &b = s.vertices[i];
       const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
-                                   b.x(), b.y(), b.z(), s.kind | s.rank << 8};
-      segments.push_back({segment, section.empty() ? 0 : section[segments.size()],
-                          appears_at(segment, std::max(a.w(), b.w()))});
+                                   b.x(), b.y(), b.z(), s.kind | s.rank << 8 | half_pair(s.mean, 0.f) << 16};
+      segments.push_back(
+          {segment, section.empty() ? 0 : section[segments.size()],
+           appears_at(segment, std::max(a.w(), b.w()), s.mean > 0.f ? s.mean : std::min(a.w(), b.w()))});
       if (a != b)
         drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
     }
@@ -295,6 +302,10 @@ ClusterTree build_clusters(const Morphology& m) {
   const std::vector<std::uint32_t> numbers = branch_numbers(m);
   std::vector<double> lengths(sections + 1);
   for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += section_length(m, SectionId(i));
+  std::vector<double> means(sections);  // of the radius along each branch
+  for (std::size_t i = 0; i < sections; ++i)
+    means[numbers[i]] += section_area(m, SectionId(i)) / (2. * std::numbers::pi);
+  for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
   std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
   const double total = std::max(lengths.back(), 1e-9);
   const auto rank_of = [&](std::size_t i) {
@@ -306,7 +317,7 @@ ClusterTree build_clusters(const Morphology& m) {
   std::vector<Strip> runs;
   if (soma.radius > 0.f) {
     const Vec4 centre(soma.x - origin.x(), soma.y - origin.y(), soma.z - origin.z(), soma.radius);
-    runs.push_back({.vertices = {centre, centre}, .kind = 1, .rank = 0, .begin = 0, .end = 0});
+    runs.push_back({.vertices = {centre, centre}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0});
     tree.section.push_back(soma_section);
   }
   std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
@@ -319,6 +330,7 @@ ClusterTree build_clusters(const Morphology& m) {
     Strip strip{.vertices = {},
                 .kind = std::uint32_t(section.kind),
                 .rank = rank_of(id.value()),
+                .mean = float(means[numbers[id.value()]]),
                 .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
                 .end = id.value() + 1};
     for (const Point& p : points) strip.vertices.push_back(vertex(p));
@@ -330,7 +342,7 @@ ClusterTree build_clusters(const Morphology& m) {
         const float inside = std::max(.3f * soma.radius, 0.f);
         const Vec3 direction = first.head<3>() / gap;
         const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
-        Strip cone{.vertices = {}, .kind = 1, .rank = 0, .begin = 0, .end = 0};
+        Strip cone{.vertices = {}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0};
         Vec4 start;
         start << direction * inside, width;
         cone.vertices = {start, first};
@@ -371,6 +383,7 @@ ClusterTree build_clusters(const Morphology& m) {
                                run.vertices.begin() + std::ptrdiff_t(at + take + 1)},
                   .kind = run.kind,
                   .rank = run.rank,
+                  .mean = run.mean,
                   .begin = begin,
                   .end = last ? run.end : nodes++};
       begin = piece.end;

@@ -142,7 +142,9 @@ TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
           return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
         };
         const float width = 2.f * std::max(radius(s.radii & 0xffff), radius(s.radii >> 16)) * magnification;
-        EXPECT_LE(width * 256.f, float(s.meta >> 8 & 255) * 1.01f);
+        const float of_branch = 2.f * radius(s.meta >> 16) * magnification;
+        EXPECT_LE(of_branch * 256.f, float(s.meta >> 8 & 255) * 1.01f);
+        EXPECT_LT(width, 1.01f);
       }
     }
   }

@@ -16,6 +16,8 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
+constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
+
 constexpr std::array<std::string_view, 4> colour_names{"type", "layer", "kind", "neuron"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 
@@ -32,9 +34,9 @@ constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73
 // Ramps from the pia down, one a type: warm, blue, green, violet, grey. Each keeps to one family of hues and grows darker,
 // so that types and layers can both be told, by colour-blind eyes too.
 constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B, 0xC8385A},
-                                                             {0xB5E3FF, 0x4FA8E8, 0x2F6FD0},
-                                                             {0xA8F0CF, 0x2FBF8F, 0x0E8F6E},
-                                                             {0xE3C8FF, 0xB48AE8, 0x8A5CD0},
+                                                             {0x86C5F4, 0x4A9DE6, 0x2F6FD0},
+                                                             {0x86D9B6, 0x2FBF8F, 0x0E8F6E},
+                                                             {0xF4F1FF, 0xDCCBFA, 0xB9A2EE},
                                                              {0xE8E8E8, 0xBBBBBB, 0x909090}}};
 // Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
 constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
@@ -186,10 +188,11 @@ View portrait(const Forest& forest) {
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
   const Vec3 centre = bounds.centre();
-  view.camera.target = centre + Vec3(0.f, -.01f * height, 0.f);
-  view.camera.eye = centre + Vec3(1.5f * radius, .21f * height, 3.6f * radius);
-  view.camera.field_of_view = 52.f;
+  view.camera.target = centre + Vec3(.42f * radius, .2f * height, 0.f);
+  view.camera.eye = centre + Vec3(3.f * radius, .74f * height, 5.8f * radius);
+  view.camera.field_of_view = 46.f;
   view.camera.near = .5f;
+  view.fog = 1.4f, view.halo = 1.5f;
   view.samples = 24;
   return view;
 }
@@ -296,7 +299,10 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
     const float depth = -axes.col(2).dot(bounds.centre() - view.camera.eye);
     const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
     s.fog_start = std::max(20.f, depth - size);
-    s.fog_length = std::max(60.f, std::min(2.f * size, extent) * .9f) / view.fog;
+    // Within the forest one sees a hundred micrometres or two, whatever its size.
+    const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
+    const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
+    s.fog_length = (length + inside * (std::min(length, seen_inside) - length)) / view.fog;
   }
   return f;
 }

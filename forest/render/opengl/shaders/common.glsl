@@ -27,7 +27,8 @@ struct Capsule {
   vec3 a, b;
   float ra, rb;
   uint entry;  // of the palette
-  float rank;  // in [0, 1): a line of width w < 1 pixel is drawn when w > rank
+  float rank;  // in [0, 1): a branch of width w < 1 pixel is drawn when w > rank
+  float mean;  // radius of its branch; 0: as its own
 };
 
 vec3 to_camera(vec3 world) {
@@ -95,11 +96,13 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.rb = max(c.rb, c.b.z / view.focal);
     c.entry = meta >> 16;
     c.rank = 0.0;
+    c.mean = 0.0;
   } else {
     vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
     vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
     c.a = to_camera(at + turned(q, c.a));
     c.b = to_camera(at + turned(q, c.b));
+    c.mean = unpackHalf2x16(meta >> 16).x;
     c.entry = texelFetch(colour_classes, int(item.x)).x * 8u + (meta & 7u);
     c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
@@ -145,7 +148,10 @@ void draw_line(Capsule c) {
   vec2 d = q - p;
   bool steep = abs(d.y) > abs(d.x);
   float major = max(abs(d.x), abs(d.y));
-  float width = width_in_pixels(c) * (major > 0.0 ? length(d) / major : 1.0);
+  float stretch = major > 0.0 ? length(d) / major : 1.0;
+  float width = width_in_pixels(c) * stretch;
+  // A thin branch is drawn or left out as a whole, by its mean width: one that fades is not dashed.
+  if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / c.a.z + 1.0 / c.b.z) * stretch, 1.0);
   int thickness = int(width + 1.0 - c.rank - 1.0 / 512.0);
   if (thickness < 1) return;
   if (hidden(min(p, q) - 0.5 * width, max(p, q) + 0.5 * width, min(c.a.z, c.b.z), 6u)) return;

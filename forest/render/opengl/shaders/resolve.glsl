@@ -52,6 +52,6 @@ void main() {
   if (view.subframe + 1u < view.last_subframe) return;
   sum /= float(view.subframe + 1u);
   vec3 c = sum.xyz * view.exposure;
-  uvec3 b = uvec3(255.0 * vec3(srgb(c.x), srgb(c.y), srgb(c.z)) + 0.5);
+  uvec3 b = uvec3(255.0 * vec3(srgb(c.x), srgb(c.y), srgb(c.z)) + noise_at(int(x), int(y)));  // no bands in a dark sky
   image[at] = b.x | (b.y << 8) | (b.z << 16) | (uint(255.0 * sum.w + 0.5) << 24);
 }

@@ -1,0 +1,1 @@
+soma none 1e39 0 0 1

@@ -1,0 +1,2 @@
+/* never ends
+soma none 0 0 0 1
