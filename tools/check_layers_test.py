@@ -61,6 +61,27 @@ class CheckLayers(unittest.TestCase):
         self.append("core/vec.h", '#include "forest/core/error.h"')
         self.assert_refused("vec.h brings <sqlite3.h>")
 
+    def test_a_library_that_the_room_does_not_name_is_refused(self):
+        self.append("scene/cut.cpp", "#include <epoxy/gl.h>")
+        self.assert_refused("cut.cpp", "<epoxy/gl.h>", "EPOXY")
+
+    def test_a_library_of_another_room_is_refused_in_tests_too(self):
+        self.append("morphology/morphology_test.cpp", "#include <nlohmann/json.hpp>")
+        self.assert_refused("morphology_test.cpp", "nlohmann_json::")
+
+    def test_a_test_library_outside_tests_is_refused(self):
+        self.append("core/error.cpp", "#include <gtest/gtest.h>")
+        self.assert_refused("error.cpp", "<gtest/gtest.h>")
+
+    def test_an_unknown_library_is_refused(self):
+        self.append("core/error.cpp", "#include <curl/curl.h>")
+        self.assert_refused("error.cpp", "no known library", "LIBRARIES")
+
+    def test_a_library_that_is_named_no_more_is_refused(self):
+        lists = self.project / "forest/scene/CMakeLists.txt"
+        lists.write_text(lists.read_text().replace("nlohmann_json::nlohmann_json", ""))
+        self.assert_refused("view.cpp", "<nlohmann/json.hpp>")
+
     def test_a_cycle_of_rooms_is_refused(self):
         lists = self.project / "forest/core/CMakeLists.txt"
         lists.write_text("forest_module(DEPENDS morphology)\n")

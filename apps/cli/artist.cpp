@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/core/file.h"
 #include "forest/io/film.h"
 #include "forest/io/png.h"
 #include "forest/scene/cut.h"
@@ -92,12 +91,6 @@ std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {
         "'{}' is no size of a picture; give WIDTHxHEIGHT in pixels up to 16384, for example 1920x1080",
         text));
   return {width, height};
-}
-
-scene::View read_view(const std::string& file_or_text) {
-  if (file_or_text.starts_with('{')) return scene::parse_view(file_or_text, "--view");
-  const MappedFile file(file_or_text);
-  return scene::parse_view(file.text(), file_or_text);
 }
 
 }  // namespace forest::cli

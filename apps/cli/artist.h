@@ -63,7 +63,4 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
 /// "1920x1080" to numbers; throws Error.
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);
 
-/// A view from a file, or from the text itself when it begins with '{'.
-scene::View read_view(const std::string& file_or_text);
-
 }  // namespace forest::cli

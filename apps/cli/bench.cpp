@@ -7,6 +7,7 @@
 #include <CLI/CLI.hpp>
 
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 
 namespace forest::cli {
 
@@ -32,9 +33,7 @@ std::function<void()> bench(CLI::App& command, Console& console) {
   const auto chosen = std::make_shared<std::function<void()>>();
   for (const Benchmark& benchmark : benchmarks()) {
     CLI::App* sub = command.add_subcommand(benchmark.name, benchmark.summary);
-    sub->add_flag("--json", console.json, "Print results as JSON");
-    sub->add_option("--threads", console.threads, "Number of threads; 0 for all cores")
-        ->check(CLI::NonNegativeNumber);
+    add_common(*sub, console);
     sub->callback([chosen, job = benchmark.setup(*sub, console)] { *chosen = job; });
   }
   return [chosen] { (*chosen)(); };

@@ -18,6 +18,7 @@
 #include "apps/cli/bench.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/options.h"
 #include "apps/cli/planting.h"
 
 namespace forest::cli {
@@ -168,8 +169,8 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
       .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
       ->check(CLI::Range(1., 10000.))
       ->capture_default_str();
-  command.add_option("--size", options->size, "Width x height in pixels")->capture_default_str();
-  command.add_option("--seed", options->seed, "Of the neurons and their places")->capture_default_str();
+  add_size(command, options->size);
+  add_seed(command, options->seed, "Of the neurons and their places");
   return [options, &console] { run(*options, console); };
 }
 

@@ -3,6 +3,7 @@
 // which the original can be made again byte for byte.
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
 
@@ -22,6 +23,7 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -37,6 +39,7 @@ struct Options {
   std::vector<std::string> files;
   std::string repo;
   fs::path repair;
+  bool force = false;
 };
 
 /// A row of the table.
@@ -55,17 +58,34 @@ struct Checked {
   }
 };
 
+/// Of findings of one code the first few are told and the rest counted; what the reader has told with its line is not told
+/// again.
 void look_at(const io::Cell& cell, Checked& checked) {
+  constexpr std::size_t told = 3;
   for (const io::Warning& w : cell.read.warnings)
     checked.found.push_back({w.line, cell.name, std::string(w.code), w.sentence,
                              std::string(w.mending.empty() ? by_repair : w.mending)});
+  struct Rest {
+    std::size_t count = 0;
+    std::string mend;
+  };
+  std::map<std::string_view, Rest> codes;
   for (const Finding& f : validate(cell.read.morphology)) {
-    if (f.severity == Severity::note) continue;
-    const std::string place = f.section.valid() ? fmt::format("section {}: ", f.section.value()) : "";
+    if (f.severity == Severity::note || std::ranges::count(cell.read.warnings, f.code, &io::Warning::code))
+      continue;
     const std::size_t half = std::min(f.sentence.find("; "), f.sentence.size());
-    checked.found.push_back({0, cell.name, std::string(f.code), place + f.sentence.substr(0, half),
-                             half < f.sentence.size() ? f.sentence.substr(half + 2) : ""});
+    Rest& rest = codes[f.code];
+    rest.mend = half < f.sentence.size() ? f.sentence.substr(half + 2) : "";
+    if (++rest.count > told) continue;
+    const std::string place = f.section.valid() ? fmt::format("section {}: ", f.section.value()) : "";
+    checked.found.push_back(
+        {0, cell.name, std::string(f.code), place + f.sentence.substr(0, half), rest.mend});
   }
+  for (const auto& [code, rest] : codes)
+    if (rest.count > told)
+      checked.found.push_back({0, cell.name, std::string(code),
+                               fmt::format("the same at {}", counted(rest.count - told, "more place")),
+                               rest.mend});
 }
 
 Json json_of(const Found& f) {
@@ -74,14 +94,15 @@ Json json_of(const Found& f) {
   return json;
 }
 
+using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
+
 /// The mended copy and its log: `passages` that, one after the other, are the original. A passage is a run of lines of the
 /// copy, [first, count] from line 1, or text as the repository's names are escaped (\xHH for bytes that are no UTF-8).
 void repair(const io::Format& format, const io::Cell& cell, std::string_view original, const fs::path& to,
-            Checked& checked) {
+            const Put& put, Checked& checked) {
   const io::Format& writer = format.write ? format : *io::find_format("swc");
   fs::path mended = to;
   if (!format.write) mended.replace_extension(std::string(writer.extensions[0]));
-  fs::create_directories(mended.parent_path());
   const std::string copy = writer.write(cell.read.morphology);
   Json passages = Json::array(), findings = Json::array();
   for (const io::Passage& p : io::difference(copy, original))
@@ -92,12 +113,12 @@ void repair(const io::Format& format, const io::Cell& cell, std::string_view ori
                  {"mended", escaped(mended.filename().string())},
                  {"findings", findings},
                  {"passages", passages}};
-  write_file(mended, std::string_view(copy));
-  write_file(mended.string() + ".log.json", log.dump(1) + "\n");
+  put(mended, copy);
+  put(mended.string() + ".log.json", log.dump(1) + "\n");
   checked.mended = mended;
 }
 
-void check_file(Checked& checked, const fs::path& to) {
+void check_file(Checked& checked, const fs::path& to, const Put& put) {
   try {
     const MappedFile file(checked.path);
     const io::Format& format = io::format_of(checked.path, file.text());
@@ -109,7 +130,7 @@ void check_file(Checked& checked, const fs::path& to) {
       checked.error = fmt::format("{}: holds {} cells, which are not mended together; convert it first",
                                   escaped(checked.path.string()), cells.size());
     else
-      repair(format, cells[0], file.text(), to, checked);
+      repair(format, cells[0], file.text(), to, put, checked);
   } catch (const InputError& error) {
     checked.error = error.what();
   }
@@ -150,33 +171,45 @@ void check_repository(const std::string& repo, Console& console) {
   for (const std::string& finding : findings) console.warn(finding);
   console.print({{"repository", repo}, {"findings", findings}});
   if (!findings.empty())
-    throw Error(fmt::format("{}: {} findings; the sentences above say what to do", repo, findings.size()));
+    throw Error(fmt::format("{}: {}; {} what to do", repo, counted(findings.size(), "finding"),
+                            findings.size() == 1 ? "the sentence above says" : "the sentences above say"));
   console.say(fmt::format("{}: all is well", repo));
 }
 
 void run(const Options& options, Console& console) {
   if (!options.repo.empty()) check_repository(options.repo, console);
-  if (options.files.empty()) {
-    if (options.repo.empty()) throw Error("name files or folders to check, or a repository with --repo");
-    return;
-  }
+  if (options.files.empty()) return;
   std::vector<Checked> files;
   std::vector<fs::path> to;
   std::map<fs::path, fs::path> taken;
-  for (const fs::path& path : neuron_files(options.files)) {
+  for (const fs::path& path : neuron_files(options.files, console)) {
     files.emplace_back().path = path;
     to.push_back(options.repair.empty() ? fs::path() : options.repair / path.filename());
     for (int number = 2; !options.repair.empty() && !taken.try_emplace(to.back(), path).second; ++number)
       to.back() =
           options.repair / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
   }
-  console.progress().begin("checking", files.size());
-  parallel_for(files.size(), 1, [&](std::size_t i) {
-    check_file(files[i], to[i]);
-    console.progress().advance();
-  });
-  console.progress().end();
-  report(files, console);
+  const auto each = [&](const char* stage, const Put& put) {
+    std::vector<Checked> checked = files;
+    console.progress().begin(stage, files.size());
+    parallel_for(files.size(), 1, [&](std::size_t i) {
+      check_file(checked[i], to[i], put);
+      console.progress().advance();
+    });
+    console.progress().end();
+    return checked;
+  };
+  if (!options.force && holds_files(options.repair)) {
+    Overwrites overwrites;
+    each("comparing", [&](const fs::path& path, std::string_view bytes) { overwrites.look(path, bytes); });
+    overwrites.refuse();
+  }
+  report(each("checking",
+              [](const fs::path& path, std::string_view bytes) {
+                fs::create_directories(path.parent_path());
+                write_file(path, bytes);
+              }),
+         console);
 }
 
 }  // namespace
@@ -184,7 +217,6 @@ void run(const Options& options, Console& console) {
 std::function<void()> check(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("files", options->files, "Neuron files, or folders with such files below them")
-      ->check(CLI::ExistingPath)
       ->type_name("FILES");
   command
       .add_option("--repo", options->repo,
@@ -196,6 +228,10 @@ std::function<void()> check(CLI::App& command, Console& console) {
                   "beside each a "
                   "log from which the original can be made again")
       ->type_name("DIR");
+  add_force(command, options->force);
+  command.parse_complete_callback([options] {
+    if (options->files.empty() && options->repo.empty()) throw CLI::RequiredError("files or --repo");
+  });
   return [options, &console] { run(*options, console); };
 }
 

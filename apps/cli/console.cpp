@@ -98,6 +98,10 @@ void Console::table(const std::vector<std::string>& header,
   for (const auto& row : rows) print(row);
 }
 
+std::string counted(std::size_t count, std::string_view noun) {
+  return fmt::format("{} {}{}", count, noun, count == 1 ? "" : "s");
+}
+
 std::filesystem::path data_folder() {
   if (const char* chosen = std::getenv("BRAINFOREST_SHARE")) return chosen;
   std::error_code ignored;

@@ -49,6 +49,9 @@ class Console {
   ProgressBar bar_;
 };
 
+/// "1 finding", "2 findings".
+std::string counted(std::size_t count, std::string_view noun);
+
 /// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the
 /// installation.
 std::filesystem::path data_folder();

@@ -2,9 +2,10 @@
 // brainforest convert: neurons from one file format to another. What the other format has no words for is told.
 #include <algorithm>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <memory>
-#include <mutex>
+#include <set>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -18,6 +19,7 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -30,7 +32,7 @@ struct Options {
   std::vector<std::string> files;
   std::string format;
   fs::path out;
-  bool verbose = false;
+  bool verbose = false, force = false;
 };
 
 /// A neuron on its way from one file to another.
@@ -41,9 +43,13 @@ struct Conversion {
   std::string error;                  // why it could not be read; empty when it could
 };
 
+using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
+
 /// The conversions of one file: one, or one for each of its cells.
-std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const io::Format& format) {
+std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const io::Format& format,
+                                     const Put& put) {
   std::vector<Conversion> done;
+  std::set<std::string> names;  // of its cells
   try {
     const MappedFile file(from);
     const std::string name = escaped(from.string());
@@ -53,13 +59,16 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
       conversion.from = from;
       conversion.to = to;
       if (cells.size() > 1) {
-        const std::string cell =
+        std::string cell =
             cells[i].name.empty() ? std::to_string(i + 1) : repository::file_name(cells[i].name);
+        const std::string wanted = cell;
+        for (int number = 2; !names.insert(cell).second; ++number)
+          cell = fmt::format("{}-{}", wanted, number);
         conversion.to.replace_filename(to.stem().string() + "-" + cell + to.extension().string());
       }
       conversion.warnings = cells[i].read.warnings;
       conversion.losses = io::losses(cells[i].read.morphology, format.keeps);
-      write_file(conversion.to, std::string_view(format.write(cells[i].read.morphology)));
+      put(conversion.to, format.write(cells[i].read.morphology));
     }
   } catch (const InputError& error) {
     done.emplace_back(Conversion{from, {}, {}, {}, error.what()});
@@ -110,34 +119,41 @@ std::vector<fs::path> targets(const Options& options, const std::vector<fs::path
 }
 
 void run(Options options, Console& console) {
-  // `convert A B`: the second name is the target when it is no file that could be read.
+  // `convert A B`: the second name is the target when no folder is named.
   fs::path single;
   if (options.out.empty()) {
-    if (options.files.size() != 2 || fs::is_directory(options.files[0]))
-      throw Error("say where the files go: convert A B for two files, or --format NAME --out DIR for many");
     single = options.files[1];
     options.files.pop_back();
-  } else if (options.format.empty()) {
-    throw Error("say which format the files are to have, with --format NAME");
   }
   const io::Format& format = single.empty() ? *io::find_format(options.format) : io::format_of(single);
   if (!format.write)
     throw Error(fmt::format("{} can be read but not written; choose another format", format.title));
-  const std::vector<fs::path> files = neuron_files(options.files);
+  const std::vector<fs::path> files = neuron_files(options.files, console);
   const std::vector<fs::path> to = single.empty() ? targets(options, files, format) : std::vector{single};
+  std::vector<std::vector<Conversion>> done(files.size());
+  const auto each = [&](const char* stage, const Put& put) {
+    console.progress().begin(stage, files.size());
+    parallel_for(files.size(), 1, [&](std::size_t i) {
+      done[i] = convert_file(files[i], to[i], format, put);
+      console.progress().advance();
+    });
+    console.progress().end();
+  };
+  const auto folder = [](const fs::path& file) {
+    return file.parent_path().empty() ? "." : file.parent_path();
+  };
+  if (!options.force && holds_files(single.empty() ? options.out : folder(single))) {
+    Overwrites overwrites;
+    each("comparing", [&](const fs::path& path, std::string_view bytes) { overwrites.look(path, bytes); });
+    overwrites.refuse();
+  }
   std::error_code error;
   for (const fs::path& path : to)
     if (!path.parent_path().empty() && (fs::create_directories(path.parent_path(), error), error))
       throw Error(fmt::format("{}: the folder cannot be made ({}); name one that can be written",
                               path.parent_path().string(), error.message()));
 
-  std::vector<std::vector<Conversion>> done(files.size());
-  console.progress().begin("converting", files.size());
-  parallel_for(files.size(), 1, [&](std::size_t i) {
-    done[i] = convert_file(files[i], to[i], format);
-    console.progress().advance();
-  });
-  console.progress().end();
+  each("converting", [](const fs::path& path, std::string_view bytes) { write_file(path, bytes); });
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t written = 0, failed = 0, oddities = 0, lost = 0;
@@ -181,6 +197,15 @@ std::function<void()> convert(CLI::App& command, Console& console) {
   command.add_option("--out", options->out, "Folder for the files that are made; made when there is none")
       ->type_name("DIR");
   command.add_flag("--verbose", options->verbose, "Show every oddity of the files that are read");
+  add_force(command, options->force);
+  command.parse_complete_callback([options] {
+    std::error_code none;
+    if (options->out.empty() && (options->files.size() != 2 || fs::is_directory(options->files[0], none)))
+      throw CLI::ValidationError(
+          "say where the files go: convert A B for two files, or --format NAME --out DIR for many");
+    if (!options->out.empty() && options->format.empty())
+      throw CLI::ValidationError("say which format the files are to have, with --format NAME");
+  });
   return [options, &console] { run(*options, console); };
 }
 

@@ -25,6 +25,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/options.h"
 #include "apps/cli/planting.h"
 #include "apps/cli/studio.h"
 #include "apps/cli/verb.h"
@@ -85,7 +86,7 @@ void import_into(const std::string& repo, const fs::path& folder, Console& conso
     Morphology morphology;
     std::string hash, error;
   };
-  const std::vector<fs::path> paths = neuron_files({folder.string()});
+  const std::vector<fs::path> paths = neuron_files({folder.string()}, console);
   std::vector<File> files(paths.size());
   console.progress().begin("reading", paths.size());
   parallel_for(paths.size(), 1, [&](std::size_t i) {
@@ -208,7 +209,7 @@ std::function<void()> demo(CLI::App& command, Console& console) {
   command
       .add_option("--traced", options->traced, "Plant the traced cells of this folder among the grown ones")
       ->check(CLI::ExistingDirectory);
-  command.add_option("--seed", options->seed, "The same seed gives the same forest")->capture_default_str();
+  add_seed(command, options->seed, "The same seed gives the same forest");
   command.add_flag("--view", options->view, "Open the studio on it at the end, where there is a display");
   return [options, &console] { run(*options, console); };
 }

@@ -16,7 +16,9 @@
 #include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/options.h"
 #include "apps/cli/tables.h"
 #include "apps/cli/verb.h"
 
@@ -30,10 +32,15 @@ struct Options {
   std::vector<std::string> names;
   std::string repo, population, format = "swc";
   fs::path out;
+  bool force = false;
 };
 
 void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Console& console) {
-  const auto files = export_tables(options.repo, rows, options.out, options.format == "csv", console);
+  const bool csv = options.format == "csv";
+  const fs::path first = csv ? options.out / "summary.csv" : options.out;
+  if (!options.force && fs::exists(first))  // a person may have written into it
+    throw Error(fmt::format("{} is there already; choose another name, or replace it with --force", first.string()));
+  const auto files = export_tables(options.repo, rows, options.out, csv, console);
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const fs::path& file : files) list.push_back(file.string());
   console.print({{"format", options.format}, {"neurons", rows.size()}, {"files", list}});
@@ -56,6 +63,24 @@ void run(const Options& options, Console& console) {
     const fs::path folder = populations.size() > 1 ? options.out / file_name(row.population) : options.out;
     files.push_back(folder / (file_name(row.name) + std::string(format.extensions[0])));
   }
+  const auto each = [&](const char* stage, const auto& use) {
+    console.progress().begin(stage, rows.size());
+    parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
+      const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
+      for (std::size_t i = begin; i < end; ++i) {
+        use(files[i], [&] { return format.write(repository.morphology(rows[i].id)); });
+        console.progress().advance();
+      }
+    });
+    console.progress().end();
+  };
+  if (!options.force && holds_files(options.out)) {
+    Overwrites overwrites;
+    each("comparing", [&](const fs::path& file, const auto& bytes) {
+      if (fs::exists(file)) overwrites.look(file, bytes());
+    });
+    overwrites.refuse();
+  }
   std::error_code error;
   for (const std::string& population : populations)
     if (fs::create_directories(populations.size() > 1 ? options.out / file_name(population) : options.out,
@@ -64,21 +89,14 @@ void run(const Options& options, Console& console) {
       throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written",
                               options.out.string(), error.message()));
 
-  console.progress().begin("exporting", rows.size());
-  parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
-    const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
-    for (std::size_t i = begin; i < end; ++i) {
-      write_file(files[i], std::string_view(format.write(repository.morphology(rows[i].id))));
-      console.progress().advance();
-    }
-  });
-  console.progress().end();
+  each("exporting",
+       [](const fs::path& file, const auto& bytes) { write_file(file, std::string_view(bytes())); });
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (std::size_t i = 0; i < rows.size(); ++i)
     list.push_back({{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}});
   console.print({{"format", options.format}, {"files", list}});
-  console.say(fmt::format("{} neurons are written to {}", rows.size(), options.out.string()));
+  console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
 }
 
 }  // namespace
@@ -103,6 +121,7 @@ std::function<void()> export_files(CLI::App& command, Console& console) {
                   "Folder the files are written to, or the workbook; made when there is none")
       ->required()
       ->type_name("PATH");
+  add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }
 

@@ -1,15 +1,36 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which files a command line means.
+// Which files a command line means, and which it may not replace.
 #pragma once
 
 #include <filesystem>
+#include <mutex>
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 namespace forest::cli {
 
-/// Files as they were named; folders as the files of a known format anywhere below them, sorted. Throws InputError for a
-/// folder without any.
-std::vector<std::filesystem::path> neuron_files(const std::vector<std::string>& names);
+class Console;
+
+/// Files as they were named, whether they are there or not; folders as the files of a known format anywhere below them,
+/// sorted. How many others lie there is told. Throws InputError for a folder without any.
+std::vector<std::filesystem::path> neuron_files(const std::vector<std::string>& names, Console& console);
+
+/// Files that a verb would replace by something else, found before its first byte is written: show it all that will be
+/// written, then refuse(). Files that hold just these bytes do not count, so a command may be repeated.
+class Overwrites {
+ public:
+  void look(const std::filesystem::path& to, std::string_view bytes);  // by any thread
+  /// Throws Error when there are any.
+  void refuse() const;
+
+ private:
+  std::mutex mutex_;
+  std::set<std::filesystem::path> found_;
+};
+
+/// Whether there may be something to overwrite: the folder is there and not empty.
+bool holds_files(const std::filesystem::path& folder);
 
 }  // namespace forest::cli

@@ -2,6 +2,7 @@
 // brainforest grow: neurons from a grammar, into a repository or a folder of SWC files.
 #include "forest/lsystem/grow.h"
 
+#include <algorithm>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -14,7 +15,9 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -25,9 +28,14 @@ struct Options {
   std::filesystem::path out;
   std::size_t count = 1;
   std::uint64_t seed = 0;
+  bool force = false;
 };
 
 constexpr std::size_t batch = 2000;  // neurons held at a time
+
+std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& name) {
+  return folder / (name + ".swc");
+}
 
 /// Where grown neurons go. What was put is undone unless it is finished.
 class Destination {
@@ -76,7 +84,7 @@ class IntoFolder final : public Destination {
     for (const auto& file : unfinished_) std::filesystem::remove(file, none);
   }
   void put(const Morphology& neuron, const std::string& name, std::uint64_t) override {
-    const auto file = folder_ / (name + ".swc");
+    const auto file = file_of(folder_, name);
     if (!std::filesystem::exists(file)) unfinished_.push_back(file);
     io::write(file, neuron);
   }
@@ -87,8 +95,34 @@ class IntoFolder final : public Destination {
   std::vector<std::filesystem::path> unfinished_;
 };
 
+std::string name_of(const Options& options, const lsystem::Grammar& grammar, std::size_t index) {
+  return fmt::format("{}-{}-{:05}", grammar.name, options.seed, index);
+}
+
+/// Refuses when a file is there that does not hold the neuron it is named after. Only where there are files is anything
+/// grown for this.
+void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, Console& console) {
+  if (options.force || options.out.empty() || !holds_files(options.out)) return;
+  Overwrites overwrites;
+  const io::Format& format = *io::find_format("swc");
+  for (std::size_t first = 0; first < options.count; first += batch) {
+    const std::size_t count = std::min(batch, options.count - first);
+    std::vector<std::filesystem::path> files;
+    for (std::size_t i = 0; i < count; ++i)
+      files.push_back(file_of(options.out, name_of(options, grammar, first + i)));
+    std::vector<bool> there;
+    for (const auto& file : files) there.push_back(std::filesystem::exists(file));
+    if (std::ranges::find(there, true) == there.end()) continue;
+    const auto neurons = lsystem::grow_population(grammar, count, options.seed, console.progress(), first);
+    for (std::size_t i = 0; i < count; ++i)
+      if (there[i]) overwrites.look(files[i], format.write(neurons[i]));
+  }
+  overwrites.refuse();
+}
+
 void run(const Options& options, Console& console) {
   const lsystem::Grammar grammar = find_grammar(options.grammar);
+  refuse_to_replace(options, grammar, console);
   std::vector<std::unique_ptr<Destination>> destinations;
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
   if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
@@ -99,7 +133,7 @@ void run(const Options& options, Console& console) {
     const auto neurons = lsystem::grow_population(grammar, std::min(batch, options.count - first),
                                                   options.seed, console.progress(), first);
     for (std::size_t i = 0; i < neurons.size(); ++i) {
-      const std::string name = fmt::format("{}-{}-{:05}", grammar.name, options.seed, first + i);
+      const std::string name = name_of(options, grammar, first + i);
       for (const auto& destination : destinations) destination->put(neurons[i], name, first + i);
       segments += neurons[i].segment_count();
       length += total_length(neurons[i]);
@@ -131,11 +165,12 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   command.add_option("--count", options->count, "Neurons to grow")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
-  command.add_option("--seed", options->seed, "The same seed grows the same neurons")->capture_default_str();
+  add_seed(command, options->seed, "The same seed grows the same neurons");
   CLI::Option_group* into = command.add_option_group("into", "where the neurons go");
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
   into->add_option("--out", options->out, "Write them into this folder as SWC files");
   into->require_option(1, 2);
+  add_force(command, options->force);
   command.add_option("--population", options->population, "Their population; by default the grammar's name")
       ->needs(repo);
   return [options, &console] { run(*options, console); };

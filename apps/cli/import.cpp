@@ -126,7 +126,7 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
 }
 
 void run(const Options& options, Console& console) {
-  const std::vector<fs::path> paths = neuron_files(options.files);
+  const std::vector<fs::path> paths = neuron_files(options.files, console);
   std::vector<Arrival> files;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
@@ -182,7 +182,6 @@ std::function<void()> import_files(CLI::App& command, Console& console) {
   command
       .add_option("files", options->files, "Files of traced neurons, or folders with such files below them")
       ->required()
-      ->check(CLI::ExistingPath)
       ->type_name("FILES");
   command.add_option("--repo", options->repo, "The repository; made when there is none")
       ->required()

@@ -7,9 +7,30 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
+
+namespace {
+
+/// What is wrong when the words so far lead to no verb (or no benchmark); empty when they do.
+std::string missing_verb(const CLI::App& app) {
+  const CLI::App* at = &app;
+  while (!at->get_subcommands().empty()) at = at->get_subcommands().front();
+  std::string names;
+  for (const CLI::App* sub : at->get_subcommands([](const CLI::App*) { return true; }))
+    names += (names.empty() ? "" : ", ") + sub->get_name();
+  if (names.empty()) return {};
+  const char* kind = at == &app ? "verb" : "benchmark";
+  for (const std::string& word : at->remaining())
+    if (!word.starts_with('-'))
+      return fmt::format("there is no {} {}; there are: {}", kind, forest::repository::shown(word), names);
+  return at->remaining().empty() ? fmt::format("say which {}, one of: {}", kind, names) : "";
+}
+
+}  // namespace
 
 int main(int argc, char** argv) {
   using namespace forest;
@@ -23,14 +44,17 @@ int main(int argc, char** argv) {
   for (const cli::Verb& verb : cli::verbs()) {
     CLI::App* command = app.add_subcommand(verb.name, verb.summary);
     command->footer(fmt::format("Example:\n  {}", verb.example));
-    command->add_flag("--json", console.json, "Print results as JSON");
-    command->add_option("--threads", console.threads, "Number of threads; 0 for all cores")
-        ->check(CLI::NonNegativeNumber);
+    cli::add_common(*command, console);
     command->callback([&run, job = verb.setup(*command, console)] { run = job; });
   }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
+    if (error.get_exit_code() != 0)
+      if (const std::string sentence = missing_verb(app); !sentence.empty()) {
+        console.warn("brainforest: " + sentence);
+        return 2;
+      }
     const int status = app.exit(error);
     return status == 0 ? 0 : 2;
   }

@@ -66,8 +66,8 @@ struct Neurons {
   std::function<std::function<Morphology(std::size_t)>()> reader;  // reads the i-th; each thread has its own
 };
 
-Neurons of_files(const Options& options) {
-  std::vector<std::filesystem::path> files = neuron_files(options.files);
+Neurons of_files(const Options& options, Console& console) {
+  std::vector<std::filesystem::path> files = neuron_files(options.files, console);
   Neurons neurons;
   for (const auto& file : files) neurons.names.push_back(file.string());
   neurons.reader = [files = std::move(files)] {
@@ -268,7 +268,7 @@ void run(const Options& options, Console& console) {
     std::vector<Row> rows;
     std::string error;
   };
-  const Neurons neurons = options.repo.empty() ? of_files(options) : of_repository(options);
+  const Neurons neurons = options.repo.empty() ? of_files(options, console) : of_repository(options);
   std::vector<Measured> measured(neurons.names.size());
   console.progress().begin("measuring", measured.size());
   parallel_ranges(measured.size(), 8, [&](std::size_t begin, std::size_t end) {
@@ -317,7 +317,6 @@ std::function<void()> measure(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   CLI::Option* files =
       command.add_option("files", options->files, "Files of neurons, or folders with such files below them")
-          ->check(CLI::ExistingPath)
           ->type_name("FILES");
   CLI::Option* repo =
       command.add_option("--repo", options->repo, "Measure the neurons of this repository instead")

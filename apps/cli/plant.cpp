@@ -10,6 +10,7 @@
 #include "forest/io/sonata.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "apps/cli/planting.h"
 #include "apps/cli/verb.h"
 
@@ -64,7 +65,7 @@ std::function<void()> plant(CLI::App& command, Console& console) {
                   "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")
       ->required()
       ->type_name("DIR");
-  command.add_option("--seed", options->seed, "The same seed plants the same circuit")->capture_default_str();
+  add_seed(command, options->seed, "The same seed plants the same circuit");
   return [options, &console] { run(*options, console); };
 }
 

@@ -11,7 +11,9 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
+#include "apps/view_text.h"
 
 namespace forest::cli {
 namespace {
@@ -30,7 +32,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->view, view_help);
-  command.add_option("--size", options->size, "Width x height in pixels")->capture_default_str();
+  add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
   return [options, &console] {
@@ -65,7 +67,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->views,
                      "Key views, two or more, as JSON files or texts; by default a walk into the forest");
-  command.add_option("--size", options->size, "Width x height in pixels, both even")->capture_default_str();
+  add_size(command, options->size, true);
   command.add_option("--seconds", options->plan.seconds, "Length of the film")
       ->check(CLI::Range(0.04, 3600.))
       ->capture_default_str();

@@ -12,6 +12,7 @@ std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
 std::function<void()> query(CLI::App&, Console&);
 std::function<void()> export_files(CLI::App&, Console&);
+std::function<void()> remove_neurons(CLI::App&, Console&);
 std::function<void()> convert(CLI::App&, Console&);
 std::function<void()> check(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
@@ -38,6 +39,8 @@ std::span<const Verb> verbs() {
        query},
       {"export", "Write neurons of a repository as files",
        "brainforest export --repo cells.db --population traced --format swc --out exported/", export_files},
+      {"remove", "Take neurons out of a repository",
+       "brainforest remove cell7 --repo cells.db --population traced", remove_neurons},
       {"convert", "Turn neuron files of one format into another",
        "brainforest convert cell7.swc cell7.asc\n"
        "  brainforest convert cells/ --format swc --out as_swc/",

@@ -45,7 +45,7 @@ std::function<void()> view(CLI::App& command, Console&) {
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
-  command.add_option("--view", options->view, "View as a JSON file");
+  command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
   return [options] {
     MappedFile exists(options->forest);  // says so here rather than in a window
     open_studio(options->forest, options->view);

@@ -11,18 +11,18 @@
 #include <CLI/CLI.hpp>
 
 #include "forest/core/error.h"
-#include "forest/core/file.h"
 
 #include "apps/studio/report.h"
 #include "apps/studio/theme.h"
 #include "apps/studio/window.h"
+#include "apps/view_text.h"
 
 namespace forest::studio {
 namespace {
 
 struct Options {
-  std::filesystem::path forest, view, screenshot;
-  std::string size;
+  std::filesystem::path forest, screenshot;
+  std::string view, size;
   bool report = false;
 };
 
@@ -53,7 +53,7 @@ int run(const Options& options, int& argc, char** argv) {
   const scene::Forest forest = scene::Forest::open(options.forest);
   scene::View view = scene::overview(forest);
   view.camera.near = .5f;
-  if (!options.view.empty()) view = scene::parse_view(MappedFile(options.view).text(), options.view.string());
+  if (!options.view.empty()) view = read_view(options.view);
   const QSize size = options.size.empty() ? QSize() : size_of(options.size);
 
   QSurfaceFormat format;
@@ -107,7 +107,7 @@ int main(int argc, char** argv) {
   Options options;
   CLI::App app{"A window on a forest: orbit, fly, and ask any branch what it is.", "brainforest-studio"};
   app.add_option("FOREST", options.forest, "A forest file, made by 'brainforest pack'")->required();
-  app.add_option("--view", options.view, "Begin with this view (JSON, as Ctrl+C copies it)");
+  app.add_option("--view", options.view, "Begin with this view: a JSON file, or the text that Ctrl+C copies");
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");

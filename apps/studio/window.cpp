@@ -5,14 +5,18 @@
 #include <QApplication>
 #include <QClipboard>
 #include <QCloseEvent>
+#include <QDialogButtonBox>
 #include <QDockWidget>
 #include <QFileDialog>
 #include <QLabel>
 #include <QMenuBar>
 #include <QMessageBox>
+#include <QScreen>
 #include <QScrollArea>
 #include <QSettings>
 #include <QStatusBar>
+#include <QTextBrowser>
+#include <QVBoxLayout>
 
 #include <nlohmann/json.hpp>
 
@@ -20,6 +24,7 @@
 
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/view_panel.h"
+#include "apps/view_text.h"
 
 namespace forest::studio {
 namespace {
@@ -201,7 +206,7 @@ void Window::copy_view() {
 void Window::paste_view() {
   try {
     Settings settings = viewport_->settings();
-    settings.view = scene::parse_view(QApplication::clipboard()->text().toStdString(), "clipboard");
+    settings.view = view_of(QApplication::clipboard()->text().toStdString(), "clipboard");
     viewport_->change(settings);
   } catch (const std::exception& error) {
     statusBar()->showMessage(QString::fromUtf8(error.what()), 8000);
@@ -237,10 +242,21 @@ void Window::explain() {
       if (!action->shortcut().isEmpty())
         row(action->shortcut().toString(QKeySequence::NativeText),
             action->toolTip().isEmpty() ? action->text().remove('&') : action->toolTip());
-  auto* box =
-      new QMessageBox(QMessageBox::NoIcon, tr("Keys and mouse"), text + "</table>", QMessageBox::Close, this);
+  auto* box = new QDialog(this);
+  box->setObjectName("keys");
+  box->setWindowTitle(tr("Keys and mouse"));
   box->setAttribute(Qt::WA_DeleteOnClose);
-  box->setModal(false);
+  auto* list = new QTextBrowser(box);  // scrolls: the table is higher than many screens
+  list->setFrameShape(QFrame::NoFrame);
+  list->setHtml(text + "</table>");
+  auto* buttons = new QDialogButtonBox(QDialogButtonBox::Close, box);
+  connect(buttons, &QDialogButtonBox::rejected, box, &QDialog::reject);
+  auto* layout = new QVBoxLayout(box);
+  layout->addWidget(list);
+  layout->addWidget(buttons);
+  const QSize room = screen()->availableSize();
+  box->resize(std::min(640, room.width() * 9 / 10),
+              std::min({720, height() * 9 / 10, room.height() * 8 / 10}));
   box->show();
 }
 

@@ -2,26 +2,70 @@
 #include "forest/core/file.h"
 
 #include <cerrno>
+#include <charconv>
 #include <cstring>
 #include <fcntl.h>
 #include <unistd.h>
 #include <utility>
 
+#include <fmt/format.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 
 #include "forest/core/error.h"
 
 namespace forest {
+namespace {
+
+const char* kind_of(mode_t mode) {
+  return S_ISDIR(mode) ? "a folder" : S_ISFIFO(mode) ? "a pipe" : S_ISSOCK(mode) ? "a socket" : "a device";
+}
+
+bool write_all(int file, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t wrote = ::write(file, bytes.data(), bytes.size());
+    if (wrote < 0 && errno == EINTR) continue;
+    if (wrote < 0) return false;
+    bytes = bytes.subspan(std::size_t(wrote));
+  }
+  return true;
+}
+
+/// The number of an open file of this program when the path is a name of one (/dev/stdout, /dev/fd/3), or -1.
+int open_file_at(const std::filesystem::path& place) {
+  constexpr std::string_view folder = "/proc/self/fd/";
+  const std::string text = place.string();
+  int number = -1;
+  if (text.starts_with(folder))
+    std::from_chars(text.data() + folder.size(), text.data() + text.size(), number);
+  return number;
+}
+
+}  // namespace
+
+std::filesystem::path followed(const std::filesystem::path& path) {
+  std::filesystem::path place = path;
+  for (int links = 0; links < 40; ++links) {  // as many as the kernel follows
+    std::error_code none;
+    // Names of open files lead to what need have no path.
+    if (open_file_at(place) >= 0 || !std::filesystem::is_symlink(place, none)) return place;
+    const auto target = std::filesystem::read_symlink(place, none);
+    place = target.is_absolute() ? target : place.parent_path() / target;
+    if (place.parent_path() == "/dev/fd") place = "/proc/self/fd" / place.filename();
+  }
+  throw Error(path.string() + ": links lead in a circle; name a file");
+}
 
 MappedFile::MappedFile(const std::filesystem::path& path) {
-  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC);
+  // A pipe would block until somebody writes into it.
+  const int file = ::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK);
   if (file < 0)
     throw InputError(path, 0, std::string("cannot be opened (") + std::strerror(errno) + "); check the path");
   struct stat status {};
   if (::fstat(file, &status) != 0 || !S_ISREG(status.st_mode)) {
     ::close(file);
-    throw InputError(path, 0, "is not a regular file; name a file, not a folder or device");
+    throw InputError(
+        path, 0, fmt::format("is {} and no file; name a file with the bytes in it", kind_of(status.st_mode)));
   }
   size_ = std::size_t(status.st_size);
   if (size_) {
@@ -48,26 +92,57 @@ MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
   return *this;
 }
 
-void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
-  std::string part = path.string() + ".XXXXXX";
-  const int file = ::mkstemp(part.data());
-  const auto fail = [&](const char* what) {
+NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(followed(wanted)) {
+  if (place_.parent_path() == "/dev/fd") place_ = "/proc/self/fd" / place_.filename();
+  struct stat status {};
+  const bool there = ::stat(place_.c_str(), &status) == 0;
+  if (there && S_ISDIR(status.st_mode)) throw Error(wanted_.string() + ": is a folder; name a file");
+  stream_ = open_file_at(place_) >= 0 || (there && !S_ISREG(status.st_mode));
+  std::string part =
+      (stream_ ? std::filesystem::temp_directory_path() / "brainforest" : place_).string() + ".XXXXXX";
+  file_ = ::mkostemp(part.data(), O_CLOEXEC);
+  if (file_ < 0) fail("created");
+  part_ = part;
+  ::fchmod(file_, there && !stream_ ? status.st_mode & 0777 : 0644);
+}
+
+NewFile::~NewFile() {
+  if (file_ >= 0) ::close(file_);
+  if (!part_.empty()) ::unlink(part_.c_str());
+}
+
+void NewFile::write(std::span<const std::byte> bytes) {
+  if (!write_all(file_, bytes)) fail("written");
+}
+
+void NewFile::commit() {
+  if (stream_) {
+    const MappedFile whole(part_);
+    const int open = open_file_at(place_);
+    const int stream = open >= 0 ? ::fcntl(open, F_DUPFD_CLOEXEC, 0)
+                                 : ::open(place_.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
+    if (stream < 0) fail("opened");
+    const bool written = write_all(stream, whole.bytes());
     const int reason = errno;
-    if (file >= 0) ::close(file), ::unlink(part.c_str());
-    throw Error(path.string() + ": cannot be " + what + " (" + std::strerror(reason) +
-                "); check that the folder exists and the disk has room");
-  };
-  if (file < 0) fail("created");
-  for (std::size_t done = 0; done < bytes.size();) {
-    const ssize_t wrote = ::write(file, bytes.data() + done, bytes.size() - done);
-    if (wrote < 0 && errno == EINTR) continue;
-    if (wrote < 0) fail("written");
-    done += std::size_t(wrote);
+    const bool closed = ::close(stream) == 0;
+    if (!written) errno = reason;
+    if (!written || !closed) fail("written");
+    return;
   }
-  ::fchmod(file, 0644);
-  if (::fsync(file) != 0 && errno != EINVAL) fail("written");
-  if (::rename(part.c_str(), path.c_str()) != 0) fail("renamed");
-  ::close(file);
+  if (::fsync(file_) != 0 && errno != EINVAL) fail("written");
+  if (::rename(part_.c_str(), place_.c_str()) != 0) fail("renamed");
+  part_.clear();
+}
+
+void NewFile::fail(const char* what) const {
+  throw Error(fmt::format("{}: cannot be {} ({}); check that the folder exists and the disk has room",
+                          wanted_.string(), what, std::strerror(errno)));
+}
+
+void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {
+  NewFile file(path);
+  file.write(bytes);
+  file.commit();
 }
 
 void write_file(const std::filesystem::path& path, std::string_view text) {

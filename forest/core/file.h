@@ -25,8 +25,34 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// Writes beside `path` and renames, so that a killed program leaves the old file or the new one, never a
-/// part. Throws Error when the folder is missing or the disk is full; then nothing is left behind.
+/// A file on its way: written under a passing name beside its place, put there by commit(), so that a killed program
+/// leaves the old file or the new one, never a part. Links are followed: what they point to is replaced, they stay. Where
+/// no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the bytes into what is there.
+class NewFile {
+ public:
+  /// Throws Error when the folder is missing or cannot be written.
+  explicit NewFile(const std::filesystem::path& wanted);
+  ~NewFile();  // without commit() nothing is left behind
+  NewFile(const NewFile&) = delete;
+  NewFile& operator=(const NewFile&) = delete;
+
+  const std::filesystem::path& path() const { return part_; }  // where to write until then
+  /// Appends. Throws Error when the disk is full.
+  void write(std::span<const std::byte> bytes);
+  void commit();
+
+ private:
+  [[noreturn]] void fail(const char* what) const;
+
+  std::filesystem::path wanted_, place_, part_;
+  bool stream_ = false;  // the place takes bytes, not a file
+  int file_ = -1;
+};
+
+/// Where a path leads: symbolic links are followed, also one to a file that is not there yet. Throws Error for a circle.
+std::filesystem::path followed(const std::filesystem::path& path);
+
+/// Writes a file whole or not at all, as NewFile does.
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes);
 void write_file(const std::filesystem::path& path, std::string_view text);
 

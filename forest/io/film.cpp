@@ -9,6 +9,7 @@ extern "C" {
 }
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 
 namespace forest::io {
 namespace {
@@ -27,7 +28,8 @@ constexpr Codec codecs[] = {{"libx264", "crf", "17"},
 }  // namespace
 
 struct Film::State {
-  std::filesystem::path path, part;
+  NewFile file;
+  std::filesystem::path path;
   std::uint32_t width, height;
   AVFormatContext* format = nullptr;
   AVCodecContext* encoder = nullptr;
@@ -36,7 +38,8 @@ struct Film::State {
   AVPacket* packet = nullptr;
   SwsContext* colours = nullptr;
   std::int64_t count = 0;
-  bool done = false;
+
+  explicit State(const std::filesystem::path& wanted) : file(wanted), path(wanted) {}
 
   [[noreturn]] void fail(const std::string& what, int code = 0) const {
     char reason[AV_ERROR_MAX_STRING_SIZE] = "";
@@ -67,20 +70,18 @@ struct Film::State {
       if (format->pb) avio_closep(&format->pb);
       avformat_free_context(format);
     }
-    std::error_code ignored;
-    if (!done && !part.empty()) std::filesystem::remove(part, ignored);
   }
 };
 
 Film::Film(const std::filesystem::path& path, std::uint32_t width, std::uint32_t height,
            int frames_per_second)
-    : state_(std::make_unique<State>()) {
+    : state_(std::make_unique<State>(path)) {
   State& s = *state_;
-  s.path = path, s.width = width, s.height = height;
+  s.width = width, s.height = height;
   if (width % 2 || height % 2 || !width || !height) s.fail("made: its width and height must be even");
   av_log_set_level(AV_LOG_QUIET);
-  s.part = path.string() + ".part";
-  if (const int code = avformat_alloc_output_context2(&s.format, nullptr, "mp4", s.part.c_str()); code < 0)
+  const char* part = s.file.path().c_str();
+  if (const int code = avformat_alloc_output_context2(&s.format, nullptr, "mp4", part); code < 0)
     s.fail("made", code);
   for (const Codec& row : codecs) {
     const AVCodec* codec = avcodec_find_encoder_by_name(row.name);
@@ -107,8 +108,7 @@ Film::Film(const std::filesystem::path& path, std::uint32_t width, std::uint32_t
   s.stream->time_base = s.encoder->time_base;
   s.format->flags |= AVFMT_FLAG_BITEXACT;
   avcodec_parameters_from_context(s.stream->codecpar, s.encoder);
-  if (const int code = avio_open(&s.format->pb, s.part.c_str(), AVIO_FLAG_WRITE); code < 0)
-    s.fail("opened", code);
+  if (const int code = avio_open(&s.format->pb, part, AVIO_FLAG_WRITE); code < 0) s.fail("opened", code);
   if (const int code = avformat_write_header(s.format, nullptr); code < 0) s.fail("written", code);
   s.packet = av_packet_alloc();
   s.frame = av_frame_alloc();
@@ -142,10 +142,7 @@ void Film::finish() {
   s.drain();
   if (const int code = av_write_trailer(s.format); code < 0) s.fail("written", code);
   if (const int code = avio_closep(&s.format->pb); code < 0) s.fail("written", code);
-  std::error_code error;
-  std::filesystem::rename(s.part, s.path, error);
-  if (error) s.fail("renamed to its place");
-  s.done = true;
+  s.file.commit();
 }
 
 std::string Film::codec() const { return state_->encoder->codec->name; }

@@ -12,6 +12,7 @@
 #include <sys/stat.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 
 namespace forest::io {
 
@@ -19,6 +20,9 @@ namespace fs = std::filesystem;
 
 NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
   if (!wanted_.has_filename()) wanted_ = wanted_.parent_path();  // "circuit/"
+  wanted_ = followed(wanted_);
+  if (std::error_code none; fs::exists(wanted_, none) && !fs::is_directory(wanted_, none))
+    throw Error(wanted_.string() + ": is there and no folder; name another");
   std::string name = (wanted_.parent_path() / ("." + wanted_.filename().string() + ".XXXXXX")).string();
   if (!::mkdtemp(name.data())) fail("created");
   part_ = name;

@@ -83,11 +83,20 @@ TEST(Film, IsAFileOnlyWhenFinishedAndTheSameEachTime) {
   };
   make(folder() / "unfinished.mp4", false);
   EXPECT_FALSE(std::filesystem::exists(folder() / "unfinished.mp4"));
-  EXPECT_FALSE(std::filesystem::exists(folder() / "unfinished.mp4.part"));
   make(folder() / "one.mp4", true);
   make(folder() / "two.mp4", true);
   EXPECT_EQ(shown(folder() / "one.mp4"), std::pair(12, 12 / 25.));
   EXPECT_EQ(MappedFile(folder() / "one.mp4").text(), MappedFile(folder() / "two.mp4").text());
+  std::filesystem::create_symlink("one.mp4", folder() / "link.mp4");
+  make(folder() / "link.mp4", true);
+  EXPECT_TRUE(std::filesystem::is_symlink(folder() / "link.mp4"));
+  make("/dev/null", true);
+  EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
+  EXPECT_THROW(make("/dev/full", true), Error);
+  std::size_t files = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(folder()))
+    files += entry.path().filename().string().find(".mp4") != std::string::npos;
+  EXPECT_EQ(files, 3u);  // nothing unfinished is left
   EXPECT_THROW(Film(folder() / "odd.mp4", 63, 48, 25), Error);
   EXPECT_THROW(Film("/nowhere/a.mp4", 64, 48, 25), Error);
 }

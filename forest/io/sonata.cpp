@@ -31,8 +31,8 @@ void refuse_foreign_folder(const fs::path& folder) {
     throw Error(fmt::format("{}: {}, so it is not replaced; choose another folder or remove it",
                             folder.string(), why));
   };
-  if (!fs::exists(fs::symlink_status(folder))) return;
-  if (!fs::is_directory(fs::symlink_status(folder))) refuse("is there and is no folder");
+  if (!fs::exists(folder)) return;
+  if (!fs::is_directory(folder)) refuse("is there and is no folder");
   if (fs::is_empty(folder)) return;
   std::ifstream config(folder / sonata_config_name);
   if (!SonataConfig::find(Json::parse(config, nullptr, false), sonata_our_key))

@@ -133,6 +133,15 @@ TEST_F(Sonata, TheSameCircuitGivesTheSameBytes) {
   EXPECT_EQ(std::distance(fs::directory_iterator(root_), {}), 1) << "something was left behind";
 }
 
+TEST_F(Sonata, ALinkToAFolderStaysAndTheFolderIsReplaced) {
+  fs::create_directory(root_ / "real");
+  fs::create_directory_symlink("real", folder());
+  write();
+  write();
+  EXPECT_TRUE(fs::is_symlink(folder()));
+  EXPECT_EQ(read_sonata(root_ / "real").circuit, circuit_);
+}
+
 TEST_F(Sonata, AFolderWithAnythingElseIsNotReplaced) {
   const auto writing = [&] { return complaint([&] { write(); }); };
   fs::create_directory(folder());

@@ -34,6 +34,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(SwcOddity::count)> table{{
     {"unknown-radius", true, "read as the radius of the parent point", "measure it where thickness matters"},
     {"negative-radius", true, "read as unknown, so as the radius of the parent point",
      "measure it where thickness matters"},
+    {"zero-radius", true, "kept as 0", "give the measured one"},
     {"unknown-place", true, "read as that of the parent point",
      "look it up in the tracing, or remove the point"},
     {"first-id", false, "any id may be the first"},
@@ -424,7 +425,19 @@ class Assembler {
     }
     if (soma.kind != SomaKind::cylinders) soma.parents.clear();
     soma_ = soma.kind;
+    tell_zero_radii();
     builder_.set_soma(std::move(soma));
+  }
+
+  /// The points of an outline need no thickness.
+  void tell_zero_radii() {
+    std::vector<std::size_t> drawn;
+    if (soma_ == SomaKind::contours)
+      for (const std::int32_t row : soma_rows_) drawn.push_back(line(row));
+    std::ranges::sort(drawn);
+    for (const std::size_t line : rows_.zero_radii)
+      if (!std::ranges::binary_search(drawn, line))
+        oddities_.add(SwcOddity::zero_radius, line, "the radius is 0");
   }
 
   Soma outline() const {

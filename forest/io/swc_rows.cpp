@@ -149,7 +149,7 @@ class Scanner {
           fmt::format("the type {} is too large; types 0 to 7 are standard, others custom", type));
     const float sum = point.x + point.y + point.z;
     if (!(std::abs(sum) < std::numeric_limits<float>::infinity()) ||
-        !(point.radius < std::numeric_limits<float>::infinity()) || point.radius < 0.f) [[unlikely]]
+        !(point.radius < std::numeric_limits<float>::infinity()) || !(point.radius > 0.f)) [[unlikely]]
       unknowns(point);
     rows.ids.push_back(id);
     rows.parents.push_back(parent);
@@ -169,6 +169,8 @@ class Scanner {
                     [&] { return fmt::format("the radius is {}", point.radius); });
       point.radius = unknown;
       rows_.unknown_numbers = true;
+    } else if (point.radius == 0.f) {
+      rows_.zero_radii.push_back(line_);
     } else if (!std::isfinite(point.radius)) {
       oddities_.add(SwcOddity::unknown_radius, line_, "the radius is not known or not finite");
       point.radius = unknown;

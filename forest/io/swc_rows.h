@@ -29,6 +29,7 @@ enum class SwcOddity : std::uint8_t {
   exponent,
   unknown_radius,
   negative_radius,
+  zero_radius,
   unknown_place,
   first_id,
   id_order,
@@ -99,6 +100,7 @@ struct SwcRows {
 
   bool consecutive = true;  // ids are first, first + 1, …
   bool unknown_numbers = false;
+  std::vector<std::size_t> zero_radii;  // lines
 
   std::size_t size() const { return ids.size(); }
   std::size_t line(std::size_t row) const;  // 1-based

@@ -111,6 +111,11 @@ const std::vector<Dialect>& dialects() {
          is_the_cell(m);
          EXPECT_EQ(m.points(SectionId(0))[1].radius, 2.f);
        }},
+      {"zero-radius", 3, "1 1 0 0 0 5 -1\n2 3 0 5 0 2 1\n3 3 0 15 0 0 2\n4 3 3 19 0 1 3\n5 3 -3 19 0 1 3\n",
+       [](const Morphology& m) {
+         is_the_cell(m);
+         EXPECT_EQ(m.points(SectionId(0))[1].radius, 0.f);
+       }},
       {"unknown-place", 3,
        "1 1 0 0 0 5 -1\n2 3 0 5 0 1 1\n3 3 nan 15 inf 1 2\n4 3 3 19 0 1 3\n5 3 -3 19 0 1 3\n", is_the_cell},
       {"unknown-place", 3,
@@ -214,6 +219,20 @@ TEST(Swc, EachDialectIsReadAndToldWithItsLine) {
     ASSERT_NE(told, warnings.end()) << dialect.code;
     EXPECT_EQ(told->line, dialect.line) << told->sentence;
   }
+}
+
+TEST(Swc, ZeroRadiiAreToldOfAllButOutlines) {
+  std::string loop;
+  for (int i = 1; i <= 8; ++i)
+    loop += fmt::format("{} 1 {} {} 0 0 {}\n", i, 9. * std::cos(.8 * i), 9. * std::sin(.8 * i),
+                        i > 1 ? i - 1 : -1);
+  const auto told = [](const std::string& text) {
+    const auto warnings = read_swc(text, "cell.swc").warnings;
+    return std::ranges::count(warnings, "zero-radius", &Warning::code);
+  };
+  EXPECT_EQ(told(loop), 0);
+  EXPECT_EQ(told(loop + "9 3 0 20 0 0 1\n10 3 0 30 0 0 9\n"), 2);
+  EXPECT_EQ(told("1 1 0 0 0 0 -1\n2 3 0 5 0 1 1\n3 3 0 9 0 1 2\n"), 1);
 }
 
 TEST(Swc, EachDialectIsTriedAndDocumented) {
@@ -329,7 +348,8 @@ TEST(Swc, WhatIsWrittenKeepsToTheStandard) {
       continue;
     SCOPED_TRACE(specimen.name);
     for (const Warning& warning : read_swc(write_swc(specimen.morphology), "cell.swc").warnings)
-      EXPECT_TRUE(warning.code.starts_with("type-")) << warning.sentence;  // kinds that the neuron has
+      EXPECT_TRUE(warning.code.starts_with("type-") || warning.code == "zero-radius")  // that the neuron has
+          << warning.sentence;
   }
 }
 

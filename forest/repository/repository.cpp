@@ -693,9 +693,13 @@ Rows Repository::Impl::stored(NeuronId id) const {
 
 Morphology Repository::morphology(NeuronId id) const {
   const int neuron = number_of(id);
+  std::string name;
   const auto damaged = [&](std::string_view why) {
-    return InputError(impl_->place, 0,
-                      fmt::format("neuron {} is damaged ({}); remove it and import it again", neuron, why));
+    return InputError(
+        impl_->place, 0,
+        fmt::format("neuron {} (id {}) is damaged ({}); take it out with 'brainforest remove' and "
+                    "import or grow it again",
+                    shown(name), neuron, why));
   };
   std::optional<long long> sum;
   const Rows rows = impl_->read([&] {
@@ -703,6 +707,7 @@ Morphology Repository::morphology(NeuronId id) const {
     if (!sum)
       throw Error(fmt::format("{}: there is no neuron {}; brainforest list shows those that are there",
                               impl_->place, neuron));
+    name = impl_->ask<std::string>("select name from neurons where id = :id", neuron).value_or("");
     try {
       return impl_->stored(id);
     } catch (const InputError&) {

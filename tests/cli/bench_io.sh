@@ -24,4 +24,4 @@ fails_with() {  # status, words of the sentence, command…
 }
 fails_with 1 'known are .swc' "$BRAINFOREST" bench io cells/notes.txt
 fails_with 2 nowhere "$BRAINFOREST" bench io nowhere
-fails_with 2 subcommand "$BRAINFOREST" bench
+fails_with 2 "say which benchmark" "$BRAINFOREST" bench

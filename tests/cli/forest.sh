@@ -34,7 +34,9 @@ cmp a.png c.png || fail "a view from a file is not the same view"
 refuses "forest file" "$program" render view.json -o x.png
 head -c 100000 a.forest >short.forest
 refuses "cut short" "$program" render short.forest -o x.png
-refuses "no size" "$program" render a.forest --size 12by9 -o x.png
+refuses "brainforest: --view:1: is no JSON from column 15 on" "$program" render a.forest --view '{"eye":[1,2,3]' -o x.png
+printf '{"eye": [1, 2, 3],\n "target" [0, 0, 0]}' >slip.json
+refuses "slip.json:2: is no JSON from column 11 on" "$program" render a.forest --view slip.json -o x.png
 refuses "same point" "$program" render a.forest --view '{"eye":[1,2,3],"target":[1,2,3]}' -o x.png
 refuses "nowhere" "$program" render a.forest --size 64x64 -o /nowhere/x.png
 refuses "two views" "$program" movie a.forest --view "$view" -o x.mp4

@@ -144,6 +144,27 @@ fails_with 2 '--repo' $BRAINFOREST list
 fails_with 2 'is no name' $BRAINFOREST import cells --repo x.db --population $'a\nb'
 fails_with 2 '--format' $BRAINFOREST export --repo one.db --format jpeg --out x
 
+# A damaged neuron is named, and can be removed and imported again; the others are as they were.
+cp one.db hurt.db
+sqlite3 hurt.db "update neurons set checksum = checksum + 1 where name = 'cell07'"
+fails_with 1 "neuron 'cell07' (id $id) is damaged" $BRAINFOREST check --repo hurt.db
+grep -q "hurt.db: 1 finding; the sentence above" err.txt
+sqlite3 hurt.db "update points set data = x'00' where neuron = $id"
+fails_with 1 "neuron 'cell07' (id $id) is damaged" $BRAINFOREST check --repo hurt.db
+fails_with 1 "brainforest remove" $BRAINFOREST show cell07 --repo hurt.db
+[ "$($BRAINFOREST remove cell07 "$id" --repo hurt.db --json | json '[(r["id"], r["name"], r["population"]) for r in d["removed"]]')" = "[($id, 'cell07', 'P')]" ]
+[ "$($BRAINFOREST check --repo hurt.db)" = 'hurt.db: all is well' ]
+fails_with 1 "there is no neuron 'cell07'" $BRAINFOREST remove cell00 cell07 --repo hurt.db --population P
+[ "$(sqlite3 hurt.db "select count(*) from neurons where name = 'cell00'")" = 2 ]  # all or none
+$BRAINFOREST import cells/deep/cell07.swc --repo hurt.db --population P >/dev/null
+$BRAINFOREST export cell07 --repo hurt.db --out mended >/dev/null
+cmp mended/cell07.swc exported/cell07.swc
+fails_with 1 'say --population with one of: P, Q' $BRAINFOREST remove cell00 --repo hurt.db
+$BRAINFOREST remove cell00 --repo hurt.db --population Q | grep -qx '1 neuron removed from hurt.db'
+fails_with 1 'there is no such repository' $BRAINFOREST remove cell00 --repo missing.db
+[ ! -e missing.db ]
+fails_with 2 'neurons' $BRAINFOREST remove --repo hurt.db
+
 # A full disk: a sentence, and whole neurons.
 got=0
 (ulimit -f 200 && exec $BRAINFOREST import cells --repo full.db) >/dev/null 2>full.err || got=$?

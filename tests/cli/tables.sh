@@ -34,3 +34,5 @@ assert rows[0] == header and len(rows) == book["sections"].max_row
 PY
 ! $BRAINFOREST export --repo r.db --format xlsx --out /nowhere/cells.xlsx 2>err.txt
 [ ! -e /nowhere ]
+if $BRAINFOREST export --repo r.db --format xlsx --out cells.xlsx 2>err.txt; then exit 1; fi  # an edited workbook is not lost
+grep -q -- --force err.txt

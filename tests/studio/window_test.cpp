@@ -407,6 +407,35 @@ TEST_F(Window, GazeFollowsTheMouse) {
   EXPECT_NEAR(view_.detail.gaze->y() * viewport().height, 250.f, 1.f);
 }
 
+TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
+  key("F1");
+  const auto list = folder / "keys.txt";
+  xdotool("search --sync --onlyvisible --name 'Keys and mouse' getwindowgeometry --shell >" + list.string());
+  int x = -1, y = -1, width = 0, height = 0;
+  const std::string said(MappedFile(list).text());
+  ASSERT_EQ(std::sscanf(said.c_str(), "WINDOW=%*d X=%d Y=%d WIDTH=%d HEIGHT=%d", &x, &y, &width, &height), 4)
+      << said;
+  EXPECT_GE(x, 0);
+  EXPECT_GE(y, 0);
+  EXPECT_GT(height, 300);
+  EXPECT_LE(x + width, 1280);
+  EXPECT_LE(y + height, 800);  // the button at its lower end can be clicked
+}
+
+TEST(Studio, TakesAViewAsTextAndSaysWhatIsWrongWithIt) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  const auto path = folder / "text.png";
+  std::filesystem::remove(path);
+  setenv("XDG_CONFIG_HOME", (folder / "settings").c_str(), 1);
+  Studio good({sample_file(), "--view", scene::to_json(scene::overview(sample())), "--screenshot", path});
+  EXPECT_EQ(good.end(), std::pair(std::string(), 0));
+  EXPECT_TRUE(std::filesystem::exists(path));
+  Studio bad({sample_file(), "--view", "{\"eye\": [1, 2, 3],\n oops}"});
+  const auto [said, status] = bad.end();
+  EXPECT_EQ(status, 1);
+  EXPECT_NE(said.find("--view:2: is no JSON from column 2"), std::string::npos) << said;
+}
+
 TEST(Studio, WritesAScreenshotOfItsWindow) {
   if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
   const auto path = folder / "screenshot.png";

@@ -1,0 +1,58 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/options.h"
+
+#include <charconv>
+#include <limits>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/repository/names.h"
+
+#include "apps/cli/artist.h"
+#include "apps/cli/console.h"
+
+namespace forest::cli {
+
+void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high) {
+  option.check([low, high](const std::string& text) {
+    std::uint64_t value = 0;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    return error == std::errc() && rest == end && value >= low && value <= high
+               ? std::string()
+               : fmt::format("{} is no whole number from {} to {}", repository::shown(text), low, high);
+  });
+}
+
+void add_common(CLI::App& command, Console& console) {
+  command.add_flag("--json", console.json, "Print results as JSON");
+  must_be_whole(*command.add_option("--threads", console.threads, "Number of threads; 0 for all cores"), 0,
+                4096);
+}
+
+void add_seed(CLI::App& command, std::uint64_t& seed, const char* help) {
+  must_be_whole(*command.add_option("--seed", seed, help)->capture_default_str(), 0,
+                std::numeric_limits<std::uint64_t>::max());
+}
+
+void add_size(CLI::App& command, std::string& size, bool even) {
+  command
+      .add_option("--size", size, even ? "Width x height in pixels, both even" : "Width x height in pixels")
+      ->capture_default_str()
+      ->check([even](const std::string& text) -> std::string {
+        try {
+          const auto [width, height] = parse_size(text);
+          return even && (width % 2 || height % 2) ? "width and height of a film must be even" : "";
+        } catch (const Error& error) {
+          return error.what();
+        }
+      });
+}
+
+void add_force(CLI::App& command, bool& force) {
+  command.add_flag("--force", force, "Replace files that are there and hold something else");
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Options that several verbs have, checked and explained alike. A wrong value is bad usage: exit status 2.
+#pragma once
+
+#include <cstdint>
+#include <string>
+
+namespace CLI {
+class App;
+class Option;
+}  // namespace CLI
+
+namespace forest::cli {
+
+class Console;
+
+/// --json and --threads.
+void add_common(CLI::App& command, Console& console);
+
+/// --seed, any whole number of 64 bits.
+/// @param help  what is the same with the same seed
+void add_seed(CLI::App& command, std::uint64_t& seed, const char* help);
+
+/// --size, WIDTHxHEIGHT (parse_size, artist.h).
+/// @param even  both must be, as in films
+void add_size(CLI::App& command, std::string& size, bool even = false);
+
+/// --force, for verbs that refuse to replace files (Overwrites, files.h).
+void add_force(CLI::App& command, bool& force);
+
+/// An option's value must be a whole number in this range. Said in one short sentence, and never rounded or cut to fit.
+void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high);
+
+}  // namespace forest::cli

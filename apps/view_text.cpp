@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/view_text.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+
+namespace forest {
+
+scene::View view_of(std::string_view text, const std::string& name) {
+  try {
+    [[maybe_unused]] const auto json = nlohmann::json::parse(text);
+  } catch (const nlohmann::json::parse_error& error) {
+    const std::string_view before = text.substr(0, std::min(text.size(), error.byte ? error.byte - 1 : 0));
+    const std::size_t line = std::size_t(std::ranges::count(before, '\n')) + 1;
+    const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;  // npos + 1 == 0
+    throw InputError(name, line,
+                     fmt::format("is no JSON from column {} on; correct what stands there or before, as "
+                                 "docs/scene/view.md shows",
+                                 column));
+  }
+  return scene::parse_view(text, name);
+}
+
+scene::View read_view(const std::string& file_or_text) {
+  const std::size_t first = file_or_text.find_first_not_of(" \t\r\n");
+  if (first != std::string::npos && file_or_text[first] == '{') return view_of(file_or_text, "--view");
+  const MappedFile file(file_or_text);
+  return view_of(file.text(), file_or_text);
+}
+
+}  // namespace forest

@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Views as people give them to the programs: a file, or the JSON itself.
+#pragma once
+
+#include <string>
+#include <string_view>
+
+#include "forest/scene/view.h"
+
+namespace forest {
+
+/// As scene::parse_view; text that is no JSON is refused with its line and column.
+scene::View view_of(std::string_view text, const std::string& name);
+
+/// A view from a file, or from the text itself when it begins with '{'. Throws InputError.
+scene::View read_view(const std::string& file_or_text);
+
+}  // namespace forest

@@ -1,0 +1,63 @@
+# SPDX-License-Identifier: Apache-2.0
+# Bad usage ends with status 2 and a short sentence that says what would be good; one bad file among good ones with status 1.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+fails_with() {  # status, words of the sentence, command…
+  local status=$1 words=$2 got=0
+  shift 2
+  "$@" >out.txt 2>err.txt || got=$?
+  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
+  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
+  ! grep -qE 'json\.exception|[0-9]{30}' err.txt || { echo "not our own words: $*"; cat err.txt; exit 1; }
+}
+program=$BRAINFOREST
+
+fails_with 2 "no verb 'frob'; there are: demo, import, list" $program frob
+fails_with 2 'say which verb, one of: demo' $program
+fails_with 2 "no benchmark 'nosuch'; there are: column" $program bench nosuch
+fails_with 2 'one of: column, grow' $program bench
+fails_with 2 'files or --repo' $program check
+fails_with 2 'files' $program convert
+fails_with 2 'say where the files go' $program convert a.swc
+fails_with 2 'with --format' $program convert a.swc --out x
+
+for seed in -1 18446744073709551616 1e3 7x ''; do
+  fails_with 2 'is no whole number from 0 to 18446744073709551615' $program grow --grammar motoneuron --out x --seed "$seed"
+  fails_with 2 'is no whole number from 0 to 18446744073709551615' $program plant --recipe column-1000 --repo x.db --out x --seed "$seed"
+  fails_with 2 'is no whole number from 0 to 18446744073709551615' $program demo --out x --seed "$seed"
+  fails_with 2 'is no whole number from 0 to 18446744073709551615' $program bench column --seed "$seed"
+done
+[ ! -e x ]
+$program grow --grammar motoneuron --out x --seed 18446744073709551615 --json | grep -q '"seed": 18446744073709551615'
+fails_with 2 "'-1' is no whole number from 0 to 4096" $program list --repo x.db --threads -1
+for size in 12by9 0x9 12x9x3 -1x5 20000x1; do
+  fails_with 2 'is no size of a picture' $program render x.forest -o x.png --size "$size"
+  fails_with 2 'is no size of a picture' $program bench column --size "$size"
+done
+fails_with 2 'must be even' $program movie x.forest -o x.mp4 --size 13x90
+
+# The good ones among bad ones are taken, and folders say what they skip.
+printf '1 1 0 0 0 5 -1\n2 3 0 5 0 1 1\n3 3 0 9 0 1 2\n' >good.swc
+fails_with 1 'missing.swc: cannot be opened' $program import good.swc missing.swc --repo r.db
+$program list --repo r.db | grep -q good
+fails_with 1 '1 of 2' $program check good.swc missing.swc
+fails_with 1 'missing.swc' $program measure good.swc missing.swc
+fails_with 1 'missing.swc' $program convert good.swc missing.swc --format swc --out converted
+cmp <($program measure good.swc --json) <($program measure converted/good.swc --json | sed 's/converted\///')
+mkdir folder && cp good.swc folder/ && touch folder/notes.txt folder/.hidden
+for verb in import check measure convert; do
+  more=()
+  [ $verb != import ] || more=(--repo f.db)
+  [ $verb != convert ] || more=(--format swc --out c)
+  $program $verb folder "${more[@]}" >/dev/null 2>err.txt
+  [ "$(cat err.txt)" = '2 files of other formats are skipped' ] || { echo "$verb: $(cat err.txt)"; exit 1; }
+done
+
+# A file without radii: the first few are told and the rest counted.
+/usr/bin/python3 -c '
+print("1 1 0 0 0 5 -1")
+for i in range(2, 5000): print(i, 3, 0, 3 * i, 0, 0, i - 1)' >thin.swc
+$program check thin.swc >out.txt
+[ "$(wc -l <out.txt)" -lt 30 ]
+grep -q 'thin.swc  *2  zero-radius' out.txt
+grep -q 'the same on 4978 more lines' out.txt
