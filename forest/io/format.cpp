@@ -8,12 +8,15 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/asc.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
 namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+
+constexpr std::array<std::string_view, 1> asc_extensions{".asc"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -24,6 +27,14 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_swc,
            .keeps = {}},
+    Format{.name = "asc",
+           .title = "Neurolucida ASC",
+           .extensions = asc_extensions,
+           .recognises = recognises_asc,
+           .read = read_asc,
+           .read_all = nullptr,
+           .write = write_asc,
+           .keeps = asc_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

@@ -96,6 +96,17 @@ Soma kept_soma(const Soma& soma, const Keeps& keeps) {
   return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
 }
 
+std::vector<SectionId> depth_first(const Morphology& m) {
+  std::vector<SectionId> order, waiting(m.roots().rbegin(), m.roots().rend());
+  while (!waiting.empty()) {
+    order.push_back(waiting.back());
+    waiting.pop_back();
+    const auto daughters = m.children(order.back());
+    waiting.insert(waiting.end(), daughters.rbegin(), daughters.rend());
+  }
+  return order;
+}
+
 }  // namespace
 
 std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
@@ -129,8 +140,9 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
   std::vector<Place> places(m.sections().size());
   std::vector<Point> points;
   std::uint32_t count = 0;
+  const std::vector<SectionId> order = keeps.order ? std::vector<SectionId>() : depth_first(m);
   for (std::size_t i = 0; i < m.sections().size(); ++i) {
-    const SectionId id(i);
+    const SectionId id = keeps.order ? SectionId(i) : order[i];
     if (!keeps.single_daughters && joins(m, id, keeps)) continue;  // taken along below
     const Section& s = m.section(id);
     if (!keeps.stumps && m.points(id).size() == 1) continue;

@@ -32,7 +32,8 @@ struct Keeps {
   bool stumps = true;            // a root of a single point
   bool spines = true;
   bool annotations = true;
-  float step = 0.f;  // coordinates and diameters are rounded to this, µm; 0: not at all
+  bool order = true;  // the order of sections; else depth first: a branch, then all that hangs on it
+  float step = 0.f;   // coordinates and diameters are rounded to this, µm; 0: not at all
 };
 
 /// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.
