@@ -16,6 +16,7 @@
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
+#include "forest/io/placed_words.h"
 #include "forest/io/swc_rows.h"
 
 namespace forest::io {
@@ -52,19 +53,25 @@ enum class AscOddity : std::uint8_t {
 constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"thumbnail", false, "the picture is skipped"},
-    {"several-outlines", false, "read as one soma, a stack of outlines", "split the file if it holds several cells"},
+    {"several-outlines", false, "read as one soma, a stack of outlines",
+     "split the file if it holds several cells"},
     {"outline-by-name", true, "read as an outline of the soma"},
     {"small-outline", true, "read as a sphere of its size", "trace the outline with three points or more"},
     {"empty-outline", true, "skipped"},
-    {"no-type", true, "read as a neurite of undefined kind", "write (Axon), (Dendrite) or (Apical) before its first point"},
-    {"type-in-branch", true, "this branch and those on it are of that kind", "nothing, if the types are right"},
+    {"no-type", true, "read as a neurite of undefined kind",
+     "write (Axon), (Dendrite) or (Apical) before its first point"},
+    {"type-in-branch", true, "this branch and those on it are of that kind",
+     "nothing, if the types are right"},
     {"no-diameter", true, "read with the diameter of the point before", "measure it where thickness matters"},
-    {"negative-diameter", true, "read as unknown, so as that of the point before", "measure it where thickness matters"},
+    {"negative-diameter", true, "read as unknown, so as that of the point before",
+     "measure it where thickness matters"},
     {"unknown-diameter", true, "read as that of the point before", "measure it where thickness matters"},
-    {"unknown-place", true, "read as that of the point before", "look it up in the tracing, or remove the point"},
+    {"unknown-place", true, "read as that of the point before",
+     "look it up in the tracing, or remove the point"},
     {"extra-numbers", false, "all but the first four are skipped"},
     {"empty-tree", true, "skipped"},
-    {"tree-begins-with-split", true, "its branches are read as trees of their own", "give it the point they leave from"},
+    {"tree-begins-with-split", true, "its branches are read as trees of their own",
+     "give it the point they leave from"},
     {"branch-without-points", true, "what hangs on it hangs on the branch point before"},
     {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
     {"empty-branch", true, "skipped"},
@@ -80,7 +87,8 @@ constexpr std::string_view layout = "a point is (x y z diameter)";
 constexpr std::array<std::string_view, 7> leaf_words{"Normal",    "High",   "Low",     "Incomplete",
                                                      "Generated", "Origin", "Midpoint"};
 // Properties of outlines and trees in which numbers follow the word.
-constexpr std::array<std::string_view, 6> numbered_words{"ZSmear", "Class", "Font", "Color", "Resolution", "SSM"};
+constexpr std::array<std::string_view, 6> numbered_words{"ZSmear", "Class",      "Font",
+                                                         "Color",  "Resolution", "SSM"};
 
 bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
 bool begins_number(char c) { return is_digit(c) || c == '-' || c == '+' || c == '.'; }
@@ -106,11 +114,12 @@ bool names_soma(std::string_view name) {
 }
 
 SpineShape shape_of(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{{{"stubby", SpineShape::stubby},
-                                                                          {"thin", SpineShape::thin},
-                                                                          {"mushroom", SpineShape::mushroom},
-                                                                          {"filopodi", SpineShape::filopodium},
-                                                                          {"branched", SpineShape::branched}}};
+  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{
+      {{"stubby", SpineShape::stubby},
+       {"thin", SpineShape::thin},
+       {"mushroom", SpineShape::mushroom},
+       {"filopodi", SpineShape::filopodium},
+       {"branched", SpineShape::branched}}};
   std::string lower(text);
   for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
   for (const auto& [word, shape] : shapes)
@@ -153,10 +162,11 @@ class Reader {
       } else if (p_ == end_) {
         return;
       } else {
-        throw InputError(name_, line_,
-                         fmt::format("\"{}\" stands outside of all brackets; in Neurolucida ASC everything is in "
-                                     "brackets, and comments begin with ;",
-                                     shown(word())));
+        throw InputError(
+            name_, line_,
+            fmt::format("\"{}\" stands outside of all brackets; in Neurolucida ASC everything is in "
+                        "brackets, and comments begin with ;",
+                        shown(word())));
       }
     }
   }
@@ -233,15 +243,17 @@ class Reader {
   }
 
   [[noreturn]] void unfinished(std::string_view what, std::size_t begin) const {
-    throw InputError(name_, line_,
-                     fmt::format("the file ends inside of {} that begins on line {}; get the whole file, or close "
-                                 "its brackets",
-                                 what, begin));
+    throw InputError(
+        name_, line_,
+        fmt::format("the file ends inside of {} that begins on line {}; get the whole file, or close "
+                    "its brackets",
+                    what, begin));
   }
 
   [[noreturn]] void unexpected(std::string_view where) const {
-    throw InputError(name_, line_,
-                     fmt::format("\"{}\" has no meaning in {}; remove it or put it into brackets", shown(word()), where));
+    throw InputError(
+        name_, line_,
+        fmt::format("\"{}\" has no meaning in {}; remove it or put it into brackets", shown(word()), where));
   }
 
   // Points -------------------------------------------------------------------------------------------------
@@ -275,7 +287,8 @@ class Reader {
         throw InputError(name_, line_, fmt::format("\"{}\" is not a number; {}", shown(word()), layout));
       if (begins_number(c) && count == 3 && !is_letter(c))
         throw InputError(name_, line_, fmt::format("\"{}\" is not a diameter; {}", shown(word()), layout));
-      if (begins_number(c)) oddities_.add(AscOddity::extra_numbers, line_, "a point has more than four numbers");
+      if (begins_number(c))
+        oddities_.add(AscOddity::extra_numbers, line_, "a point has more than four numbers");
       p_ += word().size();  // the name of a section (S1) may follow
     }
     ++p_;
@@ -297,7 +310,8 @@ class Reader {
       }
     if (v[3] >= 0.f && std::isfinite(v[3])) return;
     if (v[3] < 0.f)
-      oddities_.add(AscOddity::negative_diameter, line_, [&] { return fmt::format("the diameter is {}", v[3]); });
+      oddities_.add(AscOddity::negative_diameter, line_,
+                    [&] { return fmt::format("the diameter is {}", v[3]); });
     else
       oddities_.add(AscOddity::unknown_diameter, line_, "the diameter is not finite");
     v[3] = 2.f * last_.radius;
@@ -372,7 +386,9 @@ class Reader {
   static bool is_marker(const Block& block) { return block.points > 0 && block.word != "Color"; }
 
   /// A block that is neither tree nor outline.
-  void keep_block(std::string_view key, Block block) { annotations_.emplace_back(key, std::move(block.text)); }
+  void keep_block(std::string_view key, Block block) {
+    annotations_.emplace_back(key, std::move(block.text));
+  }
 
   void back_to(const char* p, std::size_t line) { p_ = p, line_ = line; }
 
@@ -505,9 +521,11 @@ class Reader {
               .points = own_soma_,
               .parents = own_soma_parents_,
               .contour_starts = {}};
-      bool good = own_.points.size() == 1 ? own_soma_parents_.empty() : own_soma_parents_.size() == own_.points.size();
+      bool good = own_.points.size() == 1 ? own_soma_parents_.empty()
+                                          : own_soma_parents_.size() == own_.points.size();
       for (std::size_t i = 0; i < own_.parents.size(); ++i)
-        good = good && (i == 0 ? own_.parents[i] == -1 : own_.parents[i] >= 0 && own_.parents[i] < std::int32_t(i));
+        good = good &&
+               (i == 0 ? own_.parents[i] == -1 : own_.parents[i] >= 0 && own_.parents[i] < std::int32_t(i));
       if (!good) throw InputError(name_, begin, "the comments FOREST_… of the soma are no soma; remove them");
       return;
     }
@@ -544,8 +562,8 @@ class Reader {
     SectionId node;  // the section it leaves from; once its points are over, the one that ends there
     SectionKind kind = SectionKind::undefined;
     std::int32_t tag = 0, soma_point = -1;
-    bool over = false;       // no point may follow
-    bool own = false;        // has a section
+    bool over = false;  // no point may follow
+    bool own = false;   // has a section
     bool split = false, excused = false;
     std::string_view leaf;
     std::size_t line = 0;
@@ -580,7 +598,8 @@ class Reader {
         const char inner = next();
         if (begins_number(inner)) [[likely]] {
           if (branch_.over) refuse_late_point();
-          if (said_) [[unlikely]] take_what_is_said();
+          if (said_) [[unlikely]]
+            take_what_is_said();
           last_ = point();
           has_last_ = true;
           points_.push_back(last_);
@@ -602,7 +621,8 @@ class Reader {
         if (splits_.empty()) return;
         Split split = std::move(splits_.back());
         splits_.pop_back();
-        if (split.daughters == 1) oddities_.add(AscOddity::single_daughter, split.line, "a split has a single branch");
+        if (split.daughters == 1)
+          oddities_.add(AscOddity::single_daughter, split.line, "a split has a single branch");
         branch_ = std::move(split.branch);
       } else if (c == '<') {
         spine();
@@ -610,8 +630,9 @@ class Reader {
         oddities_.add(AscOddity::text_in_tree, line_, "a text stands in a tree");
         quoted();
       } else if (p_ == end_) {
-        splits_.empty() ? unfinished("a tree", begin)
-                        : unfinished(fmt::format("a split (opened on line {}) of a tree", splits_.back().line), begin);
+        splits_.empty()
+            ? unfinished("a tree", begin)
+            : unfinished(fmt::format("a split (opened on line {}) of a tree", splits_.back().line), begin);
       } else if (is_letter(c)) {
         leaf_word();
       } else {
@@ -622,11 +643,12 @@ class Reader {
 
   [[noreturn]] void refuse_late_point() const {
     throw InputError(name_, line_,
-                     branch_.split ? std::string("a point follows the split that ends its branch; give it a branch of "
-                                                 "its own")
-                                   : fmt::format("a point follows \"{}\", which ends its branch; remove the word, or "
-                                                 "separate the branches by |",
-                                                 shown(branch_.leaf)));
+                     branch_.split
+                         ? std::string("a point follows the split that ends its branch; give it a branch of "
+                                       "its own")
+                         : fmt::format("a point follows \"{}\", which ends its branch; remove the word, or "
+                                       "separate the branches by |",
+                                       shown(branch_.leaf)));
   }
 
   void begin_split(std::size_t line) {
@@ -671,7 +693,8 @@ class Reader {
       const Point& node = ends_[branch_.node.value()];
       const bool repeated = same_place(points_[0], node);
       if (repeated && points_.size() == 1) {
-        oddities_.add(AscOddity::only_branch_point, branch_.line, "a branch holds only the point it leaves from");
+        oddities_.add(AscOddity::only_branch_point, branch_.line,
+                      "a branch holds only the point it leaves from");
         points_.clear();
         branch_.excused = true;
       } else if (!repeated) {
@@ -702,7 +725,8 @@ class Reader {
     std::size_t at = 0;
     for (Seat& seat : seats_) {
       if (!branch_.node.valid()) {
-        oddities_.add(AscOddity::spine_without_place, branch_.line, "a spine stands where its tree has no point");
+        oddities_.add(AscOddity::spine_without_place, branch_.line,
+                      "a spine stands where its tree has no point");
         continue;
       }
       seat.spine.section = branch_.node;
@@ -772,9 +796,11 @@ class Reader {
     if (const auto kind = type_of(block.word); kind && !block.more) {
       if (*kind == branch_.kind) return;
       if (branch_.over || !points_.empty())
-        throw InputError(name_, line,
-                         fmt::format("({}) stands among the points of a branch; put it before the first one", block.word));
-      oddities_.add(AscOddity::type_in_branch, line, [&] { return fmt::format("a branch is of type {}", block.word); });
+        throw InputError(
+            name_, line,
+            fmt::format("({}) stands among the points of a branch; put it before the first one", block.word));
+      oddities_.add(AscOddity::type_in_branch, line,
+                    [&] { return fmt::format("a branch is of type {}", block.word); });
       branch_.kind = *kind, branch_.tag = std::int32_t(*kind);
       return;
     }
@@ -786,7 +812,8 @@ class Reader {
     const std::string_view leaf = word();
     if (!std::ranges::all_of(leaf, [](char c) { return is_letter(c); })) unexpected("a tree");
     if (std::ranges::find(leaf_words, leaf) == leaf_words.end())
-      oddities_.add(AscOddity::unknown_word, line_, [&] { return fmt::format("\"{}\" ends a branch", shown(leaf)); });
+      oddities_.add(AscOddity::unknown_word, line_,
+                    [&] { return fmt::format("\"{}\" ends a branch", shown(leaf)); });
     p_ += leaf.size();
     close_points();
     branch_.leaf = leaf;
@@ -834,21 +861,22 @@ class Reader {
     } else if (key == asc_spine_key) {
       good = good && count == 7 && whole(6, 0., double(SpineShape::branched));
       if (good)
-        own_spine_ =
-            Spine{{}, f(0), Vec3(f(1), f(2), f(3)), f(4), f(5), static_cast<SpineShape>(int(v[6]))};
+        own_spine_ = Spine{{}, f(0), Vec3(f(1), f(2), f(3)), f(4), f(5), static_cast<SpineShape>(int(v[6]))};
     } else {
       return;
     }
     if (!good)
-      throw InputError(name_, line_,
-                       fmt::format("the comment {} does not hold the numbers it should; remove the line", shown(key)));
+      throw InputError(
+          name_, line_,
+          fmt::format("the comment {} does not hold the numbers it should; remove the line", shown(key)));
   }
 
   /// At the first point of the branch that a comment of ours is about.
   void take_what_is_said() {
     if (!points_.empty())
-      throw InputError(name_, line_,
-                       fmt::format("the comment {} stands among the points of a branch; remove it", asc_section_key));
+      throw InputError(
+          name_, line_,
+          fmt::format("the comment {} stands among the points of a branch; remove it", asc_section_key));
     branch_.kind = said_->kind, branch_.tag = said_->tag, branch_.soma_point = said_->soma_point;
     said_.reset();
   }

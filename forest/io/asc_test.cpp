@@ -56,7 +56,8 @@ TEST(Asc, ReadsNumbersAsTheyAreWritten) {
 
 TEST(Asc, SpinesSitOnTheirPoint) {
   const Morphology m = neuron(
-      "((Dendrite) (0 0 0 1) (0 10 0 1) <(1 10 0 .5)> (0 20 0 1) <(Class 3 \"Mushroom\") (Color Red)(0 20 2 .25)>\n"
+      "((Dendrite) (0 0 0 1) (0 10 0 1) <(1 10 0 .5)> (0 20 0 1) <(Class 3 \"Mushroom\") (Color Red)(0 20 2 "
+      ".25)>\n"
       "( <(0 20 9 1)> (0 30 0 1) | (9 20 0 1) Normal <(9 21 0 1)> ))");
   ASSERT_EQ(m.spines().size(), 4u);
   EXPECT_EQ(m.spines()[0], (Spine{SectionId(0), 10.f, Vec3(1, 0, 0), .5f, 0.f, SpineShape::unknown}));
@@ -67,9 +68,11 @@ TEST(Asc, SpinesSitOnTheirPoint) {
 
 TEST(Asc, WhatIsNoNeuriteIsKeptAsItsText) {
   const auto [m, warnings] = read_asc(
-      "(ImageCoords)\n(Sections S1 \"a \\\" 3 100 0) ; none\n(Dot (Color RGB (1, 2, 3))\n (Name \"m;1\") (1 2 3 .5) )\n"
+      "(ImageCoords)\n(Sections S1 \"a \\\" 3 100 0) ; none\n(Dot (Color RGB (1, 2, 3))\n (Name \"m;1\") (1 "
+      "2 3 .5) )\n"
       "(\"pia\" (Closed) (1 2 3 4) (2 3 4 5))\n( (Color White) (1 2 3) \"<-- look\" )\n"
-      "( (Color Red) (Set \"axons\") (Axon) (0 0 0 1) (0 1 0 1) (Cross (0 1 0 1)) ( (1 2 0 1) Incomplete | (2 2 0 1) Normal ))",
+      "( (Color Red) (Set \"axons\") (Axon) (0 0 0 1) (0 1 0 1) (Cross (0 1 0 1)) ( (1 2 0 1) Incomplete | "
+      "(2 2 0 1) Normal ))",
       "cell.asc");
   EXPECT_TRUE(warnings.empty());
   const Annotations expected{{"asc", "(Sections S1 \"a \\\" 3 100 0)"},
@@ -81,7 +84,8 @@ TEST(Asc, WhatIsNoNeuriteIsKeptAsItsText) {
                              {"leaf", "Incomplete 1 2 0"}};
   EXPECT_EQ(m.annotations(), expected);
   const std::string written = write_asc(m);
-  for (const std::string_view text : {"(Color Red) (Set \"axons\") (Axon)", "Incomplete\n", "(Cross (0 1 0 1))\n"})
+  for (const std::string_view text :
+       {"(Color Red) (Set \"axons\") (Axon)", "Incomplete\n", "(Cross (0 1 0 1))\n"})
     EXPECT_NE(written.find(text), written.npos) << text;
   Annotations again = neuron(written).annotations();
   EXPECT_TRUE(std::ranges::is_permutation(again, expected));
@@ -91,7 +95,8 @@ TEST(Asc, AnnotationsFromElsewhereCannotBreakTheFile) {
   MorphologyBuilder b;
   const std::vector<Point> points{{0, 0, 0, 1}, {0, 1, 0, 1}};
   b.add_section({}, SectionKind::axon, points);
-  for (const std::string_view text : {"(Cross (0 0 0 1)) ((Axon) (5 5 5 1) (6 6 6 1))", ")", "(", "\"", "(a) ; b", "x\n(y)"}) {
+  for (const std::string_view text :
+       {"(Cross (0 0 0 1)) ((Axon) (5 5 5 1) (6 6 6 1))", ")", "(", "\"", "(a) ; b", "x\n(y)"}) {
     b.annotate("marker", std::string(text));
     b.annotate("tree", "0 0 0 " + std::string(text));
     b.annotate("leaf", std::string(text) + " 0 1 0");
@@ -210,7 +215,8 @@ TEST(Asc, AHundredThousandLevelsAreReadAndWritten) {
   const std::string written = write_asc(m);
   EXPECT_LT(written.size(), 250u * 2 * levels);
   EXPECT_TRUE(std::ranges::equal(neuron(written).sections(), m.sections()));
-  for (const std::string_view opening : {"(", "((Axon)(", "((Axon)(1 2 3 4)((", "(a (", "((Axon)(1 2 3 4)<("}) {
+  for (const std::string_view opening :
+       {"(", "((Axon)(", "((Axon)(1 2 3 4)((", "(a (", "((Axon)(1 2 3 4)<("}) {
     std::string open;
     for (std::size_t i = 0; i < levels; ++i) open += opening;
     EXPECT_THROW(read_asc(open, "cell.asc"), InputError) << opening;
@@ -227,7 +233,8 @@ TEST(Asc, OursSaysWhatTheFormatHasNoWordFor) {
 }
 
 TEST(Asc, IsRecognisedByItsFirstBracket) {
-  for (const std::string_view text : {"; x\n(ImageCoords)", "\n( (Color Red)", "(\"CellBody\"", "\xef\xbb\xbf(("})
+  for (const std::string_view text :
+       {"; x\n(ImageCoords)", "\n( (Color Red)", "(\"CellBody\"", "\xef\xbb\xbf(("})
     EXPECT_TRUE(recognises_asc(text)) << text;
   for (const std::string_view text : {"", "; only", "1 1 0 0 0 1 -1\n", "(1 2 3)", "<mbf>", "# swc\n"})
     EXPECT_FALSE(recognises_asc(text)) << text;
@@ -293,7 +300,8 @@ TEST(AscRealData, TheBrokenCorpusIsReadAsDocumented) {
       {"inline_morphio_asc/single_children_1.asc", 4, 11, "single-daughter", 7},
       {"inline_morphio_asc/single_neurite_no_soma_1.asc", 1, 2, "", 0},
       {"inline_morphio_asc/single_point_section_duplicate_parent_1.asc", 1, 2, "only-branch-point", 6},
-      {"inline_morphio_asc/single_point_section_duplicate_parent_complex_1.asc", 4, 8, "only-branch-point", 7},
+      {"inline_morphio_asc/single_point_section_duplicate_parent_complex_1.asc", 4, 8, "only-branch-point",
+       7},
       {"inline_morphio_asc/skip_header_1.asc", 1, 2, "", 0},
       {"inline_morphio_asc/unfinished_file_1.asc", 0, 0, "error", 12},
       {"inline_morphio_asc/unfinished_point_1.asc", 0, 0, "error", 4},
@@ -338,9 +346,12 @@ TEST(AscRealData, TheBrokenCorpusIsReadAsDocumented) {
             (std::vector<Point>{{3, -10, 0, 10}, {0, -10, 0, 1}, {-3, -10, 0, .15f}}));
   EXPECT_EQ(points("inline_morphio_asc/section_single_point_1.asc", 1),
             (std::vector<Point>{{3, -10, 0, 2}, {3, -10, 2, 2}}));
-  EXPECT_EQ(read(folder / "inline_morphio_asc/parse_number_with_plus_symbol_1.asc").morphology.soma().points[1].y, 1.f);
+  EXPECT_EQ(
+      read(folder / "inline_morphio_asc/parse_number_with_plus_symbol_1.asc").morphology.soma().points[1].y,
+      1.f);
   const auto count = [&](const char* file, std::string_view key) {
-    return std::ranges::count(read(folder / file).morphology.annotations(), key, &Annotations::value_type::first);
+    return std::ranges::count(read(folder / file).morphology.annotations(), key,
+                              &Annotations::value_type::first);
   };
   EXPECT_EQ(count("morphio/markers.asc", "marker"), 3);
   EXPECT_EQ(count("morphio/markers.asc", "leaf"), 2);

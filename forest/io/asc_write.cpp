@@ -1,10 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
-#include <deque>
 #include <limits>
 #include <numbers>
-#include <unordered_map>
 #include <vector>
 
 #include <fmt/format.h>
@@ -12,6 +10,7 @@
 #include "forest/io/asc.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
+#include "forest/io/placed_words.h"
 #include "forest/io/swc_rows.h"
 
 namespace forest::io {
@@ -66,14 +65,15 @@ class Writer {
     for (const std::string* block : blocks) text_ += *block, text_ += '\n';
   }
 
-  using Waiting = std::unordered_map<std::string, std::deque<std::string>>;  // place, words for it
-
   bool wait(std::string_view key, std::string_view value) {
     const bool leaf = key == "leaf";
-    if (places_[leaf].empty())
-      for (std::size_t s = 0; s < m_.sections().size(); ++s)
+    PlacedWords& words = leaf ? leaves_ : trees_;
+    if (!words.offered())
+      for (std::size_t s = 0; s < m_.sections().size(); ++s) {
+        const auto points = m_.points(SectionId(s));
         if (leaf || !m_.section(SectionId(s)).parent.valid())
-          ++places_[leaf][place_text(leaf ? m_.points(SectionId(s)).back() : m_.points(SectionId(s)).front())];
+          words.offer(leaf ? points.back() : points.front());
+      }
     std::string_view word, place;
     if (leaf) {
       word = value.substr(0, value.find(' '));
@@ -84,26 +84,15 @@ class Writer {
       if (!letters || word == "Normal") return false;
     } else {
       std::size_t end = 0;
-      for (int blanks = 0; blanks < 3 && end != value.npos; ++blanks) end = value.find(' ', end + (blanks > 0));
+      for (int blanks = 0; blanks < 3 && end != value.npos; ++blanks)
+        end = value.find(' ', end + (blanks > 0));
       if (end == value.npos) return false;
       place = value.substr(0, end), word = value.substr(end + 1);
-      if (!asc_reads_as_annotation(fmt::format("({} (Dendrite) (0 0 0 0))", word), "tree", fmt::format("0 0 0 {}", word)))
+      if (!asc_reads_as_annotation(fmt::format("({} (Dendrite) (0 0 0 0))", word), "tree",
+                                   fmt::format("0 0 0 {}", word)))
         return false;
     }
-    const auto found = places_[leaf].find(std::string(place));
-    if (found == places_[leaf].end() || found->second == 0) return false;
-    --found->second;
-    waiting_[leaf][found->first].emplace_back(word);
-    return true;
-  }
-
-  std::string called(bool leaf, const Point& point) {
-    if (waiting_[leaf].empty()) return {};
-    const auto found = waiting_[leaf].find(place_text(point));
-    if (found == waiting_[leaf].end() || found->second.empty()) return {};
-    std::string word = std::move(found->second.front());
-    found->second.pop_front();
-    return word;
+    return words.add(std::string(place), std::string(word));
   }
 
   /// A comment line for each line of the text, written as it will be read.
@@ -141,7 +130,8 @@ class Writer {
     if (soma.kind == SomaKind::none) return;
     if (soma.kind == SomaKind::contours) {
       for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-        const std::size_t end = i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
+        const std::size_t end =
+            i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
         outline(std::span(soma.points).subspan(soma.contour_starts[i], end - soma.contour_starts[i]), {});
       }
       return;
@@ -178,7 +168,7 @@ class Writer {
   }
 
   void tree(SectionId root) {
-    const std::string properties = called(false, m_.points(root)[0]);
+    const std::string properties = trees_.take(m_.points(root)[0]);
     text_ += "( ";
     if (!properties.empty()) text_ += properties, text_ += ' ';
     text_ += fmt::format("({})\n", type_word(m_.section(root).kind));
@@ -192,7 +182,7 @@ class Writer {
       const auto daughters = m_.children(open.back().section);
       if (open.back().next == daughters.size()) {
         if (!daughters.empty()) indent(open.size()), text_ += ")\n";
-        if (const std::string word = called(true, m_.points(open.back().section).back()); !word.empty())
+        if (const std::string word = leaves_.take(m_.points(open.back().section).back()); !word.empty())
           indent(open.size()), text_ += word, text_ += '\n';
         else if (daughters.empty())
           indent(open.size()), text_ += "Normal\n";
@@ -221,8 +211,9 @@ class Writer {
     float position = 0.f;
     for (std::size_t i = 0; i < points.size(); ++i) {
       indent(depth), point(points[i]), text_ += '\n';
-      const float next = i + 1 < points.size() ? position + (points[i + 1].position() - points[i].position()).norm()
-                                               : std::numeric_limits<float>::infinity();
+      const float next = i + 1 < points.size()
+                             ? position + (points[i + 1].position() - points[i].position()).norm()
+                             : std::numeric_limits<float>::infinity();
       for (; spine_ < spines_.size() && spines_[spine_]->section == id &&
              (spines_[spine_]->position < next || i + 1 == points.size());
            ++spine_)
@@ -243,8 +234,7 @@ class Writer {
 
   const Morphology& m_;
   std::string text_;
-  std::unordered_map<std::string, std::size_t> places_[2];  // how many sections begin (0) or end (1) there
-  Waiting waiting_[2];
+  PlacedWords leaves_, trees_;
   std::vector<const Spine*> spines_;
   std::size_t spine_ = 0;
 };

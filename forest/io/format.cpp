@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/asc.h"
+#include "forest/io/nts.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
@@ -17,6 +18,7 @@ namespace {
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 
 constexpr std::array<std::string_view, 1> asc_extensions{".asc"};
+constexpr std::array<std::string_view, 1> nts_extensions{".nts"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -35,6 +37,14 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_asc,
            .keeps = asc_keeps},
+    Format{.name = "nts",
+           .title = "Eutectic NTS",
+           .extensions = nts_extensions,
+           .recognises = recognises_nts,
+           .read = read_nts,
+           .read_all = nullptr,
+           .write = write_nts,
+           .keeps = nts_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

@@ -6,15 +6,34 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/error.h"
+
 namespace forest::io {
 namespace {
+
+std::int32_t kept_tag(const Section& s, const Keeps& keeps) {
+  const bool kept = keeps.kinds && keeps.tags && s.tag >= -keeps.largest_tag && s.tag <= keeps.largest_tag;
+  return kept ? s.tag : std::int32_t(keeps.kinds ? s.kind : SectionKind::undefined);
+}
+
+// Decimal steps are divided by, since their reciprocal is exact.
+float rounded(float value, const Keeps& keeps) {
+  const double per = std::round(1. / double(keeps.step));
+  return float(std::round(double(value) * per) / per);
+}
+
+Point kept_point(const Point& p, const Keeps& keeps) {
+  if (keeps.step <= 0.f) return p;
+  return {rounded(p.x, keeps), rounded(p.y, keeps), rounded(p.z, keeps),
+          .5f * rounded(2.f * p.radius, keeps)};
+}
 
 // Whether a section is the only daughter, and of its parent's kind as far as kinds are kept.
 bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
   const Section& d = m.section(daughter);
   if (!d.parent.valid() || m.children(d.parent).size() != 1) return false;
   const Section& parent = m.section(d.parent);
-  return !keeps.kinds || (parent.kind == d.kind && (!keeps.tags || parent.tag == d.tag));
+  return !keeps.kinds || (parent.kind == d.kind && kept_tag(parent, keeps) == kept_tag(d, keeps));
 }
 
 // A row for each thing that can be lost.
@@ -85,6 +104,13 @@ constexpr Loss loss_table[] = {
      "{} neurites of a single point are left out"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
+    {&Keeps::spine_sizes, "spine-sizes-lost",
+     [](const Morphology& m, const Keeps& keeps) {
+       return !keeps.spines ? 0 : std::size_t(std::ranges::count_if(m.spines(), [](const Spine& s) {
+         return s != Spine{.section = s.section, .position = s.position};
+       }));
+     },
+     "the heads and shapes of {} spines are left out, where they sit is kept"},
     {&Keeps::annotations, "annotations-lost",
      [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
 };
@@ -115,20 +141,46 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
     if (!(keeps.*loss.kept))
       if (const std::size_t count = loss.count(m, keeps))
         warnings.push_back({0, loss.code, fmt::format(fmt::runtime(loss.sentence), count)});
+  const auto too_large = [&](const Section& s) {
+    return s.kind == SectionKind::custom && kept_tag(s, keeps) != s.tag;
+  };
+  if (const auto count = std::ranges::count_if(m.sections(), too_large); count && keeps.kinds && keeps.tags)
+    warnings.push_back({0, "tags-lost",
+                        fmt::format("the numbers of {} sections of a custom kind, above {}, are left out",
+                                    count, keeps.largest_tag)});
+  const auto moved = [&](const Point& p) { return kept_point(p, keeps) != p; };
+  if (const auto count = std::ranges::count_if(m.points(), moved))
+    warnings.push_back(
+        {0, "rounded",
+         fmt::format("places and diameters of {} points are rounded to {} µm", count, keeps.step)});
   return warnings;
 }
 
+void check_fits(const Morphology& m, const Keeps& keeps) {
+  const auto check = [&](std::span<const Point> points) {
+    for (const Point& p : points) {
+      const float place = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+      if (place > keeps.largest_place)
+        throw LimitError(
+            fmt::format("a coordinate of {} µm does not fit into the format, which holds up to {} µm; "
+                        "move the neuron to the origin or choose another format",
+                        place, keeps.largest_place));
+      if (2. * double(p.radius) > double(keeps.largest_diameter) &&
+          keeps.largest_diameter < std::numeric_limits<float>::max())
+        throw LimitError(
+            fmt::format("a diameter of {} µm does not fit into the format, which holds up to {} µm; "
+                        "choose another format",
+                        2. * double(p.radius), keeps.largest_diameter));
+    }
+  };
+  check(m.points());
+  check(m.soma().points);
+}
+
 Morphology as_kept(const Morphology& m, const Keeps& keeps) {
-  const auto rounded = [&](float value) {
-    return keeps.step > 0.f ? float(std::round(double(value) / double(keeps.step)) * double(keeps.step))
-                            : value;
-  };
-  const auto kept_point = [&](const Point& p) {
-    return Point{rounded(p.x), rounded(p.y), rounded(p.z), .5f * rounded(2.f * p.radius)};
-  };
   MorphologyBuilder builder;
   Soma soma = kept_soma(m.soma(), keeps);
-  for (Point& p : soma.points) p = kept_point(p);
+  for (Point& p : soma.points) p = kept_point(p, keeps);
   const bool has_soma = soma.kind != SomaKind::none;
   builder.set_soma(std::move(soma));
 
@@ -151,7 +203,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     for (SectionId at = id;;) {
       places[at.value()] = {count, length};
       for (std::size_t k = at == id ? 0 : 1; k < m.points(at).size(); ++k) {
-        points.push_back(kept_point(m.points(at)[k]));
+        points.push_back(kept_point(m.points(at)[k], keeps));
         if (points.size() > 1)
           length += (points.back().position() - points[points.size() - 2].position()).norm();
       }
@@ -161,10 +213,10 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     SectionId parent;
     if (s.parent.valid() && places[s.parent.value()].section != gone) {
       parent = SectionId(places[s.parent.value()].section);
-      if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back()).radius;
+      if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back(), keeps).radius;
     }
     const SectionKind kind = keeps.kinds ? s.kind : SectionKind::undefined;
-    const std::int32_t tag = keeps.tags && keeps.kinds ? s.tag : std::int32_t(kind);
+    const std::int32_t tag = kept_tag(s, keeps);
     std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
     if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
     builder.add_section(parent, kind, points, tag, soma_point);
@@ -176,6 +228,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
       if (place.section == gone) continue;
       spine.section = SectionId(place.section);
       spine.position += place.offset;
+      if (!keeps.spine_sizes) spine = {.section = spine.section, .position = spine.position};
       builder.add_spine(spine);
     }
   if (keeps.annotations)

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -31,10 +33,19 @@ struct Keeps {
   bool single_daughters = true;  // a node with one daughter; else the two are one section
   bool stumps = true;            // a root of a single point
   bool spines = true;
+  bool spine_sizes = true;  // heads, necks and shapes of spines; else only where they sit
   bool annotations = true;
   bool order = true;  // the order of sections; else depth first: a branch, then all that hangs on it
   float step = 0.f;   // coordinates and diameters are rounded to this, µm; 0: not at all
+
+  // What is larger cannot be written.
+  std::int32_t largest_tag = std::numeric_limits<std::int32_t>::max();  // left out: the kind's own number
+  float largest_place = std::numeric_limits<float>::max();              // refused, µm
+  float largest_diameter = std::numeric_limits<float>::max();           // refused, µm
 };
+
+/// Throws LimitError when a place or a diameter is larger than the format can hold. Writers begin with it.
+void check_fits(const Morphology& morphology, const Keeps& keeps);
 
 /// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.
 std::vector<Warning> losses(const Morphology& morphology, const Keeps& keeps);
