@@ -39,7 +39,8 @@ void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Cons
   const bool csv = options.format == "csv";
   const fs::path first = csv ? options.out / "summary.csv" : options.out;
   if (!options.force && fs::exists(first))  // a person may have written into it
-    throw Error(fmt::format("{} is there already; choose another name, or replace it with --force", first.string()));
+    throw Error(
+        fmt::format("{} is there already; choose another name, or replace it with --force", first.string()));
   const auto files = export_tables(options.repo, rows, options.out, csv, console);
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const fs::path& file : files) list.push_back(file.string());

@@ -9,10 +9,12 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/acc.h"
+#include "forest/io/asc.h"
 #include "forest/io/genesis.h"
 #include "forest/io/h5.h"
 #include "forest/io/neuroml.h"
 #include "forest/io/neuron.h"
+#include "forest/io/nts.h"
 #include "forest/io/swc.h"
 
 namespace forest::io {
@@ -27,6 +29,9 @@ constexpr std::array<std::string_view, 1> python_extensions{".py"};
 
 constexpr std::array<std::string_view, 1> genesis_extensions{".p"};
 constexpr std::array<std::string_view, 1> acc_extensions{".acc"};
+
+constexpr std::array<std::string_view, 1> asc_extensions{".asc"};
+constexpr std::array<std::string_view, 1> nts_extensions{".nts"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -85,6 +90,22 @@ constexpr std::array table{
            .read_all = read_all_neuroml,
            .write = write_neuroml,
            .keeps = neuroml_keeps},
+    Format{.name = "asc",
+           .title = "Neurolucida ASC",
+           .extensions = asc_extensions,
+           .recognises = recognises_asc,
+           .read = read_asc,
+           .read_all = nullptr,
+           .write = write_asc,
+           .keeps = asc_keeps},
+    Format{.name = "nts",
+           .title = "Eutectic NTS",
+           .extensions = nts_extensions,
+           .recognises = recognises_nts,
+           .read = read_nts,
+           .read_all = nullptr,
+           .write = write_nts,
+           .keeps = nts_keeps},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

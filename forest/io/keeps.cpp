@@ -6,17 +6,36 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/error.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
 namespace {
+
+std::int32_t kept_tag(const Section& s, const Keeps& keeps) {
+  const bool kept = keeps.kinds && keeps.tags && s.tag >= -keeps.largest_tag && s.tag <= keeps.largest_tag;
+  return kept ? s.tag : std::int32_t(keeps.kinds ? s.kind : SectionKind::undefined);
+}
+
+// Decimal steps are divided by, since their reciprocal is exact.
+float rounded(float value, const Keeps& keeps) {
+  const double per = std::round(1. / double(keeps.step));
+  return float(std::round(double(value) * per) / per);
+}
+
+Point kept_point(Point p, const Keeps& keeps) {
+  if (keeps.step > 0.f)
+    p = {rounded(p.x, keeps), rounded(p.y, keeps), rounded(p.z, keeps), .5f * rounded(2.f * p.radius, keeps)};
+  if (p.radius == 0.f) p.radius = .5f * keeps.least_diameter;
+  return p;
+}
 
 // Whether a section is the only daughter, and of its parent's kind as far as kinds are kept.
 bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
   const Section& d = m.section(daughter);
   if (!d.parent.valid() || m.children(d.parent).size() != 1) return false;
   const Section& parent = m.section(d.parent);
-  return !keeps.kinds || (parent.kind == d.kind && (!keeps.tags || parent.tag == d.tag));
+  return !keeps.kinds || (parent.kind == d.kind && kept_tag(parent, keeps) == kept_tag(d, keeps));
 }
 
 constexpr double shortest = .99e-6;  // µm; the float next to 1e-6 is below it
@@ -114,6 +133,13 @@ constexpr Loss loss_table[] = {
      "{} points have no diameter; they are written so, but a simulator needs one to compute"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
+    {&Keeps::spine_sizes, "spine-sizes-lost",
+     [](const Morphology& m, const Keeps& keeps) {
+       return !keeps.spines ? 0 : std::size_t(std::ranges::count_if(m.spines(), [](const Spine& s) {
+         return s != Spine{.section = s.section, .position = s.position};
+       }));
+     },
+     "the heads and shapes of {} spines are left out, where they sit is kept"},
     {&Keeps::annotations, "annotations-lost",
      [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
 };
@@ -129,6 +155,17 @@ Soma kept_soma(const Soma& soma, const Keeps& keeps) {
                        (soma.kind == SomaKind::contours && !keeps.contours);
   if (!simpler) return soma;
   return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
+}
+
+std::vector<SectionId> depth_first(const Morphology& m) {
+  std::vector<SectionId> order, waiting(m.roots().rbegin(), m.roots().rend());
+  while (!waiting.empty()) {
+    order.push_back(waiting.back());
+    waiting.pop_back();
+    const auto daughters = m.children(order.back());
+    waiting.insert(waiting.end(), daughters.rbegin(), daughters.rend());
+  }
+  return order;
 }
 
 }  // namespace
@@ -159,23 +196,46 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
       warnings.push_back({0, "diameters-lifted",
                           fmt::format("{} diameters of 0 become {} µm", count, keeps.least_diameter)});
   }
+  const auto too_large = [&](const Section& s) {
+    return s.kind == SectionKind::custom && kept_tag(s, keeps) != s.tag;
+  };
+  if (const auto count = std::ranges::count_if(m.sections(), too_large); count && keeps.kinds && keeps.tags)
+    warnings.push_back({0, "tags-lost",
+                        fmt::format("the numbers of {} sections of a custom kind, above {}, are left out",
+                                    count, keeps.largest_tag)});
+  const auto moved = [&](const Point& p) { return keeps.step > 0.f && kept_point(p, keeps) != p; };
+  if (const auto count = std::ranges::count_if(m.points(), moved))
+    warnings.push_back(
+        {0, "rounded",
+         fmt::format("places and diameters of {} points are rounded to {} µm", count, keeps.step)});
   return warnings;
 }
 
+void check_fits(const Morphology& m, const Keeps& keeps) {
+  const auto check = [&](std::span<const Point> points) {
+    for (const Point& p : points) {
+      const float place = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
+      if (place > keeps.largest_place)
+        throw LimitError(
+            fmt::format("a coordinate of {} µm does not fit into the format, which holds up to {} µm; "
+                        "move the neuron to the origin or choose another format",
+                        place, keeps.largest_place));
+      if (2. * double(p.radius) > double(keeps.largest_diameter) &&
+          keeps.largest_diameter < std::numeric_limits<float>::max())
+        throw LimitError(
+            fmt::format("a diameter of {} µm does not fit into the format, which holds up to {} µm; "
+                        "choose another format",
+                        2. * double(p.radius), keeps.largest_diameter));
+    }
+  };
+  check(m.points());
+  check(m.soma().points);
+}
+
 Morphology as_kept(const Morphology& m, const Keeps& keeps) {
-  const auto rounded = [&](float value) {
-    return keeps.step > 0.f ? float(std::round(double(value) / double(keeps.step)) * double(keeps.step))
-                            : value;
-  };
-  const auto kept_point = [&](const Point& p) {
-    if (!(keeps.step > 0.f) && (p.radius > 0.f || !(keeps.least_diameter > 0.f))) return p;
-    const float radius = .5f * rounded(2.f * p.radius);
-    return Point{rounded(p.x), rounded(p.y), rounded(p.z),
-                 radius > 0.f ? radius : .5f * keeps.least_diameter};
-  };
   MorphologyBuilder builder;
   Soma soma = kept_soma(m.soma(), keeps);
-  for (Point& p : soma.points) p = kept_point(p);
+  for (Point& p : soma.points) p = kept_point(p, keeps);
   const bool has_soma = soma.kind != SomaKind::none;
   builder.set_soma(std::move(soma));
 
@@ -187,8 +247,9 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
   std::vector<Place> places(m.sections().size());
   std::vector<Point> points;
   std::vector<Vec3> ends;  // of the sections that are left
+  const std::vector<SectionId> order = keeps.order ? std::vector<SectionId>() : depth_first(m);
   for (std::size_t i = 0; i < m.sections().size(); ++i) {
-    const SectionId id(i);
+    const SectionId id = keeps.order ? SectionId(i) : order[i];
     if (!keeps.single_daughters && joins(m, id, keeps)) continue;  // taken along below
     const Section& s = m.section(id);
     if (!keeps.stumps && m.points(id).size() == 1) continue;
@@ -197,7 +258,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     for (SectionId at = id;;) {
       places[at.value()] = {std::uint32_t(ends.size()), length};
       for (std::size_t k = at == id ? 0 : 1; k < m.points(at).size(); ++k) {
-        points.push_back(kept_point(m.points(at)[k]));
+        points.push_back(kept_point(m.points(at)[k], keeps));
         if (points.size() > 1)
           length += (points.back().position() - points[points.size() - 2].position()).norm();
       }
@@ -207,7 +268,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     SectionId parent;
     if (s.parent.valid() && places[s.parent.value()].section != gone) {
       parent = SectionId(places[s.parent.value()].section);
-      if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back()).radius;
+      if (!keeps.joints) points[0].radius = kept_point(m.points(s.parent).back(), keeps).radius;
       const Vec3 joint = ends[parent.value()];
       points[0] = {joint.x(), joint.y(), joint.z(), points[0].radius};
     }
@@ -219,7 +280,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     }
     ends.push_back(points.back().position());
     const SectionKind kind = keeps.kinds ? s.kind : SectionKind::undefined;
-    const std::int32_t tag = keeps.tags && keeps.kinds ? s.tag : std::int32_t(kind);
+    const std::int32_t tag = kept_tag(s, keeps);
     std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
     if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
     builder.add_section(parent, kind, points, tag, soma_point);
@@ -230,6 +291,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
       if (place.section == gone) continue;
       spine.section = SectionId(place.section);
       spine.position += place.offset;
+      if (!keeps.spine_sizes) spine = {.section = spine.section, .position = spine.position};
       builder.add_spine(spine);
     }
   if (keeps.annotations)

@@ -4,6 +4,8 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
+#include <limits>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -35,14 +37,24 @@ struct Keeps {
   bool lengthless = true;  // sections without length; else their end is moved to the next_place
   bool zero_radii = true;  // kept in any case, but told where a simulator cannot compute with them
   bool spines = true;
+  bool spine_sizes = true;  // heads, necks and shapes of spines; else only where they sit
   bool annotations = true;
   float least_diameter = 0.f;  // a diameter of 0 becomes this, µm, where a format refuses it
+  bool order = true;           // the order of sections; else depth first: a branch, then all that hangs on it
   float step = 0.f;            // coordinates and diameters are rounded to this, µm; 0: not at all
+
+  // What is larger cannot be written.
+  std::int32_t largest_tag = std::numeric_limits<std::int32_t>::max();  // left out: the kind's own number
+  float largest_place = std::numeric_limits<float>::max();              // refused, µm
+  float largest_diameter = std::numeric_limits<float>::max();           // refused, µm
 };
 
 /// 1e-6 µm from this point, or where its coordinates have no such step the next they have: no length that counts in a
 /// neuron, yet one a simulator can divide by.
 Point next_place(Point point);
+
+/// Throws LimitError when a place or a diameter is larger than the format can hold. Writers begin with it.
+void check_fits(const Morphology& morphology, const Keeps& keeps);
 
 /// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.
 std::vector<Warning> losses(const Morphology& morphology, const Keeps& keeps);

@@ -19,9 +19,12 @@ inline bool is_digit(char c) { return static_cast<unsigned char>(c - '0') < 10; 
 inline bool is_blank(char c) { return c == ' ' || c == '\t'; }
 inline bool is_line_end(char c) { return c == '\n' || c == '\r'; }
 
+/// What may follow a number where columns are set apart by blanks.
+inline bool ends_number(char c) { return is_blank(c) || is_line_end(c); }
+
 // The readers below need no end: the text must be followed by a character that belongs to no number (a line
 // end). They return false, and leave `p` where it was, when there is no such number or it does not end in a
-// blank or line end.
+// blank or line end (read_real: in what `ends` says).
 
 /// -?[0-9]{1,18}
 inline bool read_integer(const char*& p, std::int64_t& value) {
@@ -31,7 +34,7 @@ inline bool read_integer(const char*& p, std::int64_t& value) {
   const char* const first = q;
   std::int64_t sum = 0;
   while (is_digit(*q) && q - first < 18) sum = 10 * sum + (*q++ - '0');
-  if (q == first || !(is_blank(*q) || is_line_end(*q))) return false;
+  if (q == first || !ends_number(*q)) return false;
   value = minus ? -sum : sum;
   p = q;
   return true;
@@ -39,7 +42,8 @@ inline bool read_integer(const char*& p, std::int64_t& value) {
 
 /// Decimal notation with optional sign and exponent, rounded to the nearest float. Too large gives an
 /// infinity, too small a zero. The words nan and inf are not read. `exponent` is set when there is one.
-inline bool read_real(const char*& p, float& value, bool& exponent) {
+template <bool (*ends)(char) = ends_number>
+bool read_real(const char*& p, float& value, bool& exponent) {
   static constexpr std::array<double, 23> powers{1e0,  1e1,  1e2,  1e3,  1e4,  1e5,  1e6,  1e7,
                                                  1e8,  1e9,  1e10, 1e11, 1e12, 1e13, 1e14, 1e15,
                                                  1e16, 1e17, 1e18, 1e19, 1e20, 1e21, 1e22};
@@ -57,7 +61,7 @@ inline bool read_real(const char*& p, float& value, bool& exponent) {
     count += fraction;
   }
   if (count == 0) return false;
-  if (count <= 18 && digits < (1ull << 53) && (is_blank(*q) || is_line_end(*q))) [[likely]] {
+  if (count <= 18 && digits < (1ull << 53) && ends(*q)) [[likely]] {
     const double exact = static_cast<double>(digits) / powers[static_cast<std::size_t>(fraction)];
     // A double half way between two floats may itself have been rounded: then the long way decides.
     if ((std::bit_cast<std::uint64_t>(exact) & 0x1fffffff) != 0x10000000) [[likely]] {
@@ -66,7 +70,7 @@ inline bool read_real(const char*& p, float& value, bool& exponent) {
       return true;
     }
   }
-  for (; !is_blank(*q) && !is_line_end(*q); ++q) exponent = exponent || *q == 'e' || *q == 'E';
+  for (; !ends(*q); ++q) exponent = exponent || *q == 'e' || *q == 'E';
   float parsed = 0.f;
   const auto [end, error] = std::from_chars(first, q, parsed);
   if (error == std::errc::invalid_argument || end != q) return false;

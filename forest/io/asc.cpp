@@ -1,0 +1,959 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/asc.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstdint>
+#include <limits>
+#include <optional>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/io/asc_words.h"
+#include "forest/io/numbers.h"
+#include "forest/io/oddity.h"
+#include "forest/io/placed_words.h"
+#include "forest/io/swc_rows.h"
+
+namespace forest::io {
+namespace {
+
+enum class AscOddity : std::uint8_t {
+  byte_order_mark,
+  thumbnail,
+  several_outlines,
+  outline_by_name,
+  small_outline,
+  empty_outline,
+  no_type,
+  type_in_branch,
+  no_diameter,
+  negative_diameter,
+  unknown_diameter,
+  unknown_place,
+  extra_numbers,
+  empty_tree,
+  tree_begins_with_split,
+  branch_without_points,
+  only_branch_point,
+  empty_branch,
+  single_daughter,
+  second_split,
+  unknown_word,
+  text_in_tree,
+  spine_without_place,
+  stray_bracket,
+  count
+};
+
+constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
+    {"byte-order-mark", false, "the mark is skipped"},
+    {"thumbnail", false, "the picture is skipped"},
+    {"several-outlines", false, "read as one soma, a stack of outlines",
+     "split the file if it holds several cells"},
+    {"outline-by-name", true, "read as an outline of the soma"},
+    {"small-outline", true, "read as a sphere of its size", "trace the outline with three points or more"},
+    {"empty-outline", true, "skipped"},
+    {"no-type", true, "read as a neurite of undefined kind",
+     "write (Axon), (Dendrite) or (Apical) before its first point"},
+    {"type-in-branch", true, "this branch and those on it are of that kind",
+     "nothing, if the types are right"},
+    {"no-diameter", true, "read with the diameter of the point before", "measure it where thickness matters"},
+    {"negative-diameter", true, "read as unknown, so as that of the point before",
+     "measure it where thickness matters"},
+    {"unknown-diameter", true, "read as that of the point before", "measure it where thickness matters"},
+    {"unknown-place", true, "read as that of the point before",
+     "look it up in the tracing, or remove the point"},
+    {"extra-numbers", false, "all but the first four are skipped"},
+    {"empty-tree", true, "skipped"},
+    {"tree-begins-with-split", true, "its branches are read as trees of their own",
+     "give it the point they leave from"},
+    {"branch-without-points", true, "what hangs on it hangs on the branch point before"},
+    {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
+    {"empty-branch", true, "skipped"},
+    {"single-daughter", true, "kept as a section of its own"},
+    {"second-split", true, "its branches leave from the same branch point"},
+    {"unknown-word", true, "kept like the words for the end of a branch"},
+    {"text-in-tree", true, "skipped", "keep it outside of the tree"},
+    {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
+    {"stray-bracket", true, "skipped"},
+}};
+
+constexpr std::string_view layout = "a point is (x y z diameter)";
+constexpr std::array<std::string_view, 7> leaf_words{"Normal",    "High",   "Low",     "Incomplete",
+                                                     "Generated", "Origin", "Midpoint"};
+// Properties of outlines and trees in which numbers follow the word.
+constexpr std::array<std::string_view, 6> numbered_words{"ZSmear", "Class",      "Font",
+                                                         "Color",  "Resolution", "SSM"};
+
+bool is_letter(char c) { return (c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z'); }
+bool begins_number(char c) { return is_digit(c) || c == '-' || c == '+' || c == '.'; }
+bool ends_word(char c) {
+  return static_cast<unsigned char>(c) <= ' ' || c == ')' || c == '(' || c == ';' || c == '|' || c == '<' ||
+         c == '>' || c == '"';
+}
+
+bool same_word(std::string_view text, std::string_view lower) {
+  return std::ranges::equal(text, lower,
+                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
+}
+
+std::optional<SectionKind> type_of(std::string_view word) {
+  if (same_word(word, "axon")) return SectionKind::axon;
+  if (same_word(word, "dendrite")) return SectionKind::basal;
+  if (same_word(word, "apical") || same_word(word, "apicaldendrite")) return SectionKind::apical;
+  return std::nullopt;
+}
+
+bool names_soma(std::string_view name) {
+  return same_word(name, "cellbody") || same_word(name, "cell body") || same_word(name, "soma");
+}
+
+SpineShape shape_of(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{
+      {{"stubby", SpineShape::stubby},
+       {"thin", SpineShape::thin},
+       {"mushroom", SpineShape::mushroom},
+       {"filopodi", SpineShape::filopodium},
+       {"branched", SpineShape::branched}}};
+  std::string lower(text);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  for (const auto& [word, shape] : shapes)
+    if (lower.find(word) != lower.npos) return shape;
+  return SpineShape::unknown;
+}
+
+bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+/// For a message: at most 40 characters, only printable ASCII.
+std::string shown(std::string_view text) {
+  std::string result(text.substr(0, 40));
+  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
+  return text.size() > 40 ? result + "…" : result;
+}
+
+class Reader {
+ public:
+  Reader(std::string_view bytes, const std::string& name) : text_(bytes), name_(name), oddities_(table) {}
+
+  void read() {
+    p_ = text_.data();
+    end_ = p_ + text_.size();  // there a zero ends every loop
+    if (text_.starts_with("\xef\xbb\xbf")) {
+      oddities_.add(AscOddity::byte_order_mark, 1, "the file begins with a byte order mark");
+      p_ += 3;
+    }
+    if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff"))
+      throw InputError(name_, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+    has_spines_ = text_.find('<') != text_.npos;
+    for (;;) {
+      inside_ = false;
+      const char c = next();
+      if (c == '(') {
+        inside_ = true;
+        block();
+      } else if (c == ')') {
+        oddities_.add(AscOddity::stray_bracket, line_, "a bracket closes that was not opened");
+        ++p_;
+      } else if (p_ == end_) {
+        return;
+      } else {
+        throw InputError(
+            name_, line_,
+            fmt::format("\"{}\" stands outside of all brackets; in Neurolucida ASC everything is in "
+                        "brackets, and comments begin with ;",
+                        shown(word())));
+      }
+    }
+  }
+
+  bool holds_nothing() const { return ends_.empty() && soma_.points.empty(); }
+  bool to_the_letter() const { return to_the_letter_; }
+  const Annotations& annotations() const { return annotations_; }
+  std::size_t sections() const { return ends_.size(); }
+
+  ReadResult result() {
+    set_soma();
+    for (const Spine& spine : spines_) builder_.add_spine(spine);
+    for (auto& [key, value] : annotations_) builder_.annotate(std::move(key), std::move(value));
+    return {builder_.build(), oddities_.take()};
+  }
+
+ private:
+  // Characters ---------------------------------------------------------------------------------------------
+
+  /// Goes to the next character that is neither blank nor in a comment.
+  char next() {
+    for (;; ++p_) {
+      const char c = *p_;
+      if (c == ' ' || c == '\t') continue;
+      if (c == '\n') {
+        ++line_;
+      } else if (c == '\r') {
+        line_ += p_[1] != '\n';
+      } else if (c == ';') {
+        comment();
+        --p_;
+      } else {
+        return c;
+      }
+    }
+  }
+
+  void comment() {
+    const char* const begin = p_;
+    while (!is_line_end(*p_) && p_ < end_) ++p_;
+    if (inside_ && !to_the_letter_) return;
+    const char* before = begin;
+    while (before > text_.data() && is_blank(before[-1])) --before;
+    const std::string_view said = asc_comment({begin, p_});
+    if (inside_) {
+      if (said.starts_with(asc_own_prefix)) own_comment(said);
+    } else if (line_ == 1 && said == asc_marker) {
+      to_the_letter_ = true;
+    } else if (const bool whole_line = before == text_.data() || is_line_end(before[-1]);
+               whole_line && !said.empty()) {
+      const auto [key, value] = swc_comment(said);
+      annotations_.emplace_back(key, value);
+    }
+  }
+
+  /// The run of characters that begins here, one at least; stays in front of it.
+  std::string_view word() const {
+    const char* q = p_;
+    do ++q;
+    while (q < end_ && !ends_word(*q));
+    return {p_, std::min(q, end_)};
+  }
+
+  /// From a quotation mark to behind the next one.
+  std::string_view quoted() {
+    const char* const begin = ++p_;
+    const std::size_t line = line_;
+    for (; *p_ != '"'; ++p_) {
+      if (p_ == end_)
+        throw InputError(name_, line, "a quotation mark is not closed; close it, or get the whole file");
+      line_ += *p_ == '\n' || (*p_ == '\r' && p_[1] != '\n');
+    }
+    return {begin, p_++};
+  }
+
+  [[noreturn]] void unfinished(std::string_view what, std::size_t begin) const {
+    throw InputError(
+        name_, line_,
+        fmt::format("the file ends inside of {} that begins on line {}; get the whole file, or close "
+                    "its brackets",
+                    what, begin));
+  }
+
+  [[noreturn]] void unexpected(std::string_view where) const {
+    throw InputError(
+        name_, line_,
+        fmt::format("\"{}\" has no meaning in {}; remove it or put it into brackets", shown(word()), where));
+  }
+
+  // Points -------------------------------------------------------------------------------------------------
+
+  /// From the first number to behind the closing bracket.
+  Point point() {
+    std::array<float, 4> v{};
+    std::size_t count = 0;
+    bool exponent = false;
+    while (count < 4 && read_real<ends_word>(p_, v[count], exponent)) {
+      ++count;
+      if (next() == ')') break;
+    }
+    if (count == 4 && *p_ == ')') [[likely]]
+      ++p_;
+    else
+      odd_point(v, count);
+    const float sum = v[0] + v[1] + v[2];
+    if (!(std::abs(sum) < std::numeric_limits<float>::infinity()) || !(v[3] >= 0.f) ||
+        !(v[3] < std::numeric_limits<float>::infinity())) [[unlikely]]
+      unknown_numbers(v);
+    return {v[0], v[1], v[2], .5f * v[3]};
+  }
+
+  void odd_point(std::array<float, 4>& v, std::size_t count) {
+    for (;;) {
+      const char c = next();
+      if (c == ')') break;
+      if (p_ == end_) unfinished("a point", line_);
+      if (count < 3 || c == '(' || c == '|' || c == '<' || c == '>' || c == '"')
+        throw InputError(name_, line_, fmt::format("\"{}\" is not a number; {}", shown(word()), layout));
+      if (begins_number(c) && count == 3 && !is_letter(c))
+        throw InputError(name_, line_, fmt::format("\"{}\" is not a diameter; {}", shown(word()), layout));
+      if (begins_number(c))
+        oddities_.add(AscOddity::extra_numbers, line_, "a point has more than four numbers");
+      p_ += word().size();  // the name of a section (S1) may follow
+    }
+    ++p_;
+    if (count < 3) throw InputError(name_, line_, fmt::format("a point has {} numbers; {}", count, layout));
+    if (count == 3) {
+      oddities_.add(AscOddity::no_diameter, line_, "a point has no diameter");
+      v[3] = 2.f * last_.radius;
+    }
+  }
+
+  void unknown_numbers(std::array<float, 4>& v) {
+    const std::array<float, 3> before{last_.x, last_.y, last_.z};
+    for (std::size_t i = 0; i < 3; ++i)
+      if (!std::isfinite(v[i])) {
+        if (!has_last_)
+          throw InputError(name_, line_, "the first point has no place; give its coordinates in µm");
+        oddities_.add(AscOddity::unknown_place, line_, "a coordinate is not finite");
+        v[i] = before[i];
+      }
+    if (v[3] >= 0.f && std::isfinite(v[3])) return;
+    if (v[3] < 0.f)
+      oddities_.add(AscOddity::negative_diameter, line_,
+                    [&] { return fmt::format("the diameter is {}", v[3]); });
+    else
+      oddities_.add(AscOddity::unknown_diameter, line_, "the diameter is not finite");
+    v[3] = 2.f * last_.radius;
+  }
+
+  // Blocks -------------------------------------------------------------------------------------------------
+
+  struct Block {
+    std::string text;       // one blank between words, no comments
+    std::string_view word;  // its first
+    std::string_view quoted;
+    std::size_t numbers = 0;  // behind the word
+    std::size_t points = 0;   // brackets that begin with a number
+    bool quotes = false, splits = false, more = false;
+  };
+
+  /// From an opening bracket to behind the one that closes it, whatever is between them.
+  Block skip_block() {
+    Block block;
+    const std::size_t begin = line_;
+    std::size_t depth = 0;
+    bool first = true, opened = false, numbers = false;
+    do {
+      const char c = next();
+      if (p_ == end_) unfinished("a block", begin);
+      const bool glued = block.text.empty() || block.text.back() == '(' || c == ')';
+      if (!glued) block.text += ' ';
+      if (c == '(') {
+        ++depth;
+        block.text += c, ++p_;
+        block.splits = block.splits || (opened && depth > 2);
+        opened = true, numbers = false;
+        block.more = block.more || depth > 1;
+        continue;
+      }
+      if (c == ')') {
+        --depth;
+        block.text += c, ++p_;
+      } else if (c == '"') {
+        const std::string_view string = quoted();
+        (block.text += '"') += string;
+        block.text += '"';
+        if (block.quoted.empty()) block.quoted = string;
+        block.quotes = block.quotes || depth == 1;
+        block.more = true;
+      } else {
+        const std::string_view word = this->word();
+        if (first) block.word = word;
+        float value = 0.f;
+        bool exponent = false;
+        const char* q = p_;
+        const bool number = begins_number(c) && read_real<ends_word>(q, value, exponent);
+        block.points += number && opened && depth > 1;
+        block.splits = block.splits || c == '|';
+        block.numbers += number && numbers;
+        numbers = depth == 1 && (first || (numbers && number));
+        block.more = block.more || !first;
+        block.text += word;
+        p_ += word.size();
+      }
+      first = false, opened = false;
+    } while (depth > 0);
+    return block;
+  }
+
+  /// Whether a block in a tree or an outline has a word where a point has a number.
+  void refuse_broken_point(const Block& block, std::size_t line) const {
+    if (block.numbers >= 2 && std::ranges::find(numbered_words, block.word) == numbered_words.end())
+      throw InputError(name_, line, fmt::format("\"{}\" is not a number; {}", shown(block.word), layout));
+  }
+
+  static bool is_marker(const Block& block) { return block.points > 0 && block.word != "Color"; }
+
+  /// A block that is neither tree nor outline.
+  void keep_block(std::string_view key, Block block) {
+    annotations_.emplace_back(key, std::move(block.text));
+  }
+
+  void back_to(const char* p, std::size_t line) { p_ = p, line_ = line; }
+
+  /// A block of the file.
+  void block() {
+    const char* const begin = p_;
+    const std::size_t begin_line = line_;
+    has_last_ = false, last_ = {};
+    branch_ = {};
+    branch_.line = line_;
+    own_soma_.clear();
+    said_.reset();
+    std::optional<SectionKind> type;
+    std::optional<std::string_view> title;
+    bool cell_body = false;
+    std::string properties;
+    ++p_;
+    if (const char c = next(); is_letter(c)) {
+      const std::string_view word = this->word();
+      type = type_of(word);
+      cell_body = same_word(word, "cellbody");
+      if (!type && !cell_body) {
+        back_to(begin, begin_line);
+        return word_block();
+      }
+      p_ += word.size();
+    }
+    for (;;) {  // what is said before the first point
+      const char c = next();
+      const char* const at = p_;
+      const std::size_t at_line = line_;
+      if (c == '"') {
+        const std::string_view string = quoted();
+        if (!title) title = string;
+        properties += fmt::format("{}\"{}\"", properties.empty() ? "" : " ", string);
+        continue;
+      }
+      if (c != '(') break;
+      ++p_;
+      const bool property = is_letter(next());
+      back_to(at, at_line);
+      if (!property) break;
+      Block block = skip_block();
+      if (const auto kind = type_of(block.word)) {
+        type = kind;
+      } else if (same_word(block.word, "cellbody")) {
+        cell_body = true;
+      } else if (is_marker(block)) {
+        keep_block("marker", std::move(block));
+      } else {
+        refuse_broken_point(block, at_line);
+        if (!properties.empty()) properties += ' ';
+        properties += block.text;
+      }
+    }
+    if (p_ == end_) unfinished("a block", begin_line);
+    if (cell_body) return outline(begin_line);
+    if (type) return tree(*type, properties);
+    const char* const content = p_;
+    const std::size_t content_line = line_;
+    back_to(begin, begin_line);
+    Block whole = skip_block();
+    if (title && names_soma(*title) && whole.points > 0) {
+      oddities_.add(AscOddity::outline_by_name, begin_line, [&] {
+        return fmt::format("an outline is called \"{}\" but has no (CellBody)", shown(*title));
+      });
+      back_to(content, content_line);
+      outline(begin_line);
+    } else if (title) {
+      keep_block(whole.points > 0 ? "contour" : "text", std::move(whole));
+    } else if (whole.quotes || (whole.points < 2 && !whole.splits)) {
+      if (whole.more)
+        keep_block("text", std::move(whole));
+      else
+        oddities_.add(AscOddity::empty_tree, begin_line, "brackets with nothing in them");
+    } else {
+      oddities_.add(AscOddity::no_type, begin_line, "a tree has no type");
+      back_to(content, content_line);
+      tree(SectionKind::undefined, properties);
+    }
+  }
+
+  /// A block of the file that begins with a word: (Sections …), a marker.
+  void word_block() {
+    const std::size_t line = line_;
+    Block block = skip_block();
+    if (same_word(block.word, "thumbnail"))
+      oddities_.add(AscOddity::thumbnail, line, "the file holds a small picture of the cell");
+    else if (block.more)
+      keep_block(is_marker(block) ? "marker" : "asc", std::move(block));
+  }
+
+  // The soma -----------------------------------------------------------------------------------------------
+
+  void outline(std::size_t begin) {
+    const std::size_t first = soma_.points.size();
+    for (;;) {
+      const char c = next();
+      if (c == ')') break;
+      if (p_ == end_) unfinished("an outline", begin);
+      if (c == '"') {
+        quoted();
+        continue;
+      }
+      if (c != '(') unexpected("an outline");
+      const char* const at = p_;
+      const std::size_t at_line = line_;
+      ++p_;
+      const char inner = next();
+      if (begins_number(inner)) {
+        last_ = point();
+        has_last_ = true;
+        soma_.points.push_back(last_);
+      } else if (p_ == end_) {
+        unfinished("an outline", begin);
+      } else if (is_letter(inner)) {
+        back_to(at, at_line);
+        Block block = skip_block();
+        refuse_broken_point(block, at_line);
+        if (is_marker(block)) keep_block("marker", std::move(block));
+      } else {
+        unexpected("an outline");
+      }
+    }
+    ++p_;
+    if (!own_soma_.empty()) {
+      if (!soma_.contour_starts.empty() || own_.kind != SomaKind::none)
+        throw InputError(name_, begin, "the soma is said twice; remove one of its outlines");
+      own_ = {.kind = own_soma_parents_.empty() ? SomaKind::sphere : SomaKind::cylinders,
+              .points = own_soma_,
+              .parents = own_soma_parents_,
+              .contour_starts = {}};
+      bool good = own_.points.size() == 1 ? own_soma_parents_.empty()
+                                          : own_soma_parents_.size() == own_.points.size();
+      for (std::size_t i = 0; i < own_.parents.size(); ++i)
+        good = good &&
+               (i == 0 ? own_.parents[i] == -1 : own_.parents[i] >= 0 && own_.parents[i] < std::int32_t(i));
+      if (!good) throw InputError(name_, begin, "the comments FOREST_… of the soma are no soma; remove them");
+      return;
+    }
+    if (soma_.points.size() == first) {
+      oddities_.add(AscOddity::empty_outline, begin, "an outline has no points");
+      return;
+    }
+    if (first > 0) oddities_.add(AscOddity::several_outlines, begin, "the soma has several outlines");
+    if (soma_.contour_starts.empty()) soma_line_ = begin;
+    soma_.contour_starts.push_back(static_cast<std::uint32_t>(first));
+  }
+
+  void set_soma() {
+    if (own_.kind != SomaKind::none) {
+      if (!soma_.points.empty() && !soma_.contour_starts.empty())
+        throw InputError(name_, soma_line_, "the soma is said twice; remove one of its outlines");
+      return builder_.set_soma(std::move(own_));
+    }
+    if (soma_.points.empty()) return;
+    soma_.kind = SomaKind::contours;
+    if (soma_.points.size() < 3) {
+      oddities_.add(AscOddity::small_outline, soma_line_, [&] {
+        return fmt::format("the outline of the soma has {} points", soma_.points.size());
+      });
+      if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
+      soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
+    }
+    builder_.set_soma(std::move(soma_));
+  }
+
+  // Trees --------------------------------------------------------------------------------------------------
+
+  struct Branch {
+    SectionId node;  // the section it leaves from; once its points are over, the one that ends there
+    SectionKind kind = SectionKind::undefined;
+    std::int32_t tag = 0, soma_point = -1;
+    bool over = false;  // no point may follow
+    bool own = false;   // has a section
+    bool split = false, excused = false;
+    std::string_view leaf;
+    std::size_t line = 0;
+  };
+  struct Split {
+    Branch branch;  // that splits
+    std::size_t line = 0;
+    std::size_t daughters = 0;
+  };
+  struct Said {
+    SectionKind kind;
+    std::int32_t tag, soma_point;
+  };
+  struct Seat {  // of a spine, until its section is known
+    std::size_t points;
+    Spine spine;
+    Vec3 head;
+    bool said;
+  };
+
+  void tree(SectionKind kind, const std::string& properties) {
+    branch_.kind = kind, branch_.tag = std::int32_t(kind);
+    const std::size_t begin = branch_.line;
+    properties_ = properties;
+    points_.clear();
+    for (;;) {
+      const char c = next();
+      if (c == '(') {
+        const char* const at = p_;
+        const std::size_t at_line = line_;
+        ++p_;
+        const char inner = next();
+        if (begins_number(inner)) [[likely]] {
+          if (branch_.over) refuse_late_point();
+          if (said_) [[unlikely]]
+            take_what_is_said();
+          last_ = point();
+          has_last_ = true;
+          points_.push_back(last_);
+        } else if (is_letter(inner)) {
+          back_to(at, at_line);
+          inner_block();
+        } else {
+          begin_split(at_line);
+        }
+      } else if (c == '|') {
+        if (splits_.empty())
+          throw InputError(name_, line_, "a | stands outside of a split; put the branches into brackets");
+        ++p_;
+        end_branch();
+        begin_branch();
+      } else if (c == ')') {
+        ++p_;
+        end_branch();
+        if (splits_.empty()) return;
+        Split split = std::move(splits_.back());
+        splits_.pop_back();
+        if (split.daughters == 1)
+          oddities_.add(AscOddity::single_daughter, split.line, "a split has a single branch");
+        branch_ = std::move(split.branch);
+      } else if (c == '<') {
+        spine();
+      } else if (c == '"') {
+        oddities_.add(AscOddity::text_in_tree, line_, "a text stands in a tree");
+        quoted();
+      } else if (p_ == end_) {
+        splits_.empty()
+            ? unfinished("a tree", begin)
+            : unfinished(fmt::format("a split (opened on line {}) of a tree", splits_.back().line), begin);
+      } else if (is_letter(c)) {
+        leaf_word();
+      } else {
+        unexpected("a tree");
+      }
+    }
+  }
+
+  [[noreturn]] void refuse_late_point() const {
+    throw InputError(name_, line_,
+                     branch_.split
+                         ? std::string("a point follows the split that ends its branch; give it a branch of "
+                                       "its own")
+                         : fmt::format("a point follows \"{}\", which ends its branch; remove the word, or "
+                                       "separate the branches by |",
+                                       shown(branch_.leaf)));
+  }
+
+  void begin_split(std::size_t line) {
+    if (splits_.empty() && !branch_.node.valid() && points_.empty() && !branch_.own)
+      oddities_.add(AscOddity::tree_begins_with_split, line, "a tree begins with a split");
+    else if (points_.empty() && !branch_.over)
+      oddities_.add(AscOddity::branch_without_points, line, "a branch splits before its first point");
+    close_points();
+    if (branch_.split) oddities_.add(AscOddity::second_split, line, "a branch splits twice");
+    branch_.split = true;
+    splits_.push_back({branch_, line, 0});
+    begin_branch();
+  }
+
+  void begin_branch() {
+    const Branch& parent = splits_.back().branch;
+    branch_ = {};
+    branch_.node = parent.node;
+    branch_.kind = parent.kind, branch_.tag = parent.tag;
+    branch_.line = line_;
+    if (parent.node.valid()) last_ = ends_[parent.node.value()];
+  }
+
+  void end_branch() {
+    close_points();
+    const bool something = branch_.own || branch_.split;
+    if (!something && !branch_.excused)
+      splits_.empty() ? oddities_.add(AscOddity::empty_tree, branch_.line, "a tree has no points")
+                      : oddities_.add(AscOddity::empty_branch, branch_.line, "a branch has no points");
+    if (!splits_.empty()) splits_.back().daughters += something;
+    if (!branch_.leaf.empty() && branch_.node.valid() && branch_.leaf != leaf_words[0])
+      annotations_.emplace_back("leaf",
+                                fmt::format("{} {}", branch_.leaf, place_text(ends_[branch_.node.value()])));
+  }
+
+  /// The branch has no more points: they become a section.
+  void close_points() {
+    if (branch_.over && points_.empty()) return seat_spines(0);
+    branch_.over = true;
+    std::size_t joint = 0;
+    if (branch_.node.valid() && !points_.empty()) {
+      const Point& node = ends_[branch_.node.value()];
+      const bool repeated = same_place(points_[0], node);
+      if (repeated && points_.size() == 1) {
+        oddities_.add(AscOddity::only_branch_point, branch_.line,
+                      "a branch holds only the point it leaves from");
+        points_.clear();
+        branch_.excused = true;
+      } else if (!repeated) {
+        points_.insert(points_.begin(), {node.x, node.y, node.z, points_[0].radius});
+        joint = 1;
+      }
+    }
+    if (points_.empty()) return seat_spines(0);
+    if (splits_.empty() && !properties_.empty())
+      annotations_.emplace_back("tree", fmt::format("{} {}", place_text(points_[0]), properties_));
+    branch_.node = builder_.add_section(branch_.node, branch_.kind, points_, branch_.tag, branch_.soma_point);
+    branch_.own = true;
+    ends_.push_back(points_.back());
+    if (has_spines_) {
+      float length = 0.f;
+      for (std::size_t i = 1; i < points_.size(); ++i)
+        length += (points_[i].position() - points_[i - 1].position()).norm();
+      lengths_.push_back(length);
+      seat_spines(joint);
+    }
+    points_.clear();
+  }
+
+  /// Of the branch up to here. `joint`: how many points were put before its own.
+  void seat_spines(std::size_t joint) {
+    if (seats_.empty()) return;
+    float position = 0.f;
+    std::size_t at = 0;
+    for (Seat& seat : seats_) {
+      if (!branch_.node.valid()) {
+        oddities_.add(AscOddity::spine_without_place, branch_.line,
+                      "a spine stands where its tree has no point");
+        continue;
+      }
+      seat.spine.section = branch_.node;
+      if (!seat.said) {
+        if (points_.empty()) {  // behind the section, or behind the one the branch leaves from
+          seat.spine.position = lengths_[branch_.node.value()];
+          seat.spine.head = seat.head - ends_[branch_.node.value()].position();
+        } else {
+          const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
+          for (; at < to; ++at) position += (points_[at + 1].position() - points_[at].position()).norm();
+          seat.spine.position = position;
+          seat.spine.head = seat.head - points_[to].position();
+        }
+        if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();
+      }
+      spines_.push_back(seat.spine);
+    }
+    seats_.clear();
+  }
+
+  void spine() {
+    const std::size_t begin = line_;
+    ++p_;
+    own_spine_.reset();
+    bool placed = false;
+    Seat seat{points_.size(), {}, Vec3::Zero(), false};
+    for (;;) {
+      const char c = next();
+      if (c == '>') break;
+      if (p_ == end_) unfinished("a spine", begin);
+      if (c == '"') {
+        quoted();
+        continue;
+      }
+      if (c != '(') unexpected("a spine");
+      const char* const at = p_;
+      const std::size_t at_line = line_;
+      ++p_;
+      const char inner = next();
+      if (begins_number(inner)) {
+        const Point head = point();
+        seat.head = head.position(), seat.spine.head_diameter = 2.f * head.radius;
+        placed = true;
+      } else if (is_letter(inner)) {
+        back_to(at, at_line);
+        const Block block = skip_block();
+        refuse_broken_point(block, at_line);
+        if (same_word(block.word, "class")) seat.spine.shape = shape_of(block.quoted);
+      } else if (p_ == end_) {
+        unfinished("a spine", begin);
+      } else {
+        unexpected("a spine");
+      }
+    }
+    ++p_;
+    if (own_spine_) seat.spine = *std::exchange(own_spine_, std::nullopt), seat.said = true;
+    if (!placed && !seat.said)
+      oddities_.add(AscOddity::spine_without_place, begin, "a spine has no point");
+    else
+      seats_.push_back(seat);
+  }
+
+  /// A block among the points of a tree: a property, a marker, a type.
+  void inner_block() {
+    const std::size_t line = line_;
+    Block block = skip_block();
+    if (const auto kind = type_of(block.word); kind && !block.more) {
+      if (*kind == branch_.kind) return;
+      if (branch_.over || !points_.empty())
+        throw InputError(
+            name_, line,
+            fmt::format("({}) stands among the points of a branch; put it before the first one", block.word));
+      oddities_.add(AscOddity::type_in_branch, line,
+                    [&] { return fmt::format("a branch is of type {}", block.word); });
+      branch_.kind = *kind, branch_.tag = std::int32_t(*kind);
+      return;
+    }
+    refuse_broken_point(block, line);
+    if (is_marker(block)) keep_block("marker", std::move(block));
+  }
+
+  void leaf_word() {
+    const std::string_view leaf = word();
+    if (!std::ranges::all_of(leaf, [](char c) { return is_letter(c); })) unexpected("a tree");
+    if (std::ranges::find(leaf_words, leaf) == leaf_words.end())
+      oddities_.add(AscOddity::unknown_word, line_,
+                    [&] { return fmt::format("\"{}\" ends a branch", shown(leaf)); });
+    p_ += leaf.size();
+    close_points();
+    branch_.leaf = leaf;
+  }
+
+  // Comments of ours ---------------------------------------------------------------------------------------
+
+  void own_comment(std::string_view text) {
+    const std::string_view key = text.substr(0, text.find(' '));
+    const std::string numbers = std::string(text.substr(key.size())) + '\n';
+    const char* p = numbers.data();
+    std::array<double, 7> v{};
+    std::size_t count = 0;
+    for (;;) {
+      while (is_blank(*p)) ++p;
+      float real = 0.f;
+      std::int64_t whole = 0;
+      bool exponent = false;
+      if (const char* q = p; read_integer(q, whole) && count < v.size())
+        p = q, v[count++] = double(whole);
+      else if (count < v.size() && read_real(p, real, exponent) && std::isfinite(real))
+        v[count++] = double(real);
+      else
+        break;
+    }
+    const auto f = [&](std::size_t i) { return float(v[i]); };
+    const auto whole = [&](std::size_t i, double low, double high) {
+      return v[i] == std::floor(v[i]) && v[i] >= low && v[i] <= high;
+    };
+    bool good = *p == '\n';
+    constexpr double most = std::numeric_limits<std::int32_t>::max();
+    if (key == asc_sphere_key) {
+      good = good && count == 4 && v[3] >= 0. && own_soma_.empty();
+      own_soma_ = {{f(0), f(1), f(2), f(3)}};
+      own_soma_parents_.clear();
+    } else if (key == asc_cylinder_key) {
+      good = good && count == 5 && v[3] >= 0. && whole(4, -1., most);
+      if (own_soma_.empty()) own_soma_parents_.clear();
+      own_soma_.push_back({f(0), f(1), f(2), f(3)});
+      if (good) own_soma_parents_.push_back(std::int32_t(v[4]));
+    } else if (key == asc_section_key) {
+      good = good && count == 3 && whole(0, 0., 7.) && v[0] != 1. && whole(1, -most, most) &&
+             whole(2, -1., double(std::max(own_.points.size(), soma_.points.size())) - 1.);
+      if (good) said_ = {SectionKind(int(v[0])), std::int32_t(v[1]), std::int32_t(v[2])};
+    } else if (key == asc_spine_key) {
+      good = good && count == 7 && whole(6, 0., double(SpineShape::branched));
+      if (good)
+        own_spine_ = Spine{{}, f(0), Vec3(f(1), f(2), f(3)), f(4), f(5), static_cast<SpineShape>(int(v[6]))};
+    } else {
+      return;
+    }
+    if (!good)
+      throw InputError(
+          name_, line_,
+          fmt::format("the comment {} does not hold the numbers it should; remove the line", shown(key)));
+  }
+
+  /// At the first point of the branch that a comment of ours is about.
+  void take_what_is_said() {
+    if (!points_.empty())
+      throw InputError(
+          name_, line_,
+          fmt::format("the comment {} stands among the points of a branch; remove it", asc_section_key));
+    branch_.kind = said_->kind, branch_.tag = said_->tag, branch_.soma_point = said_->soma_point;
+    said_.reset();
+  }
+
+  const std::string text_;  // with the zero behind it
+  const std::string& name_;
+  OddityList<AscOddity> oddities_;
+  const char* p_ = nullptr;
+  const char* end_ = nullptr;
+  std::size_t line_ = 1, soma_line_ = 0;
+  bool inside_ = false, to_the_letter_ = false, has_spines_ = false, has_last_ = false;
+
+  MorphologyBuilder builder_;
+  Annotations annotations_;
+  Soma soma_, own_;
+  std::vector<Point> own_soma_;
+  std::vector<std::int32_t> own_soma_parents_;
+
+  Point last_;  // the one before, for numbers that are not known
+  Branch branch_;
+  std::vector<Split> splits_;
+  std::vector<Point> points_;  // of the branch
+  std::string properties_;     // of the tree
+  std::vector<Point> ends_;    // of each section
+  std::vector<float> lengths_;
+  std::vector<Seat> seats_;
+  std::optional<Said> said_;
+  std::optional<Spine> own_spine_;
+  std::vector<Spine> spines_;
+};
+
+}  // namespace
+
+std::string_view asc_comment(std::string_view text) {
+  constexpr std::string_view around = " \t\v\f";
+  text.remove_prefix(std::min(text.find_first_not_of("; \t\v\f"), text.size()));
+  return text.substr(0, text.find_last_not_of(around) + 1);
+}
+
+bool asc_reads_as_annotation(std::string_view text, std::string_view key, std::string_view value) {
+  const std::string name;
+  try {
+    Reader reader(text, name);
+    reader.read();
+    return reader.annotations() == Annotations{{std::string(key), std::string(value)}};
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+bool recognises_asc(std::string_view bytes) {
+  std::size_t at = bytes.starts_with("\xef\xbb\xbf") ? 3 : 0;
+  const auto skip = [&] {
+    while (at < bytes.size()) {
+      if (bytes[at] == ';')
+        at = std::min(bytes.find_first_of("\r\n", at), bytes.size());
+      else if (is_blank(bytes[at]) || is_line_end(bytes[at]))
+        ++at;
+      else
+        break;
+    }
+  };
+  skip();
+  if (at == bytes.size() || bytes[at] != '(') return false;
+  ++at;
+  skip();
+  return at < bytes.size() && (is_letter(bytes[at]) || bytes[at] == '"' || bytes[at] == '(');
+}
+
+ReadResult read_asc(std::string_view bytes, const std::string& name) {
+  Reader reader(bytes, name);
+  reader.read();
+  if (reader.holds_nothing() && !reader.to_the_letter())
+    throw InputError(name, 0, "holds neither a tree nor a cell body; a tree is ((Axon) (x y z diameter) …)");
+  return reader.result();
+}
+
+std::span<const Oddity> asc_oddities() { return table; }
+
+}  // namespace forest::io
