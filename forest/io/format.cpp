@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/asc.h"
+#include "forest/io/nmf.h"
 #include "forest/io/nts.h"
 #include "forest/io/swc.h"
 
@@ -19,6 +20,7 @@ constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 
 constexpr std::array<std::string_view, 1> asc_extensions{".asc"};
 constexpr std::array<std::string_view, 1> nts_extensions{".nts"};
+constexpr std::array<std::string_view, 1> nmf_extensions{".xml"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -45,6 +47,14 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_nts,
            .keeps = nts_keeps},
+    Format{.name = "nmf",
+           .title = "Neurolucida XML (NMF 4)",
+           .extensions = nmf_extensions,
+           .recognises = recognises_nmf,
+           .read = read_nmf,
+           .read_all = nullptr,
+           .write = nullptr,
+           .keeps = {}},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {

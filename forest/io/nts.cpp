@@ -46,30 +46,35 @@ enum class NtsOddity : std::uint8_t {
 constexpr std::array<Oddity, static_cast<std::size_t>(NtsOddity::count)> table{{
     {"columns", false, "read at the blanks between them"},
     {"no-header", false, "read from the first record"},
-    {"point-count", false, "the records that are there are read", "get the whole file, or correct the number"},
+    {"point-count", false, "the records that are there are read",
+     "get the whole file, or correct the number"},
     {"tree-count", false, "the trees that are there are read", "get the whole file, or correct the number"},
     {"late-comment", false, "kept with the comments of the header"},
     {"second-header", true, "read as one neuron", "split the file if it holds several cells"},
     {"small-letters", false, "read like capital ones"},
     {"unknown-code", true, "read as a continuation point", "write the code that is meant"},
     {"negative-diameter", true, "read as that of the point before", "measure it where thickness matters"},
-    {"tag-change", true, "the branch keeps the tag of its first point", "nothing, if the tag marks points and no kind"},
+    {"tag-change", true, "the branch keeps the tag of its first point",
+     "nothing, if the tag marks points and no kind"},
     {"point-without-origin", true, "read as a tree of its own", "attach it to the branch it was traced from"},
     {"origin-alone", true, "read as a neurite of one point"},
-    {"unfinished-branch", true, "read as far as it goes", "get the whole file, or trace the branch to its end"},
+    {"unfinished-branch", true, "read as far as it goes",
+     "get the whole file, or trace the branch to its end"},
     {"open-branches", true, "what was not traced is left out", "get the whole file, or trace them"},
     {"outline-without-start", true, "an outline begins here"},
     {"several-outlines", false, "read as one soma, a stack of outlines"},
     {"small-outline", false, "read as a sphere of its size", "trace the outline with three points or more"},
 }};
 
-constexpr std::string_view layout = "a record is: number code tag x y z thickness, in columns 0-5, 8-10, 11-15, 16-23, "
-                                    "24-31, 32-39, 40-45";
+constexpr std::string_view layout =
+    "a record is: number code tag x y z thickness, in columns 0-5, 8-10, 11-15, 16-23, "
+    "24-31, 32-39, 40-45";
 constexpr std::string_view blanks = " \t\v\f";
 
 std::string_view trim(std::string_view text, std::string_view around = blanks) {
   const auto first = text.find_first_not_of(around);
-  return first == text.npos ? std::string_view{} : text.substr(first, text.find_last_not_of(around) - first + 1);
+  return first == text.npos ? std::string_view{}
+                            : text.substr(first, text.find_last_not_of(around) - first + 1);
 }
 
 /// For a message: at most 60 characters, only printable ASCII.
@@ -116,7 +121,8 @@ std::optional<Record> record_of(std::string_view line) {
     at = line.find_first_not_of(blanks, end);
   }
   const auto reads = [&](const std::array<std::string_view, 7>& fields) {
-    bool good = parse(fields[0], r.number) && is_code(fields[1]) && (fields[2].empty() || parse(fields[2], r.tag));
+    bool good =
+        parse(fields[0], r.number) && is_code(fields[1]) && (fields[2].empty() || parse(fields[2], r.tag));
     for (std::size_t i = 0; i < 4; ++i) good = good && parse(fields[i + 3], r.v[i]);
     r.code = fields[1];
     return good;
@@ -124,7 +130,8 @@ std::optional<Record> record_of(std::string_view line) {
   constexpr std::array<std::pair<std::size_t, std::size_t>, 7> columns{
       {{0, 5}, {8, 10}, {11, 15}, {16, 23}, {24, 31}, {32, 39}, {40, 45}}};
   std::array<std::string_view, 7> fields;
-  for (std::size_t i = 0; i < fields.size(); ++i) fields[i] = field(line, columns[i].first, columns[i].second);
+  for (std::size_t i = 0; i < fields.size(); ++i)
+    fields[i] = field(line, columns[i].first, columns[i].second);
   if (count == tokens.size() && reads(tokens)) {
     r.by_blanks = fields != tokens;
     r.rest = trim(line.substr(end));
@@ -136,9 +143,9 @@ std::optional<Record> record_of(std::string_view line) {
 }
 
 bool same_start(std::string_view text, std::string_view lower) {
-  return text.size() >= lower.size() && std::ranges::equal(text.substr(0, lower.size()), lower, [](char a, char b) {
-    return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b;
-  });
+  return text.size() >= lower.size() &&
+         std::ranges::equal(text.substr(0, lower.size()), lower,
+                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
 }
 
 /// Calls `visit(line, number)` for each; lines end as on any system.
@@ -188,9 +195,11 @@ class Reader {
     } else if (same_start(text, "no. points")) {
       if (header_) oddities_.add(NtsOddity::second_header, line_, "another header begins");
       header_ = true;
-      if (std::int64_t count = 0; parse(trim(text.substr(10)), count)) said_points_ = said_points_.value_or(0) + count;
+      if (std::int64_t count = 0; parse(trim(text.substr(10)), count))
+        said_points_ = said_points_.value_or(0) + count;
     } else if (same_start(text, "no. trees")) {
-      if (std::int64_t count = 0; parse(trim(text.substr(9)), count)) said_trees_ = said_trees_.value_or(0) + count;
+      if (std::int64_t count = 0; parse(trim(text.substr(9)), count))
+        said_trees_ = said_trees_.value_or(0) + count;
     } else if (same_start(text, "point ") && text.find("Type") != text.npos) {
     } else if (same_start(text, "text ") && header_) {
       if (const std::string_view value = trim(text.substr(5)); value != "unassigned")
@@ -222,7 +231,8 @@ class Reader {
     }
     const Point sphere{v[0], v[1], v[2], v[3]};
     if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large(sphere))
-      throw InputError(name_, line_, fmt::format("the comment {} does not hold four numbers; remove it", nts_sphere_key));
+      throw InputError(name_, line_,
+                       fmt::format("the comment {} does not hold four numbers; remove it", nts_sphere_key));
     sphere_ = sphere;
   }
 
@@ -240,15 +250,17 @@ class Reader {
       oddities_.add(NtsOddity::no_header, line_, "records begin without \"No. points\"");
     if (r.by_blanks) oddities_.add(NtsOddity::columns, line_, "the numbers do not stand in their columns");
     if (r.v[3] < 0.f) {
-      oddities_.add(NtsOddity::negative_diameter, line_, [&] { return fmt::format("the thickness is {}", r.v[3]); });
+      oddities_.add(NtsOddity::negative_diameter, line_,
+                    [&] { return fmt::format("the thickness is {}", r.v[3]); });
       r.v[3] = 2.f * last_.radius;
     }
     const Point point{r.v[0], r.v[1], r.v[2], .5f * r.v[3]};
     if (too_large(point))
-      throw InputError(name_, line_,
-                       fmt::format("{} {} {} {} lies outside of what the format can hold, places up to {} µm and "
-                                   "diameters up to {} µm; correct it",
-                                   r.v[0], r.v[1], r.v[2], r.v[3], nts_keeps.largest_place, nts_keeps.largest_diameter));
+      throw InputError(
+          name_, line_,
+          fmt::format("{} {} {} {} lies outside of what the format can hold, places up to {} µm and "
+                      "diameters up to {} µm; correct it",
+                      r.v[0], r.v[1], r.v[2], r.v[3], nts_keeps.largest_place, nts_keeps.largest_diameter));
     if (std::abs(double(r.tag)) > 99999.)
       throw InputError(name_, line_, fmt::format("the tag {} has more than five digits; correct it", r.tag));
     last_ = point;
@@ -257,7 +269,8 @@ class Reader {
     if (upper != r.code) oddities_.add(NtsOddity::small_letters, line_, "a code is written in small letters");
     const NtsCode* code = find_nts_code(upper);
     if (!code) {
-      oddities_.add(NtsOddity::unknown_code, line_, [&] { return fmt::format("the code is \"{}\"", r.code); });
+      oddities_.add(NtsOddity::unknown_code, line_,
+                    [&] { return fmt::format("the code is \"{}\"", r.code); });
       code = find_nts_code("CP");
     }
     take(*code, point, static_cast<std::int32_t>(r.tag), r.rest);
@@ -298,11 +311,13 @@ class Reader {
 
   void compare_counts() {
     if (said_points_ && *said_points_ != std::int64_t(records_))
-      oddities_.add(NtsOddity::point_count, 0,
-                    [&] { return fmt::format("the header says {} points, there are {}", *said_points_, records_); });
+      oddities_.add(NtsOddity::point_count, 0, [&] {
+        return fmt::format("the header says {} points, there are {}", *said_points_, records_);
+      });
     if (said_trees_ && *said_trees_ != trees_ && *said_trees_ != trees_ + outlines_)
-      oddities_.add(NtsOddity::tree_count, 0,
-                    [&] { return fmt::format("the header says {} trees, there are {}", *said_trees_, trees_); });
+      oddities_.add(NtsOddity::tree_count, 0, [&] {
+        return fmt::format("the header says {} trees, there are {}", *said_trees_, trees_);
+      });
   }
 
   // Trees --------------------------------------------------------------------------------------------------
@@ -337,8 +352,9 @@ class Reader {
       open_.pop_back();
       return;
     }
-    oddities_.add(NtsOddity::point_without_origin, line_,
-                  [&] { return fmt::format("the point at {} follows the end of its tree", place_text(point)); });
+    oddities_.add(NtsOddity::point_without_origin, line_, [&] {
+      return fmt::format("the point at {} follows the end of its tree", place_text(point));
+    });
     ++trees_;
   }
 
@@ -384,7 +400,8 @@ class Reader {
     float position = 0.f;
     std::size_t at = 0;
     for (const std::size_t seat : seats_) {
-      for (; at < seat + joint; ++at) position += (points_[at + 1].position() - points_[at].position()).norm();
+      for (; at < seat + joint; ++at)
+        position += (points_[at + 1].position() - points_[at].position()).norm();
       spines_.push_back({.section = id, .position = position});
     }
     seats_.clear();
@@ -412,7 +429,8 @@ class Reader {
   void soma(const NtsCode& code, const Point& point) {
     if (code.part == NtsPart::start || soma_.points.empty()) {
       if (code.part != NtsPart::start)
-        oddities_.add(NtsOddity::outline_without_start, line_, [&] { return fmt::format("{} without SOS", code.code); });
+        oddities_.add(NtsOddity::outline_without_start, line_,
+                      [&] { return fmt::format("{} without SOS", code.code); });
       if (!soma_.points.empty())
         oddities_.add(NtsOddity::several_outlines, line_, "the soma has several outlines");
       soma_.contour_starts.push_back(static_cast<std::uint32_t>(soma_.points.size()));
@@ -427,8 +445,9 @@ class Reader {
     } else if (!soma_.points.empty()) {
       soma_.kind = SomaKind::contours;
       if (soma_.points.size() < 3) {
-        oddities_.add(NtsOddity::small_outline, 0,
-                      [&] { return fmt::format("the outline of the soma has {} points", soma_.points.size()); });
+        oddities_.add(NtsOddity::small_outline, 0, [&] {
+          return fmt::format("the outline of the soma has {} points", soma_.points.size());
+        });
         if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
         soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
       }
@@ -453,7 +472,8 @@ class Reader {
 
   void finish_outline() {
     if (!outline_.empty())
-      annotations_.emplace_back(outline_role_ == NtsRole::dots ? "dots" : "outline", std::exchange(outline_, {}));
+      annotations_.emplace_back(outline_role_ == NtsRole::dots ? "dots" : "outline",
+                                std::exchange(outline_, {}));
   }
 
   const std::string& name_;
@@ -471,13 +491,13 @@ class Reader {
   NtsRole outline_role_ = NtsRole::outline;
   std::string outline_;
 
-  bool active_ = false;          // a branch is being traced
-  SectionId node_;               // it leaves from
-  std::int32_t tag_ = 0;         // of it
-  std::vector<Point> points_;    // of it
+  bool active_ = false;             // a branch is being traced
+  SectionId node_;                  // it leaves from
+  std::int32_t tag_ = 0;            // of it
+  std::vector<Point> points_;       // of it
   std::vector<std::size_t> seats_;  // of its spines, among these points
-  std::vector<SectionId> open_;  // branch points that lack a daughter
-  std::vector<Point> ends_;      // of each section
+  std::vector<SectionId> open_;     // branch points that lack a daughter
+  std::vector<Point> ends_;         // of each section
   std::vector<Spine> spines_;
 };
 
@@ -486,7 +506,8 @@ class Reader {
 bool recognises_nts(std::string_view bytes) {
   bool found = false;
   each_line(bytes, [&](std::string_view line, std::size_t number) {
-    const auto record = line.size() < 200 && !trim(line).empty() && is_digit(trim(line)[0]) ? record_of(line) : std::nullopt;
+    const auto record =
+        line.size() < 200 && !trim(line).empty() && is_digit(trim(line)[0]) ? record_of(line) : std::nullopt;
     found = same_start(trim(line), "no. points") || (record && find_nts_code(record->code));
     return !found && number < 100;
   });

@@ -27,15 +27,19 @@ struct Row {
 };
 
 std::string file(const std::vector<Row>& rows, std::size_t trees = 1) {
-  std::string text = fmt::format("No. points {:6}\r\nNo. trees  {:6}\r\nText  unassigned\r\n \r\n Point  Type  Tag\r\n\r\n",
-                                 rows.size(), trees);
+  std::string text =
+      fmt::format("No. points {:6}\r\nNo. trees  {:6}\r\nText  unassigned\r\n \r\n Point  Type  Tag\r\n\r\n",
+                  rows.size(), trees);
   std::size_t number = 0;
   for (const Row& r : rows)
-    text += fmt::format("{:6}  {:>3}{:5}{:8.1f}{:8.1f}{:8.1f}{:6.1f}\r\n", ++number, r.code, r.tag, r.x, r.y, r.z, r.thick);
+    text += fmt::format("{:6}  {:>3}{:5}{:8.1f}{:8.1f}{:8.1f}{:6.1f}\r\n", ++number, r.code, r.tag, r.x, r.y,
+                        r.z, r.thick);
   return text;
 }
 
-ReadResult cell(const std::vector<Row>& rows, std::size_t trees = 1) { return read_nts(file(rows, trees), "cell.nts"); }
+ReadResult cell(const std::vector<Row>& rows, std::size_t trees = 1) {
+  return read_nts(file(rows, trees), "cell.nts");
+}
 
 TEST(Nts, TheOrderOfRecordsIsTheTree) {
   const auto [m, warnings] = cell({{"MTO", 4, 0, 5, 0, 4},
@@ -109,26 +113,27 @@ TEST(Nts, OutlinesOfTheSomaAreAStackAndSpineBasesSpines) {
 TEST(Nts, OtherCodesAndNamesAreWrittenAgain) {
   std::string text = file({{"MTO", 0, 0, 0, 0, 1}, {"FS", 0, 0, 5, 0, 3}, {"ES", 0, 0, 9, 0, 3}});
   text.insert(text.find("1.0\r\n") + 3, "  15rc01  soma       7");
-  text += "     4   OS    0     1.0     2.0     3.0    .5\n     5  OCP    0     2.0     2.0     3.0    .5\n"
-          "     6   DS    0    -1.5     2.0     3.0    .5\n";
+  text +=
+      "     4   OS    0     1.0     2.0     3.0    .5\n     5  OCP    0     2.0     2.0     3.0    .5\n"
+      "     6   DS    0    -1.5     2.0     3.0    .5\n";
   const Morphology m = read_nts("by hand\n" + text, "cell.nts").morphology;
-  const Annotations expected{{"comment", "by hand"},
-                             {"eutectic", "MTO 15rc01 soma 7 0 0 0"},
-                             {"eutectic", "FS 0 5 0"},
-                             {"eutectic", "ES 0 9 0"},
-                             {"outline", "1 2 3 0.5; 2 2 3 0.5"},
-                             {"dots", "-1.5 2 3 0.5"}};
+  const Annotations expected{
+      {"comment", "by hand"},   {"eutectic", "MTO 15rc01 soma 7 0 0 0"}, {"eutectic", "FS 0 5 0"},
+      {"eutectic", "ES 0 9 0"}, {"outline", "1 2 3 0.5; 2 2 3 0.5"},     {"dots", "-1.5 2 3 0.5"}};
   EXPECT_EQ(m.annotations(), expected);
   const std::string written = write_nts(m);
-  for (const std::string_view part : {"   1.0  15rc01  soma       7\n", "   FS    0      .0     5.0      .0   3.0\n",
-                                      "   ES    0      .0     9.0      .0   3.0\n", "   OE    0     2.0     2.0     3.0    .5\n"})
+  for (const std::string_view part :
+       {"   1.0  15rc01  soma       7\n", "   FS    0      .0     5.0      .0   3.0\n",
+        "   ES    0      .0     9.0      .0   3.0\n", "   OE    0     2.0     2.0     3.0    .5\n"})
     EXPECT_NE(written.find(part), written.npos) << part << written;
   EXPECT_TRUE(std::ranges::is_permutation(read_nts(written, "again").morphology.annotations(), expected));
 }
 
 TEST(Nts, FieldsMayTouchAndColumnsMayBeLost) {
   const Morphology touching =
-      read_nts("     1  MTO   19-12345.6-99999.9 12345.6 999.9\n     2   NE   19-12345.6-99989.9 12345.61234.5\n", "cell")
+      read_nts(
+          "     1  MTO   19-12345.6-99999.9 12345.6 999.9\n     2   NE   19-12345.6-99989.9 12345.61234.5\n",
+          "cell")
           .morphology;
   EXPECT_EQ(touching.points()[0], (Point{-12345.6f, -99999.9f, 12345.6f, .5f * 999.9f}));
   EXPECT_EQ(touching.points()[1].radius, .5f * 1234.5f);
@@ -167,7 +172,9 @@ TEST(Nts, EveryDeviationIsToldAndRead) {
       {"open-branches", 9, file({stem[0], {"BP", 0, 0, 10, 0, 1}, {"NE", 0, 0, 15, 0, 1}}), 15.},
       {"outline-without-start", 9, file(with({{"OCP", 0, 0, 0, 0, 0}})), 10.},
       {"several-outlines", 12,
-       file(with({{"SOS", 0, 0, 0, 0, 0}, {"SCP", 0, 1, 0, 0, 0}, {"SOE", 0, 1, 1, 0, 0}, {"SOS", 0, 0, 0, 1, 0}})), 10.},
+       file(with(
+           {{"SOS", 0, 0, 0, 0, 0}, {"SCP", 0, 1, 0, 0, 0}, {"SOE", 0, 1, 1, 0, 0}, {"SOS", 0, 0, 0, 1, 0}})),
+       10.},
       {"small-outline", 0, file(with({{"SOS", 0, 0, 0, 0, 0}})), 10.},
   };
   std::set<std::string_view> seen;
@@ -241,10 +248,12 @@ TEST(Nts, AHundredThousandOpenBranchesAreReadAndWritten) {
 
 TEST(Nts, SpinesBetweenPointsGetAPointOfTheirOwn) {
   MorphologyBuilder b;
-  const auto stem = b.add_section({}, SectionKind::apical, std::vector<Point>{{0, 0, 0, 1}, {0, 10, 0, .5f}, {0, 20, 0, .5f}});
+  const auto stem = b.add_section({}, SectionKind::apical,
+                                  std::vector<Point>{{0, 0, 0, 1}, {0, 10, 0, .5f}, {0, 20, 0, .5f}});
   b.add_section(stem, SectionKind::apical, std::vector<Point>{{0, 30, 0, .5f}});
   b.add_section(stem, SectionKind::apical, std::vector<Point>{{5, 20, 0, .5f}});
-  for (const float position : {-1.f, 4.f, 10.f, 10.01f, 99.f}) b.add_spine({.section = stem, .position = position});
+  for (const float position : {-1.f, 4.f, 10.f, 10.01f, 99.f})
+    b.add_spine({.section = stem, .position = position});
   b.add_spine({.section = SectionId(2), .position = 2.5f});
   const Morphology read = read_nts(write_nts(b.build()), "spines").morphology;
   ASSERT_EQ(read.spines().size(), 6u);
@@ -257,7 +266,8 @@ TEST(Nts, IsRecognisedWhateverTheExtension) {
   EXPECT_TRUE(recognises_nts(file({{"MTO", 0, 0, 0, 0, 1}})));
   EXPECT_TRUE(recognises_nts("     1  MTO    0      .0      .0      .0    .6\n"));
   EXPECT_EQ(format_of("cell.ca1", file({{"MTO", 0, 0, 0, 0, 1}})).name, "nts");
-  for (const std::string_view text : {"", "1 1 0 0 0 1 -1\n", "((Axon) (0 0 0 1))", "<mbf>"}) EXPECT_FALSE(recognises_nts(text));
+  for (const std::string_view text : {"", "1 1 0 0 0 1 -1\n", "((Axon) (0 0 0 1))", "<mbf>"})
+    EXPECT_FALSE(recognises_nts(text));
 }
 
 TEST(NtsRealData, TheTracedNeuronIsReadAndSurvivesExport) {

@@ -30,7 +30,8 @@ std::int32_t tag_of(const Section& section) {
 /// One decimal, and no zero before the point.
 std::string decimal(float value) {
   std::array<char, 32> digits;
-  const auto end = std::to_chars(digits.data(), digits.data() + digits.size(), double(value), std::chars_format::fixed, 1);
+  const auto end =
+      std::to_chars(digits.data(), digits.data() + digits.size(), double(value), std::chars_format::fixed, 1);
   std::string text(digits.data(), end.ptr);
   if (text == "-0.0") text.erase(0, 1);
   if (text.starts_with("0.")) text.erase(0, 1);
@@ -60,14 +61,15 @@ class Writer {
     });
     std::span<const Spine* const> rest(spines);
     for (std::size_t s = 0; s < m_.sections().size(); ++s) {
-      const auto own = std::ranges::find_if(rest, [&](const Spine* spine) { return spine->section.value() != s; });
+      const auto own =
+          std::ranges::find_if(rest, [&](const Spine* spine) { return spine->section.value() != s; });
       section(SectionId(s), rest.first(std::size_t(own - rest.begin())));
       rest = rest.subspan(std::size_t(own - rest.begin()));
     }
     place_words();
     if (records_.size() > most_records)
-      throw LimitError(fmt::format("the neuron has {} points, NTS counts to {}; choose another format", records_.size(),
-                                   most_records));
+      throw LimitError(fmt::format("the neuron has {} points, NTS counts to {}; choose another format",
+                                   records_.size(), most_records));
     return text();
   }
 
@@ -77,12 +79,13 @@ class Writer {
   void header() {
     for (const auto& [key, value] : m_.annotations()) {
       const std::string_view trimmed = nts_comment(value);
-      if (key == "Text" && text_line_.empty() && trimmed == value && !value.empty() && value != "unassigned" &&
-          value.find_first_of("\r\n") == value.npos)
+      if (key == "Text" && text_line_.empty() && trimmed == value && !value.empty() &&
+          value != "unassigned" && value.find_first_of("\r\n") == value.npos)
         text_line_ = value;
       else if (key == "eutectic" && is_word(value))
         words_.push_back(value);
-      else if (!((key == "outline" || key == "dots") && outline(key == "outline" ? NtsRole::outline : NtsRole::dots, value)))
+      else if (!((key == "outline" || key == "dots") &&
+                 outline(key == "outline" ? NtsRole::outline : NtsRole::dots, value)))
         comment(key == "comment" ? value : key + ' ' + value);
     }
   }
@@ -107,7 +110,8 @@ class Writer {
     if (blanks < 3 || blanks > 6 || value.ends_with(' ')) return false;
     const NtsCode* code = find_nts_code(value.substr(0, value.find(' ')));
     if (!code) return false;
-    if (code->role == NtsRole::swelling || code->role == NtsRole::end) return blanks == 3 && code->code != "NE";
+    if (code->role == NtsRole::swelling || code->role == NtsRole::end)
+      return blanks == 3 && code->code != "NE";
     if (code->role != NtsRole::origin) return false;
     const std::string_view last = last_name(value);
     return blanks == 3 ? code->code != "MTO" : last != nts_no_name[std::size_t(blanks - 4)];
@@ -155,7 +159,7 @@ class Writer {
     if (words_.empty()) return;
     PlacedWords origins, swellings, ends;
     const auto words_for = [&](NtsRole role) -> PlacedWords* {
-      return role == NtsRole::origin ? &origins
+      return role == NtsRole::origin                               ? &origins
              : role == NtsRole::point || role == NtsRole::swelling ? &swellings
              : role == NtsRole::end                                ? &ends
                                                                    : nullptr;
@@ -165,7 +169,8 @@ class Writer {
     for (const std::string& value : words_) {
       const NtsCode* code = find_nts_code(std::string_view(value).substr(0, value.find(' ')));
       const std::size_t at = place_at(value);
-      if (!words_for(code->role)->add(value.substr(at), value.substr(0, at - 1))) comment("eutectic " + value);
+      if (!words_for(code->role)->add(value.substr(at), value.substr(0, at - 1)))
+        comment("eutectic " + value);
     }
     for (Record& record : records_)
       if (PlacedWords* words = words_for(record.role))
@@ -183,8 +188,10 @@ class Writer {
     if (soma.kind == SomaKind::none) return;
     if (soma.kind == SomaKind::contours) {
       for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-        const std::size_t end = i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
-        outline(NtsRole::soma, std::span(soma.points).subspan(soma.contour_starts[i], end - soma.contour_starts[i]));
+        const std::size_t end =
+            i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
+        outline(NtsRole::soma,
+                std::span(soma.points).subspan(soma.contour_starts[i], end - soma.contour_starts[i]));
       }
       return;
     }
@@ -194,7 +201,9 @@ class Writer {
       comments_ += ' ', append_number(comments_, number);
     comments_ += '\n';
     std::vector<Point> circle;
-    const auto inside = [](float value) { return std::clamp(value, -nts_keeps.largest_place, nts_keeps.largest_place); };
+    const auto inside = [](float value) {
+      return std::clamp(value, -nts_keeps.largest_place, nts_keeps.largest_place);
+    };
     for (int i = 0; i < circle_points; ++i) {
       const double angle = 2. * std::numbers::pi * i / circle_points;
       circle.push_back({inside(sphere.x + sphere.radius * float(std::cos(angle))),
@@ -217,7 +226,8 @@ class Writer {
       // The branch point is written by the parent. It is repeated where the reader could not tell this section's first
       // point from it.
       const bool still = same_place(points[0], points[1]);
-      const bool said = points[0].radius != points[1].radius || (still && (points.size() > 2 || daughters > 1));
+      const bool said =
+          points[0].radius != points[1].radius || (still && (points.size() > 2 || daughters > 1));
       if (!said) points.erase(points.begin());
     }
     const std::int32_t tag = tag_of(s);
@@ -236,10 +246,12 @@ class Writer {
     for (std::size_t k = 0; k < points.size(); ++k) {
       const bool origin = root && k == 0, last = k + 1 == points.size() && !origin;
       const float step = (points[k].position() - before.position()).norm(), here = at + step;
-      for (; !origin && spine < spines.size() && (position() < here - at_point || (last && daughters != 1)); ++spine) {
+      for (; !origin && spine < spines.size() && (position() < here - at_point || (last && daughters != 1));
+           ++spine) {
         const float t = step > 0.f ? std::clamp((position() - at) / step, 0.f, 1.f) : 0.f;
         const Vec3 place = before.position() + t * (points[k].position() - before.position());
-        put(NtsRole::spine, {place.x(), place.y(), place.z(), before.radius + t * (points[k].radius - before.radius)});
+        put(NtsRole::spine,
+            {place.x(), place.y(), place.z(), before.radius + t * (points[k].radius - before.radius)});
       }
       if (origin) {
         put(NtsRole::origin, points[k]);
@@ -264,8 +276,9 @@ class Writer {
 
   std::string text() const {
     const auto trees = std::ranges::count(records_, NtsRole::origin, &Record::role);
-    std::string text = fmt::format("{}\n{}No. points {:6}\nNo. trees  {:6}\nText  {}\n\n", nts_marker, comments_,
-                                   records_.size(), trees, text_line_.empty() ? "unassigned" : text_line_);
+    std::string text =
+        fmt::format("{}\n{}No. points {:6}\nNo. trees  {:6}\nText  {}\n\n", nts_marker, comments_,
+                    records_.size(), trees, text_line_.empty() ? "unassigned" : text_line_);
     text += " Point  Type  Tag      X       Y       Z  Thick   Name    Attachment\n\n";
     text.reserve(text.size() + 48 * records_.size());
     std::size_t number = 0;
