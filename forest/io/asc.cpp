@@ -109,24 +109,6 @@ std::optional<SectionKind> type_of(std::string_view word) {
   return std::nullopt;
 }
 
-bool names_soma(std::string_view name) {
-  return same_word(name, "cellbody") || same_word(name, "cell body") || same_word(name, "soma");
-}
-
-SpineShape shape_of(std::string_view text) {
-  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{
-      {{"stubby", SpineShape::stubby},
-       {"thin", SpineShape::thin},
-       {"mushroom", SpineShape::mushroom},
-       {"filopodi", SpineShape::filopodium},
-       {"branched", SpineShape::branched}}};
-  std::string lower(text);
-  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-  for (const auto& [word, shape] : shapes)
-    if (lower.find(word) != lower.npos) return shape;
-  return SpineShape::unknown;
-}
-
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 /// For a message: at most 40 characters, only printable ASCII.
@@ -774,7 +756,7 @@ class Reader {
         back_to(at, at_line);
         const Block block = skip_block();
         refuse_broken_point(block, at_line);
-        if (same_word(block.word, "class")) seat.spine.shape = shape_of(block.quoted);
+        if (same_word(block.word, "class")) seat.spine.shape = spine_shape(block.quoted);
       } else if (p_ == end_) {
         unfinished("a spine", begin);
       } else {
@@ -832,7 +814,7 @@ class Reader {
       float real = 0.f;
       std::int64_t whole = 0;
       bool exponent = false;
-      if (const char* q = p; read_integer(q, whole) && count < v.size())
+      if (const char* q = p; read_integer(q, whole) && count < v.size() && !(whole == 0 && *p == '-'))
         p = q, v[count++] = double(whole);
       else if (count < v.size() && read_real(p, real, exponent) && std::isfinite(real))
         v[count++] = double(real);
@@ -914,6 +896,27 @@ std::string_view asc_comment(std::string_view text) {
   constexpr std::string_view around = " \t\v\f";
   text.remove_prefix(std::min(text.find_first_not_of("; \t\v\f"), text.size()));
   return text.substr(0, text.find_last_not_of(around) + 1);
+}
+
+bool names_soma(std::string_view name) {
+  while (!name.empty() &&
+         (is_digit(name.back()) || is_blank(name.back()) || name.back() == '_' || name.back() == '-'))
+    name.remove_suffix(1);
+  return same_word(name, "cellbody") || same_word(name, "cell body") || same_word(name, "soma");
+}
+
+SpineShape spine_shape(std::string_view text) {
+  constexpr std::array<std::pair<std::string_view, SpineShape>, 5> shapes{
+      {{"stubby", SpineShape::stubby},
+       {"thin", SpineShape::thin},
+       {"mushroom", SpineShape::mushroom},
+       {"filopodi", SpineShape::filopodium},
+       {"branched", SpineShape::branched}}};
+  std::string lower(text);
+  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  for (const auto& [word, shape] : shapes)
+    if (lower.find(word) != lower.npos) return shape;
+  return SpineShape::unknown;
 }
 
 bool asc_reads_as_annotation(std::string_view text, std::string_view key, std::string_view value) {

@@ -1,9 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
-// What the reader and the writer of ASC agree upon.
+// Words of Neurolucida's files that readers and writers agree upon.
 #pragma once
 
 #include <string>
 #include <string_view>
+
+#include "forest/morphology/morphology.h"
 
 namespace forest::io {
 
@@ -21,6 +23,12 @@ inline constexpr std::string_view asc_own_prefix = "FOREST_";
 
 /// The text of a comment without the signs and blanks around it.
 std::string_view asc_comment(std::string_view text);
+
+/// Whether an outline of this name is the soma's: "CellBody", "Cell Body", "Soma", also with a number.
+bool names_soma(std::string_view name);
+
+/// Of the words of Neurolucida; unknown for others.
+SpineShape spine_shape(std::string_view text);
 
 /// Whether `text` is read as exactly this annotation and nothing else, so that it may be written as it stands.
 bool asc_reads_as_annotation(std::string_view text, std::string_view key, std::string_view value);

@@ -14,6 +14,7 @@
 #include "forest/io/h5.h"
 #include "forest/io/neuroml.h"
 #include "forest/io/neuron.h"
+#include "forest/io/nmf.h"
 #include "forest/io/nts.h"
 #include "forest/io/swc.h"
 
@@ -32,6 +33,7 @@ constexpr std::array<std::string_view, 1> acc_extensions{".acc"};
 
 constexpr std::array<std::string_view, 1> asc_extensions{".asc"};
 constexpr std::array<std::string_view, 1> nts_extensions{".nts"};
+constexpr std::array<std::string_view, 1> nmf_extensions{".xml"};
 
 constexpr std::array table{
     Format{.name = "swc",
@@ -106,6 +108,14 @@ constexpr std::array table{
            .read_all = nullptr,
            .write = write_nts,
            .keeps = nts_keeps},
+    Format{.name = "nmf",
+           .title = "Neurolucida XML (NMF 4)",
+           .extensions = nmf_extensions,
+           .recognises = recognises_nmf,
+           .read = read_nmf,
+           .read_all = nullptr,
+           .write = nullptr,
+           .keeps = {}},
 };
 
 std::string lower_extension(const std::filesystem::path& path) {
