@@ -15,6 +15,7 @@
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
 #include "forest/io/format.h"
+#include "forest/io/model.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
@@ -33,7 +34,28 @@ struct Options {
   std::string format;
   fs::path out;
   bool verbose = false, force = false;
+  std::string geometry = "cylinder";
+  io::ModelOptions model;
 };
+
+/// What the files become: a row of one of the two tables.
+struct Target {
+  const io::Format* neuron = nullptr;
+  const io::ModelFormat* model = nullptr;
+
+  std::string_view name() const { return neuron ? neuron->name : model->name; }
+  std::string_view title() const { return neuron ? neuron->title : model->title; }
+  std::string_view extension() const { return neuron ? neuron->extensions[0] : model->extensions[0]; }
+};
+
+Target target_of(const fs::path& path) {
+  if (const io::ModelFormat* model = io::model_format_of(path)) return {.model = model};
+  return {.neuron = &io::format_of(path)};
+}
+
+Target find_target(std::string_view name) {
+  return {.neuron = io::find_format(name), .model = io::find_model_format(name)};
+}
 
 /// A neuron on its way from one file to another.
 struct Conversion {
@@ -46,8 +68,8 @@ struct Conversion {
 using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
 
 /// The conversions of one file: one, or one for each of its cells.
-std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const io::Format& format,
-                                     const Put& put) {
+std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const Target& target,
+                                     const io::ModelOptions& options, const Put& put) {
   std::vector<Conversion> done;
   std::set<std::string> names;  // of its cells
   try {
@@ -67,9 +89,17 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
         conversion.to.replace_filename(to.stem().string() + "-" + cell + to.extension().string());
       }
       conversion.warnings = cells[i].read.warnings;
-      conversion.losses = io::losses(cells[i].read.morphology, format.keeps);
-      put(conversion.to, format.write(cells[i].read.morphology));
+      const Morphology& m = cells[i].read.morphology;
+      if (target.neuron) {
+        conversion.losses = io::losses(m, target.neuron->keeps);
+        put(conversion.to, target.neuron->write(m));
+      } else {
+        const io::Model model = io::make_model(m, conversion.to.stem().string(), options, conversion.losses);
+        put(conversion.to, target.model->write(model));
+      }
     }
+  } catch (const LimitError& error) {
+    done.back().error = fmt::format("{}: {}", escaped(from.string()), error.what());
   } catch (const InputError& error) {
     done.emplace_back(Conversion{from, {}, {}, {}, error.what()});
   }
@@ -99,7 +129,7 @@ nlohmann::ordered_json json_of(const std::vector<io::Warning>& warnings) {
 
 /// Where each file goes: beside its name with another extension, folders as they lie below the one that was named.
 std::vector<fs::path> targets(const Options& options, const std::vector<fs::path>& files,
-                              const io::Format& format) {
+                              std::string_view extension) {
   std::vector<fs::path> targets;
   std::map<fs::path, fs::path> taken;
   for (const fs::path& file : files) {
@@ -109,7 +139,7 @@ std::vector<fs::path> targets(const Options& options, const std::vector<fs::path
         if (const fs::path relative = file.lexically_relative(named);
             !relative.empty() && *relative.begin() != "..")
           below = relative;
-    fs::path to = options.out / below.replace_extension(std::string(format.extensions[0]));
+    fs::path to = options.out / below.replace_extension(std::string(extension));
     if (const auto [other, fresh] = taken.try_emplace(to, file); !fresh)
       throw Error(fmt::format("{} and {} would both become {}; convert them into different folders",
                               other->second.string(), file.string(), to.string()));
@@ -125,16 +155,19 @@ void run(Options options, Console& console) {
     single = options.files[1];
     options.files.pop_back();
   }
-  const io::Format& format = single.empty() ? *io::find_format(options.format) : io::format_of(single);
-  if (!format.write)
-    throw Error(fmt::format("{} can be read but not written; choose another format", format.title));
+  const Target target = single.empty() ? find_target(options.format) : target_of(single);
+  if (target.neuron && !target.neuron->write)
+    throw Error(fmt::format("{} can be read but not written; choose another format", target.title()));
+  options.model.geometry = *io::geometry(options.geometry);
+  if (target.model) io::check(*target.model, options.model.geometry);
   const std::vector<fs::path> files = neuron_files(options.files, console);
-  const std::vector<fs::path> to = single.empty() ? targets(options, files, format) : std::vector{single};
+  const std::vector<fs::path> to =
+      single.empty() ? targets(options, files, target.extension()) : std::vector{single};
   std::vector<std::vector<Conversion>> done(files.size());
   const auto each = [&](const char* stage, const Put& put) {
     console.progress().begin(stage, files.size());
     parallel_for(files.size(), 1, [&](std::size_t i) {
-      done[i] = convert_file(files[i], to[i], format, put);
+      done[i] = convert_file(files[i], to[i], target, options.model, put);
       console.progress().advance();
     });
     console.progress().end();
@@ -171,9 +204,9 @@ void run(Options options, Console& console) {
         entry["error"] = c.error;
       list.push_back(std::move(entry));
     }
-  console.print({{"format", format.name}, {"written", written}, {"failed", failed}, {"files", list}});
+  console.print({{"format", target.name()}, {"written", written}, {"failed", failed}, {"files", list}});
   console.say(fmt::format(
-      "{} written as {}, {} not read, {} kinds of loss told above{}", written, format.title, failed, lost,
+      "{} written as {}, {} not read, {} kinds of loss told above{}", written, target.title(), failed, lost,
       oddities && !options.verbose ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
                                    : ""));
   if (failed)
@@ -188,6 +221,7 @@ std::function<void()> convert(CLI::App& command, Console& console) {
   std::vector<std::string> formats;
   for (const io::Format& format : io::formats())
     if (format.write) formats.emplace_back(format.name);
+  for (const io::ModelFormat& format : io::model_formats()) formats.emplace_back(format.name);
   command
       .add_option("files", options->files,
                   "A file and the one to make of it; or files and folders, with --out")
@@ -196,6 +230,20 @@ std::function<void()> convert(CLI::App& command, Console& console) {
       ->check(CLI::IsMember(formats));
   command.add_option("--out", options->out, "Folder for the files that are made; made when there is none")
       ->type_name("DIR");
+  const auto geometries = io::geometry_names();
+  command
+      .add_option("--geometry", options->geometry,
+                  "Of a model: lines, a tube a section, or one closed surface")
+      ->check(CLI::IsMember(std::vector<std::string>(geometries.begin(), geometries.end())))
+      ->capture_default_str();
+  command.add_option("--sides", options->model.sides, "Of a model's cylinders")
+      ->check(CLI::Range(3, 64))
+      ->capture_default_str();
+  command
+      .add_option("--detail", options->model.detail,
+                  "Grid of a model's surface in µm; 0 chooses by the thinnest branch")
+      ->check(CLI::Range(0.f, 1000.f))
+      ->capture_default_str();
   command.add_flag("--verbose", options->verbose, "Show every oddity of the files that are read");
   add_force(command, options->force);
   command.parse_complete_callback([options] {

@@ -81,8 +81,13 @@ void expect_same_neuron(const Morphology& read, const Morphology& written, const
 TEST_P(EveryFormat, IsFoundByItsNameAndItsExtensions) {
   const Format& format = GetParam();
   EXPECT_EQ(find_format(format.name)->title, format.title);
-  for (const std::string_view extension : format.extensions)
+  for (const std::string_view extension : format.extensions) {
+    const auto shares = [&](const Format& other) {
+      return std::ranges::find(other.extensions, extension) != other.extensions.end();
+    };
+    if (std::ranges::count_if(formats(), shares) > 1) continue;  // the content decides
     EXPECT_EQ(format_of("a folder.swc/cell" + std::string(extension)).name, format.name);
+  }
 }
 
 TEST_P(EveryFormat, ReadsBackWhatItWrote) {
@@ -296,12 +301,14 @@ INSTANTIATE_TEST_SUITE_P(Formats, EveryFormat, testing::ValuesIn(formats().begin
                            return name;
                          });
 
-TEST(Formats, HaveDifferentNamesAndExtensions) {
+TEST(Formats, HaveDifferentNamesAndExtensionsOrAreRecognised) {
   std::set<std::string_view> names, extensions;
   for (const Format& format : formats()) {
     EXPECT_TRUE(names.insert(format.name).second);
-    for (const std::string_view extension : format.extensions)
-      EXPECT_TRUE(extensions.insert(extension).second);
+    for (const std::string_view extension : format.extensions) {
+      const bool fresh = extensions.insert(extension).second;
+      EXPECT_TRUE(fresh || format.recognises) << extension;
+    }
   }
 }
 

@@ -1,0 +1,142 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/morphology/surface.h"
+
+#include <algorithm>
+#include <optional>
+#include <vector>
+
+namespace forest {
+namespace {
+
+/// A piece of the soma: a sphere (both ends alike) or a tapered cylinder.
+struct SomaPiece {
+  Vec4 a, b;
+};
+
+Vec4 vec4(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
+
+/// The middle and mean radius of each outline, in their order.
+std::vector<Vec4> outlines(const Soma& soma) {
+  std::vector<Vec4> discs;
+  for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
+    const std::size_t begin = soma.contour_starts[i];
+    const std::size_t end =
+        i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
+    if (begin == end) continue;
+    const auto loop = std::span(soma.points).subspan(begin, end - begin);
+    Vec3 middle = Vec3::Zero();
+    for (const Point& p : loop) middle += p.position() / float(loop.size());
+    float radius = 0.f;
+    for (const Point& p : loop) radius += (p.position() - middle).norm() / float(loop.size());
+    discs.emplace_back(middle.x(), middle.y(), middle.z(), radius);
+  }
+  return discs;
+}
+
+std::vector<SomaPiece> pieces(const Soma& soma) {
+  std::vector<SomaPiece> list;
+  const Vec4 mean = vec4(soma.sphere());
+  if (soma.kind == SomaKind::cylinders) {
+    for (std::size_t i = 0; i < soma.points.size(); ++i)
+      if (soma.parents[i] >= 0)
+        list.push_back({vec4(soma.points[std::size_t(soma.parents[i])]), vec4(soma.points[i])});
+  } else if (soma.kind == SomaKind::contours) {
+    const std::vector<Vec4> discs = outlines(soma);
+    for (std::size_t i = 1; i < discs.size(); ++i) list.push_back({discs[i - 1], discs[i]});
+  }
+  if (list.empty() && soma.kind != SomaKind::none && mean.w() > 0.f) list.push_back({mean, mean});
+  return list;
+}
+
+/// Where a stem is fastened within the soma; none for a root that lies apart.
+std::optional<Vec3> anchor(const Morphology& m, const Section& stem) {
+  const Soma& soma = m.soma();
+  if (soma.kind == SomaKind::none) return {};
+  const Point mean = soma.sphere();
+  const Vec3 begin = m.points()[stem.first_point].position();
+  const bool known = stem.soma_point >= 0 && std::size_t(stem.soma_point) < soma.points.size();
+  if (!known && (begin - mean.position()).norm() > 1.5f * mean.radius) return {};
+  if (known && soma.kind == SomaKind::cylinders) return soma.points[std::size_t(stem.soma_point)].position();
+  return mean.position();
+}
+
+/// The points of a section with radii of at least `thinnest`, a stem from where it is fastened. Empty for a root of a
+/// single point that is fastened nowhere.
+std::vector<Vec4> axis(const Morphology& m, SectionId id, float thinnest) {
+  const auto points = m.points(id);
+  std::vector<Vec4> list;
+  list.reserve(points.size() + 1);
+  const auto add = [&](const Vec3& at, float radius) {
+    list.emplace_back(at.x(), at.y(), at.z(), std::max(radius, thinnest));
+  };
+  if (!m.section(id).parent.valid())
+    if (const auto inside = anchor(m, m.section(id)); inside && *inside != points[0].position()) {
+      const float soma = m.soma().sphere().radius;
+      add(*inside, soma > 0.f ? std::min(points[0].radius, soma) : points[0].radius);
+    }
+  for (const Point& p : points) add(p.position(), p.radius);
+  return list;
+}
+
+std::vector<SectionId> all_sections(const Morphology& m) {
+  std::vector<SectionId> ids;
+  for (std::uint32_t i = 0; i < m.sections().size(); ++i) ids.emplace_back(i);
+  return ids;
+}
+
+std::uint8_t label_of(const Section& section) { return std::uint8_t(section.kind); }
+
+}  // namespace
+
+Lines sticks(const Morphology& m) {
+  Lines lines;
+  const Soma& soma = m.soma();
+  std::vector<Vec3> line;
+  if (soma.kind == SomaKind::sphere) {
+    const Point p = soma.sphere();
+    for (int i = 0; i < 3; ++i) {
+      const Vec3 half = p.radius * Vec3::Unit(i);
+      lines.add(std::array{Vec3(p.position() - half), Vec3(p.position() + half)}, soma_label);
+    }
+  } else if (soma.kind == SomaKind::contours) {
+    for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
+      const std::size_t end =
+          i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
+      line.clear();
+      for (std::size_t p = soma.contour_starts[i]; p < end; ++p) line.push_back(soma.points[p].position());
+      if (line.empty()) continue;
+      line.push_back(line[0]);
+      lines.add(line, soma_label);
+    }
+  } else {
+    for (const SomaPiece& piece : pieces(soma))
+      lines.add(std::array{Vec3(piece.a.head<3>()), Vec3(piece.b.head<3>())}, soma_label);
+  }
+  for (const SectionId id : all_sections(m)) {
+    line.clear();
+    for (const Vec4& p : axis(m, id, 0.f)) line.push_back(p.head<3>());
+    if (line.size() > 1) lines.add(line, label_of(m.section(id)));
+  }
+  return lines;
+}
+
+Mesh tubes(const Morphology& m, const TubeOptions& options) {
+  Mesh mesh;
+  for (const SomaPiece& piece : pieces(m.soma())) {
+    std::array ends{piece.a, piece.b};
+    for (Vec4& end : ends) end.w() = std::max(end.w(), options.thinnest);
+    append(mesh, ends[0] == ends[1]
+                     ? icosphere(ends[0].head<3>(), ends[0].w(), 3, soma_label)
+                     : tube(ends, std::max(24, options.sides), Cap::flat, Cap::flat, soma_label));
+  }
+  for (const SectionId id : all_sections(m)) {
+    const Section& section = m.section(id);
+    const std::vector<Vec4> line = axis(m, id, options.thinnest);
+    const bool free = !section.parent.valid() && !anchor(m, section);
+    append(mesh, tube(line, options.sides, free ? Cap::flat : Cap::dome,
+                      m.is_terminal(id) ? Cap::flat : Cap::dome, label_of(section)));
+  }
+  return mesh;
+}
+
+}  // namespace forest
