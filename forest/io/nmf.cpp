@@ -6,13 +6,14 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <optional>
+#include <pugixml.hpp>
 #include <utility>
 #include <vector>
 
 #include <fmt/format.h>
-#include <pugixml.hpp>
 
 #include "forest/core/error.h"
 #include "forest/io/asc_words.h"
@@ -45,26 +46,32 @@ enum class NmfOddity : std::uint8_t {
 
 constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"version", false, "read like version 4.0"},
-    {"unknown-type", true, "read as a neurite of undefined kind", "give it the type Axon, Dendrite or Apical Dendrite"},
+    {"unknown-type", true, "read as a neurite of undefined kind",
+     "give it the type Axon, Dendrite or Apical Dendrite"},
     {"no-diameter", true, "read with the diameter of the point before", "measure it where thickness matters"},
-    {"negative-diameter", true, "read as unknown, so as that of the point before", "measure it where thickness matters"},
+    {"negative-diameter", true, "read as unknown, so as that of the point before",
+     "measure it where thickness matters"},
     {"unknown-diameter", true, "read as that of the point before", "measure it where thickness matters"},
-    {"unknown-place", true, "read as that of the point before", "look it up in the tracing, or remove the point"},
-    {"several-outlines", false, "read as one soma, a stack of outlines", "split the file if it holds several cells"},
+    {"unknown-place", true, "read as that of the point before",
+     "look it up in the tracing, or remove the point"},
+    {"several-outlines", false, "read as one soma, a stack of outlines",
+     "nothing, if they are outlines of one soma; split the file if it holds several cells"},
     {"small-outline", false, "read as a sphere of its size", "trace the outline with three points or more"},
     {"empty-tree", true, "skipped"},
-    {"tree-begins-with-split", true, "its branches are read as trees of their own", "give it the point they leave from"},
+    {"tree-begins-with-split", true, "its branches are read as trees of their own",
+     "give it the point they leave from"},
     {"branch-without-points", true, "what hangs on it hangs on the branch point before"},
     {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
     {"empty-branch", true, "skipped"},
-    {"single-daughter", true, "kept as a section of its own"},
+    {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
     {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
     {"skipped-element", true, "skipped", "keep the file beside what is made of it"},
 }};
 
 // Of the file, not of the cell; and what is said in other ways.
-constexpr std::array<std::string_view, 9> silent_elements{"filefacts", "thumbnail", "property",    "images", "sparcdata",
-                                                          "scalebar",  "zsmear",    "resolution", "description"};
+constexpr std::array<std::string_view, 9> silent_elements{"filefacts", "thumbnail",  "property",
+                                                          "images",    "sparcdata",  "scalebar",
+                                                          "zsmear",    "resolution", "description"};
 constexpr int circle_points = 16;
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
@@ -83,7 +90,8 @@ std::string_view name_of(const pugi::xml_node& element) {
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r\n");
-  return first == text.npos ? std::string_view{} : text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
+  return first == text.npos ? std::string_view{}
+                            : text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
 }
 
 /// The decimal number; an infinity for the words NaN, INF and for numbers out of range.
@@ -92,8 +100,10 @@ std::optional<float> number(std::string_view text) {
   if (text.starts_with('+')) text.remove_prefix(1);
   float value = 0.f;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || end != text.data() + text.size() || error == std::errc::invalid_argument) return std::nullopt;
-  if (error == std::errc::result_out_of_range || !std::isfinite(value)) return std::numeric_limits<float>::infinity();
+  if (text.empty() || end != text.data() + text.size() || error == std::errc::invalid_argument)
+    return std::nullopt;
+  if (error == std::errc::result_out_of_range || !std::isfinite(value))
+    return std::numeric_limits<float>::infinity();
   return value;
 }
 
@@ -128,7 +138,8 @@ std::string asc_word(std::string_view text, std::string_view otherwise) {
 
 class Reader {
  public:
-  Reader(std::string_view bytes, const std::string& name) : text_(in_utf8(bytes)), name_(name), oddities_(table) {
+  Reader(std::string_view bytes, const std::string& name)
+      : text_(in_utf8(bytes)), name_(name), oddities_(table) {
     if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff"))
       throw InputError(name_, 1, "is written in UTF-16; save it as UTF-8");
   }
@@ -138,8 +149,9 @@ class Reader {
     const auto parsed =
         document.load_buffer(text_.data(), text_.size(), pugi::parse_default, pugi::encoding_utf8);
     if (!parsed)
-      throw InputError(name_, line_at(std::size_t(std::max<std::ptrdiff_t>(parsed.offset, 0))),
-                       fmt::format("the XML is broken ({}); get the whole file or mend it there", parsed.description()));
+      throw InputError(
+          name_, line_at(std::size_t(std::max<std::ptrdiff_t>(parsed.offset, 0))),
+          fmt::format("the XML is broken ({}); get the whole file or mend it there", parsed.description()));
     pugi::xml_node root = document.document_element();
     if (name_of(root) != "mbf")
       throw InputError(name_, line_of(root), "has no <mbf> element; Neurolucida XML is all inside of one");
@@ -186,10 +198,13 @@ class Reader {
 
   std::size_t line_at(std::size_t offset) {
     if (line_ends_.empty()) {
-      for (std::size_t at = text_.find('\n'); at != text_.npos; at = text_.find('\n', at + 1)) line_ends_.push_back(at);
+      for (std::size_t at = text_.find('\n'); at != text_.npos; at = text_.find('\n', at + 1))
+        line_ends_.push_back(at);
       line_ends_.push_back(text_.size());
     }
-    return std::size_t(std::ranges::lower_bound(line_ends_, std::min(offset, text_.size())) - line_ends_.begin()) + 1;
+    return std::size_t(std::ranges::lower_bound(line_ends_, std::min(offset, text_.size())) -
+                       line_ends_.begin()) +
+           1;
   }
   std::size_t line_of(const pugi::xml_node& element) {
     return line_at(std::size_t(std::max<std::ptrdiff_t>(element.offset_debug(), 0)));
@@ -208,7 +223,8 @@ class Reader {
 
   void skip(const pugi::xml_node& element) {
     const std::string_view what = name_of(element);
-    if (element.type() == pugi::node_element && std::ranges::find(silent_elements, what) == silent_elements.end())
+    if (element.type() == pugi::node_element &&
+        std::ranges::find(silent_elements, what) == silent_elements.end())
       oddities_.add(NmfOddity::skipped_element, line_of(element),
                     [&] { return fmt::format("there is an element <{}>", what.substr(0, 40)); });
   }
@@ -221,9 +237,10 @@ class Reader {
       if (!attribute && *key == 'd') return std::nullopt;
       const auto found = number(attribute.value());
       if (!found)
-        throw InputError(name_, line_of(element),
-                         fmt::format("a point has {} = \"{}\", which is no number; a point is <point x= y= z= d=/>", key,
-                                     std::string_view(attribute.value()).substr(0, 40)));
+        throw InputError(
+            name_, line_of(element),
+            fmt::format("a point has {} = \"{}\", which is no number; a point is <point x= y= z= d=/>", key,
+                        std::string_view(attribute.value()).substr(0, 40)));
       return found;
     };
     std::array<float, 3> place{*value("x"), *value("y"), *value("z")};
@@ -231,16 +248,17 @@ class Reader {
     for (std::size_t i = 0; i < 3; ++i)
       if (!std::isfinite(place[i])) {
         if (!has_last_)
-          throw InputError(name_, line_of(element), "the first point has no place; give its coordinates in µm");
+          throw InputError(name_, line_of(element),
+                           "the first point has no place; give its coordinates in µm");
         oddities_.add(NmfOddity::unknown_place, line_of(element), "a coordinate is not finite");
         place[i] = before[i];
       }
     const std::optional<float> said = value("d");
     float diameter = said.value_or(0.f);
     if (!said || !std::isfinite(diameter) || diameter < 0.f) {
-      const NmfOddity odd = !said             ? NmfOddity::no_diameter
+      const NmfOddity odd = !said            ? NmfOddity::no_diameter
                             : diameter < 0.f ? NmfOddity::negative_diameter
-                                              : NmfOddity::unknown_diameter;
+                                             : NmfOddity::unknown_diameter;
       oddities_.add(odd, line_of(element), [&] {
         return !said ? std::string("a point has no diameter") : fmt::format("the diameter is {}", diameter);
       });
@@ -266,18 +284,21 @@ class Reader {
     has_last_ = false, last_ = {};
     std::vector<Point> points = points_of(element);
     const std::string shape = lower(element.attribute("shape").value());
-    if (points.size() == 2 && (shape == "circle" || shape == "box")) points = drawn(shape == "circle", points);
+    if (points.size() == 2 && (shape == "circle" || shape == "box"))
+      points = drawn(shape == "circle", points);
     for (const pugi::xml_node child : element.children())
       if (name_of(child) == "marker") marker(child, "Dot");
     if (points.empty()) return;
     if (names_soma(element.attribute("name").value())) {
-      if (!soma_.points.empty()) oddities_.add(NmfOddity::several_outlines, line_of(element), "the soma has several outlines");
+      if (!soma_.points.empty())
+        oddities_.add(NmfOddity::several_outlines, line_of(element), "the soma has several outlines");
       soma_.contour_starts.push_back(std::uint32_t(soma_.points.size()));
       soma_.points.insert(soma_.points.end(), points.begin(), points.end());
       return;
     }
     std::string text = '(' + quoted(element.attribute("name").value());
-    if (const std::string color = asc_color(element.attribute("color").value()); !color.empty()) text += ' ' + color;
+    if (const std::string color = asc_color(element.attribute("color").value()); !color.empty())
+      text += ' ' + color;
     if (element.attribute("closed").as_bool()) text += " (Closed)";
     for (const Point& p : points) text += ' ' + asc_point(p);
     builder_.annotate("contour", text + ')');
@@ -291,7 +312,8 @@ class Reader {
     std::vector<Point> points;
     for (int i = 0; std::isfinite(radius) && i < circle_points; ++i) {
       const double angle = 2. * std::numbers::pi * i / circle_points;
-      points.push_back({a.x + radius * float(std::cos(angle)), a.y + radius * float(std::sin(angle)), a.z, a.radius});
+      points.push_back(
+          {a.x + radius * float(std::cos(angle)), a.y + radius * float(std::sin(angle)), a.z, a.radius});
     }
     const bool good = std::ranges::all_of(points, [](const Point& p) { return p.position().allFinite(); });
     return good && !points.empty() ? points : two;
@@ -299,7 +321,8 @@ class Reader {
 
   void marker(const pugi::xml_node& element, std::string_view word) {
     std::string text = '(' + asc_word(element.attribute("type").value(), word);
-    if (const std::string color = asc_color(element.attribute("color").value()); !color.empty()) text += ' ' + color;
+    if (const std::string color = asc_color(element.attribute("color").value()); !color.empty())
+      text += ' ' + color;
     const std::string_view name = element.attribute("name").value();
     if (!name.empty()) text += fmt::format(" (Name {})", quoted(name));
     const Point last = std::exchange(last_, Point{});
@@ -314,8 +337,9 @@ class Reader {
     if (soma_.points.empty()) return;
     soma_.kind = SomaKind::contours;
     if (soma_.points.size() < 3) {
-      oddities_.add(NmfOddity::small_outline, 0,
-                    [&] { return fmt::format("the outline of the soma has {} points", soma_.points.size()); });
+      oddities_.add(NmfOddity::small_outline, 0, [&] {
+        return fmt::format("the outline of the soma has {} points", soma_.points.size());
+      });
       if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
       soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
     }
@@ -340,17 +364,18 @@ class Reader {
 
   void tree(const pugi::xml_node& element) {
     const std::string type = lower(element.attribute("type").value());
-    kind_ = type == "axon"                                   ? SectionKind::axon
-            : type == "dendrite"                             ? SectionKind::basal
+    kind_ = type == "axon"                                  ? SectionKind::axon
+            : type == "dendrite"                            ? SectionKind::basal
             : type == "apical" || type == "apical dendrite" ? SectionKind::apical
-                                                             : SectionKind::undefined;
+                                                            : SectionKind::undefined;
     if (kind_ == SectionKind::undefined)
       oddities_.add(NmfOddity::unknown_type, line_of(element),
                     [&] { return fmt::format("a tree is of type \"{}\"", type.substr(0, 40)); });
     has_last_ = false, last_ = {};
     std::vector<Branch> open;
     const auto begin = [&](const pugi::xml_node& branch, SectionId node) {
-      open.push_back({.element = branch, .next = branch.first_child(), .node = node, .points = {}, .seats = {}});
+      open.push_back(
+          {.element = branch, .next = branch.first_child(), .node = node, .points = {}, .seats = {}});
       if (node.valid()) last_ = ends_[node.value()];
     };
     begin(element, {});
@@ -367,16 +392,18 @@ class Reader {
       const std::string_view what = name_of(child);
       if (what == "point") {
         if (branch.over)
-          throw InputError(name_, line_of(child),
-                           "a point follows the branches that leave from its branch; give it a branch of its own");
+          throw InputError(
+              name_, line_of(child),
+              "a point follows the branches that leave from its branch; give it a branch of its own");
         last_ = point(child);
         has_last_ = true;
         branch.points.push_back(last_);
       } else if (what == "branch") {
         if (branch.points.empty() && !branch.over)
-          oddities_.add(open.size() == 1 ? NmfOddity::tree_begins_with_split : NmfOddity::branch_without_points,
-                        line_of(branch.element),
-                        open.size() == 1 ? "a tree begins with a branch" : "a branch splits before its first point");
+          oddities_.add(
+              open.size() == 1 ? NmfOddity::tree_begins_with_split : NmfOddity::branch_without_points,
+              line_of(branch.element),
+              open.size() == 1 ? "a tree begins with a branch" : "a branch splits before its first point");
         close(branch, open.size() == 1);
         ++branch.branches;
         begin(child, branch.node);
@@ -428,7 +455,7 @@ class Reader {
       float length = 0.f;
       for (std::size_t i = 1; i < branch.points.size(); ++i)
         length += (branch.points[i].position() - branch.points[i - 1].position()).norm();
-      lengths_.push_back(length);
+      lengths_.push_back(std::min(length, std::numeric_limits<float>::max()));
     }
     seat_spines(branch, joint);
     branch.over = true;
@@ -476,7 +503,8 @@ class Reader {
     std::size_t at = 0;
     for (Seat& seat : branch.seats) {
       if (!branch.node.valid()) {
-        oddities_.add(NmfOddity::spine_without_place, line_of(branch.element), "a spine stands where its tree has no point");
+        oddities_.add(NmfOddity::spine_without_place, line_of(branch.element),
+                      "a spine stands where its tree has no point");
         continue;
       }
       seat.spine.section = branch.node;
@@ -485,8 +513,9 @@ class Reader {
         seat.spine.head = seat.head - ends_[branch.node.value()].position();
       } else {
         const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
-        for (; at < to; ++at) position += (branch.points[at + 1].position() - branch.points[at].position()).norm();
-        seat.spine.position = position;
+        for (; at < to; ++at)
+          position += (branch.points[at + 1].position() - branch.points[at].position()).norm();
+        seat.spine.position = std::min(position, std::numeric_limits<float>::max());
         seat.spine.head = seat.head - branch.points[to].position();
       }
       if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();

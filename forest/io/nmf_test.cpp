@@ -18,11 +18,15 @@
 namespace forest::io {
 namespace {
 
-std::string file(std::string_view inside) { return fmt::format("<mbf version=\"4.0\">\n{}\n</mbf>\n", inside); }
+std::string file(std::string_view inside) {
+  return fmt::format("<mbf version=\"4.0\">\n{}\n</mbf>\n", inside);
+}
 std::string point(float x, float y, float z, float d) {
   return fmt::format("<point x=\"{}\" y=\"{}\" z=\"{}\" d=\"{}\"/>", x, y, z, d);
 }
-std::string tree(std::string_view inside) { return fmt::format("<tree type=\"Axon\" leaf=\"Normal\">{}</tree>", inside); }
+std::string tree(std::string_view inside) {
+  return fmt::format("<tree type=\"Axon\" leaf=\"Normal\">{}</tree>", inside);
+}
 
 const std::string& sample() {
   static const std::string bytes(MappedFile(FOREST_SOURCE_DIR "/fuzz/corpus/nmf/cell.xml").text());
@@ -54,8 +58,9 @@ TEST(Nmf, ReadsSomaStemSpineAndBranches) {
 
 TEST(Nmf, WhatItKeepsAsAnnotationsIsWrittenIntoAsc) {
   const std::string asc = write_asc(read_nmf(sample(), "cell.xml").morphology);
-  for (const std::string_view part : {"\n(\"pia\" (Color RGB (0, 255, 0)) (0 99 0 1))\n", "\n(Circle1 (Color", "Incomplete\n",
-                                      "( (Color RGB (255, 255, 0)) (Set \"traced\") (Apical)\n"})
+  for (const std::string_view part :
+       {"\n(\"pia\" (Color RGB (0, 255, 0)) (0 99 0 1))\n", "\n(Circle1 (Color", "Incomplete\n",
+        "( (Color RGB (255, 255, 0)) (Set \"traced\") (Apical)\n"})
     EXPECT_NE(asc.find(part), asc.npos) << part;
 }
 
@@ -63,8 +68,8 @@ TEST(Nmf, EveryDeviationIsToldWithItsLineAndRead) {
   const std::string stem = point(0, 0, 0, 1) + point(0, 10, 0, 1) + "\n";
   const auto branch = [](const std::string& inside) { return "<branch>" + inside + "</branch>"; };
   const std::string a = branch(point(1, 10, 0, 1)), b = branch(point(2, 10, 0, 1));
-  const std::string soma = "<contour name=\"Soma 1\" shape=\"Contour\">" + point(5, 0, 0, 1) + point(0, 5, 0, 1) +
-                           point(-5, 0, 0, 1) + "</contour>\n";
+  const std::string soma = "<contour name=\"Soma 1\" shape=\"Contour\">" + point(5, 0, 0, 1) +
+                           point(0, 5, 0, 1) + point(-5, 0, 0, 1) + "</contour>\n";
   struct Deviation {
     std::string_view code;
     std::size_t line;
@@ -79,7 +84,8 @@ TEST(Nmf, EveryDeviationIsToldWithItsLineAndRead) {
       {"unknown-diameter", 3, file(tree(stem + "<point x=\"0\" y=\"20\" z=\"0\" d=\"NaN\"/>")), 20.},
       {"unknown-place", 3, file(tree(stem + "<point x=\"1e99\" y=\"20\" z=\"0\" d=\"1\"/>")), 20.},
       {"several-outlines", 3, file(soma + soma + tree(stem)), 10.},
-      {"small-outline", 0, file("<contour name=\"Cell Body\">" + point(5, 0, 0, 8) + "</contour>" + tree(stem)), 10.},
+      {"small-outline", 0,
+       file("<contour name=\"Cell Body\">" + point(5, 0, 0, 8) + "</contour>" + tree(stem)), 10.},
       {"empty-tree", 3, file(soma + tree("")), 0.},
       {"tree-begins-with-split", 2, file(tree(branch(stem) + branch(stem))), 20.},
       {"branch-without-points", 3, file(tree(stem + branch(a + b) + a)), 10. + 1. + 2. + 1.},
@@ -138,7 +144,8 @@ TEST(Nmf, WhatCannotBeReadIsRefusedWithItsLine) {
 TEST(Nmf, HostileXmlCostsNeitherStackNorMemory) {
   constexpr std::size_t levels = 100000;
   std::string deep;
-  for (std::size_t i = 0; i < levels; ++i) deep += "<branch>" + point(float(i), 1, 1, 1) + "<branch>" + point(0, 0, 0, 1) + "</branch>";
+  for (std::size_t i = 0; i < levels; ++i)
+    deep += "<branch>" + point(float(i), 1, 1, 1) + "<branch>" + point(0, 0, 0, 1) + "</branch>";
   for (std::size_t i = 0; i < levels; ++i) deep += "</branch>";
   const Morphology m = read_nmf(file(tree(point(0, 0, 0, 1) + deep)), "deep.xml").morphology;
   EXPECT_GT(m.sections().size(), levels);
@@ -146,7 +153,9 @@ TEST(Nmf, HostileXmlCostsNeitherStackNorMemory) {
   for (std::size_t i = 0; i < levels; ++i) open += "<tree>";
   EXPECT_THROW(read_nmf(open, "open.xml"), InputError);
   std::string laughs = "<!DOCTYPE mbf [<!ENTITY a \"aaaaaaaaaa\">";
-  for (char c = 'b'; c <= 'z'; ++c) laughs += fmt::format("<!ENTITY {} \"&{};&{};&{};&{};&{};&{};&{};&{};\">", c, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1, c - 1);
+  for (char c = 'b'; c <= 'z'; ++c)
+    laughs += fmt::format("<!ENTITY {} \"&{};&{};&{};&{};&{};&{};&{};&{};\">", c, c - 1, c - 1, c - 1, c - 1,
+                          c - 1, c - 1, c - 1, c - 1);
   laughs += "<!ENTITY file SYSTEM \"file:///etc/passwd\">]>" +
             file("<description>&z;&file;</description>" + tree(point(0, 0, 0, 1)));
   const Morphology laughed = read_nmf(laughs, "laughs.xml").morphology;
@@ -182,18 +191,20 @@ TEST(Nmf, CutOrChangedAnywhereItIsAnErrorOrANeuron) {
 }
 
 TEST(Nmf, LatinLettersBecomeUtf8AndCirclesOutlines) {
-  const Morphology m = read_nmf("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>" +
-                                    file("<description>5 \xb5m</description><contour name=\"Soma\" shape=\"Circle\">" +
-                                         point(1, 0, 0, 1) + point(6, 0, 0, 1) + "</contour>"),
-                                "cell.xml")
-                           .morphology;
+  const Morphology m =
+      read_nmf("<?xml version=\"1.0\" encoding=\"ISO-8859-1\"?>" +
+                   file("<description>5 \xb5m</description><contour name=\"Soma\" shape=\"Circle\">" +
+                        point(1, 0, 0, 1) + point(6, 0, 0, 1) + "</contour>"),
+               "cell.xml")
+          .morphology;
   EXPECT_EQ(m.annotations()[0].second, "5 µm");
   EXPECT_NEAR(m.soma().sphere().radius, 5., 1e-5);
 }
 
 TEST(Nmf, IsRecognisedByItsElement) {
   EXPECT_TRUE(recognises_nmf(sample()));
-  for (const std::string_view text : {"", "<mbf", "<mbfx>", "<neuroml>", "((Axon)"}) EXPECT_FALSE(recognises_nmf(text));
+  for (const std::string_view text : {"", "<mbf", "<mbfx>", "<neuroml>", "((Axon)"})
+    EXPECT_FALSE(recognises_nmf(text));
 }
 
 TEST(NmfRealData, TheTracedNeuronIsReadAndSurvivesAsc) {
