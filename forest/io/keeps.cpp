@@ -19,7 +19,7 @@ std::int32_t kept_tag(const Section& s, const Keeps& keeps) {
 // Decimal steps are divided by, since their reciprocal is exact.
 float rounded(float value, const Keeps& keeps) {
   const double per = std::round(1. / double(keeps.step));
-  return float(std::round(double(value) * per) / per);
+  return float(std::round(double(value) * per) / per) + 0.f;  // a zero without sign
 }
 
 Point kept_point(const Point& p, const Keeps& keeps) {
