@@ -157,7 +157,7 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
 }
 
 void check_fits(const Morphology& m, const Keeps& keeps) {
-  const auto check = [&](std::span<const Point> points) {
+  const auto check = [&](std::span<const Point> points, bool diameters) {
     for (const Point& p : points) {
       const float place = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
       if (place > keeps.largest_place)
@@ -165,7 +165,7 @@ void check_fits(const Morphology& m, const Keeps& keeps) {
             fmt::format("a coordinate of {} µm does not fit into the format, which holds up to {} µm; "
                         "move the neuron to the origin or choose another format",
                         place, keeps.largest_place));
-      if (2. * double(p.radius) > double(keeps.largest_diameter) &&
+      if (diameters && 2. * double(p.radius) > double(keeps.largest_diameter) &&
           keeps.largest_diameter < std::numeric_limits<float>::max())
         throw LimitError(
             fmt::format("a diameter of {} µm does not fit into the format, which holds up to {} µm; "
@@ -173,8 +173,9 @@ void check_fits(const Morphology& m, const Keeps& keeps) {
                         2. * double(p.radius), keeps.largest_diameter));
     }
   };
-  check(m.points());
-  check(m.soma().points);
+  check(m.points(), true);
+  const Soma soma = kept_soma(m.soma(), keeps);
+  check(soma.points, soma.kind != SomaKind::sphere);
 }
 
 Morphology as_kept(const Morphology& m, const Keeps& keeps) {

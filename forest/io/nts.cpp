@@ -231,7 +231,7 @@ class Reader {
       text = trim(text.substr(end));
     }
     const Point sphere{v[0], v[1], v[2], v[3]};
-    if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large(sphere))
+    if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large({sphere.x, sphere.y, sphere.z, 0.f}))
       throw InputError(name_, line_,
                        fmt::format("the comment {} does not hold four numbers; remove it", nts_sphere_key));
     sphere_ = sphere;
