@@ -50,11 +50,13 @@ enum class AscOddity : std::uint8_t {
   count
 };
 
+constexpr std::string_view several_cells =
+    "nothing, if they are outlines of one soma; split the file if it holds several cells";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"thumbnail", false, "the picture is skipped"},
-    {"several-outlines", false, "read as one soma, a stack of outlines",
-     "split the file if it holds several cells"},
+    {"several-outlines", false, "read as one soma, a stack of outlines", several_cells},
     {"outline-by-name", true, "read as an outline of the soma"},
     {"small-outline", true, "read as a sphere of its size", "trace the outline with three points or more"},
     {"empty-outline", true, "skipped"},
@@ -75,9 +77,9 @@ constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"branch-without-points", true, "what hangs on it hangs on the branch point before"},
     {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
     {"empty-branch", true, "skipped"},
-    {"single-daughter", true, "kept as a section of its own"},
+    {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
     {"second-split", true, "its branches leave from the same branch point"},
-    {"unknown-word", true, "kept like the words for the end of a branch"},
+    {"unknown-word", true, "kept like the words for the end of a branch", "nothing, if it is meant so"},
     {"text-in-tree", true, "skipped", "keep it outside of the tree"},
     {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
     {"stray-bracket", true, "skipped"},
@@ -603,7 +605,7 @@ class Reader {
         if (splits_.empty()) return;
         Split split = std::move(splits_.back());
         splits_.pop_back();
-        if (split.daughters == 1)
+        if (split.daughters == 1 && !to_the_letter_)
           oddities_.add(AscOddity::single_daughter, split.line, "a split has a single branch");
         branch_ = std::move(split.branch);
       } else if (c == '<') {
@@ -694,7 +696,7 @@ class Reader {
       float length = 0.f;
       for (std::size_t i = 1; i < points_.size(); ++i)
         length += (points_[i].position() - points_[i - 1].position()).norm();
-      lengths_.push_back(length);
+      lengths_.push_back(std::min(length, std::numeric_limits<float>::max()));
       seat_spines(joint);
     }
     points_.clear();
@@ -719,7 +721,7 @@ class Reader {
         } else {
           const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
           for (; at < to; ++at) position += (points_[at + 1].position() - points_[at].position()).norm();
-          seat.spine.position = position;
+          seat.spine.position = std::min(position, std::numeric_limits<float>::max());
           seat.spine.head = seat.head - points_[to].position();
         }
         if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();

@@ -163,7 +163,8 @@ class Writer {
   void sort_spines() {
     for (std::size_t i = 0; i < m_.spines().size(); ++i) spines_.push_back(&m_.spines()[i]);
     std::ranges::stable_sort(spines_, [](const Spine* a, const Spine* b) {
-      return a->section != b->section ? a->section.value() < b->section.value() : a->position < b->position;
+      return a->section != b->section ? a->section.value() < b->section.value()
+                                      : finite(a->position) < finite(b->position);
     });
   }
 
@@ -211,11 +212,11 @@ class Writer {
     float position = 0.f;
     for (std::size_t i = 0; i < points.size(); ++i) {
       indent(depth), point(points[i]), text_ += '\n';
-      const float next = i + 1 < points.size()
-                             ? position + (points[i + 1].position() - points[i].position()).norm()
-                             : std::numeric_limits<float>::infinity();
+      const bool last = i + 1 == points.size();
+      const float next =
+          last ? position : finite(position + (points[i + 1].position() - points[i].position()).norm());
       for (; spine_ < spines_.size() && spines_[spine_]->section == id &&
-             (spines_[spine_]->position < next || i + 1 == points.size());
+             (last || finite(spines_[spine_]->position) < next);
            ++spine_)
         spine(*spines_[spine_], points[i], depth);
       position = next;

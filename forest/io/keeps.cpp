@@ -20,7 +20,7 @@ std::int32_t kept_tag(const Section& s, const Keeps& keeps) {
 // Decimal steps are divided by, since their reciprocal is exact.
 float rounded(float value, const Keeps& keeps) {
   const double per = std::round(1. / double(keeps.step));
-  return float(std::round(double(value) * per) / per);
+  return float(std::round(double(value) * per) / per) + 0.f;  // a zero without sign
 }
 
 Point kept_point(Point p, const Keeps& keeps) {
@@ -212,7 +212,7 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
 }
 
 void check_fits(const Morphology& m, const Keeps& keeps) {
-  const auto check = [&](std::span<const Point> points) {
+  const auto check = [&](std::span<const Point> points, bool diameters) {
     for (const Point& p : points) {
       const float place = std::max({std::abs(p.x), std::abs(p.y), std::abs(p.z)});
       if (place > keeps.largest_place)
@@ -220,7 +220,7 @@ void check_fits(const Morphology& m, const Keeps& keeps) {
             fmt::format("a coordinate of {} µm does not fit into the format, which holds up to {} µm; "
                         "move the neuron to the origin or choose another format",
                         place, keeps.largest_place));
-      if (2. * double(p.radius) > double(keeps.largest_diameter) &&
+      if (diameters && 2. * double(p.radius) > double(keeps.largest_diameter) &&
           keeps.largest_diameter < std::numeric_limits<float>::max())
         throw LimitError(
             fmt::format("a diameter of {} µm does not fit into the format, which holds up to {} µm; "
@@ -228,8 +228,9 @@ void check_fits(const Morphology& m, const Keeps& keeps) {
                         2. * double(p.radius), keeps.largest_diameter));
     }
   };
-  check(m.points());
-  check(m.soma().points);
+  check(m.points(), true);
+  const Soma soma = kept_soma(m.soma(), keeps);
+  check(soma.points, soma.kind != SomaKind::sphere);
 }
 
 Morphology as_kept(const Morphology& m, const Keeps& keeps) {

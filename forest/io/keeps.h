@@ -53,7 +53,8 @@ struct Keeps {
 /// neuron, yet one a simulator can divide by.
 Point next_place(Point point);
 
-/// Throws LimitError when a place or a diameter is larger than the format can hold. Writers begin with it.
+/// Throws LimitError when a place or a diameter (that of a sphere for the soma aside) is larger than the format can hold.
+/// Writers begin with it.
 void check_fits(const Morphology& morphology, const Keeps& keeps);
 
 /// What of this neuron is not kept, and what it becomes: one warning (line 0) for each kind of loss.

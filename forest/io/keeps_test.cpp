@@ -4,6 +4,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "forest/core/error.h"
 #include "forest/morphology/measure.h"
 
 #include "tests/zoo.h"
@@ -86,6 +87,46 @@ TEST(Keeps, CoordinatesAreRoundedToTheStep) {
   b.add_section({}, SectionKind::basal, zoo_parts::Points{{.26f, -.24f, 7, .33f}, {1.05f, 2, 3, .1f}}, 3, 0);
   const Morphology left = as_kept(b.build(), {.step = .1f});
   EXPECT_THAT(left.points()[0], testing::Eq(Point{.3f, -.2f, 7.f, .35f}));
+}
+
+TEST(Keeps, DepthFirstIsTheSameTreeInAnotherOrder) {
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    const Morphology left = as_kept(specimen.morphology, {.order = false});
+    ASSERT_EQ(left.sections().size(), specimen.morphology.sections().size());
+    for (std::size_t i = 1; i < left.sections().size(); ++i)
+      if (const SectionId parent = left.sections()[i].parent; parent.valid()) {
+        EXPECT_TRUE(parent.value() == i - 1 || left.children(parent)[0] != SectionId(i));
+      }
+    EXPECT_EQ(as_kept(left, {.order = false}), left);
+    EXPECT_TRUE(losses(specimen.morphology, {.order = false}).empty());
+    EXPECT_EQ(left.spines().size(), specimen.morphology.spines().size());
+  }
+}
+
+TEST(Keeps, WhatIsRoundedOrTooLargeIsTold) {
+  const Keeps keeps{.spine_sizes = false,
+                    .step = .1f,
+                    .largest_tag = 9999,
+                    .largest_place = 1000.f,
+                    .largest_diameter = 10.f};
+  MorphologyBuilder b;
+  const auto stem =
+      b.add_section({}, SectionKind::custom, zoo_parts::Points{{0, .04f, 0, 1}, {0, 22.46f, 0, 1}}, 10000);
+  b.add_spine({stem, 4.f, Vec3(1, 0, 0), .5f, .1f, SpineShape::thin});
+  const Morphology m = b.build(), left = as_kept(m, keeps);
+  EXPECT_EQ(left.points()[1].y, 22.5f);
+  EXPECT_EQ(left.sections()[0].tag, int(SectionKind::custom));
+  EXPECT_EQ(left.spines()[0], (Spine{.section = stem, .position = 4.f}));
+  std::vector<std::string_view> codes;
+  for (const Warning& warning : losses(m, keeps)) codes.push_back(warning.code);
+  EXPECT_THAT(codes, testing::ElementsAre("spine-sizes-lost", "tags-lost", "rounded"));
+  EXPECT_TRUE(losses(left, keeps).empty());
+  EXPECT_NO_THROW(check_fits(m, keeps));
+  b.add_section({}, SectionKind::axon, zoo_parts::Points{{0, 0, 0, 1}, {0, -1001, 0, 1}});
+  EXPECT_THROW(check_fits(b.build(), keeps), LimitError);
+  b.add_section({}, SectionKind::axon, zoo_parts::Points{{0, 0, 0, 1}, {0, 1, 0, 6}});
+  EXPECT_THROW(check_fits(b.build(), keeps), LimitError);
 }
 
 }  // namespace

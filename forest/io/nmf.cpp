@@ -6,6 +6,7 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <pugixml.hpp>
@@ -54,7 +55,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"unknown-place", true, "read as that of the point before",
      "look it up in the tracing, or remove the point"},
     {"several-outlines", false, "read as one soma, a stack of outlines",
-     "split the file if it holds several cells"},
+     "nothing, if they are outlines of one soma; split the file if it holds several cells"},
     {"small-outline", false, "read as a sphere of its size", "trace the outline with three points or more"},
     {"empty-tree", true, "skipped"},
     {"tree-begins-with-split", true, "its branches are read as trees of their own",
@@ -62,7 +63,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"branch-without-points", true, "what hangs on it hangs on the branch point before"},
     {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
     {"empty-branch", true, "skipped"},
-    {"single-daughter", true, "kept as a section of its own"},
+    {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
     {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
     {"skipped-element", true, "skipped", "keep the file beside what is made of it"},
 }};
@@ -454,7 +455,7 @@ class Reader {
       float length = 0.f;
       for (std::size_t i = 1; i < branch.points.size(); ++i)
         length += (branch.points[i].position() - branch.points[i - 1].position()).norm();
-      lengths_.push_back(length);
+      lengths_.push_back(std::min(length, std::numeric_limits<float>::max()));
     }
     seat_spines(branch, joint);
     branch.over = true;
@@ -514,7 +515,7 @@ class Reader {
         const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
         for (; at < to; ++at)
           position += (branch.points[at + 1].position() - branch.points[at].position()).norm();
-        seat.spine.position = position;
+        seat.spine.position = std::min(position, std::numeric_limits<float>::max());
         seat.spine.head = seat.head - branch.points[to].position();
       }
       if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();

@@ -57,12 +57,13 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NtsOddity::count)> table{{
     {"tag-change", true, "the branch keeps the tag of its first point",
      "nothing, if the tag marks points and no kind"},
     {"point-without-origin", true, "read as a tree of its own", "attach it to the branch it was traced from"},
-    {"origin-alone", true, "read as a neurite of one point"},
+    {"origin-alone", true, "read as a neurite of one point", "nothing, if only its origin was traced"},
     {"unfinished-branch", true, "read as far as it goes",
      "get the whole file, or trace the branch to its end"},
     {"open-branches", true, "what was not traced is left out", "get the whole file, or trace them"},
     {"outline-without-start", true, "an outline begins here"},
-    {"several-outlines", false, "read as one soma, a stack of outlines"},
+    {"several-outlines", false, "read as one soma, a stack of outlines",
+     "nothing, if they are outlines of one soma; split the file if it holds several cells"},
     {"small-outline", false, "read as a sphere of its size", "trace the outline with three points or more"},
 }};
 
@@ -230,7 +231,7 @@ class Reader {
       text = trim(text.substr(end));
     }
     const Point sphere{v[0], v[1], v[2], v[3]};
-    if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large(sphere))
+    if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large({sphere.x, sphere.y, sphere.z, 0.f}))
       throw InputError(name_, line_,
                        fmt::format("the comment {} does not hold four numbers; remove it", nts_sphere_key));
     sphere_ = sphere;

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Eutectic NTS, the files of the Neuron Tracing System that N++ was built for: a header, then one record a point in
 // fixed columns. The order of records is the tree: after an end the next point leaves from the branch point opened last
-// (R. C. Cannon's and W. R. Holmes's notes on the format, as given with ntscable; NEURON's reader import3d/read_nts.hoc).
+// (the notes on the format that go with ntscable in surf-hippo, and NEURON's reader import3d/read_nts.hoc).
 //
 //   column   0–5     8–10  11–15   16–23   24–31   32–39   40–45  48–53   56–61 62–67
 //   Point    number  type  tag     X       Y       Z       Thick  name    attachment

@@ -196,10 +196,10 @@ class Writer {
       return;
     }
     const Point sphere = soma.sphere();
-    comments_ += fmt::format("# {}", nts_sphere_key);
+    sphere_ = fmt::format("# {}", nts_sphere_key);
     for (const float number : {sphere.x, sphere.y, sphere.z, sphere.radius})
-      comments_ += ' ', append_number(comments_, number);
-    comments_ += '\n';
+      sphere_ += ' ', append_number(sphere_, number);
+    sphere_ += '\n';
     std::vector<Point> circle;
     const auto inside = [](float value) {
       return std::clamp(value, -nts_keeps.largest_place, nts_keeps.largest_place);
@@ -277,7 +277,7 @@ class Writer {
   std::string text() const {
     const auto trees = std::ranges::count(records_, NtsRole::origin, &Record::role);
     std::string text =
-        fmt::format("{}\n{}No. points {:6}\nNo. trees  {:6}\nText  {}\n\n", nts_marker, comments_,
+        fmt::format("{}\n{}{}No. points {:6}\nNo. trees  {:6}\nText  {}\n\n", nts_marker, sphere_, comments_,
                     records_.size(), trees, text_line_.empty() ? "unassigned" : text_line_);
     text += " Point  Type  Tag      X       Y       Z  Thick   Name    Attachment\n\n";
     text.reserve(text.size() + 48 * records_.size());
@@ -301,7 +301,7 @@ class Writer {
   }
 
   const Morphology& m_;
-  std::string comments_, text_line_;
+  std::string sphere_, comments_, text_line_;
   std::vector<std::string> words_;
   std::vector<Record> records_;
 };

@@ -14,12 +14,12 @@
 
 namespace forest::io {
 
-/// "x y z", of float precision.
+/// "x y z", of float precision; a zero has no sign.
 inline std::string place_text(const Point& p) {
   std::string text;
-  append_number(text, p.x), text += ' ';
-  append_number(text, p.y), text += ' ';
-  append_number(text, p.z);
+  append_number(text, p.x + 0.f), text += ' ';
+  append_number(text, p.y + 0.f), text += ' ';
+  append_number(text, p.z + 0.f);
   return text;
 }
 
