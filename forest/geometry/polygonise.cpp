@@ -203,7 +203,7 @@ class BlockMaker {
         high = t, value_b = d, value_a *= .5f;
       if (value_a == 0.f || value_b == 0.f) break;
     }
-    return a + std::clamp(t, .05f, .95f) * (b - a);
+    return a + std::clamp(t, .01f, .99f) * (b - a);
   }
 
   void add_triangles(int x, int y, int z) {
@@ -284,7 +284,7 @@ double expected_triangles(const std::vector<BranchCone>& cones, float voxel) {
     const double length = (cone.shape.b - cone.shape.a).norm();
     area += length > 0. ? pi * (r + s) * std::hypot(length, r - s) : 4. * pi * r * r;
   }
-  return 9. * area / (double(voxel) * double(voxel));
+  return 12. * area / (double(voxel) * double(voxel));
 }
 
 Mesh polygonise(const std::vector<BranchCone>& cones, const std::vector<Joint>& joints, float voxel) {
