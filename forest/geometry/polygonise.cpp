@@ -284,7 +284,7 @@ double expected_triangles(const std::vector<BranchCone>& cones, float voxel) {
     const double length = (cone.shape.b - cone.shape.a).norm();
     area += length > 0. ? pi * (r + s) * std::hypot(length, r - s) : 4. * pi * r * r;
   }
-  return 12. * area / (double(voxel) * double(voxel));
+  return 12.75 * area / (double(voxel) * double(voxel));
 }
 
 Mesh polygonise(const std::vector<BranchCone>& cones, const std::vector<Joint>& joints, float voxel) {

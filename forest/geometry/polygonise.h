@@ -31,7 +31,7 @@ struct Joint {
 
 inline constexpr std::size_t most_triangles = 20'000'000;
 
-/// About how many triangles `polygonise` makes, less what is hidden within other cones.
+/// How many triangles `polygonise` makes about, if nothing were hidden within other cones.
 double expected_triangles(const std::vector<BranchCone>& cones, float voxel);
 
 /// @param voxel  µm, > 0: the longer of the lattice's two edges. Branches of a radius below 0.75 of it may break.
