@@ -99,6 +99,7 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
       }
     }
   } catch (const LimitError& error) {
+    if (done.empty()) done.push_back({from, {}, {}, {}, {}});
     done.back().error = fmt::format("{}: {}", escaped(from.string()), error.what());
   } catch (const InputError& error) {
     done.emplace_back(Conversion{from, {}, {}, {}, error.what()});

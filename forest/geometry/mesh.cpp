@@ -82,18 +82,13 @@ double area(const Mesh& mesh) {
 std::vector<Vec3> vertex_normals(const Mesh& mesh) {
   std::vector<Vec3> normals(mesh.positions.size(), Vec3::Zero());
   for (const Triangle& t : mesh.triangles) {
-    const std::array<Vec3, 3> p{mesh.positions[t[0]], mesh.positions[t[1]], mesh.positions[t[2]]};
-    const Vec3 across = (p[1] - p[0]).cross(p[2] - p[0]);
-    const float twice = across.norm();
-    if (!(twice > 0.f)) continue;
-    for (std::size_t i = 0; i < 3; ++i) {
-      const Vec3 u = p[(i + 1) % 3] - p[i], v = p[(i + 2) % 3] - p[i];
-      normals[t[i]] += std::atan2(u.cross(v).norm(), u.dot(v)) / twice * across;
-    }
+    const Vec3 across =
+        (mesh.positions[t[1]] - mesh.positions[t[0]]).cross(mesh.positions[t[2]] - mesh.positions[t[0]]);
+    for (const std::uint32_t v : t) normals[v] += across;
   }
   for (Vec3& n : normals) {
-    const float length = n.norm();
-    n = length > 1e-6f ? Vec3(n / length) : Vec3(0.f, 1.f, 0.f);
+    n = n.stableNormalized();
+    if (!(n.squaredNorm() > .5f)) n = Vec3(0.f, 1.f, 0.f);
   }
   return normals;
 }

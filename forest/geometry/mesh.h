@@ -41,7 +41,7 @@ std::size_t count_pieces(const Mesh& mesh);
 double volume(const Mesh& mesh);
 double area(const Mesh& mesh);  // µm²
 
-/// Unit normals of the vertices: the mean of their triangles' by angle (Thürmer & Wüthrich 1998). (0, 1, 0) where the
+/// Unit normals of the vertices: the mean of their triangles' by area, so that slivers say little. (0, 1, 0) where the
 /// triangles have no area.
 std::vector<Vec3> vertex_normals(const Mesh& mesh);
 

@@ -68,7 +68,7 @@ float signed_distance(const Vec3& point, const RoundCone& cone) {
     return std::min((point - cone.a).norm() - cone.radius_a, (point - cone.b).norm() - cone.radius_b);
   const Vec3 u = axis / length, to = point - cone.a;
   const float s = taper / length, c = std::sqrt(1.f - s * s);
-  const float y = to.dot(u), rho = std::sqrt(std::max(0.f, to.squaredNorm() - y * y));
+  const float y = to.dot(u), rho = (to - y * u).norm();
   const float along =
       c * y - s * rho;  // position along the slanted side, measured from the touching circle of a
   if (along <= 0.f) return to.norm() - cone.radius_a;

@@ -14,14 +14,17 @@ namespace {
 
 constexpr std::array<std::string_view, 3> geometries{"stick", "cylinder", "surface"};
 
-constexpr std::array<std::string_view, 1> gltf_extensions{".glb"}, obj_extensions{".obj"},
-    ply_extensions{".ply"}, stl_extensions{".stl"};
+using Extension = std::array<std::string_view, 1>;
+constexpr Extension gltf_extensions{".glb"}, obj_extensions{".obj"}, ply_extensions{".ply"},
+    stl_extensions{".stl"}, vrml_extensions{".wrl"}, x3d_extensions{".x3d"};
 
 constexpr std::array table{
     ModelFormat{"gltf", "glTF 2.0, binary", gltf_extensions, true, write_gltf},
     ModelFormat{"obj", "Wavefront OBJ", obj_extensions, true, write_obj},
     ModelFormat{"ply", "Stanford PLY, binary", ply_extensions, true, write_ply},
     ModelFormat{"stl", "STL, binary", stl_extensions, false, write_stl},
+    ModelFormat{"vrml", "VRML97", vrml_extensions, true, write_vrml},
+    ModelFormat{"x3d", "X3D 3.3 (XML)", x3d_extensions, true, write_x3d},
 };
 
 }  // namespace
@@ -36,11 +39,30 @@ std::span<const std::string_view> geometry_names() { return geometries; }
 Model make_model(const Morphology& m, std::string name, const ModelOptions& options,
                  std::vector<Warning>& losses) {
   Model model{.name = std::move(name), .lines = {}, .mesh = {}};
-  (void)losses;
-  if (options.geometry == Geometry::stick)
+  const auto lose = [&](std::string_view code, std::string sentence) {
+    losses.push_back({.line = 0, .code = code, .sentence = std::move(sentence)});
+  };
+  if (options.geometry == Geometry::stick) {
     model.lines = sticks(m);
-  else
-    model.mesh = tubes(m, {.sides = options.sides});
+  } else if (options.geometry == Geometry::cylinder) {
+    const TubeOptions tube{.sides = options.sides};
+    model.mesh = tubes(m, tube);
+    const auto thin =
+        std::ranges::count_if(m.points(), [&](const Point& p) { return p.radius < tube.thinnest; });
+    if (thin > 0)
+      lose("thickened",
+           fmt::format("{} points are thinner than {} µm or have no radius; they are shown as thick as that",
+                       thin, tube.thinnest));
+  } else {
+    Surface made = surface(m, {.voxel = options.detail});
+    model.mesh = std::move(made.mesh);
+    if (made.thickened > 0)
+      lose("thickened",
+           fmt::format("{} points are thinner than the grid of {:.3g} µm can hold; they are shown {:.3g} µm "
+                       "thick in radius (a finer --detail shows them as they are)",
+                       made.thickened, made.voxel, .75f * made.voxel));
+  }
+  if (!m.spines().empty()) lose("spines", fmt::format("{} spines are not shown", m.spines().size()));
   return model;
 }
 

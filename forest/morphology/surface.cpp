@@ -2,8 +2,12 @@
 #include "forest/morphology/surface.h"
 
 #include <algorithm>
+#include <cmath>
+#include <limits>
 #include <optional>
 #include <vector>
+
+#include "forest/geometry/polygonise.h"
 
 namespace forest {
 namespace {
@@ -137,6 +141,87 @@ Mesh tubes(const Morphology& m, const TubeOptions& options) {
                       m.is_terminal(id) ? Cap::flat : Cap::dome, label_of(section)));
   }
   return mesh;
+}
+
+namespace {
+
+/// The soma is branch 0, section i branch i + 1.
+std::vector<BranchCone> branch_cones(const Morphology& m, float thinnest) {
+  std::vector<BranchCone> cones;
+  const auto add = [&](const Vec4& a, const Vec4& b, std::size_t branch, std::uint8_t label) {
+    cones.push_back({.shape = {.a = a.head<3>(),
+                               .b = b.head<3>(),
+                               .radius_a = std::max(a.w(), thinnest),
+                               .radius_b = std::max(b.w(), thinnest)},
+                     .branch = std::uint32_t(branch),
+                     .label = label});
+  };
+  for (const SomaPiece& piece : pieces(m.soma())) add(piece.a, piece.b, 0, soma_label);
+  for (const SectionId id : all_sections(m)) {
+    const std::vector<Vec4> line = axis(m, id, thinnest);
+    const std::uint8_t label = label_of(m.section(id));
+    if (line.size() == 1) add(line[0], line[0], id.value() + 1, label);
+    for (std::size_t i = 1; i < line.size(); ++i) add(line[i - 1], line[i], id.value() + 1, label);
+  }
+  return cones;
+}
+
+/// Branch points, and where stems leave the soma. As far as three radii they are rounded, by half a radius.
+std::vector<Joint> joints_of(const Morphology& m, float thinnest) {
+  std::vector<Joint> joints;
+  const auto add = [&](const Vec3& centre, float radius) -> Joint& {
+    const float r = std::max(radius, thinnest);
+    return joints.emplace_back(
+        Joint{.centre = centre, .reach = 3.f * r, .rounding = .5f * r, .branches = {}});
+  };
+  for (const SectionId id : all_sections(m)) {
+    const Section& section = m.section(id);
+    const Point& last = m.points(id).back();
+    if (const auto children = m.children(id); !children.empty()) {
+      Joint& joint = add(last.position(), last.radius);
+      joint.branches.push_back(id.value() + 1);
+      for (const SectionId child : children) joint.branches.push_back(child.value() + 1);
+    }
+    if (section.parent.valid() || !anchor(m, section)) continue;
+    const Point &first = m.points(id)[0], mean = m.soma().sphere();
+    const Vec3 out = first.position() - mean.position();
+    const bool round = pieces(m.soma()).size() == 1 && out.norm() > 0.f;
+    add(round ? Vec3(mean.position() + mean.radius * out.normalized()) : first.position(),
+        std::min(first.radius, mean.radius))
+        .branches = {0, id.value() + 1};
+  }
+  return joints;
+}
+
+/// The thinnest radius above 0; 0.5 µm where none was measured.
+float thinnest_radius(const Morphology& m) {
+  float thinnest = std::numeric_limits<float>::infinity();
+  for (const Point& p : m.points())
+    if (p.radius > 0.f) thinnest = std::min(thinnest, p.radius);
+  if (m.points().empty() && m.soma().sphere().radius > 0.f) thinnest = m.soma().sphere().radius / 8.f;
+  return std::isfinite(thinnest) ? thinnest : .5f;
+}
+
+constexpr double unasked_triangles = 2e6;
+constexpr float voxels_a_radius = .75f;
+
+}  // namespace
+
+Surface surface(const Morphology& m, const SurfaceOptions& options) {
+  Surface result;
+  float& voxel = result.voxel = options.voxel;
+  if (!(voxel > 0.f)) {
+    voxel = std::max(thinnest_radius(m), 1e-3f);
+    for (int i = 0; i < 8; ++i) {  // thickened branches have more area, so that once is not enough
+      const double expected = expected_triangles(branch_cones(m, voxels_a_radius * voxel), voxel);
+      if (expected <= unasked_triangles) break;
+      voxel *= 1.01f * float(std::sqrt(expected / unasked_triangles));
+    }
+  }
+  const float thinnest = voxels_a_radius * voxel;
+  for (const Point& p : m.points()) result.thickened += p.radius < thinnest;
+  result.mesh = polygonise(branch_cones(m, thinnest), joints_of(m, thinnest), voxel);
+  return result;
 }
 
 }  // namespace forest

@@ -27,4 +27,18 @@ struct TubeOptions {
 /// The pieces overlap where they meet.
 Mesh tubes(const Morphology& m, const TubeOptions& options = {});
 
+struct SurfaceOptions {
+  float voxel = 0.f;  // µm; 0: the thinnest radius, or coarser where that gives more than 2 million triangles
+};
+
+struct Surface {
+  Mesh mesh;
+  float voxel = 0.f;          // µm, that was taken
+  std::size_t thickened = 0;  // points whose radius was made 0.75 voxels, for thinner branches would break
+};
+
+/// The whole neuron as one closed surface, rounded where branches meet; its tips are round too. Pieces that do not touch
+/// stay pieces. Throws LimitError as `polygonise` does.
+Surface surface(const Morphology& m, const SurfaceOptions& options = {});
+
 }  // namespace forest
