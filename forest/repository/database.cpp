@@ -50,6 +50,7 @@ void migrate(Database& database, int from) {
     if (step.to == 1) fill_section_kinds(database.sql());
     if (step.to == 2) fill_metrics(database.sql());
   }
+  if (from == 0) database.sql() << "drop table old_sections";  // else refill() empties it
 }
 
 }  // namespace forest::repository

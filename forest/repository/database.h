@@ -4,6 +4,7 @@
 #pragma once
 
 #include <memory>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -13,6 +14,9 @@
 #include "forest/repository/answer.h"
 
 namespace forest::repository {
+
+struct InsertColumn;
+class InsertStatement;
 
 /// One open connection.
 class Database {
@@ -27,8 +31,11 @@ class Database {
   virtual std::string dialect(std::string_view sql) const = 0;
   /// A number for a new row of a table: never one that is taken, also when others write too.
   virtual int next_id(const std::string& table) = 0;
-  /// Whether bytes travel as hexadecimal text, and rows of one table as arrays.
+  /// Whether bytes are asked for as hexadecimal text.
   virtual bool as_text() const = 0;
+  /// See insert.h. The columns must outlive the statement.
+  virtual std::unique_ptr<InsertStatement> prepare_insert(const std::string& table,
+                                                          std::span<const InsertColumn> columns) = 0;
   /// Sentences on what is wrong with the database itself.
   virtual std::vector<std::string> examine_structure() { return {}; }
   /// From now on nothing can be written through this connection, whatever it is asked.
@@ -43,7 +50,7 @@ class Database {
 };
 
 /// Brings what an older version stored into the new tables, in the transaction that makes them.
-using Refill = void (*)(Database& database, int from);
+using Refill = void (*)(Database& database);
 
 /// Opens `place`, which must be a repository this program can read; with `write` it is made when there is none, so that
 /// whoever looks sees none or a whole one, and brought to the newest schema. Throws InputError.

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
-// Rows into a table through a statement that is prepared once. Where rows travel best depends on the database: SQLite
-// takes them one by one, a server as arrays, all in one message.
+// Rows into a table, through a statement that is prepared once and reads its values from variables it was told of:
+//
+//   Insert insert(database, "spines");
+//   insert.with("neuron", id).with("section", sections).with("shape", shapes);   // a column: a value or a vector of them
+//   insert.run(sections.size());                                                 // as often as one likes
+//
+// How rows travel best depends on the database: SQLite takes them one by one, a server as arrays, all in one message.
 #pragma once
 
-#include <deque>
 #include <functional>
 #include <memory>
 #include <string>
@@ -15,64 +19,50 @@
 namespace forest::repository {
 
 using Ints = std::vector<int>;
+using Longs = std::vector<long long>;
 using Reals = std::vector<double>;
 using Texts = std::vector<std::string>;
 
-/// One row at a time. The variables must outlive the statement.
-class RowInsert {
- public:
-  RowInsert(Database& database, std::string table) : database_(&database), table_(std::move(table)) {}
-
-  RowInsert& with(const char* column, int& value, soci::indicator* filled = nullptr);
-  RowInsert& with(const char* column, long long& value, soci::indicator* filled = nullptr);
-  RowInsert& with(const char* column, double& value);
-  RowInsert& with(const char* column, std::string& value, soci::indicator* filled = nullptr);
-  RowInsert& with_bytes(const char* column, const std::string& bytes);  // null when there are none
-
-  /// False when the table has such a row already.
-  bool run();
-
- private:
-  struct Bytes {
-    const std::string* value;
-    std::string text;                  // hexadecimal
-    std::unique_ptr<soci::blob> blob;  // or as they are
-    soci::indicator filled = soci::i_ok;
-  };
-  void add(const char* column, const char* expression = nullptr);
-  void prepare();
-
-  Database* database_;
-  std::string table_, columns_, values_;
-  std::deque<Bytes> bytes_;
-  std::vector<std::function<void(soci::statement&)>> exchanges_;
-  std::unique_ptr<soci::statement> statement_;  // after what it uses
+/// Where the values of a column stand. What is no vector is the same in every row.
+struct InsertColumn {
+  const char* name;
+  std::variant<const Ints*, const Longs*, const Reals*, const Texts*, const int*, const long long*,
+               const double*, const std::string*>
+      values;
+  bool bytes = false;                                 // a text that is no text; null when empty
+  std::function<bool(std::size_t row)> is_null = {};  // of no row when empty
 };
 
-/// All rows that belong to one neuron at once.
-class RowsInsert {
+/// The prepared statement of one database.
+class InsertStatement {
  public:
-  RowsInsert(Database& database, std::string table) : database_(&database), table_(std::move(table)) {}
+  virtual ~InsertStatement() = default;
+  virtual std::size_t run(std::size_t count) = 0;
+};
 
-  RowsInsert& with(const char* column, Ints& values, std::vector<soci::indicator>* filled = nullptr);
-  RowsInsert& with(const char* column, Reals& values);
-  RowsInsert& with(const char* column, Texts& values);
+class Insert {
+ public:
+  Insert(Database& database, std::string table) : database_(&database), table_(std::move(table)) {}
 
-  void run(std::size_t count);  // every vector is that long
+  /// The variable must outlive the last run().
+  template <class T>
+  Insert& with(const char* column, const T& values, std::function<bool(std::size_t)> is_null = {}) {
+    columns_.push_back({column, &values, false, std::move(is_null)});
+    return *this;
+  }
+  Insert& with_bytes(const char* column, const std::string& bytes) {
+    columns_.push_back({column, &bytes, true});
+    return *this;
+  }
+
+  /// Stores `count` rows, which every vector must have; returns how many were not there already, by some unique column.
+  std::size_t run(std::size_t count = 1);
 
  private:
-  struct Column {
-    const char* name;
-    std::variant<Ints*, Reals*, Texts*> values;
-    std::vector<soci::indicator>* filled = nullptr;
-    std::string text = {};  // an array, as PostgreSQL writes them
-  };
-  void prepare();
-
   Database* database_;
   std::string table_;
-  std::deque<Column> columns_;
-  std::unique_ptr<soci::statement> statement_;
+  std::vector<InsertColumn> columns_;
+  std::unique_ptr<InsertStatement> statement_;
 };
 
 std::string hexadecimal(const std::string& bytes);

@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <numeric>
 #include <span>
 #include <utility>
 
@@ -18,6 +19,7 @@
 #include "forest/repository/names.h"
 #include "forest/repository/packing.h"
 #include "forest/repository/rows.h"
+#include "forest/repository/schema.h"
 #include "forest/statistics/metric.h"
 
 namespace forest::repository {
@@ -31,6 +33,12 @@ using soci::use;
 std::size_t room(std::size_t count) { return count + 2; }
 
 int number_of(NeuronId id) { return int(id.value()); }
+
+/// Sections of a neuron are those from its first to before the next one's.
+long long first_section(long long neuron) { return neuron << section_bits; }
+std::string of_sections(long long neuron) {
+  return fmt::format("sections where id >= {} and id < {}", first_section(neuron), first_section(neuron + 1));
+}
 
 std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
 
@@ -49,9 +57,9 @@ std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
 }
 
 /// The statements that store one neuron, prepared once, with the variables they are bound to.
-class Insert {
+class Statements {
  public:
-  explicit Insert(Database& database)
+  explicit Statements(Database& database)
       : neuron_(database, "neurons"),
         provenance_(database, "provenance"),
         soma_(database, "somata"),
@@ -66,35 +74,37 @@ class Insert {
     neuron_.with("type", about.type).with("stems", stems_).with("sections", section_count_);
     neuron_.with("points", point_count_).with("spines", spine_count_).with("length", length_);
     neuron_.with("checksum", checksum);
-    provenance_.with("neuron", id).with("origin", origin_).with("source_file", file_, &if_traced_);
-    provenance_.with("source_hash", hash_, &if_traced_).with("grammar", grammar, &if_grown_);
-    provenance_.with("seed", seed_, &if_grown_).with("number", index_, &if_grown_).with("program", program_);
+    const auto unless_traced = [this](std::size_t) { return !std::holds_alternative<Traced>(about.provenance); };
+    const auto unless_grown = [this](std::size_t) { return !std::holds_alternative<Grown>(about.provenance); };
+    provenance_.with("neuron", id).with("origin", origin_).with("source_file", file_, unless_traced);
+    provenance_.with("source_hash", hash_, unless_traced).with("grammar", grammar, unless_grown);
+    provenance_.with("seed", seed_, unless_grown).with("number", index_, unless_grown);
+    provenance_.with("program", program_);
     soma_.with("neuron", id).with("kind", soma_kind_).with("x", sphere_[0]).with("y", sphere_[1]);
     soma_.with("z", sphere_[2]).with("radius", sphere_[3]).with("area", area_);
     soma_.with_bytes("points", rows.soma_points).with_bytes("links", rows.soma_links);
     points_.with("neuron", id).with_bytes("data", data_).with("packing", packing_);
-    arbors_.with("neuron", ids_).with("number", numbers_).with("root", rows.arbors.root);
-    arbors_.with("kind", rows.arbors.kind).with("sections", rows.arbors.sections);
-    arbors_.with("terminals", rows.arbors.terminals).with("max_order", rows.arbors.order);
-    arbors_.with("length", rows.arbors.length);
-    auto& s = rows.sections;
-    sections_.with("neuron", ids_).with("number", numbers_).with("parent", s.parent, &if_parent_);
-    sections_.with("arbor", s.arbor)
-        .with("branch_order", s.order)
-        .with("length", s.length)
-        .with("kind", s.kind);
-    sections_.with("tag", s.tag).with("soma_point", s.soma_point).with("first_point", s.first_point);
-    sections_.with("point_count", s.point_count).with("daughters", s.daughters).with("area", s.area);
-    sections_.with("start_diameter", s.start_diameter).with("end_diameter", s.end_diameter);
-    sections_.with("end_x", s.end_x).with("end_y", s.end_y).with("end_z", s.end_z);
-    metrics_.with("neuron", ids_).with("metric", rows.metric).with("value", rows.metric_value);
-    spines_.with("neuron", ids_).with("number", numbers_).with("section", spine_section_);
+    const auto& a = rows.arbors;
+    arbors_.with("neuron", id).with("number", numbers_).with("root", a.root).with("kind", a.kind);
+    arbors_.with("sections", a.sections).with("terminals", a.terminals).with("max_order", a.order);
+    arbors_.with("length", a.length);
+    const auto& s = rows.sections;
+    sections_.with("id", section_ids_);
+    sections_.with("parent", s.parent, [&s](std::size_t row) { return s.parent[row] < 0; });
+    sections_.with("arbor", s.arbor).with("branch_order", s.order).with("kind", s.kind).with("tag", s.tag);
+    sections_.with("soma_point", s.soma_point).with("points", s.point_count).with("daughters", s.daughters);
+    sections_.with("length", s.length).with("area", s.area).with("start_diameter", s.start_diameter);
+    sections_.with("end_diameter", s.end_diameter).with("end_x", s.end_x).with("end_y", s.end_y);
+    sections_.with("end_z", s.end_z);
+    metrics_.with("neuron", id).with("metric", rows.metric).with("value", rows.metric_value);
+    spines_.with("neuron", id).with("number", numbers_).with("section", spine_section_);
     constexpr const char* spine_columns[] = {"position", "head_x",        "head_y",
                                              "head_z",   "head_diameter", "neck_diameter"};
     for (std::size_t i = 0; i < spine_.size(); ++i) spines_.with(spine_columns[i], spine_[i]);
     spines_.with("shape", spine_shape_);
-    annotations_.with("neuron", ids_).with("number", numbers_).with("name", key_).with("value", value_);
+    annotations_.with("neuron", id).with("number", numbers_).with("name", key_).with("value", value_);
   }
+  Statements(const Statements&) = delete;  // its parts point at one another
 
   // What the caller sets before run().
   int id = 0, population = 0, grammar = 0;
@@ -117,8 +127,6 @@ class Insert {
     const auto* traced = std::get_if<Traced>(&about.provenance);
     const auto* grown = std::get_if<Grown>(&about.provenance);
     origin_ = traced ? "traced" : "grown";
-    if_traced_ = traced ? soci::i_ok : soci::i_null;
-    if_grown_ = grown ? soci::i_ok : soci::i_null;
     if (traced) file_ = escaped(traced->file), hash_ = escaped(traced->hash);
     if (grown) seed_ = std::bit_cast<long long>(grown->seed), index_ = std::bit_cast<long long>(grown->index);
     provenance_.run();
@@ -154,35 +162,29 @@ class Insert {
     data_ = packing_ ? packed_points : rows.points;
     if (!data_.empty()) points_.run();
     run(arbors_, rows.arbors.size());
-    if_parent_.assign(rows.sections.size(), soci::i_ok);
-    for (std::size_t i = 0; i < rows.sections.size(); ++i)
-      if (rows.sections.parent[i] < 0) if_parent_[i] = soci::i_null;
-    run(sections_, rows.sections.size());
-    run(metrics_, rows.metric.size());
+    section_ids_.resize(rows.sections.size());
+    std::iota(section_ids_.begin(), section_ids_.end(), first_section(id));
+    sections_.run(rows.sections.size());
+    metrics_.run(rows.metric.size());
   }
 
  private:
   /// A table with `count` rows of this neuron.
-  void run(RowsInsert& insert, std::size_t count) {
-    if (count == 0) return;
-    ids_.assign(count, id);
+  void run(Insert& insert, std::size_t count) {
     for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(int(i));
-    numbers_.resize(count);
     insert.run(count);
   }
 
   int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0, packing_ = 0;
   double length_ = 0., area_ = 0.;
   std::string origin_, file_, hash_, program_ = FOREST_VERSION, soma_kind_, data_;
-  soci::indicator if_traced_ = soci::i_ok, if_grown_ = soci::i_ok;
   long long seed_ = 0, index_ = 0;
   std::array<double, 4> sphere_{};
-  Ints ids_, numbers_, spine_section_, spine_shape_;
-  std::vector<soci::indicator> if_parent_;
+  Ints numbers_, spine_section_, spine_shape_;
+  Longs section_ids_;
   std::array<Reals, 6> spine_;
   Texts key_, value_;
-  RowInsert neuron_, provenance_, soma_, points_;  // after what they use
-  RowsInsert arbors_, sections_, metrics_, spines_, annotations_;
+  Insert neuron_, provenance_, soma_, points_, arbors_, sections_, metrics_, spines_, annotations_;
 };
 
 }  // namespace
@@ -191,30 +193,35 @@ struct Repository::Impl {
   std::string place;
   std::shared_ptr<Database> database;
   soci::session& sql;
-  std::unique_ptr<Insert> insert;  // prepared on first use
+  std::unique_ptr<Statements> insert;  // prepared on first use
   bool writing = false;            // a transaction is open
   bool failed = false;             // and cannot be committed any more
+  // Those last stored under: thousands of neurons have the same.
+  std::pair<std::string, int> known_population, known_grammar;
+  std::string known_hash;
 
   Impl(const std::string& at, std::shared_ptr<Database> open)
       : place(at), database(std::move(open)), sql(database->sql()) {}
 
-  /// What version 1 stored, with what version 2 knows of it besides.
-  static void refill(Database& database, int from) {
-    if (from != 1) return;
+  /// What an earlier version stored, with what this one knows of it besides.
+  static void refill(Database& database) {
     Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
     impl.writing = true;
-    Insert insert(database);
+    Statements insert(database);
     std::vector<int> ids(room(std::size_t(impl.ask<int>("select count(*) from neurons").value_or(0))));
     impl.sql << "select id from neurons order by id", into(ids);
     for (const int id : ids) {
-      const Morphology m = morphology_of(impl.stored(NeuronId(std::size_t(id))));
-      for (const char* table : {"points", "arbors", "sections"})
+      const Morphology m = morphology_of(
+          impl.stored(NeuronId(std::size_t(id)), "point_count",
+                      fmt::format("old_sections where neuron = {} order by number", id)));
+      for (const char* table : {"points", "arbors", "neuron_metrics"})
         impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
       insert.id = id;
       insert.rows = rows_of(m);
       insert.packed_points = packed(m.points());
       insert.run_shape();
     }
+    impl.sql << "drop table old_sections";
     impl.writing = false;
   }
 
@@ -235,6 +242,7 @@ struct Repository::Impl {
     } catch (const std::exception&) {  // the database has done so already
     }
     insert.reset();  // a statement that failed is not used again
+    known_population = {}, known_hash = {};
     writing = failed = false;
   }
 
@@ -315,17 +323,31 @@ struct Repository::Impl {
 
   /// The number of a population, which is made when there is none.
   int population(const std::string& name) {
+    if (name == known_population.first) return known_population.second;
     const std::string find = "select id from populations where name = :name";
-    if (const auto id = ask<int>(find, name)) return *id;
-    const int id = database->next_id("populations");
-    sql << "insert into populations (id, name) values (:id, :name) on conflict do nothing", use(id),
-        use(name);
-    return *ask<int>(find, name);  // another program may have been quicker
+    auto number = ask<int>(find, name);
+    if (!number) {
+      const int id = database->next_id("populations");
+      sql << "insert into populations (id, name) values (:id, :name) on conflict do nothing", use(id),
+          use(name);
+      number = ask<int>(find, name);  // another program may have been quicker
+    }
+    known_population = {name, *number};
+    return *number;
+  }
+
+  std::optional<int> grammar(const Grown& grown) {
+    if (grown.grammar_hash == known_hash && grown.grammar == known_grammar.first) return known_grammar.second;
+    const auto number = ask<int>("select id from grammars where hash = :hash and name = :name",
+                                 grown.grammar_hash, grown.grammar);
+    if (number) known_hash = grown.grammar_hash, known_grammar = {grown.grammar, *number};
+    return number;
   }
 
   std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
                               int id) const;
-  Rows stored(NeuronId id) const;
+  /// The rows of one neuron; `points` and `from` tell where its sections stand, which differs between versions.
+  Rows stored(NeuronId id, const char* points, const std::string& from) const;
 };
 
 Repository::Repository(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -367,8 +389,8 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
   const std::uint64_t sum = data.sum;
 
   return impl.write([&] {
-    if (!impl.insert) impl.insert = std::make_unique<Insert>(*impl.database);
-    Insert& insert = *impl.insert;
+    if (!impl.insert) impl.insert = std::make_unique<Statements>(*impl.database);
+    Statements& insert = *impl.insert;
     insert.fingerprint = fingerprint(neuron.provenance, sum);
     insert.about = neuron;
     for (std::string* text :
@@ -377,10 +399,12 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
     insert.rows = std::move(data.rows);
     insert.packed_points = std::move(data.packed_points);
     insert.checksum = std::bit_cast<long long>(sum);
+    if (data.morphology.sections().size() >> section_bits)
+      throw Error(fmt::format("{} has more than {} sections, which no repository holds", shown(neuron.name),
+                              (1 << section_bits) - 1));
     insert.population = impl.population(neuron.population);
     if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
-      const auto grammar = impl.ask<int>("select id from grammars where hash = :hash and name = :name",
-                                         grown->grammar_hash, grown->grammar);
+      const auto grammar = impl.grammar(*grown);
       if (!grammar)
         throw Error(fmt::format(
             "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
@@ -389,24 +413,21 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
     }
     insert.name = neuron.name;
     for (int number = 2;;) {
+      insert.id = impl.database->next_id("neurons");
+      if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
       const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
       if (const auto there = impl.ask<int>("select id " + same, insert.population, insert.fingerprint))
         return Added{NeuronId(std::size_t(*there)),
                      *impl.ask<std::string>("select name " + same, insert.population, insert.fingerprint),
                      true};
-      if (const auto other = impl.ask<std::string>(
-              "select fingerprint from neurons where population = :population and name = :name",
-              insert.population, insert.name)) {
-        if (*other == insert.fingerprint) continue;  // another program stored it since we looked
-        if (!neuron.number_if_taken)
-          throw Error(
-              fmt::format("another neuron of population {} is called {}; choose another name or population",
-                          shown(neuron.population), shown(neuron.name)));
-        insert.name = fmt::format("{}-{}", neuron.name, number++);
-        continue;
-      }
-      insert.id = impl.database->next_id("neurons");
-      if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
+      const auto other = impl.ask<int>("select id from neurons where population = :population and name = :name",
+                                       insert.population, insert.name);
+      if (!other) continue;  // it was removed since
+      if (!neuron.number_if_taken)
+        throw Error(
+            fmt::format("another neuron of population {} is called {}; choose another name or population",
+                        shown(neuron.population), shown(neuron.name)));
+      insert.name = fmt::format("{}-{}", neuron.name, number++);
     }
   });
 }
@@ -635,7 +656,7 @@ std::vector<ArborRow> Repository::arbors(NeuronId id) const {
   });
 }
 
-Rows Repository::Impl::stored(NeuronId id) const {
+Rows Repository::Impl::stored(NeuronId id, const char* points, const std::string& from) const {
   const int neuron = number_of(id);
   const auto count = [&](const char* table) {
     return std::size_t(
@@ -650,19 +671,20 @@ Rows Repository::Impl::stored(NeuronId id) const {
   rows.soma_links = bytes("select {} from somata where neuron = :id", "links", neuron);
   rows.points = bytes("select {} from points where neuron = :id", "data", neuron);
   if (ask<int>("select packing from points where neuron = :id", neuron).value_or(0)) {
-    const std::vector<Point> points = unpacked(rows.points);
-    rows.points.assign(reinterpret_cast<const char*>(points.data()), points.size() * sizeof(Point));
+    const std::vector<Point> unpacked_points = unpacked(rows.points);
+    rows.points.assign(reinterpret_cast<const char*>(unpacked_points.data()),
+                       unpacked_points.size() * sizeof(Point));
   }
 
-  if (const std::size_t n = count("sections")) {
+  if (const auto n = std::size_t(
+          ask<int>("select coalesce(max(sections), 0) from neurons where id = :id", neuron).value_or(0))) {
     auto& s = rows.sections;
-    for (auto* column : {&s.parent, &s.kind, &s.tag, &s.soma_point, &s.first_point, &s.point_count})
-      column->resize(room(n));
-    sql << "select coalesce(parent, -1), kind, tag, soma_point, first_point, point_count from sections where "
-           "neuron = :id order by "
-           "number",
-        into(s.parent), into(s.kind), into(s.tag), into(s.soma_point), into(s.first_point),
-        into(s.point_count), use(neuron);
+    for (auto* column : {&s.parent, &s.kind, &s.tag, &s.soma_point, &s.point_count}) column->resize(room(n));
+    sql << fmt::format("select coalesce(parent, -1), kind, tag, soma_point, {} from {}", points, from),
+        into(s.parent), into(s.kind), into(s.tag), into(s.soma_point), into(s.point_count);
+    if (s.size() != n) throw Error("sections are missing");
+    s.first_point.resize(n);
+    std::exclusive_scan(s.point_count.begin(), s.point_count.end(), s.first_point.begin(), 0);
   }
   if (const std::size_t n = count("spines")) {
     Ints section(room(n)), shape(room(n));
@@ -709,7 +731,7 @@ Morphology Repository::morphology(NeuronId id) const {
                               impl_->place, neuron));
     name = impl_->ask<std::string>("select name from neurons where id = :id", neuron).value_or("");
     try {
-      return impl_->stored(id);
+      return impl_->stored(id, "points", of_sections(neuron) + " order by id");
     } catch (const InputError&) {
       throw;
     } catch (const Error& error) {
@@ -730,8 +752,9 @@ bool Repository::remove(NeuronId id) {
     const int neuron = number_of(id);
     if (!impl_->ask<int>("select id from neurons where id = :id", neuron)) return false;
     for (const char* table :
-         {"provenance", "somata", "arbors", "sections", "points", "spines", "annotations", "neuron_metrics"})
+         {"provenance", "somata", "arbors", "points", "spines", "annotations", "neuron_metrics"})
       impl_->sql << fmt::format("delete from {} where neuron = :id", table), use(neuron);
+    impl_->sql << "delete from " + of_sections(neuron);
     impl_->sql << "delete from neurons where id = :id", use(neuron);
     return true;
   });

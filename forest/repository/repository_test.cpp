@@ -533,17 +533,31 @@ TEST_P(EveryDatabase, AnswersQuestionsInSqlAndLetsNothingBeWritten) {
   EXPECT_FALSE(fs::exists("/tmp/forest-attached.db") || fs::exists("/tmp/forest-copied"));
 }
 
-/// As version 1 stored it.
-std::string as_version_1(const std::string& file) {
-  return fmt::format(
-      "sqlite3 '{}' 'begin; drop view neuron; drop view section; drop view junction; drop view metric; "
-      "drop table neuron_metrics; drop table metrics; drop table distributions; "
-      "alter table points drop column packing; alter table sections drop column daughters; "
-      "alter table sections drop column area; alter table sections drop column start_diameter; "
-      "alter table sections drop column end_diameter; alter table sections drop column end_x; "
-      "alter table sections drop column end_y; alter table sections drop column end_z; "
-      "pragma user_version = 1; commit'",
-      file);
+std::size_t terminals(const Morphology& m) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < m.sections().size(); ++i) count += m.is_terminal(SectionId(i));
+  return count;
+}
+
+/// As an older version stored it.
+std::string as_version(int version, const std::string& file) {
+  std::string sql =
+      "begin; drop view section; drop view junction; alter table sections rename to new; "
+      "create table sections (neuron integer not null, number integer not null, parent integer, arbor integer not null, "
+      "branch_order integer not null, length real not null, kind integer not null, tag integer not null, "
+      "soma_point integer not null, first_point integer not null, point_count integer not null, "
+      "daughters integer not null default 0, area real not null default 0, primary key (neuron, number)) "
+      "without rowid; "
+      "insert into sections select id >> 24, id & 16777215, parent, arbor, branch_order, length, kind, tag, "
+      "soma_point, sum(points) over (partition by id >> 24 order by id) - points, points, daughters, area from new; "
+      "drop table new; ";
+  if (version == 1)
+    sql += "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; "
+           "drop table distributions; alter table points drop column packing; "
+           "alter table sections drop column daughters; alter table sections drop column area; ";
+  else
+    sql += "create view section as select 1; create view junction as select 1; ";
+  return fmt::format("sqlite3 '{}' '{} pragma user_version = {}; commit'", file, sql, version);
 }
 
 TEST_F(RepositoryTest, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
@@ -555,22 +569,31 @@ TEST_F(RepositoryTest, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
     for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
     rows = repository.neurons();
   }
-  ASSERT_EQ(std::system(as_version_1(file_).c_str()), 0);
-  const std::string old = bytes_of(file_);
+  const std::string new_one = bytes_of(file_);
   Random random(3);
-  for (int round = 0; round < 12; ++round) {
-    write_file(file_, old);
-    const pid_t child = in_child([&] { Repository::open(file_, Access::read); });
-    ::usleep(std::uint32_t(random.uniform(0., 30'000.)));
-    ::kill(child, SIGKILL);
-    wait_for(child);
-    EXPECT_EQ(whole_neurons(file_, source), source.size()) << "opening it again ends what was begun";
+  for (const int version : {1, 2}) {
+    write_file(file_, new_one);
+    ASSERT_EQ(std::system(as_version(version, file_).c_str()), 0);
+    const std::string old = bytes_of(file_);
+    for (int round = 0; round < 8; ++round) {
+      write_file(file_, old);
+      const pid_t child = in_child([&] { Repository::open(file_, Access::read); });
+      ::usleep(std::uint32_t(random.uniform(0., 30'000.)));
+      ::kill(child, SIGKILL);
+      wait_for(child);
+      EXPECT_EQ(whole_neurons(file_, source), source.size()) << "opening it again ends what was begun";
+    }
+    Repository repository = Repository::open(file_, Access::read);
+    EXPECT_EQ(repository.neurons_where("total_length > 0").size(), source.size());
+    const auto count = [&](const char* question) {
+      return std::get<std::int64_t>(repository.query(question).rows[0][0]);
+    };
+    EXPECT_EQ(count("select count(*) from junction where junction = 'terminal' and neuron = 5"),
+              std::int64_t(terminals(source[4])));
+    EXPECT_EQ(count("select count(*) from sqlite_master where name like 'old%' or name = 'new'"), 0);
+    const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
+    EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
   }
-  Repository repository = Repository::open(file_, Access::read);
-  EXPECT_EQ(repository.neurons_where("total_length > 0").size(), source.size());
-  EXPECT_EQ(repository.query("select sum(end_x + daughters) from sections where neuron = 5").rows.size(), 1u);
-  const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
-  EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
 }
 
 TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tables of a repository, as steps from version to version; docs/repository/schema.md draws them. Plain SQL but for
-// words in @, for which each database has its own: @id (a whole number that names a row), @bytes, and @by_key (rows kept in
-// the order of their key).
+// words in @, for which each database has its own: @id and @long_id (a whole number of 32 or 64 bits that names a row), @bytes,
+// and @by_key (rows kept in the order of their key).
 #pragma once
 
 #include <array>
@@ -176,8 +176,47 @@ create view metric as
   select n.id as neuron, n.name as name, p.name as population, m.name as metric, v.value, m.unit
   from neuron_metrics v join metrics m on m.id = v.metric join neurons n on n.id = v.neuron
        join populations p on p.id = n.population;
+)sql"},
+    // A section is named by one number, so that the table needs no index besides its own order. What version 2 kept is
+    // moved by the program, which then drops old_sections.
+    Migration{3, R"sql(
+drop view section;
+drop view junction;
+alter table sections rename to old_sections;
+create table sections (
+  id           @long_id,                  -- 2^24 neuron + section; parents before children, sections from 0
+  parent       integer,                   -- null for a root
+  arbor        integer not null,
+  branch_order integer not null,          -- 0 for a stem, one more at every branch point
+  kind         integer not null,          -- as section_kinds.id
+  tag          integer not null,          -- the number the file gave
+  soma_point   integer not null,          -- a root: index of the soma point it leaves from, -1 when not known
+  points       integer not null,          -- how many; those of all sections follow one another in points.data
+  daughters    integer not null,
+  length       double precision not null, -- micrometres, as all that follow
+  area         double precision not null, -- square micrometres
+  start_diameter double precision not null,
+  end_diameter double precision not null,
+  end_x        double precision not null,
+  end_y        double precision not null,
+  end_z        double precision not null
+);
+create view section as
+  select n.id as neuron, n.name as name, p.name as population, s.id & 16777215 as section, s.parent, s.arbor,
+         s.branch_order, k.name as kind, s.tag, s.points, s.length, s.area, s.start_diameter, s.end_diameter
+  from neurons n cross join sections s join populations p on p.id = n.population
+       left join section_kinds k on k.id = s.kind
+  where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
+create view junction as
+  select n.id as neuron, n.name as name, p.name as population, s.id & 16777215 as section,
+         case s.daughters when 0 then 'terminal' when 1 then 'node' when 2 then 'bifurcation' else 'multifurcation' end
+           as junction,
+         s.daughters, s.branch_order, s.end_x as x, s.end_y as y, s.end_z as z, s.end_diameter as diameter
+  from neurons n cross join sections s join populations p on p.id = n.population
+  where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
 )sql"}};
 
+inline constexpr int section_bits = 24;  // of sections.id
 inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository
 
 }  // namespace forest::repository

@@ -66,9 +66,11 @@ def unpacked(blob):  # docs/repository/schema.md
 for neuron, packing, blob in db.execute("select neuron, packing, data from points"):
     assert packing == 1 and len(blob) < 10 * db.execute("select points from neurons where id = ?", (neuron,)).fetchone()[0]
     points = unpacked(blob)
-    for parent, first, count, length in db.execute(
-            "select parent, first_point, point_count, length from sections where neuron = ? order by number", (neuron,)):
+    first = 0
+    for parent, count, length in db.execute(
+            "select parent, points, length from section where neuron = ? order by section", (neuron,)):
         run = points[first:first + count]
+        first += count
         assert abs(sum(math.dist(a[:3], b[:3]) for a, b in zip(run, run[1:])) - length) < 1e-3 * length
     assert db.execute("select sum(length) from arbors where neuron = ?", (neuron,)).fetchone()[0] > 0
 PY
@@ -90,7 +92,7 @@ $BRAINFOREST export --repo one.db --population P --format swc --out exported >/d
 $BRAINFOREST export --repo two.db --out exported2 --threads 1 >/dev/null
 diff -r exported exported2
 $BRAINFOREST import exported --repo back.db --population P >/dev/null
-facts="select name, stems, n.sections, n.points, group_concat(s.number || '<' || coalesce(s.parent, '') || ':' || s.kind) from neurons n join sections s on s.neuron = n.id group by n.id order by name"
+facts="select name, stems, n.sections, n.points, group_concat(s.section || '<' || coalesce(s.parent, '') || ':' || s.kind) from neurons n join section s on s.neuron = n.id group by n.id order by name"
 [ "$(sqlite3 one.db "$facts")" = "$(sqlite3 back.db "$facts")" ]
 $BRAINFOREST export cell07 "$id" cell00 --repo one.db --out some >/dev/null
 [ "$(ls some | tr '\n' ' ')" = 'cell00.swc cell07.swc ' ]
