@@ -19,7 +19,7 @@ import urllib.parse
 CELLS, PORT_FILE, LOG = (pathlib.Path(path) for path in sys.argv[1:4])
 cells = {path.stem: path.read_bytes() for path in sorted(CELLS.glob("*.swc"))}
 asked = {}  # how often each path
-SLOW = 4096  # bytes a tenth of a second
+SLOW = 16384  # bytes a tenth of a second
 
 
 def record(name, number):
@@ -61,7 +61,7 @@ class Service(http.server.BaseHTTPRequestHandler):
             found, pages = [], 10**6
         elif wanted == "hostile":
             names = ["../../escaped", "..%2f..%2fescaped", "", "plain-1"]
-            found, pages = [record(name, i) for i, name in enumerate(names)], 1
+            found, pages = [record(name, i) | {"species": "\33[2Jrat"} for i, name in enumerate(names)], 1
         elif wanted == "broken" and number > 0:
             return self.answer(200, b'{"_embedded":{"neur', "application/json")
         else:

@@ -76,8 +76,6 @@ cp r.db r2.db
 fetch --query 'species:rat AND brain_region:neocortex' --limit 5 --repo r.db --population wild | grep -c 'already there' | grep -qx 3
 fetch --query 'species:rat AND brain_region:neocortex' --limit 3 --repo r2.db --population wild >/dev/null
 [ "$(sqlite3 r2.db 'select count(*) from neurons')" = 3 ]
-$BRAINFOREST export --repo r.db --out exported >/dev/null && $BRAINFOREST measure exported/plain-4.swc cells/plain-4.swc --json |
-  json 'len(d)' >/dev/null
 
 # A service that waits, is ill for a while, or has moved: patience. One that breaks off: the rest and only the rest.
 fetch busy-1 ill-1 moved-1 cut-1 changed-1 weak-1 wrong-1 --out patient >/dev/null 2>err.txt
@@ -106,7 +104,7 @@ grep -q '^1 fetched (1 of them from the cache), 11 failed$' said.txt && cmp bad/
 told() { grep -qE "^$1: .*$2" err.txt || { echo "no '$2' of $1"; cat err.txt; exit 1; }; }
 told gone-1 'does not have it \(status 404\)'
 told page-1 'is a web page and no SWC file'
-told nonsense-1 'CNG.swc:1: '
+told nonsense-1 'holds no point'
 told file-1 'cannot be had \(Protocol "file"'
 told circle-1 'Maximum \(5\) redirects'
 told short-1 'broke off after 2 attempts with [0-9]+ bytes there'
@@ -118,8 +116,8 @@ told 'a%2fb' 'no single piece of an address'
 grep -q '11 of 12 cells could not be fetched' err.txt
 fails_with 1 'larger than 1000000 bytes' fetch flood-1 --out bad --max-size 1 --retries 0
 fails_with 1 'broke off' fetch silent-1 --out bad --timeout 1 --retries 0
-fails_with 1 'alone for 86400 seconds' fetch away-1 plain-4 --out bad  # and what is in the cache is served
-cmp bad/plain-4.swc cells/plain-4.swc
+fails_with 1 'alone for 86400 seconds' fetch away-1 plain-0 --out away  # and what is in the cache is served
+cmp away/plain-0.swc cells/plain-0.swc
 grep -q '1 of 2 cells' err.txt
 
 # Queries to a service that lies end, and names out of them lead nowhere.
@@ -130,6 +128,7 @@ fails_with 1 '250 of 250 cells' fetch --query species:new --limit 250 --out neve
 [ "$(requests species%3Anew)" = 3 ] && [ ! -e never ]
 fetch --query species:empty --out never | grep -q '^0 fetched'
 fails_with 1 '3 of 4 cells' fetch --query species:hostile --out hostile
+! grep -q $'\e' out.txt err.txt  # nor their terminal's commands
 [ "$(find . -name '*escaped*')" = '' ] && [ ! -e ../../escaped.swc ] && [ "$(ls hostile | wc -l)" = 2 ]
 fails_with 1 'pages ended early' fetch --query species:broken --limit 200 --out broken --retries 0
 [ "$(ls broken/*.swc | wc -l)" = 5 ]
@@ -172,7 +171,7 @@ timeout 60 $BRAINFOREST fetch plain-0 plain-1 plain-2 --out polite --cache fresh
 /usr/bin/python3 - <<'PY'
 import json
 times = [json.loads(line)["time"] for line in open("log.jsonl")][-6:]
-assert min(b - a for a, b in zip(times, times[1:])) > .2, times
+assert times[-1] - times[0] > 1 and min(b - a for a, b in zip(times, times[1:])) > .1, times  # but for delays of the log
 PY
 
 # A full disk, a cache that is a file, a server that is not there: a sentence each, and not one for every cell's retries.
@@ -196,7 +195,7 @@ cmp tls/plain-0.swc cells/plain-0.swc
 
 # Bad usage.
 fails_with 2 'say which neurons' fetch --out x
-fails_with 2 'into' fetch plain-0
+fails_with 2 '--out,--repo' fetch plain-0
 fails_with 2 'no address of a service' $BRAINFOREST fetch a --out x --from file:///etc
 fails_with 2 'without user' $BRAINFOREST fetch a --out x --from http://me:secret@host
 ! grep -q secret err.txt
