@@ -257,7 +257,7 @@ std::function<void()> fetch_cells(CLI::App& command, Console& console) {
     if (options->names.empty() && options->query.empty())
       throw CLI::ValidationError("say which neurons: their names, or --query \"field:value\"");
     try {
-      fetch::Addresses{options->from};
+      (void)fetch::Addresses(options->from);
       if (!options->query.empty()) fetch::conditions(options->query);
     } catch (const Error& error) {
       throw CLI::ValidationError(error.what());

@@ -77,10 +77,9 @@ Record record_of(const Json& json) {
   record.species = joined(entries(find(json, "species")));
   record.type = joined(entries(find(json, "cell_type")));
   // The layer is one of the regions: ["neocortex", "prefrontal", "layer 3"].
-  std::vector<std::string> regions = entries(find(json, "brain_region")), layers;
-  const auto others = std::ranges::stable_partition(regions, [](const auto& r) { return !is_layer(r); });
-  layers.assign(others.begin(), others.end());
-  regions.erase(others.begin(), others.end());
+  std::vector<std::string> regions, layers;
+  for (std::string& entry : entries(find(json, "brain_region")))
+    (is_layer(entry) ? layers : regions).push_back(std::move(entry));
   record.region = joined(regions);
   record.layer = joined(layers);
   for (const auto& [key, value] : json.items())
