@@ -74,7 +74,7 @@ class CheckLayers(unittest.TestCase):
         self.assert_refused("error.cpp", "<gtest/gtest.h>")
 
     def test_an_unknown_library_is_refused(self):
-        self.append("core/error.cpp", "#include <curl/curl.h>")
+        self.append("core/error.cpp", "#include <git2.h>")
         self.assert_refused("error.cpp", "no known library", "LIBRARIES")
 
     def test_a_library_that_is_named_no_more_is_refused(self):

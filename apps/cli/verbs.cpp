@@ -8,6 +8,7 @@ namespace forest::cli {
 // One declaration and one row a verb, in the order of --help.
 std::function<void()> demo(CLI::App&, Console&);
 std::function<void()> import_files(CLI::App&, Console&);
+std::function<void()> fetch_cells(CLI::App&, Console&);
 std::function<void()> list(CLI::App&, Console&);
 std::function<void()> show(CLI::App&, Console&);
 std::function<void()> query(CLI::App&, Console&);
@@ -30,6 +31,10 @@ std::span<const Verb> verbs() {
        demo},
       {"import", "Store traced neurons in a repository",
        "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
+      {"fetch", "Download cells from NeuroMorpho.Org or a service like it",
+       "brainforest fetch cnic_001 NMO_00002 --out cells/\n"
+       "  brainforest fetch --query \"species:rat AND brain_region:neocortex\" --limit 20 --repo cells.db",
+       fetch_cells},
       {"list", "List the populations and neurons of a repository",
        "brainforest list --repo cells.db --where \"type = 'L5 pyramidal' and total_length > 5000\"", list},
       {"show", "Show all that is known of a neuron: soma, arbors, sections, where it comes from",

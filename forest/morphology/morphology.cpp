@@ -187,6 +187,12 @@ void MorphologyBuilder::add_spine(const Spine& spine) {
   data_->spines.push_back(spine);
 }
 
+Morphology Morphology::with_annotations(Annotations annotations) const {
+  auto data = std::make_shared<Data>(*data_);
+  data->annotations = std::move(annotations);
+  return Morphology(std::move(data));
+}
+
 void MorphologyBuilder::annotate(std::string key, std::string value) {
   data_->annotations.emplace_back(std::move(key), std::move(value));
 }

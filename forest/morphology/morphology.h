@@ -102,6 +102,7 @@ class Morphology {
   std::span<const Section> sections() const { return data_->sections; }
   std::span<const Spine> spines() const { return data_->spines; }
   const Annotations& annotations() const { return data_->annotations; }
+  Morphology with_annotations(Annotations annotations) const;  // the same neuron; these instead of its own
 
   const Section& section(SectionId id) const { return data_->sections[id.value()]; }
   std::span<const Point> points(SectionId id) const {

@@ -22,6 +22,13 @@ Morphology tree(bool soma) {
   return builder.build();
 }
 
+TEST(Annotations, AreReplacedAndNothingElse) {
+  const Morphology before = tree(true), after = before.with_annotations({{"doi", "10.1/a"}});
+  EXPECT_EQ(after, before);
+  EXPECT_EQ(after.annotations(), (Annotations{{"doi", "10.1/a"}}));
+  EXPECT_EQ(before.annotations(), (Annotations{{"species", "rat"}}));
+}
+
 TEST(Translated, MovesEveryPointAndChangesNothingElse) {
   const Morphology before = tree(true), after = translated(before, {1, 2, 3});
   ASSERT_EQ(after.points().size(), before.points().size());

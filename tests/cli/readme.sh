@@ -4,7 +4,7 @@ ln -s "$FOREST_SOURCE_DIR/data" data
 export PATH="$(dirname "$BRAINFOREST"):$PATH"
 brainforest grow --grammar data/grammars/motoneuron.lsys --count 3 --seed 7 --out cells/  # the reader's own cells
 
-grep '^brainforest ' "$FOREST_SOURCE_DIR/README.md" | grep -v ' view ' |  # a window needs a display
+grep '^brainforest ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' |  # a window needs a display, a service a network
   sed 's/^brainforest movie .*/& --size 320x180 --fps 5 --samples 2/' >commands
 grep -q '^brainforest import' commands
 mv cells/motoneuron-7-00000.swc cells/cell7.swc

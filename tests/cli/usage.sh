@@ -12,7 +12,7 @@ fails_with() {  # status, words of the sentence, command…
 }
 program=$BRAINFOREST
 
-fails_with 2 "no verb 'frob'; there are: demo, import, list" $program frob
+fails_with 2 "no verb 'frob'; there are: demo, import, fetch, list" $program frob
 fails_with 2 'say which verb, one of: demo' $program
 fails_with 2 "no benchmark 'nosuch'; there are: column" $program bench nosuch
 fails_with 2 'one of: column, grow' $program bench
