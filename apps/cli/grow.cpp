@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <memory>
+#include <optional>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/parallel.h"
 #include "forest/io/format.h"
 #include "forest/morphology/measure.h"
 #include "forest/repository/repository.h"
@@ -31,17 +33,23 @@ struct Options {
   bool force = false;
 };
 
-constexpr std::size_t batch = 2000;  // neurons held at a time
+constexpr std::size_t batch = 2000;   // neurons compared at a time
+constexpr std::size_t stored = 500;   // as one transaction: their pages fit into memory, so that readers wait for none
 
 std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& name) {
   return folder / (name + ".swc");
 }
 
-/// Where grown neurons go. What was put is undone unless it is finished.
+struct Ready {
+  Morphology neuron;
+  std::optional<repository::Prepared> prepared;  // when it goes into a repository
+};
+
+/// Where grown neurons go.
 class Destination {
  public:
   virtual ~Destination() = default;
-  virtual void put(const Morphology& neuron, const std::string& name, std::uint64_t index) = 0;
+  virtual void put(Ready& neuron, const std::string& name, std::uint64_t index) = 0;
   virtual void finish() = 0;
 };
 
@@ -51,23 +59,29 @@ class IntoRepository final : public Destination {
       : options_(options),
         name_(grammar.name),
         repository_(repository::Repository::open(options.repo, repository::Access::write)),
-        transaction_(repository_.begin()),
         hash_(repository_.add_grammar(grammar.name, grammar.text)) {}
 
-  void put(const Morphology& neuron, const std::string& name, std::uint64_t index) override {
-    repository_.add(neuron, {.name = name,
-                             .population = options_.population.empty() ? name_ : options_.population,
-                             .provenance = repository::Grown{name_, hash_, options_.seed, index},
-                             .number_if_taken = true});
+  void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
+    if (!transaction_) transaction_.emplace(repository_.begin());
+    repository_.add(std::move(*neuron.prepared),
+                    {.name = name,
+                     .population = options_.population.empty() ? name_ : options_.population,
+                     .provenance = repository::Grown{name_, hash_, options_.seed, index},
+                     .number_if_taken = true});
+    if (++count_ % stored == 0) finish();
   }
-  void finish() override { transaction_.commit(); }
+  void finish() override {
+    if (transaction_) transaction_->commit();
+    transaction_.reset();
+  }
 
  private:
   const Options& options_;
   std::string name_;
   repository::Repository repository_;
-  repository::Repository::Transaction transaction_;
+  std::optional<repository::Repository::Transaction> transaction_;
   std::string hash_;
+  std::size_t count_ = 0;
 };
 
 class IntoFolder final : public Destination {
@@ -83,10 +97,10 @@ class IntoFolder final : public Destination {
     std::error_code none;
     for (const auto& file : unfinished_) std::filesystem::remove(file, none);
   }
-  void put(const Morphology& neuron, const std::string& name, std::uint64_t) override {
+  void put(Ready& ready, const std::string& name, std::uint64_t) override {
     const auto file = file_of(folder_, name);
     if (!std::filesystem::exists(file)) unfinished_.push_back(file);
-    io::write(file, neuron);
+    io::write(file, ready.neuron);
   }
   void finish() override { unfinished_.clear(); }
 
@@ -129,16 +143,22 @@ void run(const Options& options, Console& console) {
 
   std::size_t segments = 0;
   double length = 0.;
-  for (std::size_t first = 0; first < options.count; first += batch) {
-    const auto neurons = lsystem::grow_population(grammar, std::min(batch, options.count - first),
-                                                  options.seed, console.progress(), first);
-    for (std::size_t i = 0; i < neurons.size(); ++i) {
-      const std::string name = name_of(options, grammar, first + i);
-      for (const auto& destination : destinations) destination->put(neurons[i], name, first + i);
-      segments += neurons[i].segment_count();
-      length += total_length(neurons[i]);
-    }
-  }
+  console.progress().begin("growing", options.count);
+  parallel_in_order(
+      options.count,
+      [&](std::size_t i) {
+        Ready ready{lsystem::grow(grammar, options.seed, i), {}};
+        if (!options.repo.empty()) ready.prepared.emplace(ready.neuron);
+        return ready;
+      },
+      [&](std::size_t i, Ready&& ready) {
+        const std::string name = name_of(options, grammar, i);
+        for (const auto& destination : destinations) destination->put(ready, name, i);
+        segments += ready.neuron.segment_count();
+        length += total_length(ready.neuron);
+        console.progress().advance();
+      });
+  console.progress().end();
   for (const auto& destination : destinations) destination->finish();
 
   console.print({{"grammar", grammar.name},

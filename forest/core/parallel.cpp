@@ -4,6 +4,7 @@
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
+#include <tbb/parallel_pipeline.h>
 
 namespace forest {
 
@@ -11,6 +12,24 @@ void parallel_ranges(std::size_t count, std::size_t grain,
                      const std::function<void(std::size_t, std::size_t)>& body) {
   using Range = tbb::blocked_range<std::size_t>;
   tbb::parallel_for(Range(0, count, grain ? grain : 1), [&](const Range& r) { body(r.begin(), r.end()); });
+}
+
+void detail::in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
+              const std::function<void(std::size_t, void*)>& take) {
+  using Made = std::pair<std::size_t, std::shared_ptr<void>>;
+  using tbb::filter_mode;
+  constexpr std::size_t ahead = 64;
+  std::size_t next = 0;
+  tbb::parallel_pipeline(
+      ahead,
+      tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order,
+                                          [&](tbb::flow_control& control) {
+                                            if (next == count) control.stop();
+                                            return next++;
+                                          }) &
+          tbb::make_filter<std::size_t, Made>(filter_mode::parallel, [&](std::size_t i) { return Made(i, make(i)); }) &
+          tbb::make_filter<Made, void>(filter_mode::serial_in_order,
+                                       [&](const Made& made) { take(made.first, made.second.get()); }));
 }
 
 ThreadLimit::ThreadLimit(unsigned threads) {

@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <functional>
+#include <memory>
 
 namespace forest {
 
@@ -19,6 +20,21 @@ void parallel_for(std::size_t count, std::size_t grain, Body&& body) {
   parallel_ranges(count, grain, [&](std::size_t begin, std::size_t end) {
     for (std::size_t i = begin; i < end; ++i) body(i);
   });
+}
+
+namespace detail {
+void in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
+              const std::function<void(std::size_t, void*)>& take);
+}
+
+/// What make(i) returns goes to take(i, …), in the order of i and one at a time, while later ones are being made on all
+/// cores; few wait at any time. The first exception thrown by either is rethrown here.
+template <class Make, class Take>
+void parallel_in_order(std::size_t count, Make&& make, Take&& take) {
+  using T = decltype(make(std::size_t()));
+  detail::in_order(
+      count, [&](std::size_t i) { return std::make_shared<T>(make(i)); },
+      [&](std::size_t i, void* made) { take(i, std::move(*static_cast<T*>(made))); });
 }
 
 /// Limits every parallel loop for as long as the object lives; 0 means all cores.

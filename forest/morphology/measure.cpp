@@ -23,10 +23,6 @@ double sum_over_sections(const Morphology& m, Measure measure) {
 
 }  // namespace
 
-double segment_length(const Point& a, const Point& b) {
-  return std::hypot(double(b.x) - a.x, double(b.y) - a.y, double(b.z) - a.z);
-}
-
 double segment_area(const Point& a, const Point& b) {
   const double slant = std::hypot(segment_length(a, b), double(b.radius) - a.radius);
   return std::numbers::pi * (double(a.radius) + b.radius) * slant;

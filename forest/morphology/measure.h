@@ -2,11 +2,16 @@
 // Length, area and volume of segments (truncated cones) and sections, in double precision.
 #pragma once
 
+#include <cmath>
+
 #include "forest/morphology/morphology.h"
 
 namespace forest {
 
-double segment_length(const Point& a, const Point& b);  // µm
+inline double segment_length(const Point& a, const Point& b) {  // µm
+  const double x = double(b.x) - a.x, y = double(b.y) - a.y, z = double(b.z) - a.z;
+  return std::sqrt(x * x + y * y + z * z);  // squares of floats are far from the ends of double
+}
 double segment_area(const Point& a, const Point& b);    // lateral area of the truncated cone, µm²
 double segment_volume(const Point& a, const Point& b);  // µm³
 

@@ -39,7 +39,7 @@ void measure(const Morphology& m, Rows& rows) {
   int number = 0;
   for (const statistics::Metric& metric : statistics::metrics()) {
     ++number;
-    const double value = statistics::summarize(metric.values(arbors)).mean;
+    const double value = statistics::mean(metric.values(arbors));
     if (!std::isfinite(value)) continue;
     rows.metric.push_back(number);
     rows.metric_value.push_back(value);

@@ -168,18 +168,20 @@ double pk_classic(const Arbors& a, const Bifurcation& b) {
   return ratio(std::pow(d.large, 1.5) + std::pow(d.small, 1.5), std::pow(d.parent, 1.5));
 }
 
-// large^n + small^n - parent^n, divided by parent^n, falls from 1 at n = 0 where both daughters are thinner.
+// large^n + small^n - parent^n, divided by parent^n, is convex in n and falls from 1 at n = 0 where both daughters are
+// thinner: Newton's steps from there never go past the root.
 double rall_power(const Arbors& a, const Bifurcation& b) {
   const Diameters d = diameters(a, b);
-  const double p = ratio(d.large, d.parent), q = ratio(d.small, d.parent);
-  const auto excess = [&](double n) { return std::pow(p, n) + std::pow(q, n) - 1.; };
-  double low = 0., high = 5.;
-  if (!(p < 1. && q > 0. && excess(high) <= 0.)) return nan;
-  for (int i = 0; i < 60; ++i) {
-    const double middle = 0.5 * (low + high);
-    (excess(middle) > 0. ? low : high) = middle;
+  const double p = std::log(ratio(d.large, d.parent)), q = std::log(ratio(d.small, d.parent));
+  if (!(p < 0. && q < 0. && std::isfinite(q) && std::exp(5. * p) + std::exp(5. * q) <= 1.)) return nan;
+  double n = 0.;
+  for (int i = 0; i < 100; ++i) {
+    const double u = std::exp(n * p), v = std::exp(n * q);
+    const double step = (1. - u - v) / (p * u + q * v);
+    n += step;
+    if (std::abs(step) <= 1e-15 * n) break;
   }
-  return 0.5 * (low + high);
+  return n;
 }
 
 double partition_asymmetry(const Arbors& a, const Bifurcation& b) {

@@ -29,4 +29,12 @@ Summary summarize(std::span<const double> values) {
           .max = v.back()};
 }
 
+double mean(std::span<const double> values) {
+  double sum = 0.;
+  std::size_t count = 0;
+  for (const double x : values)
+    if (!std::isnan(x)) sum += x, ++count;
+  return count ? sum / double(count) : std::numeric_limits<double>::quiet_NaN();
+}
+
 }  // namespace forest::statistics

@@ -16,4 +16,7 @@ struct Summary {
 
 Summary summarize(std::span<const double> values);
 
+/// Of the values that are defined; NaN when there is none. Takes a tenth of the time of all five numbers.
+double mean(std::span<const double> values);
+
 }  // namespace forest::statistics
