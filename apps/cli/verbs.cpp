@@ -29,7 +29,9 @@ std::span<const Verb> verbs() {
       {"demo", "Do it all: grow, store, plant, pack, draw and film a forest", "brainforest demo --out demo",
        demo},
       {"import", "Store traced neurons in a repository",
-       "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
+       "brainforest import cells/ more/cell7.swc --repo cells.db --population traced\n"
+       "  brainforest import edited.xlsx --repo cells.db",
+       import_files},
       {"list", "List the populations and neurons of a repository",
        "brainforest list --repo cells.db --where \"type = 'L5 pyramidal' and total_length > 5000\"", list},
       {"show", "Show all that is known of a neuron: soma, arbors, sections, where it comes from",
