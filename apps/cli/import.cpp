@@ -136,19 +136,22 @@ void run_workbook(const Options& options, Console& console) {
   const NewNeuron& about = options.about;
   if (!about.species.empty() || !about.region.empty() || !about.layer.empty() || !about.type.empty() ||
       about.population != NewNeuron().population)
-    throw Error(fmt::format("{} is a workbook, which says itself what its neurons are; leave out --population, "
-                            "--species, --region, --layer and --type",
-                            escaped(file)));
+    throw Error(
+        fmt::format("{} is a workbook, which says itself what its neurons are; leave out --population, "
+                    "--species, --region, --layer and --type",
+                    escaped(file)));
   revise({file, options.repo, options.dry_run, options.verbose}, console);
 }
 
 void run(const Options& options, Console& console) {
-  if (const auto workbook = std::ranges::find_if(options.files, is_workbook); workbook != options.files.end()) {
+  if (const auto workbook = std::ranges::find_if(options.files, is_workbook);
+      workbook != options.files.end()) {
     Options first = options;
     std::swap(first.files.front(), first.files[std::size_t(workbook - options.files.begin())]);
     return run_workbook(first, console);
   }
-  if (options.dry_run) throw Error("--dry-run tells what a workbook would change; leave it out to import files");
+  if (options.dry_run)
+    throw Error("--dry-run tells what a workbook would change; leave it out to import files");
   const std::vector<fs::path> paths = neuron_files(options.files, console);
   std::vector<Arrival> files;
   std::optional<Repository> repository;  // made when there is something to store
@@ -203,8 +206,10 @@ void run(const Options& options, Console& console) {
 std::function<void()> import_files(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
-      .add_option("files", options->files, "Files of traced neurons, or folders with such files below them; or one workbook that export "
-                  "wrote, whose changes are taken over")
+      .add_option(
+          "files", options->files,
+          "Files of traced neurons, or folders with such files below them; or one workbook that export "
+          "wrote, whose changes are taken over")
       ->required()
       ->type_name("FILES");
   command.add_option("--repo", options->repo, "The repository; made when there is none")

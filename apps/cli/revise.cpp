@@ -7,12 +7,13 @@
 #include <array>
 #include <charconv>
 #include <cmath>
-#include <functional>
+#include <fstream>
 #include <limits>
 #include <map>
 #include <optional>
 #include <set>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <vector>
 
@@ -91,10 +92,12 @@ struct OfPoint {
   const char *sheet, *column, *points;
   bool last;
 };
-constexpr OfPoint of_points[] = {
-    {"sections", "start_diameter", "diameter", false}, {"sections", "end_diameter", "diameter", true},
-    {"junctions", "x", "x", true},                     {"junctions", "y", "y", true},
-    {"junctions", "z", "z", true},                     {"junctions", "diameter", "diameter", true}};
+constexpr OfPoint of_points[] = {{"sections", "start_diameter", "diameter", false},
+                                 {"sections", "end_diameter", "diameter", true},
+                                 {"junctions", "x", "x", true},
+                                 {"junctions", "y", "y", true},
+                                 {"junctions", "z", "z", true},
+                                 {"junctions", "diameter", "diameter", true}};
 
 constexpr std::array<float Point::*, 3> axes{&Point::x, &Point::y, &Point::z};
 
@@ -148,7 +151,8 @@ bool same(const Value& stored, const ReadCell& cell, bool entry) {
 
 /// What is wrong with a number of a person, or "".
 std::string number_fault(const ReadCell& cell, bool diameter) {
-  if (cell.kind == Kind::formula) return "it is a formula without a value; save the workbook with a spreadsheet";
+  if (cell.kind == Kind::formula)
+    return "it is a formula without a value; save the workbook with a spreadsheet";
   if (cell.kind == Kind::empty)
     return "it is empty; give a number (points are added and removed in the neuron's file)";
   const auto number = number_in(cell);
@@ -214,7 +218,8 @@ class Revising {
   void run() {
     find_neurons();
     if (drafts_.empty() && refused_.empty())
-      throw InputError(options_.workbook.string(), 0, "names no neuron on its sheet neurons; export it again");
+      throw InputError(options_.workbook.string(), 0,
+                       "names no neuron on its sheet neurons; export it again");
     compare();
     check_names();
     for (Draft& draft : drafts_)
@@ -233,13 +238,14 @@ class Revising {
     const ReadSheet* sheet = book_.find("neurons");
     const std::string file = options_.workbook.string();
     if (!sheet)
-      throw InputError(file, 0, "has no sheet neurons, so brainforest export did not write it; name one it wrote");
+      throw InputError(file, 0,
+                       "has no sheet neurons, so brainforest export did not write it; name one it wrote");
     const auto column = [&](std::string_view title) {
       const auto found = std::ranges::find(sheet->header, title);
       if (found == sheet->header.end())
-        throw InputError(file, 0,
-                         fmt::format("its sheet neurons has no column {}; export it again with this Brain Forest",
-                                     title));
+        throw InputError(
+            file, 0,
+            fmt::format("its sheet neurons has no column {}; export it again with this Brain Forest", title));
       return std::size_t(found - sheet->header.begin());
     };
     const std::size_t id = column("id"), version = column("version");
@@ -258,7 +264,8 @@ class Revising {
         refuse_row(fmt::format("the neuron stands at {} too; delete one of the two rows",
                                sheet->place(first->second, id)));
       } else if (!stored.contains(*number)) {
-        refuse_row("there is no such neuron in the repository; delete its rows, or import it and export again");
+        refuse_row(
+            "there is no such neuron in the repository; delete its rows, or import it and export again");
       }
     }
     std::vector<NeuronId> ids;
@@ -309,8 +316,7 @@ class Revising {
         notes_.push_back(fmt::format("there is no sheet {}, so nothing of it changes", rule.sheet));
         continue;
       }
-      const TableSheet& stored =
-          *std::ranges::find(tables_, std::string_view(rule.sheet), &TableSheet::name);
+      const TableSheet& stored = *std::ranges::find(tables_, std::string_view(rule.sheet), &TableSheet::name);
       Pair& pair = pairs_.emplace(rule.sheet, Pair{rule, stored, *read}).first->second;
       if (match_columns(pair)) compare_rows(pair);
     }
@@ -342,8 +348,8 @@ class Revising {
         refuse({read.name, "", "header", column.title(), "", "the column is missing; bring it back"});
         keyed = false;
       } else {
-        notes_.push_back(
-            fmt::format("the sheet {} has no column {}, so nothing of it changes", read.name, column.title()));
+        notes_.push_back(fmt::format("the sheet {} has no column {}, so nothing of it changes", read.name,
+                                     column.title()));
       }
     }
     for (std::size_t h = 0; h < read.header.size(); ++h)
@@ -399,7 +405,8 @@ class Revising {
     }
     std::map<std::int64_t, std::pair<std::string, std::size_t>> missing;  // the first, and how many
     for (std::size_t s = 0; s < rows.size(); ++s)
-      if (const auto id = std::get<std::int64_t>(rows[s][0]); pair.row_of[s] == none && !draft_of(id)->stale) {
+      if (const auto id = std::get<std::int64_t>(rows[s][0]);
+          pair.row_of[s] == none && !draft_of(id)->stale) {
         auto& [first, count] = missing[id];
         if (!count++) first = stored_key(pair, s);
       }
@@ -428,11 +435,10 @@ class Revising {
       return;
     }
     refuse({place, draft ? draft->row.name : "", "row", "", key,
-            draft && draft->stale
-                ? stale
-                : std::string_view(pair.rule.sheet) == "annotations"
-                      ? "there is no such annotation; leave the number of a new one empty"
-                      : "there is no such row; nothing is added in a workbook, so delete it or mend its numbers"});
+            draft && draft->stale ? stale
+            : std::string_view(pair.rule.sheet) == "annotations"
+                ? "there is no such annotation; leave the number of a new one empty"
+                : "there is no such row; nothing is added in a workbook, so delete it or mend its numbers"});
   }
 
   void compare_row(Pair& pair, std::size_t s, std::size_t r) {
@@ -447,8 +453,8 @@ class Revising {
       if (draft.stale && (!column.entry || is_joint(pair, draft, s, column.name)))
         continue;  // it follows from what changed since
       if (!column.entry && column.name == "name" && text_of(cell) == draft.now.name) continue;
-      Finding finding{pair.read.place(r, pair.at[c]), draft.row.name, column.title(), text_of(row[c]),
-                      text_of(cell),                  ""};
+      Finding finding{
+          pair.read.place(r, pair.at[c]), draft.row.name, column.title(), text_of(row[c]), text_of(cell), ""};
       if (!column.entry)
         finding.why = remedy(pair, column.name, row);
       else if (draft.stale)
@@ -481,7 +487,8 @@ class Revising {
     const std::string_view sheet = pair.rule.sheet;
     for (const OfPoint& of : of_points)
       if (of.sheet == sheet && of.column == column) {
-        const auto id = std::get<std::int64_t>(row[0]), section = std::get<std::int64_t>(row[pair.rule.keys[1]]);
+        const auto id = std::get<std::int64_t>(row[0]),
+                   section = std::get<std::int64_t>(row[pair.rule.keys[1]]);
         return fmt::format("it is that of a point; correct {}",
                            point_place(*draft_of(id), std::size_t(section), of.last, of.points));
       }
@@ -614,8 +621,8 @@ class Revising {
         if (is != joint && is != was) {
           constexpr std::array<const char*, 3> names{"x", "y", "z"};
           const std::size_t soma = draft.soma.size();
-          refuse({place_of(draft, soma + begin, names[axis]), draft.row.name, fmt::format("{} (µm)", names[axis]),
-                  fmt::format("{}", was), fmt::format("{}", is),
+          refuse({place_of(draft, soma + begin, names[axis]), draft.row.name,
+                  fmt::format("{} (µm)", names[axis]), fmt::format("{}", was), fmt::format("{}", is),
                   fmt::format("section {} begins where section {} ends; correct {}, and this follows", i,
                               section.parent.value(), place_of(draft, soma + end, names[axis]))});
         }
@@ -628,9 +635,9 @@ class Revising {
     std::vector<Revision> revisions;
     for (Draft& draft : drafts_) {
       if (!draft.changed) continue;
-      Revision& revision = revisions.emplace_back(
-          Revision{draft.row.id, draft.version, draft.now.name, draft.now.species, draft.now.region,
-                   draft.now.layer, draft.now.type, std::nullopt});
+      Revision& revision =
+          revisions.emplace_back(Revision{draft.row.id, draft.version, draft.now.name, draft.now.species,
+                                          draft.now.region, draft.now.layer, draft.now.type, std::nullopt});
       if (!draft.shaped) continue;
       const Morphology& old = *draft.morphology;
       MorphologyBuilder builder;
@@ -683,7 +690,11 @@ class Revising {
     nlohmann::ordered_json changed = nlohmann::ordered_json::array(), refused = changed;
     std::vector<std::vector<std::string>> lines;
     for (const Finding& f : changed_) {
-      changed.push_back({{"cell", f.place}, {"neuron", f.neuron}, {"column", f.column}, {"before", f.before}, {"after", f.after}});
+      changed.push_back({{"cell", f.place},
+                         {"neuron", f.neuron},
+                         {"column", f.column},
+                         {"before", f.before},
+                         {"after", f.after}});
       if (lines.size() < enough(changed_.size()))
         lines.push_back({f.place, f.neuron, f.column, f.before, f.after});
     }
@@ -691,7 +702,12 @@ class Revising {
     if (lines.size() < changed_.size())
       console_.say(fmt::format("… and {} more, shown by --verbose", changed_.size() - lines.size()));
     for (const Finding& f : refused_) {
-      refused.push_back({{"cell", f.place}, {"neuron", f.neuron}, {"column", f.column}, {"before", f.before}, {"after", f.after}, {"why", f.why}});
+      refused.push_back({{"cell", f.place},
+                         {"neuron", f.neuron},
+                         {"column", f.column},
+                         {"before", f.before},
+                         {"after", f.after},
+                         {"why", f.why}});
       if (refused.size() <= enough(refused_.size()))
         console_.warn(fmt::format("{}: {}: {}{} is {} instead of {}; {}", escaped(file), f.place, f.column,
                                   f.neuron.empty() ? "" : " of neuron " + shown(f.neuron), quoted(f.after),
@@ -712,13 +728,14 @@ class Revising {
                     {"refused", refused},
                     {"notes", notes_}});
     if (!refused_.empty())
-      throw Error(fmt::format("{} refused, so nothing is stored; mend what the sentences above name",
-                              refused_.size() == 1 ? "1 cell is"
-                                                   : fmt::format("{} cells are", refused_.size())));
+      throw Error(
+          fmt::format("{} refused, so nothing is stored; mend what the sentences above name",
+                      refused_.size() == 1 ? "1 cell is" : fmt::format("{} cells are", refused_.size())));
   }
 
   static constexpr const char* stale =
-      "the neuron in the repository has changed since the workbook was written; export it again and repeat the change there";
+      "the neuron in the repository has changed since the workbook was written; export it again and repeat "
+      "the change there";
 
   const ReviseOptions& options_;
   io::ReadWorkbook book_;
@@ -733,18 +750,29 @@ class Revising {
   std::vector<std::string> notes_;
 };
 
-fs::path sheet_file(const fs::path& folder, std::string_view sheet) { return folder / fmt::format("{}.csv", sheet); }
+fs::path sheet_file(const fs::path& folder, std::string_view sheet) {
+  return folder / fmt::format("{}.csv", sheet);
+}
 
 }  // namespace
 
 bool is_workbook(const fs::path& path) {
   std::error_code ignored;
+  const auto begin_of = [](const fs::path& file,
+                           std::size_t bytes) {  // "" of what cannot be read, which is told later
+    std::string begin(bytes, '\0');
+    std::ifstream stream(file, std::ios::binary);
+    stream.read(begin.data(), std::streamsize(bytes));
+    begin.resize(std::size_t(stream.gcount()));
+    return begin;
+  };
   if (fs::is_directory(path, ignored)) {
     const fs::path neurons = sheet_file(path, "neurons");
-    return fs::is_regular_file(neurons, ignored) && MappedFile(neurons).text().substr(0, 1000).find("version") != std::string::npos;
+    return fs::is_regular_file(neurons, ignored) &&
+           begin_of(neurons, 1000).find("version") != std::string::npos;
   }
   return fs::is_regular_file(path, ignored) &&
-         (path.extension() == ".xlsx" || io::recognises_workbook(MappedFile(path).text()));
+         (path.extension() == ".xlsx" || io::recognises_workbook(begin_of(path, 4)));
 }
 
 void revise(const ReviseOptions& options, Console& console) {

@@ -61,9 +61,9 @@ TableSheet sheet_of(Repository& repository, const Sheet& sheet, const std::strin
   TableSheet table{sheet.name, {}, std::move(answer.rows)};
   for (const std::string& column : answer.columns) {
     const auto unit = std::ranges::find(units, column, &std::pair<std::string_view, std::string_view>::first);
-    table.columns.push_back({column, unit == std::end(units) ? "" : std::string(unit->second),
-                             fmt::format(" {} ", sheet.entries).find(fmt::format(" {} ", column)) !=
-                                 std::string::npos});
+    table.columns.push_back(
+        {column, unit == std::end(units) ? "" : std::string(unit->second),
+         fmt::format(" {} ", sheet.entries).find(fmt::format(" {} ", column)) != std::string::npos});
   }
   return table;
 }
@@ -234,8 +234,9 @@ std::vector<std::filesystem::path> export_tables(const std::string& repo,
                                                  const std::filesystem::path& out, bool csv,
                                                  Console& console) {
   std::ranges::sort(neurons, {}, [](const auto& neuron) { return neuron.id.value(); });
-  const auto twice = std::ranges::unique(neurons, {}, [](const auto& neuron) { return neuron.id.value(); });
-  neurons.erase(twice.begin(), twice.end());  // one may be named twice, by name and by id
+  neurons.erase(
+      std::unique(neurons.begin(), neurons.end(), [](const auto& a, const auto& b) { return a.id == b.id; }),
+      neurons.end());  // one may be named twice, by name and by id
   Repository repository = Repository::open(repo, repository::Access::read);
   std::size_t points = 0;
   for (const auto& neuron : neurons) points += neuron.points;
@@ -249,7 +250,7 @@ std::vector<std::filesystem::path> export_tables(const std::string& repo,
     if (points <= io::most_rows) book.sheets.pop_back();
   }
   add_summary(book, TableSheet(book.sheets[0]), mean_sholl(repo, neurons, console.progress()));
-  std::ranges::rotate(book.sheets.begin() + 1, book.sheets.begin() + 2, book.sheets.begin() + 5);
+  std::rotate(book.sheets.begin() + 1, book.sheets.begin() + 2, book.sheets.begin() + 5);
   if (!csv) {
     io::write_workbook(out, book);
     return {out};

@@ -76,7 +76,8 @@ std::optional<Number> number_of(std::string_view text) {
 std::string decoded(std::string text) {
   const auto at = [&](std::size_t i) -> std::optional<unsigned> {
     unsigned code = 0;
-    if (i + 7 > text.size() || text[i] != '_' || text[i + 1] != 'x' || text[i + 6] != '_') return std::nullopt;
+    if (i + 7 > text.size() || text[i] != '_' || text[i + 1] != 'x' || text[i + 6] != '_')
+      return std::nullopt;
     const auto [end, error] = std::from_chars(&text[i + 2], &text[i + 6], code, 16);
     if (error != std::errc() || end != &text[i + 6] || (code >= 0xd800 && code < 0xe000)) return std::nullopt;
     return code;
@@ -317,8 +318,9 @@ class SheetReader {
       const pugi::xml_attribute reference = attribute(c, "r");
       const auto column = reference ? column_of(reference.value()) : next;
       if (!column || *column < next || *column >= most_columns)
-        archive_.fail("row {} of the sheet {} has a cell '{}' out of its order; save it again with a spreadsheet",
-                      row_, sheet_.name, reference.value());
+        archive_.fail(
+            "row {} of the sheet {} has a cell '{}' out of its order; save it again with a spreadsheet", row_,
+            sheet_.name, reference.value());
       next = *column + 1;
       if (row_ != 1 && *column >= width) break;
       const ReadCell cell = cell_of(c, *column);
@@ -491,10 +493,11 @@ void read_csv(ReadWorkbook& book, std::string sheet, std::string_view bytes, con
     while (!fields.empty() && fields.back().empty()) fields.pop_back();
     if (fields.empty()) continue;
     if (fields.size() > read.header.size())
-      throw InputError(name, begun,
-                       fmt::format("has {} fields, and the header names {}; put fields that hold the separator "
-                                   "between quotation marks",
-                                   fields.size(), read.header.size()));
+      throw InputError(
+          name, begun,
+          fmt::format("has {} fields, and the header names {}; put fields that hold the separator "
+                      "between quotation marks",
+                      fields.size(), read.header.size()));
     read.rows.push_back(number);
     for (std::string& field : fields) {
       ReadCell& cell = read.cells.emplace_back();

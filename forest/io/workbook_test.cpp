@@ -78,7 +78,8 @@ TEST(Workbook, EveryFloatComesBackExactly) {
   Workbook book;
   book.sheets.push_back({"points", {{"x", "µm"}}, {}});
   std::vector<float> values;
-  for (std::uint32_t i = 1; i < 2000; ++i) values.push_back(std::ldexp(float(i * 2654435761u), int(i % 200) - 130));
+  for (std::uint32_t i = 1; i < 2000; ++i)
+    values.push_back(std::ldexp(float(i * 2654435761u), int(i % 200) - 130));
   for (const float v : values) book.sheets[0].rows.push_back({double(v)});
   const fs::path file = fs::temp_directory_path() / fmt::format("forest-workbook-floats-{}.xlsx", ::getpid());
   write_workbook(file, book);
@@ -152,7 +153,8 @@ TEST(Workbook, WhatIsNoneIsASentence) {
     EXPECT_NE(message(zip_of(parts)), "no error") << missing;
   }
   parts = workbook_parts(sheet_xml(header));
-  parts[1].second = R"(<workbook xmlns:r="r"><sheets><sheet name="a" r:id="a"/><sheet name="a" r:id="a"/></sheets></workbook>)";
+  parts[1].second =
+      R"(<workbook xmlns:r="r"><sheets><sheet name="a" r:id="a"/><sheet name="a" r:id="a"/></sheets></workbook>)";
   EXPECT_THAT(message(zip_of(parts)), HasSubstr("two sheets a"));
   EXPECT_THAT(message(zip_of(workbook_parts("\xff\xfe<\0w"))), HasSubstr("UTF-16"));
   EXPECT_THAT(message(zip_of(workbook_parts("<worksheet><row r=\"1\">"))), HasSubstr("cut off"));
@@ -166,7 +168,8 @@ TEST(Workbook, RowsAndCellsThatAreNotInOrderAreRefused) {
   EXPECT_THAT(refused("<row r=\"1\"><c r=\"B1\"/><c r=\"B1\"/></row>"), HasSubstr("'B1' out of its order"));
   EXPECT_THAT(refused("<row r=\"1\"><c r=\"XFE1\"/></row>"), HasSubstr("'XFE1'"));
   EXPECT_THAT(refused("<row r=\"1\"><c r=\"1\"/></row>"), HasSubstr("'1' out of"));
-  EXPECT_THAT(refused(header + "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>0</v></c></row>"), HasSubstr("neurons!A2 shows text 0"));
+  EXPECT_THAT(refused(header + "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>0</v></c></row>"),
+              HasSubstr("neurons!A2 shows text 0"));
   EXPECT_THAT(refused(header + "<row r=\"2\"><c r=\"A2\" t=\"s\"><v>-1</v></c></row>", "<sst><si/></sst>"),
               HasSubstr("text -1"));
   EXPECT_THAT(refused(header + "<row r=\"2\"><c></row>"), HasSubstr("no XML"));
@@ -174,9 +177,11 @@ TEST(Workbook, RowsAndCellsThatAreNotInOrderAreRefused) {
 }
 
 TEST(Workbook, CutOffAnywhereOrWithAnyByteChangedItIsReadOrRefused) {
-  const std::string whole = zip_of(workbook_parts(sheet_xml(header + R"(<row r="2"><c r="A2"><v>3</v></c></row>)")), true);
+  const std::string whole =
+      zip_of(workbook_parts(sheet_xml(header + R"(<row r="2"><c r="A2"><v>3</v></c></row>)")), true);
   ASSERT_EQ(message(whole), "no error");
-  for (std::size_t end = 0; end < whole.size(); ++end) EXPECT_NE(message(whole.substr(0, end)), "no error") << end;
+  for (std::size_t end = 0; end < whole.size(); ++end)
+    EXPECT_NE(message(whole.substr(0, end)), "no error") << end;
   for (std::size_t at = 0; at < whole.size(); ++at)
     for (const int change : {1, 64, 255}) {
       std::string bytes = whole;
@@ -201,7 +206,8 @@ TEST(Workbook, BombsEndAtAStatedLimit) {
 
 TEST(Csv, FieldsAreAsInTheRfcAndAsSpreadsheetsWriteThem) {
   ReadWorkbook book;
-  read_csv(book, "neurons", "\xef\xbb\xbfid, name \r\n1,\"a \"\"b\"\"\nc\"\r\n\r\n,\r\n2\n3,last", "neurons.csv");
+  read_csv(book, "neurons", "\xef\xbb\xbfid, name \r\n1,\"a \"\"b\"\"\nc\"\r\n\r\n,\r\n2\n3,last",
+           "neurons.csv");
   const ReadSheet& s = book.sheets.at(0);
   EXPECT_THAT(s.header, ElementsAre("id", "name"));
   EXPECT_THAT(s.rows, ElementsAre(2u, 5u, 6u));

@@ -805,7 +805,8 @@ void Repository::revise(std::span<const Revision> revisions) {
                       .layer = escaped(r.layer),
                       .type = escaped(r.type)};
       if (prepared[i]) {
-        const std::string fingerprint = *impl.ask<std::string>("select fingerprint from neurons where id = :id", id);
+        const std::string fingerprint =
+            *impl.ask<std::string>("select fingerprint from neurons where id = :id", id);
         const int grammar =
             impl.ask<int>("select grammar from provenance where neuron = :id", id).value_or(0);
         about.provenance = neuron(r.id)->provenance;
@@ -821,7 +822,8 @@ void Repository::revise(std::span<const Revision> revisions) {
       } else {
         impl.sql << "update neurons set name = :name, species = :species, region = :region, layer = :layer, "
                     "type = :type where id = :id",
-            use(about.name), use(about.species), use(about.region), use(about.layer), use(about.type), use(id);
+            use(about.name), use(about.species), use(about.region), use(about.layer), use(about.type),
+            use(id);
       }
     }
     return true;

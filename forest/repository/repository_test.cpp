@@ -309,7 +309,8 @@ TEST_P(EveryDatabase, RemovingLeavesNothingOfANeuron) {
 TEST_P(EveryDatabase, ARevisedNeuronIsThatNeuron) {
   Repository repository = Repository::open(place_, Access::write);
   const std::string hash = repository.add_grammar("grammar", "text");
-  const NeuronId a = repository.add(neuron(1), {.name = "a", .species = "rat", .provenance = Traced{"a.swc", "h"}}).id;
+  const NeuronId a =
+      repository.add(neuron(1), {.name = "a", .species = "rat", .provenance = Traced{"a.swc", "h"}}).id;
   const NeuronId b = repository.add(neuron(2), {.name = "b", .provenance = Grown{"grammar", hash, 5, 6}}).id;
   const NeuronId c = repository.add(neuron(3), {.name = "c"}).id;
   const auto before = repository.versions(std::vector{a, b, c, NeuronId(99)});
@@ -337,7 +338,8 @@ TEST_P(EveryDatabase, ARevisedNeuronIsThatNeuron) {
   // Metrics, sections and arbors are those of a neuron that was stored so.
   const NeuronId fresh = repository.add(neuron(4), {.name = "fresh", .population = "other"}).id;
   EXPECT_EQ(repository.arbors(b).size(), repository.arbors(fresh).size());
-  EXPECT_TRUE(repository.add(neuron(2), {.name = "b", .provenance = Grown{"grammar", hash, 5, 6}}).already_there);
+  EXPECT_TRUE(
+      repository.add(neuron(2), {.name = "b", .provenance = Grown{"grammar", hash, 5, 6}}).already_there);
   EXPECT_TRUE(repository.check().empty());
   const auto of = [&](const char* view, NeuronId id) {
     return repository.query(fmt::format("select * from {} where neuron = {}", view, id.value()));
@@ -360,13 +362,16 @@ TEST_P(EveryDatabase, RevisionsAreAllStoredOrNone) {
     EXPECT_EQ(repository.morphology(a), neuron(1));
   };
   const Revision good{.id = a, .version = versions[0], .name = "new", .morphology = neuron(5)};
-  fails({good, {.id = b, .version = versions[1], .name = "new"}}, "another neuron of the population is called 'new'");
+  fails({good, {.id = b, .version = versions[1], .name = "new"}},
+        "another neuron of the population is called 'new'");
   fails({good, {.id = b, .version = "v0", .name = "b"}}, "neuron 2 has been changed");
   fails({good, {.id = NeuronId(7), .version = "", .name = "b"}}, "neuron 7 has been removed");
   fails({good, {.id = b, .version = versions[1], .name = "a\nb"}}, "is no name");
   {
     auto transaction = repository.begin();
-    EXPECT_THROW(repository.revise(std::vector{good, Revision{.id = b, .version = versions[1], .name = "new"}}), Error);
+    EXPECT_THROW(
+        repository.revise(std::vector{good, Revision{.id = b, .version = versions[1], .name = "new"}}),
+        Error);
     EXPECT_THROW(transaction.commit(), Error);
   }
   EXPECT_EQ(repository.versions(std::vector{a, b}), versions);
