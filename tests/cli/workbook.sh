@@ -14,7 +14,8 @@ cat >a.swc <<'SWC'
 SWC
 sed 's/^5 3 7 /5 3 9 /' a.swc >b.swc
 $BRAINFOREST import a.swc b.swc --repo cells.db --population P --species rat >out.txt
-$BRAINFOREST grow --grammar motoneuron --count 2 --seed 2 --repo cells.db >out.txt
+printf 'steps: 4\naxiom: Soma(10) Basal f(5) A\ngrow: A -> F(uniform(9, 11), 1) [ +(30) A ] -(30) A\n' >bush.lsys
+$BRAINFOREST grow --grammar bush.lsys --count 2 --seed 2 --repo cells.db >out.txt
 $BRAINFOREST export --repo cells.db --format xlsx --out book.xlsx >out.txt
 $BRAINFOREST export --repo cells.db --format csv --out tables >out.txt
 cp cells.db first.db
