@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest import: files into a repository. Files are read on all cores and stored in the order of their names, each in
-// a transaction of its own, so the bytes of the repository do not depend on the number of threads.
+// a transaction of its own, so the bytes of the repository do not depend on the number of threads. A workbook that export
+// wrote brings back what was changed in it (revise.h).
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
@@ -22,6 +23,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/revise.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -34,7 +36,7 @@ struct Options {
   std::vector<std::string> files;
   std::string repo;
   NewNeuron about;  // what all of them share
-  bool verbose = false;
+  bool verbose = false, dry_run = false;
 };
 
 /// A neuron on its way into the repository.
@@ -125,7 +127,31 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
         fmt::format("{} of {} files could not be read; the sentences above say why", failed, files.size()));
 }
 
+/// What a workbook cannot be imported with. Its neurons have their populations and say the rest themselves.
+void run_workbook(const Options& options, Console& console) {
+  const std::string& file = options.files[0];
+  if (options.files.size() > 1)
+    throw Error(fmt::format("{} is a workbook of neurons that are in the repository; import it alone",
+                            escaped(file)));
+  const NewNeuron& about = options.about;
+  if (!about.species.empty() || !about.region.empty() || !about.layer.empty() || !about.type.empty() ||
+      about.population != NewNeuron().population)
+    throw Error(
+        fmt::format("{} is a workbook, which says itself what its neurons are; leave out --population, "
+                    "--species, --region, --layer and --type",
+                    escaped(file)));
+  revise({file, options.repo, options.dry_run, options.verbose}, console);
+}
+
 void run(const Options& options, Console& console) {
+  if (const auto workbook = std::ranges::find_if(options.files, is_workbook);
+      workbook != options.files.end()) {
+    Options first = options;
+    std::swap(first.files.front(), first.files[std::size_t(workbook - options.files.begin())]);
+    return run_workbook(first, console);
+  }
+  if (options.dry_run)
+    throw Error("--dry-run tells what a workbook would change; leave it out to import files");
   const std::vector<fs::path> paths = neuron_files(options.files, console);
   std::vector<Arrival> files;
   std::optional<Repository> repository;  // made when there is something to store
@@ -180,7 +206,10 @@ void run(const Options& options, Console& console) {
 std::function<void()> import_files(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
-      .add_option("files", options->files, "Files of traced neurons, or folders with such files below them")
+      .add_option(
+          "files", options->files,
+          "Files of traced neurons, or folders with such files below them; or one workbook that export "
+          "wrote, whose changes are taken over")
       ->required()
       ->type_name("FILES");
   command.add_option("--repo", options->repo, "The repository; made when there is none")
@@ -195,6 +224,7 @@ std::function<void()> import_files(CLI::App& command, Console& console) {
   command.add_option("--type", options->about.type, "Their cell type");
   command.add_flag("--verbose", options->verbose,
                    "Show every oddity: file, line, what stands there and how it was read");
+  command.add_flag("--dry-run", options->dry_run, "Of a workbook: only tell what it would change");
   return [options, &console] { run(*options, console); };
 }
 

@@ -3,8 +3,10 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
 #include <map>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -23,6 +25,7 @@ namespace {
 using io::TableColumn;
 using io::TableSheet;
 using io::Value;
+using repository::NeuronId;
 using repository::Repository;
 
 /// Units of the columns of the views (docs/repository/schema.md).
@@ -35,19 +38,21 @@ constexpr std::pair<std::string_view, std::string_view> units[] = {
 /// A sheet for each view: its columns in the order of the page, of the neurons that were chosen.
 struct Sheet {
   const char *name, *columns, *from, *id;
+  const char* entries = "";  // what a person may change
 };
 constexpr Sheet sheets[] = {
     {"neurons",
      "id, name, population, species, region, layer, type, stems, sections, points, spines, length, soma, "
      "soma_x, soma_y, "
      "soma_z, soma_radius, soma_area, origin, source_file, grammar, seed, number",
-     "neuron", "id"},
+     "neuron", "id", "name species region layer type"},
     {"sections",
      "neuron, name, section, parent, arbor, branch_order, kind, tag, points, length, area, start_diameter, "
      "end_diameter",
      "section", "neuron, section"},
     {"junctions", "neuron, name, section, junction, daughters, branch_order, x, y, z, diameter", "junction",
-     "neuron, section"}};
+     "neuron, section"},
+    {"annotations", "neuron, number, name, value", "annotations", "neuron, number", "name value"}};
 
 TableSheet sheet_of(Repository& repository, const Sheet& sheet, const std::string& ids) {
   const std::string_view key = std::string_view(sheet.id).substr(0, std::string_view(sheet.id).find(','));
@@ -56,7 +61,44 @@ TableSheet sheet_of(Repository& repository, const Sheet& sheet, const std::strin
   TableSheet table{sheet.name, {}, std::move(answer.rows)};
   for (const std::string& column : answer.columns) {
     const auto unit = std::ranges::find(units, column, &std::pair<std::string_view, std::string_view>::first);
-    table.columns.push_back({column, unit == std::end(units) ? "" : std::string(unit->second)});
+    table.columns.push_back(
+        {column, unit == std::end(units) ? "" : std::string(unit->second),
+         fmt::format(" {} ", sheet.entries).find(fmt::format(" {} ", column)) != std::string::npos});
+  }
+  return table;
+}
+
+/// The shortest decimal that is this float, as a person would have typed it.
+double decimal(float value) {
+  std::array<char, 32> digits;
+  const char* const end = std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr;
+  double result = 0.;
+  std::from_chars(digits.data(), end, result);
+  return result;
+}
+
+/// A row a point, first those of the soma.
+TableSheet points_sheet(const Repository& repository, const std::vector<repository::NeuronRow>& neurons) {
+  TableSheet table{"points",
+                   {{"neuron", ""},
+                    {"section", ""},
+                    {"point", ""},
+                    {"x", "µm", true},
+                    {"y", "µm", true},
+                    {"z", "µm", true},
+                    {"diameter", "µm", true}},
+                   {}};
+  for (const auto& neuron : neurons) {
+    const Morphology m = repository.morphology(neuron.id);
+    const auto add = [&](const Value& section, std::span<const Point> points) {
+      for (std::size_t i = 0; i < points.size(); ++i) {
+        const Point& p = points[i];
+        table.rows.push_back({std::int64_t(neuron.id.value()), section, std::int64_t(i), decimal(p.x),
+                              decimal(p.y), decimal(p.z), decimal(2.f * p.radius)});
+      }
+    };
+    add("soma", m.soma().points);
+    for (std::size_t s = 0; s < m.sections().size(); ++s) add(std::int64_t(s), m.points(SectionId(s)));
   }
   return table;
 }
@@ -167,18 +209,48 @@ void add_summary(io::Workbook& book, const TableSheet& metrics, const std::vecto
 
 }  // namespace
 
+std::vector<TableSheet> sheets_of(Repository& repository, const std::vector<repository::NeuronRow>& neurons,
+                                  bool points) {
+  std::vector<NeuronId> numbers;
+  std::string ids;
+  for (const auto& neuron : neurons) {
+    ids += fmt::format("{}{}", ids.empty() ? "" : ", ", neuron.id.value());
+    numbers.push_back(neuron.id);
+  }
+  std::vector<TableSheet> tables{metrics_sheet(repository, neurons, ids)};
+  for (const Sheet& sheet : sheets) tables.push_back(sheet_of(repository, sheet, ids));
+  std::map<std::int64_t, std::string> version;
+  const std::vector<std::string> versions = repository.versions(numbers);
+  for (std::size_t i = 0; i < numbers.size(); ++i) version[std::int64_t(numbers[i].value())] = versions[i];
+  TableSheet& first = tables[1];
+  first.columns.push_back({"version", ""});
+  for (auto& row : first.rows) row.emplace_back(version[std::get<std::int64_t>(row[0])]);
+  if (points) tables.push_back(points_sheet(repository, neurons));
+  return tables;
+}
+
 std::vector<std::filesystem::path> export_tables(const std::string& repo,
-                                                 const std::vector<repository::NeuronRow>& neurons,
+                                                 std::vector<repository::NeuronRow> neurons,
                                                  const std::filesystem::path& out, bool csv,
                                                  Console& console) {
-  std::string ids;
-  for (const auto& neuron : neurons) ids += fmt::format("{}{}", ids.empty() ? "" : ", ", neuron.id.value());
+  std::ranges::sort(neurons, {}, [](const auto& neuron) { return neuron.id.value(); });
+  neurons.erase(
+      std::unique(neurons.begin(), neurons.end(), [](const auto& a, const auto& b) { return a.id == b.id; }),
+      neurons.end());  // one may be named twice, by name and by id
   Repository repository = Repository::open(repo, repository::Access::read);
+  std::size_t points = 0;
+  for (const auto& neuron : neurons) points += neuron.points;
   io::Workbook book;
-  for (const Sheet& sheet : sheets) book.sheets.push_back(sheet_of(repository, sheet, ids));
-  book.sheets.push_back(metrics_sheet(repository, neurons, ids));
-  const TableSheet metrics = book.sheets.back();
-  add_summary(book, metrics, mean_sholl(repo, neurons, console.progress()));
+  book.sheets = sheets_of(repository, neurons, csv || points <= io::most_rows);
+  if (!csv && (points > io::most_rows || book.sheets.back().rows.size() > io::most_rows)) {
+    console.warn(fmt::format(
+        "{}: the sheet points is left out, for a sheet holds {} rows and there are {} points; choose fewer "
+        "neurons, or --format csv, to correct coordinates",
+        out.string(), io::most_rows, points));
+    if (points <= io::most_rows) book.sheets.pop_back();
+  }
+  add_summary(book, TableSheet(book.sheets[0]), mean_sholl(repo, neurons, console.progress()));
+  std::rotate(book.sheets.begin() + 1, book.sheets.begin() + 2, book.sheets.begin() + 5);
   if (!csv) {
     io::write_workbook(out, book);
     return {out};

@@ -30,7 +30,9 @@ std::span<const Verb> verbs() {
       {"demo", "Do it all: grow, store, plant, pack, draw and film a forest", "brainforest demo --out demo",
        demo},
       {"import", "Store traced neurons in a repository",
-       "brainforest import cells/ more/cell7.swc --repo cells.db --population traced", import_files},
+       "brainforest import cells/ more/cell7.swc --repo cells.db --population traced\n"
+       "  brainforest import edited.xlsx --repo cells.db",
+       import_files},
       {"fetch", "Download cells from NeuroMorpho.Org or a service like it",
        "brainforest fetch cnic_001 NMO_00002 --out cells/\n"
        "  brainforest fetch --query \"species:rat AND brain_region:neocortex\" --limit 20 --repo cells.db",

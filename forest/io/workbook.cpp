@@ -15,8 +15,8 @@
 namespace forest::io {
 namespace {
 
-constexpr std::size_t most_rows = 1048575;            // and a header
-constexpr std::size_t longest_text = 32767;           // Excel's limit of a cell, characters
+constexpr std::size_t longest_text = 32767;           // Excel's limit of a cell is in characters
+constexpr lxw_color_t entry_colour = 0xfff2cc;        // the headers of what a person may change
 constexpr int chart_width = 480, chart_height = 288;  // pixels, libxlsxwriter's own
 
 std::string text_of(const Value& value) {
@@ -29,13 +29,28 @@ std::string text_of(const Value& value) {
   return std::visit(text, value);
 }
 
-void write_cell(lxw_worksheet* sheet, lxw_row_t row, lxw_col_t column, const Value& value) {
+/// What looks like the code of a character in a workbook (_x0041_) gets a code for its first letter, so that it is none.
+std::string coded(std::string_view text) {
+  std::string result;
+  const auto is_code = [](std::string_view c) {
+    return c.size() == 7 && c.starts_with("_x") && c[6] == '_' &&
+           c.substr(2, 4).find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
+  };
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (is_code(text.substr(i, 7))) result += "_x005F";
+    result += text[i];
+  }
+  return result;
+}
+
+void write_cell(lxw_worksheet* sheet, lxw_row_t row, lxw_col_t column, const Value& value,
+                lxw_format* format) {
   if (const auto* number = std::get_if<double>(&value)) {
-    if (std::isfinite(*number)) worksheet_write_number(sheet, row, column, *number, nullptr);
+    if (std::isfinite(*number)) worksheet_write_number(sheet, row, column, *number, format);
   } else if (const auto* whole = std::get_if<std::int64_t>(&value)) {
-    worksheet_write_number(sheet, row, column, double(*whole), nullptr);
+    worksheet_write_number(sheet, row, column, double(*whole), format);
   } else if (const auto* text = std::get_if<std::string>(&value); text && !text->empty()) {
-    worksheet_write_string(sheet, row, column, text->substr(0, longest_text).c_str(), nullptr);
+    worksheet_write_string(sheet, row, column, coded(cell_text(*text)).c_str(), format);
   }
 }
 
@@ -55,18 +70,26 @@ void write_sheet(lxw_workbook* book, const TableSheet& sheet) {
   lxw_worksheet* page = workbook_add_worksheet(book, sheet.name.c_str());
   if (!page)
     throw Error(fmt::format("'{}' is no name for a sheet; this is an error of the program", sheet.name));
-  lxw_format* header = workbook_add_format(book);
-  format_set_bold(header);
-  format_set_bottom(header, LXW_BORDER_THIN);
+  lxw_format *header = workbook_add_format(book), *entry = workbook_add_format(book);
+  for (lxw_format* format : {header, entry}) {
+    format_set_bold(format);
+    format_set_bottom(format, LXW_BORDER_THIN);
+  }
+  format_set_bg_color(entry, entry_colour);
+  lxw_format* text = workbook_add_format(book);
+  format_set_num_format(text, "@");  // or Excel makes a date of layer 2/3
   worksheet_freeze_panes(page, 1, 0);
+  std::vector<lxw_format*> formats;
   for (std::size_t c = 0; c < sheet.columns.size(); ++c) {
     const auto column = lxw_col_t(c);
-    worksheet_set_column(page, column, column, width_of(sheet, c), nullptr);
-    worksheet_write_string(page, 0, column, sheet.columns[c].title().c_str(), header);
+    formats.push_back(sheet.columns[c].entry && sheet.columns[c].unit.empty() ? text : nullptr);
+    worksheet_set_column(page, column, column, width_of(sheet, c), formats.back());
+    worksheet_write_string(page, 0, column, sheet.columns[c].title().c_str(),
+                           sheet.columns[c].entry ? entry : header);
   }
   for (std::size_t r = 0; r < sheet.rows.size(); ++r)
     for (std::size_t c = 0; c < sheet.columns.size(); ++c)
-      write_cell(page, lxw_row_t(r + 1), lxw_col_t(c), sheet.rows[r][c]);
+      write_cell(page, lxw_row_t(r + 1), lxw_col_t(c), sheet.rows[r][c], formats[c]);
   if (!sheet.rows.empty())
     worksheet_autofilter(page, 0, 0, lxw_row_t(sheet.rows.size()), lxw_col_t(sheet.columns.size() - 1));
 }
@@ -94,6 +117,13 @@ void add_chart(lxw_workbook* book, const Workbook& workbook, const Chart& chart,
 }
 
 }  // namespace
+
+std::string_view cell_text(std::string_view text) {
+  if (text.size() <= longest_text) return text;
+  std::size_t end = longest_text;
+  while (end && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
+  return text.substr(0, end);
+}
 
 void write_workbook(const std::filesystem::path& path, const Workbook& workbook) {
   const std::filesystem::path part =

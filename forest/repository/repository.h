@@ -16,6 +16,7 @@
 #include <filesystem>
 #include <memory>
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <variant>
@@ -89,6 +90,15 @@ struct ArborRow {
   double length = 0.;  // µm
 };
 
+/// What a neuron is to be from now on.
+struct Revision {
+  NeuronId id;
+  std::string version;                                           // what Repository::versions() said of it
+  std::string name = {};                                         // see names.h
+  std::string species = {}, region = {}, layer = {}, type = {};  // empty: not known
+  std::optional<Morphology> morphology = {};                     // none: as it is
+};
+
 enum class Access : std::uint8_t { read, write };
 
 /// A neuron made ready to be stored: its rows, metrics, packed points and checksum. Most of the work of storing one, and
@@ -150,6 +160,16 @@ class Repository {
   Morphology morphology(NeuronId id) const;
 
   bool remove(NeuronId id);  // false when there was none
+
+  // ── Correcting ──
+
+  /// A word for each neuron that is another one after anything of it has changed; empty when there is none of that id.
+  std::vector<std::string> versions(std::span<const NeuronId> ids) const;
+
+  /// Makes neurons what these say, all or none. They keep id, population and where they come from, so that the same
+  /// source is still known to be there; metrics and rows follow the new points. Names may be exchanged. Throws Error when
+  /// a neuron is not of that version any more, or a name is none or taken.
+  void revise(std::span<const Revision> revisions);
 
   /// One question in SQL, on the views neuron, section, junction, metric and the tables (docs/repository/schema.md).
   /// From then on this object can only read. Throws Error that says what is not understood.

@@ -306,6 +306,79 @@ TEST_P(EveryDatabase, RemovingLeavesNothingOfANeuron) {
   EXPECT_THAT(repository.check(), testing::IsEmpty());
 }
 
+TEST_P(EveryDatabase, ARevisedNeuronIsThatNeuron) {
+  Repository repository = Repository::open(place_, Access::write);
+  const std::string hash = repository.add_grammar("grammar", "text");
+  const NeuronId a =
+      repository.add(neuron(1), {.name = "a", .species = "rat", .provenance = Traced{"a.swc", "h"}}).id;
+  const NeuronId b = repository.add(neuron(2), {.name = "b", .provenance = Grown{"grammar", hash, 5, 6}}).id;
+  const NeuronId c = repository.add(neuron(3), {.name = "c"}).id;
+  const auto before = repository.versions(std::vector{a, b, c, NeuronId(99)});
+  EXPECT_EQ(before[3], "");
+  EXPECT_NE(before[0], before[1]);
+  const NeuronRow grown = *repository.neuron(b);
+  repository.revise(std::vector<Revision>{
+      {.id = a, .version = before[0], .name = "b", .species = "back\\slash \xff", .layer = "2/3"},
+      {.id = b, .version = before[1], .name = "a", .morphology = neuron(4)}});
+  const auto after = repository.versions(std::vector{a, b, c});
+  EXPECT_NE(after[0], before[0]);
+  EXPECT_NE(after[1], before[1]);
+  EXPECT_EQ(after[2], before[2]);
+  const NeuronRow first = *repository.neuron(a), second = *repository.neuron(b);
+  EXPECT_EQ(first.name, "b");
+  EXPECT_EQ(first.species, "back\\slash \xff");
+  EXPECT_EQ(first.layer, "2/3");
+  EXPECT_EQ(first.provenance, (Provenance{Traced{"a.swc", "h"}}));
+  EXPECT_EQ(repository.morphology(a), neuron(1));
+  EXPECT_EQ(second.name, "a");
+  EXPECT_EQ(second.provenance, grown.provenance);
+  EXPECT_EQ(second.points, neuron(4).points().size());
+  EXPECT_EQ(repository.morphology(b), neuron(4));
+  EXPECT_EQ(repository.morphology(b).annotations(), neuron(4).annotations());
+  // Metrics, sections and arbors are those of a neuron that was stored so.
+  const NeuronId fresh = repository.add(neuron(4), {.name = "fresh", .population = "other"}).id;
+  EXPECT_EQ(repository.arbors(b).size(), repository.arbors(fresh).size());
+  EXPECT_TRUE(
+      repository.add(neuron(2), {.name = "b", .provenance = Grown{"grammar", hash, 5, 6}}).already_there);
+  EXPECT_TRUE(repository.check().empty());
+  const auto of = [&](const char* view, NeuronId id) {
+    return repository.query(fmt::format("select * from {} where neuron = {}", view, id.value()));
+  };
+  for (const char* view : {"section", "junction", "metric"}) {
+    const Answer is = of(view, b), expected = of(view, fresh);
+    ASSERT_EQ(is.rows.size(), expected.rows.size()) << view;
+    EXPECT_EQ(is.rows.back().back(), expected.rows.back().back()) << view;
+  }
+}
+
+TEST_P(EveryDatabase, RevisionsAreAllStoredOrNone) {
+  Repository repository = Repository::open(place_, Access::write);
+  const NeuronId a = repository.add(neuron(1), {.name = "a"}).id;
+  const NeuronId b = repository.add(neuron(2), {.name = "b"}).id;
+  const auto versions = repository.versions(std::vector{a, b});
+  const auto fails = [&](const std::vector<Revision>& revisions, const char* words) {
+    EXPECT_THAT(message([&] { repository.revise(revisions); }), HasSubstr(words));
+    EXPECT_EQ(repository.versions(std::vector{a, b}), versions);
+    EXPECT_EQ(repository.morphology(a), neuron(1));
+  };
+  const Revision good{.id = a, .version = versions[0], .name = "new", .morphology = neuron(5)};
+  fails({good, {.id = b, .version = versions[1], .name = "new"}},
+        "another neuron of the population is called 'new'");
+  fails({good, {.id = b, .version = "v0", .name = "b"}}, "neuron 2 has been changed");
+  fails({good, {.id = NeuronId(7), .version = "", .name = "b"}}, "neuron 7 has been removed");
+  fails({good, {.id = b, .version = versions[1], .name = "a\nb"}}, "is no name");
+  {
+    auto transaction = repository.begin();
+    EXPECT_THROW(
+        repository.revise(std::vector{good, Revision{.id = b, .version = versions[1], .name = "new"}}),
+        Error);
+    EXPECT_THROW(transaction.commit(), Error);
+  }
+  EXPECT_EQ(repository.versions(std::vector{a, b}), versions);
+  repository.revise(std::vector{good});
+  EXPECT_EQ(repository.morphology(a), neuron(5));
+}
+
 TEST_P(EveryDatabase, PopulationsAreSummedUp) {
   Repository repository = Repository::open(place_, Access::write);
   EXPECT_TRUE(repository.populations().empty());

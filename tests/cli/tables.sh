@@ -10,7 +10,7 @@ cmp cells.xlsx again.xlsx
 import csv, json, sqlite3, zipfile
 import openpyxl
 book = openpyxl.load_workbook("cells.xlsx")
-assert book.sheetnames == ["summary", "neurons", "sections", "junctions", "metrics"], book.sheetnames
+assert book.sheetnames == ["summary", "neurons", "sections", "junctions", "metrics", "annotations", "points"], book.sheetnames
 db = sqlite3.connect("r.db")
 count = lambda view: db.execute(f"select count(*) from {view} where population = 'motoneuron'").fetchone()[0]
 assert book["neurons"].max_row == 1 + 4 and book["sections"].max_row == 1 + count("section")
@@ -28,7 +28,7 @@ summary = {row[0].value: row for row in book["summary"].iter_rows(min_row=2)}
 assert abs(summary["total_length"][3].value - total / 4) < 1e-6 * total and summary["total_length"][2].value == 4
 assert len([n for n in zipfile.ZipFile("cells.xlsx").namelist() if n.startswith("xl/charts/chart")]) == 4
 files = json.load(open("files.json"))["files"]
-assert len(files) == 5, files
+assert len(files) == 7, files
 rows = list(csv.reader(open("tables/sections.csv", newline="", encoding="utf-8")))
 assert rows[0] == header and len(rows) == book["sections"].max_row
 PY
