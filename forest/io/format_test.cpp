@@ -15,6 +15,7 @@
 #include "forest/morphology/measure.h"
 #include "forest/morphology/validate.h"
 
+#include "tests/real_data.h"
 #include "tests/zoo.h"
 
 namespace forest::io {
@@ -102,6 +103,40 @@ TEST_P(EveryFormat, ReadsBackWhatItWrote) {
     expect_same_neuron(read, specimen.morphology, format.keeps);
     EXPECT_EQ(format.write(read), bytes) << "written again, the bytes differ";
   }
+}
+
+/// From a neuron to this format and on to every other: what the two keep comes through.
+void expect_through_every_other(const Format& format, const Morphology& m) {
+  if (!fits(format, m)) return;
+  const Morphology once = format.read(format.write(m), "once").morphology;
+  expect_same_neuron(once, m, format.keeps);
+  for (const Format& other : formats()) {
+    if (!other.read || !other.write || other.name == format.name) continue;
+    SCOPED_TRACE(other.name);
+    if (fits(other, once))
+      expect_same_neuron(other.read(other.write(once), "twice").morphology, once, other.keeps);
+  }
+}
+
+TEST_P(EveryFormat, LeadsToEveryOther) {
+  if (!GetParam().read || !GetParam().write) GTEST_SKIP() << "is not both read and written";
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    expect_through_every_other(GetParam(), specimen.morphology);
+  }
+}
+
+TEST_P(EveryFormat, LeadsTracedNeuronsToEveryOther) {
+  if (!GetParam().read || !GetParam().write) GTEST_SKIP() << "is not both read and written";
+  FOREST_REAL_DATA(folder, "morphologies/real");
+  std::set<std::filesystem::path> populations;
+  for (const char* const extension : {".swc", ".asc", ".h5"})
+    for (const auto& path : files_below(folder, extension))
+      if (populations.insert(path.parent_path()).second) {  // one cell of each
+        SCOPED_TRACE(path.string());
+        expect_through_every_other(GetParam(), read(path).morphology);
+      }
+  EXPECT_GT(populations.size(), 10u);
 }
 
 TEST_P(EveryFormat, WritesTheSameBytesForWhatIsLeftOfANeuron) {
