@@ -347,6 +347,31 @@ TEST(Formats, HaveDifferentNamesAndExtensionsOrAreRecognised) {
   }
 }
 
+TEST(Formats, FilesOfOtherKindsAreToldAsWhatTheyAre) {
+  using namespace std::string_view_literals;
+  const std::pair<std::string_view, std::string_view> files[] = {
+      {"", "is empty"},
+      {"\x1f\x8b\x08 ..."sv, "unpack it"},
+      {"PK\x03\x04 ..."sv, "unpack it"},
+      {"<!DOCTYPE HTML><html>404</html>", "is a web page"},
+      {"\0\5\26\7 ..."sv, "macOS"},
+      {"((Axon) (0 0 0 1) (0 1 0 1))", "name it .asc"},
+      {"<neuroml id=\"n\"/>", "name it .nml"},
+  };
+  for (const auto& [bytes, words] : files) {
+    try {
+      read_all(*find_format("swc"), bytes, "cell.swc");
+      ADD_FAILURE() << bytes;
+    } catch (const InputError& error) {
+      EXPECT_NE(error.sentence().find(words), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_THROW(read_all(*find_format("genesis"), "#!/usr/bin/perl\nprint 1;\n", "script.p"), NotANeuron);
+  EXPECT_THROW(read_all(*find_format("neuroml"), "<project/>", "build.xml"), NotANeuron);
+  EXPECT_THROW(read_all(*find_format("asc"), "(\"pia\" (Color Red) (1 2 3 1) (2 3 4 1))", "pia.asc"),
+               NotANeuron);
+}
+
 TEST(Formats, AnUnknownExtensionIsRefusedWithTheKnownOnes) {
   EXPECT_EQ(find_format("wordstar"), nullptr);
   EXPECT_EQ(format_of("CELL.SWC").name, "swc");
