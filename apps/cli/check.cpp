@@ -51,6 +51,7 @@ struct Found {
 struct Checked {
   fs::path path;
   std::string format, error;
+  bool skipped = false;  // it holds no neuron, and lay in a folder
   std::vector<Found> found;
   fs::path mended;
   bool can_be_mended() const {
@@ -118,7 +119,7 @@ void repair(const io::Format& format, const io::Cell& cell, std::string_view ori
   checked.mended = mended;
 }
 
-void check_file(Checked& checked, const fs::path& to, const Put& put) {
+void check_file(Checked& checked, const Options& options, const fs::path& to, const Put& put) {
   try {
     const MappedFile file(checked.path);
     const io::Format& format = io::format_of(checked.path, file.text());
@@ -133,16 +134,17 @@ void check_file(Checked& checked, const fs::path& to, const Put& put) {
       repair(format, cells[0], file.text(), to, put, checked);
   } catch (const InputError& error) {
     checked.error = error.what();
+    checked.skipped = may_skip(error, checked.path, options.files);
   }
 }
 
 void report(const std::vector<Checked>& files, Console& console) {
   Json list = Json::array();
   std::vector<std::vector<std::string>> rows;
-  std::size_t sound = 0, odd = 0, failed = 0, mended = 0;
+  std::size_t sound = 0, odd = 0, failed = 0, skipped = 0, mended = 0;
   for (const Checked& file : files) {
     const std::string path = escaped(file.path.string());
-    (!file.error.empty() ? failed : file.found.empty() ? sound : odd) += 1;
+    (file.skipped ? skipped : !file.error.empty() ? failed : file.found.empty() ? sound : odd) += 1;
     mended += !file.mended.empty();
     Json entry{{"file", path}, {"format", file.format}, {"findings", Json::array()}};
     for (const Found& f : file.found) {
@@ -150,17 +152,23 @@ void report(const std::vector<Checked>& files, Console& console) {
       rows.push_back({path, f.line ? std::to_string(f.line) : "", f.code, escaped(f.what), f.mend});
     }
     if (!file.error.empty()) {
-      entry["error"] = file.error;
-      rows.push_back({path, "", "not-read", file.error, ""});
+      entry[file.skipped ? "skipped" : "error"] = file.error;
+      rows.push_back({path, "", file.skipped ? "skipped" : "not-read", file.error, ""});
     }
     if (!file.mended.empty()) entry["mended"] = escaped(file.mended.string());
     list.push_back(std::move(entry));
   }
   if (!rows.empty())
     console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
-  console.say(fmt::format("{} files without a finding, {} with some, {} not read{}", sound, odd, failed,
+  console.say(fmt::format("{} files without a finding, {} with some, {} not read{}{}", sound, odd, failed,
+                          skipped ? fmt::format(", {} skipped", skipped) : "",
                           mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
-  console.print({{"sound", sound}, {"odd", odd}, {"failed", failed}, {"mended", mended}, {"files", list}});
+  console.print({{"sound", sound},
+                 {"odd", odd},
+                 {"failed", failed},
+                 {"skipped", skipped},
+                 {"mended", mended},
+                 {"files", list}});
   if (failed)
     throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
 }
@@ -193,7 +201,7 @@ void run(const Options& options, Console& console) {
     std::vector<Checked> checked = files;
     console.progress().begin(stage, files.size());
     parallel_for(files.size(), 1, [&](std::size_t i) {
-      check_file(checked[i], to[i], put);
+      check_file(checked[i], options, to[i], put);
       console.progress().advance();
     });
     console.progress().end();

@@ -63,13 +63,14 @@ struct Conversion {
   std::vector<io::Warning> warnings;  // oddities of the file that was read
   std::vector<io::Warning> losses;    // what the other one cannot hold
   std::string error;                  // why it could not be read; empty when it could
+  bool skipped = false;               // it holds no neuron, and lay in a folder
 };
 
 using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
 
 /// The conversions of one file: one, or one for each of its cells.
 std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const Target& target,
-                                     const io::ModelOptions& options, const Put& put) {
+                                     const Options& options, const Put& put) {
   std::vector<Conversion> done;
   std::set<std::string> names;  // of its cells
   try {
@@ -94,15 +95,16 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
         conversion.losses = io::losses(m, target.neuron->keeps);
         put(conversion.to, target.neuron->write(m));
       } else {
-        const io::Model model = io::make_model(m, conversion.to.stem().string(), options, conversion.losses);
+        const io::Model model =
+            io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
         put(conversion.to, target.model->write(model));
       }
     }
   } catch (const LimitError& error) {
-    if (done.empty()) done.push_back({from, {}, {}, {}, {}});
+    if (done.empty()) done.push_back({from, {}, {}, {}, {}, false});
     done.back().error = fmt::format("{}: {}", escaped(from.string()), error.what());
   } catch (const InputError& error) {
-    done.emplace_back(Conversion{from, {}, {}, {}, error.what()});
+    done.emplace_back(Conversion{from, {}, {}, {}, error.what(), may_skip(error, from, options.files)});
   }
   return done;
 }
@@ -110,7 +112,7 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
 void tell(const Conversion& conversion, const Options& options, Console& console) {
   const std::string from = escaped(conversion.from.string());
   if (!conversion.error.empty()) {
-    console.warn(conversion.error);
+    console.warn(conversion.skipped ? conversion.error + "; skipped" : conversion.error);
     return;
   }
   if (options.verbose)
@@ -168,7 +170,7 @@ void run(Options options, Console& console) {
   const auto each = [&](const char* stage, const Put& put) {
     console.progress().begin(stage, files.size());
     parallel_for(files.size(), 1, [&](std::size_t i) {
-      done[i] = convert_file(files[i], to[i], target, options.model, put);
+      done[i] = convert_file(files[i], to[i], target, options, put);
       console.progress().advance();
     });
     console.progress().end();
@@ -190,11 +192,11 @@ void run(Options options, Console& console) {
   each("converting", [](const fs::path& path, std::string_view bytes) { write_file(path, bytes); });
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  std::size_t written = 0, failed = 0, oddities = 0, lost = 0;
+  std::size_t written = 0, failed = 0, skipped = 0, oddities = 0, lost = 0;
   for (const auto& conversions : done)
     for (const Conversion& c : conversions) {
       tell(c, options, console);
-      (c.error.empty() ? written : failed) += 1;
+      (c.error.empty() ? written : c.skipped ? skipped : failed) += 1;
       oddities += c.warnings.size(), lost += c.losses.size();
       nlohmann::ordered_json entry{{"from", escaped(c.from.string())}};
       if (c.error.empty())
@@ -202,14 +204,19 @@ void run(Options options, Console& console) {
                       {"warnings", json_of(c.warnings)},
                       {"losses", json_of(c.losses)}});
       else
-        entry["error"] = c.error;
+        entry[c.skipped ? "skipped" : "error"] = c.error;
       list.push_back(std::move(entry));
     }
-  console.print({{"format", target.name()}, {"written", written}, {"failed", failed}, {"files", list}});
-  console.say(fmt::format(
-      "{} written as {}, {} not read, {} kinds of loss told above{}", written, target.title(), failed, lost,
-      oddities && !options.verbose ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
-                                   : ""));
+  console.print({{"format", target.name()},
+                 {"written", written},
+                 {"failed", failed},
+                 {"skipped", skipped},
+                 {"files", list}});
+  console.say(fmt::format("{} written as {}, {} not read, {} skipped, {} kinds of loss told above{}", written,
+                          target.title(), failed, skipped, lost,
+                          oddities && !options.verbose
+                              ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
+                              : ""));
   if (failed)
     throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
                             files.size()));

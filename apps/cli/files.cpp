@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <cctype>
+#include <functional>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -17,19 +19,46 @@ namespace forest::cli {
 namespace fs = std::filesystem;
 namespace {
 
-bool known(const fs::path& path) {
+std::string extension_of(const fs::path& path) {
   std::string extension = path.extension().string();
   for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+bool known(const fs::path& path) {
   return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
-    return f.read && std::ranges::find(f.extensions, extension) != f.extensions.end();
+    return f.read && std::ranges::find(f.extensions, extension_of(path)) != f.extensions.end();
   });
+}
+
+/// Whether a file of another extension (Eutectic's are pieces of the cell's name) is a neuron all the same. Columns of
+/// numbers might be anything and do not count.
+bool looks_like_neuron(const fs::path& path) {
+  try {
+    const MappedFile file(path);
+    const std::string_view format = io::format_of(path, file.text()).name;
+    return format != "swc" && format != "genesis";
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
+/// "7 .txt, 2 .jpg, 1 without extension": the most frequent first, at most eight.
+std::string listed(const std::map<std::string, std::size_t>& extensions) {
+  std::vector<std::pair<std::string, std::size_t>> rows(extensions.begin(), extensions.end());
+  std::ranges::stable_sort(rows, std::greater(), &std::pair<std::string, std::size_t>::second);
+  std::string text;
+  for (std::size_t i = 0; i < std::min<std::size_t>(rows.size(), 8); ++i)
+    text += fmt::format("{}{} {}", i ? ", " : "", rows[i].second,
+                        rows[i].first.empty() ? "without extension" : repository::escaped(rows[i].first));
+  return rows.size() > 8 ? text + ", …" : text;
 }
 
 }  // namespace
 
 std::vector<fs::path> neuron_files(const std::vector<std::string>& names, Console& console) {
   std::vector<fs::path> files;
-  std::size_t skipped = 0;
+  std::map<std::string, std::size_t> skipped;  // by their extensions
   std::error_code none;
   for (const std::string& name : names) {
     if (!fs::is_directory(name, none)) {
@@ -37,21 +66,40 @@ std::vector<fs::path> neuron_files(const std::vector<std::string>& names, Consol
       continue;
     }
     const auto first = std::ptrdiff_t(files.size());
-    for (const auto& entry : fs::recursive_directory_iterator(name)) {
-      if (entry.is_directory(none)) continue;
-      if (known(entry.path()))
-        files.push_back(entry.path());
-      else
-        ++skipped;
+    std::vector<fs::path> folders{name};
+    while (!folders.empty()) {
+      const fs::path folder = std::move(folders.back());
+      folders.pop_back();
+      std::error_code error;
+      for (fs::directory_iterator entry(folder, error), end; !error && entry != end; entry.increment(error)) {
+        const fs::path& path = entry->path();
+        if (entry->is_directory(none)) {
+          if (!entry->is_symlink(none)) folders.push_back(path);  // a link may lead in a circle
+        } else if (known(path) || (entry->is_regular_file(none) && looks_like_neuron(path))) {
+          files.push_back(path);
+        } else {
+          ++skipped[extension_of(path)];
+        }
+      }
+      if (error)
+        console.warn(fmt::format("{}: the folder cannot be read ({}) and is skipped; check its permissions",
+                                 repository::escaped(folder.string()), error.message()));
     }
     if (first == std::ptrdiff_t(files.size()))
       throw InputError(name, 0, "holds no file of a known format; name the files themselves");
     std::sort(files.begin() + first, files.end());
   }
-  if (skipped)
-    console.warn(
-        fmt::format("{} of other formats {} skipped", counted(skipped, "file"), skipped == 1 ? "is" : "are"));
+  std::size_t count = 0;
+  for (const auto& [extension, number] : skipped) count += number;
+  if (count)
+    console.warn(fmt::format("{} of other formats {} skipped ({})", counted(count, "file"),
+                             count == 1 ? "is" : "are", listed(skipped)));
   return files;
+}
+
+bool may_skip(const Error& error, const fs::path& path, const std::vector<std::string>& names) {
+  const bool named = std::ranges::find(names, path.string()) != names.end();
+  return !named && (dynamic_cast<const io::NotANeuron*>(&error) || !known(path));
 }
 
 void Overwrites::look(const fs::path& to, std::string_view bytes) {

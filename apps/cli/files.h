@@ -9,13 +9,22 @@
 #include <string_view>
 #include <vector>
 
+namespace forest {
+class Error;
+}
+
 namespace forest::cli {
 
 class Console;
 
 /// Files as they were named, whether they are there or not; folders as the files of a known format anywhere below them,
-/// sorted. How many others lie there is told. Throws InputError for a folder without any.
+/// sorted, by extension or by what is in them. How many others lie there is told, and folders that cannot be read. Throws
+/// InputError for a folder without any.
 std::vector<std::filesystem::path> neuron_files(const std::vector<std::string>& names, Console& console);
+
+/// Whether a file that was refused is told as skipped and is no failure: it holds no neuron, and nobody named it.
+/// @param names  what the command line named, as neuron_files takes them
+bool may_skip(const Error& error, const std::filesystem::path& path, const std::vector<std::string>& names);
 
 /// Files that a verb would replace by something else, found before its first byte is written: show it all that will be
 /// written, then refuse(). Files that hold just these bytes do not count, so a command may be repeated.

@@ -5,8 +5,10 @@
 #include <algorithm>
 #include <filesystem>
 #include <iterator>
+#include <map>
 #include <memory>
 #include <optional>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -46,13 +48,14 @@ struct Arrival {
   std::vector<io::Warning> oddities;
   std::optional<Prepared> prepared;
   std::string hash;
-  std::string error;  // why it could not be read; empty when it could
+  std::string error;     // why it could not be read; empty when it could
+  bool skipped = false;  // it holds no neuron, and lay in a folder
   std::optional<Added> added;
   std::size_t sections = 0, warnings = 0;
 };
 
 /// The neurons of a file: nearly always one.
-std::vector<Arrival> read(const fs::path& path) {
+std::vector<Arrival> read(const fs::path& path, const Options& options) {
   std::vector<Arrival> arrivals;
   const std::string stem = escaped(path.stem().string());
   try {
@@ -79,18 +82,49 @@ std::vector<Arrival> read(const fs::path& path) {
     arrivals[0] = {};
     arrivals[0].path = path;
     arrivals[0].error = error.what();
+    arrivals[0].skipped = may_skip(error, path, options.files);
   }
   return arrivals;
 }
 
 const char* outcome(const Arrival& file) {
-  return !file.added ? "not read" : file.added->already_there ? "already there" : "stored";
+  return file.skipped                ? "skipped"
+         : !file.added               ? "not read"
+         : file.added->already_there ? "already there"
+                                     : "stored";
+}
+
+/// What was odd, a line a kind: in how many files, where first, and what can be done.
+void report_oddities(const std::vector<Arrival>& files, Console& console) {
+  struct Kind {
+    std::size_t files = 0, times = 0;
+    std::string place, sentence, mending;
+    const Arrival* last = nullptr;
+  };
+  std::map<std::string_view, Kind> kinds;
+  for (const Arrival& file : files)
+    for (const io::Warning& w : file.oddities) {
+      Kind& kind = kinds[w.code];
+      if (kind.times++ == 0) {
+        kind.place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
+        kind.sentence = escaped(w.sentence);
+        kind.mending = w.mending.empty() ? "brainforest check --repair writes it so" : w.mending;
+      }
+      kind.files += std::exchange(kind.last, &file) != &file;
+    }
+  if (kinds.empty()) return;
+  std::vector<std::vector<std::string>> lines;
+  for (const auto& [code, kind] : kinds)
+    lines.push_back({std::string(code), std::to_string(kind.files), std::to_string(kind.times), kind.place,
+                     kind.sentence, kind.mending});
+  console.table({"what was odd", "files", "times", "first at", "and how it was read", "what you can do"},
+                lines);
 }
 
 void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
   std::vector<std::vector<std::string>> lines;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  std::size_t stored = 0, there = 0, failed = 0, warnings = 0;
+  std::size_t stored = 0, there = 0, failed = 0, skipped = 0, warnings = 0;
   for (const Arrival& file : files) {
     const std::string path = escaped(file.path.string());
     nlohmann::ordered_json entry{{"file", path}, {"outcome", outcome(file)}};
@@ -104,7 +138,7 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                        outcome(file)});
     } else {
       entry["error"] = file.error;
-      ++failed;
+      ++(file.skipped ? skipped : failed);
       lines.push_back({path, "-", "-", "-", outcome(file)});
     }
     warnings += file.warnings;
@@ -112,14 +146,16 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
   }
   console.table({"file", "neuron", "sections", "warnings", ""}, lines);
   console.say(fmt::format(
-      "{} stored, {} already there, {} not read{}", stored, there, failed,
+      "{} stored, {} already there, {} not read, {} skipped{}", stored, there, failed, skipped,
       warnings ? fmt::format("; {} warnings{}", warnings, options.verbose ? "" : ", shown by --verbose")
                : ""));
+  report_oddities(files, console);
   console.print({{"repository", options.repo},
                  {"population", options.about.population},
                  {"stored", stored},
                  {"already_there", there},
                  {"failed", failed},
+                 {"skipped", skipped},
                  {"warnings", warnings},
                  {"files", list}});
   if (failed)
@@ -163,13 +199,13 @@ void run(const Options& options, Console& console) {
     const std::size_t count = std::min(window, paths.size() - first), begin = files.size();
     std::vector<std::vector<Arrival>> arrived(count);
     parallel_for(count, 1, [&](std::size_t i) {
-      arrived[i] = read(paths[first + i]);
+      arrived[i] = read(paths[first + i], options);
       console.progress().advance();
     });
     for (auto& arrivals : arrived) std::ranges::move(arrivals, std::back_inserter(files));
     for (Arrival& file : std::span(files).subspan(begin)) {
       if (!file.error.empty()) {
-        console.warn(file.error);
+        console.warn(file.skipped ? file.error + "; skipped" : file.error);
         continue;
       }
       if (options.verbose)

@@ -14,6 +14,7 @@
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
 #include "forest/io/format.h"
+#include "forest/io/workbook.h"
 #include "forest/repository/repository.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
@@ -153,26 +154,14 @@ std::vector<Row> rows(const Options& options, const Picks& picks, const std::str
 }
 
 std::string csv(const std::vector<Column>& columns, const std::vector<Row>& rows) {
-  const auto quoted = [](const std::string& text) {
-    if (text.find_first_of(",\"\r\n") == std::string::npos) return text;
-    std::string out = "\"";
-    for (const char c : text) out += c == '"' ? "\"\"" : std::string(1, c);
-    return out + '"';
-  };
-  std::string out;
-  for (const Column& c : columns) out += (out.empty() ? "" : ",") + quoted(c.title());
+  io::TableSheet sheet{.name = "metrics", .columns = {}, .rows = {}};
+  for (const Column& c : columns) sheet.columns.push_back({c.name, std::string(c.unit)});
   for (const Row& row : rows) {
-    char before = '\n';
-    for (const Cell& cell : row) {
-      out += std::exchange(before, ',');
-      if (const double* number = std::get_if<double>(&cell)) {
-        if (!std::isnan(*number)) out += fmt::format("{}", *number);
-      } else {
-        out += quoted(std::get<std::string>(cell));
-      }
-    }
+    auto& cells = sheet.rows.emplace_back();
+    for (const Cell& cell : row)  // NaN becomes an empty cell
+      std::visit([&](const auto& value) { cells.emplace_back(value); }, cell);
   }
-  return out + '\n';
+  return io::csv_of(sheet);
 }
 
 nlohmann::ordered_json json(const Options& options, const std::vector<Column>& columns,
@@ -267,6 +256,7 @@ void run(const Options& options, Console& console) {
   struct Measured {
     std::vector<Row> rows;
     std::string error;
+    bool skipped = false;
   };
   const Neurons neurons = options.repo.empty() ? of_files(options, console) : of_repository(options);
   std::vector<Measured> measured(neurons.names.size());
@@ -278,6 +268,7 @@ void run(const Options& options, Console& console) {
         measured[i].rows = rows(options, picks, neurons.names[i], Arbors(read(i), kinds));
       } catch (const Error& error) {
         measured[i].error = error.what();
+        measured[i].skipped = options.repo.empty() && may_skip(error, neurons.names[i], options.files);
       }
       console.progress().advance();
     }
@@ -286,12 +277,15 @@ void run(const Options& options, Console& console) {
 
   const std::vector<Column> header = columns(options, picks);
   std::vector<Row> all;
-  std::size_t failed = 0;
+  std::size_t failed = 0, unread = 0;
   for (Measured& m : measured) {
-    if (!m.error.empty()) console.warn(m.error), ++failed;
+    if (!m.error.empty()) {
+      console.warn(m.skipped ? m.error + "; skipped" : m.error);
+      ++unread, failed += !m.skipped;
+    }
     std::ranges::move(m.rows, std::back_inserter(all));
   }
-  if (failed == measured.size()) throw Error("no neuron could be read, so nothing was measured");
+  if (unread == measured.size()) throw Error("no neuron could be read, so nothing was measured");
 
   if (!options.csv.empty()) write_file(options.csv, csv(header, all));
   if (console.json) {

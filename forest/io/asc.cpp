@@ -17,13 +17,16 @@
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/placed_words.h"
+#include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
+#include "forest/io/traced_branch.h"
 
 namespace forest::io {
 namespace {
 
 enum class AscOddity : std::uint8_t {
   byte_order_mark,
+  padding,
   thumbnail,
   several_outlines,
   outline_by_name,
@@ -45,6 +48,7 @@ enum class AscOddity : std::uint8_t {
   second_split,
   unknown_word,
   text_in_tree,
+  trailing_text,
   spine_without_place,
   stray_bracket,
   count
@@ -55,6 +59,7 @@ constexpr std::string_view several_cells =
 
 constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
+    {"padding", false, "what stands behind the text is skipped"},
     {"thumbnail", false, "the picture is skipped"},
     {"several-outlines", false, "read as one soma, a stack of outlines", several_cells},
     {"outline-by-name", true, "read as an outline of the soma"},
@@ -81,6 +86,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"second-split", true, "its branches leave from the same branch point"},
     {"unknown-word", true, "kept like the words for the end of a branch", "nothing, if it is meant so"},
     {"text-in-tree", true, "skipped", "keep it outside of the tree"},
+    {"trailing-text", false, "skipped", "see whether trees are missing"},
     {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
     {"stray-bracket", true, "skipped"},
 }};
@@ -111,8 +117,6 @@ std::optional<SectionKind> type_of(std::string_view word) {
   return std::nullopt;
 }
 
-bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
-
 /// For a message: at most 40 characters, only printable ASCII.
 std::string shown(std::string_view text) {
   std::string result(text.substr(0, 40));
@@ -122,18 +126,11 @@ std::string shown(std::string_view text) {
 
 class Reader {
  public:
-  Reader(std::string_view bytes, const std::string& name) : text_(bytes), name_(name), oddities_(table) {}
+  Reader(std::string_view bytes, const std::string& name) : Reader(plain_text(bytes, name), name) {}
 
   void read() {
     p_ = text_.data();
     end_ = p_ + text_.size();  // there a zero ends every loop
-    if (text_.starts_with("\xef\xbb\xbf")) {
-      oddities_.add(AscOddity::byte_order_mark, 1, "the file begins with a byte order mark");
-      p_ += 3;
-    }
-    if (text_.starts_with("\xff\xfe") || text_.starts_with("\xfe\xff"))
-      throw InputError(name_, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
-    has_spines_ = text_.find('<') != text_.npos;
     for (;;) {
       inside_ = false;
       const char c = next();
@@ -145,6 +142,9 @@ class Reader {
         ++p_;
       } else if (p_ == end_) {
         return;
+      } else if (!holds_nothing() && std::find(p_, end_, '(') == end_) {
+        oddities_.add(AscOddity::trailing_text, line_, "words follow the last bracket");
+        return;
       } else {
         throw InputError(
             name_, line_,
@@ -155,19 +155,25 @@ class Reader {
     }
   }
 
-  bool holds_nothing() const { return ends_.empty() && soma_.points.empty(); }
+  bool holds_nothing() const { return sections_.size() == 0 && soma_.points.empty(); }
   bool to_the_letter() const { return to_the_letter_; }
   const Annotations& annotations() const { return annotations_; }
-  std::size_t sections() const { return ends_.size(); }
 
   ReadResult result() {
     set_soma();
-    for (const Spine& spine : spines_) builder_.add_spine(spine);
+    sections_.add_spines();
     for (auto& [key, value] : annotations_) builder_.annotate(std::move(key), std::move(value));
     return {builder_.build(), oddities_.take()};
   }
 
  private:
+  Reader(const PlainText& plain, const std::string& name)
+      : text_(plain.text), name_(name), oddities_(table), sections_(builder_, text_.find('<') != text_.npos) {
+    if (plain.byte_order_mark)
+      oddities_.add(AscOddity::byte_order_mark, 1, "the file begins with a byte order mark");
+    if (plain.padding) oddities_.add(AscOddity::padding, 0, "zero bytes or Ctrl-Z stand at the end");
+  }
+
   // Characters ---------------------------------------------------------------------------------------------
 
   /// Goes to the next character that is neither blank nor in a comment.
@@ -393,7 +399,7 @@ class Reader {
     if (const char c = next(); is_letter(c)) {
       const std::string_view word = this->word();
       type = type_of(word);
-      cell_body = same_word(word, "cellbody");
+      cell_body = names_soma(word);
       if (!type && !cell_body) {
         back_to(begin, begin_line);
         return word_block();
@@ -418,7 +424,7 @@ class Reader {
       Block block = skip_block();
       if (const auto kind = type_of(block.word)) {
         type = kind;
-      } else if (same_word(block.word, "cellbody")) {
+      } else if (names_soma(block.word) && !block.more) {
         cell_body = true;
       } else if (is_marker(block)) {
         keep_block("marker", std::move(block));
@@ -529,26 +535,17 @@ class Reader {
       return builder_.set_soma(std::move(own_));
     }
     if (soma_.points.empty()) return;
-    soma_.kind = SomaKind::contours;
-    if (soma_.points.size() < 3) {
+    if (soma_.points.size() < 3)
       oddities_.add(AscOddity::small_outline, soma_line_, [&] {
         return fmt::format("the outline of the soma has {} points", soma_.points.size());
       });
-      if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
-      soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
-    }
-    builder_.set_soma(std::move(soma_));
+    builder_.set_soma(soma_of_outlines(std::move(soma_)));
   }
 
   // Trees --------------------------------------------------------------------------------------------------
 
-  struct Branch {
-    SectionId node;  // the section it leaves from; once its points are over, the one that ends there
-    SectionKind kind = SectionKind::undefined;
-    std::int32_t tag = 0, soma_point = -1;
-    bool over = false;  // no point may follow
-    bool own = false;   // has a section
-    bool split = false, excused = false;
+  struct Branch : TracedBranch {
+    bool split = false;
     std::string_view leaf;
     std::size_t line = 0;
   };
@@ -561,13 +558,6 @@ class Reader {
     SectionKind kind;
     std::int32_t tag, soma_point;
   };
-  struct Seat {  // of a spine, until its section is known
-    std::size_t points;
-    Spine spine;
-    Vec3 head;
-    bool said;
-  };
-
   void tree(SectionKind kind, const std::string& properties) {
     branch_.kind = kind, branch_.tag = std::int32_t(kind);
     const std::size_t begin = branch_.line;
@@ -587,7 +577,7 @@ class Reader {
           last_ = point();
           has_last_ = true;
           points_.push_back(last_);
-        } else if (is_letter(inner)) {
+        } else if (is_letter(inner) || inner == '"') {
           back_to(at, at_line);
           inner_block();
         } else {
@@ -653,7 +643,7 @@ class Reader {
     branch_.node = parent.node;
     branch_.kind = parent.kind, branch_.tag = parent.tag;
     branch_.line = line_;
-    if (parent.node.valid()) last_ = ends_[parent.node.value()];
+    if (parent.node.valid()) last_ = sections_.end(parent.node);
   }
 
   void end_branch() {
@@ -665,70 +655,20 @@ class Reader {
     if (!splits_.empty()) splits_.back().daughters += something;
     if (!branch_.leaf.empty() && branch_.node.valid() && branch_.leaf != leaf_words[0])
       annotations_.emplace_back("leaf",
-                                fmt::format("{} {}", branch_.leaf, place_text(ends_[branch_.node.value()])));
+                                fmt::format("{} {}", branch_.leaf, place_text(sections_.end(branch_.node))));
   }
 
   /// The branch has no more points: they become a section.
   void close_points() {
-    if (branch_.over && points_.empty()) return seat_spines(0);
-    branch_.over = true;
-    std::size_t joint = 0;
-    if (branch_.node.valid() && !points_.empty()) {
-      const Point& node = ends_[branch_.node.value()];
-      const bool repeated = same_place(points_[0], node);
-      if (repeated && points_.size() == 1) {
-        oddities_.add(AscOddity::only_branch_point, branch_.line,
-                      "a branch holds only the point it leaves from");
-        points_.clear();
-        branch_.excused = true;
-      } else if (!repeated) {
-        points_.insert(points_.begin(), {node.x, node.y, node.z, points_[0].radius});
-        joint = 1;
-      }
-    }
-    if (points_.empty()) return seat_spines(0);
-    if (splits_.empty() && !properties_.empty())
+    if (splits_.empty() && !properties_.empty() && !points_.empty())
       annotations_.emplace_back("tree", fmt::format("{} {}", place_text(points_[0]), properties_));
-    branch_.node = builder_.add_section(branch_.node, branch_.kind, points_, branch_.tag, branch_.soma_point);
-    branch_.own = true;
-    ends_.push_back(points_.back());
-    if (has_spines_) {
-      float length = 0.f;
-      for (std::size_t i = 1; i < points_.size(); ++i)
-        length += (points_[i].position() - points_[i - 1].position()).norm();
-      lengths_.push_back(std::min(length, std::numeric_limits<float>::max()));
-      seat_spines(joint);
-    }
-    points_.clear();
-  }
-
-  /// Of the branch up to here. `joint`: how many points were put before its own.
-  void seat_spines(std::size_t joint) {
-    if (seats_.empty()) return;
-    float position = 0.f;
-    std::size_t at = 0;
-    for (Seat& seat : seats_) {
-      if (!branch_.node.valid()) {
-        oddities_.add(AscOddity::spine_without_place, branch_.line,
-                      "a spine stands where its tree has no point");
-        continue;
-      }
-      seat.spine.section = branch_.node;
-      if (!seat.said) {
-        if (points_.empty()) {  // behind the section, or behind the one the branch leaves from
-          seat.spine.position = lengths_[branch_.node.value()];
-          seat.spine.head = seat.head - ends_[branch_.node.value()].position();
-        } else {
-          const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
-          for (; at < to; ++at) position += (points_[at + 1].position() - points_[at].position()).norm();
-          seat.spine.position = std::min(position, std::numeric_limits<float>::max());
-          seat.spine.head = seat.head - points_[to].position();
-        }
-        if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();
-      }
-      spines_.push_back(seat.spine);
-    }
-    seats_.clear();
+    const auto closed = sections_.close(branch_, points_, seats_);
+    if (closed.only_branch_point)
+      oddities_.add(AscOddity::only_branch_point, branch_.line,
+                    "a branch holds only the point it leaves from");
+    for (std::size_t i = 0; i < closed.lost_spines; ++i)
+      oddities_.add(AscOddity::spine_without_place, branch_.line,
+                    "a spine stands where its tree has no point");
   }
 
   void spine() {
@@ -736,13 +676,18 @@ class Reader {
     ++p_;
     own_spine_.reset();
     bool placed = false;
-    Seat seat{points_.size(), {}, Vec3::Zero(), false};
+    std::size_t depth = 0;  // some programs put brackets around what is in the spine
+    SpineSeat seat{.points = points_.size(), .spine = {}, .head = Vec3::Zero(), .said = false};
     for (;;) {
       const char c = next();
       if (c == '>') break;
       if (p_ == end_) unfinished("a spine", begin);
       if (c == '"') {
         quoted();
+        continue;
+      }
+      if (c == ')' && depth > 0) {
+        --depth, ++p_;
         continue;
       }
       if (c != '(') unexpected("a spine");
@@ -761,6 +706,8 @@ class Reader {
         if (same_word(block.word, "class")) seat.spine.shape = spine_shape(block.quoted);
       } else if (p_ == end_) {
         unfinished("a spine", begin);
+      } else if (inner == '(') {
+        ++depth;
       } else {
         unexpected("a spine");
       }
@@ -789,7 +736,10 @@ class Reader {
       return;
     }
     refuse_broken_point(block, line);
-    if (is_marker(block)) keep_block("marker", std::move(block));
+    if (is_marker(block))
+      keep_block(block.word.empty() ? "contour" : "marker", std::move(block));
+    else if (block.word.empty())
+      oddities_.add(AscOddity::text_in_tree, line, "a text stands in a tree");
   }
 
   void leaf_word() {
@@ -871,9 +821,10 @@ class Reader {
   const char* p_ = nullptr;
   const char* end_ = nullptr;
   std::size_t line_ = 1, soma_line_ = 0;
-  bool inside_ = false, to_the_letter_ = false, has_spines_ = false, has_last_ = false;
+  bool inside_ = false, to_the_letter_ = false, has_last_ = false;
 
   MorphologyBuilder builder_;
+  TracedSections sections_;
   Annotations annotations_;
   Soma soma_, own_;
   std::vector<Point> own_soma_;
@@ -884,12 +835,9 @@ class Reader {
   std::vector<Split> splits_;
   std::vector<Point> points_;  // of the branch
   std::string properties_;     // of the tree
-  std::vector<Point> ends_;    // of each section
-  std::vector<float> lengths_;
-  std::vector<Seat> seats_;
+  std::vector<SpineSeat> seats_;
   std::optional<Said> said_;
   std::optional<Spine> own_spine_;
-  std::vector<Spine> spines_;
 };
 
 }  // namespace
@@ -954,8 +902,12 @@ bool recognises_asc(std::string_view bytes) {
 ReadResult read_asc(std::string_view bytes, const std::string& name) {
   Reader reader(bytes, name);
   reader.read();
-  if (reader.holds_nothing() && !reader.to_the_letter())
-    throw InputError(name, 0, "holds neither a tree nor a cell body; a tree is ((Axon) (x y z diameter) …)");
+  if (reader.holds_nothing() && !reader.to_the_letter()) {
+    const std::string sentence =
+        "holds neither a tree nor a cell body; a tree is ((Axon) (x y z diameter) …)";
+    if (reader.annotations().empty()) throw InputError(name, 0, sentence);
+    throw NotANeuron(name, 0, sentence);  // outlines of layers, markers
+  }
   return reader.result();
 }
 

@@ -140,6 +140,67 @@ bool has(const Format& format, std::string_view extension) {
                                lower_extension(path), known));
 }
 
+const Format* recognised_format(std::string_view bytes) {
+  const auto row =
+      std::ranges::find_if(table, [&](const Format& f) { return f.read && f.recognises(bytes); });
+  return row == table.end() ? nullptr : &*row;
+}
+
+// How files begin that come under the name of a neuron's.
+struct Beginning {
+  std::string_view bytes;  // of letters the small ones
+  std::string_view sentence;
+};
+constexpr std::string_view packed = "is packed; unpack it and give what was in it",
+                           web_page = "is a web page, as a failed download leaves; fetch the file again",
+                           picture = "is a picture or a document; give the file of the tracing";
+constexpr std::array beginnings{
+    Beginning{"\x1f\x8b", packed},
+    Beginning{"pk\x03\x04", packed},
+    Beginning{"\xfd"
+              "7zxz",
+              packed},
+    Beginning{"bzh", packed},
+    Beginning{"\x28\xb5\x2f\xfd", packed},
+    Beginning{"7z\xbc\xaf", packed},
+    Beginning{"<!doctype html", web_page},
+    Beginning{"<html", web_page},
+    Beginning{"\x89png", picture},
+    Beginning{"\xff\xd8\xff", picture},
+    Beginning{"ii*", picture},
+    Beginning{"%pdf", picture},
+};
+constexpr std::string_view apple_double("\x00\x05\x16\x07", 4);
+
+/// Throws when the bytes are those of no neuron file at all.
+void refuse_other_kinds(std::string_view bytes, const std::string& name) {
+  if (bytes.empty()) throw InputError(name, 0, "is empty; copy or export it again");
+  if (bytes.starts_with(apple_double))
+    throw NotANeuron(name, 0, "holds what macOS notes beside a file, not the file; remove it");
+  const auto same = [](char a, char b) { return (a >= 'A' && a <= 'Z' ? char(a - 'A' + 'a') : a) == b; };
+  for (const Beginning& row : beginnings)
+    if (bytes.size() >= row.bytes.size() &&
+        std::ranges::equal(bytes.substr(0, row.bytes.size()), row.bytes, same))
+      throw InputError(name, 0, std::string(row.sentence));
+}
+
+/// Reads by `read`; a refusal says what else the file looks like.
+template <class Read>
+auto guarded(const Format& format, std::string_view bytes, const std::string& name, const Read& read) {
+  refuse_other_kinds(bytes, name);
+  try {
+    return read();
+  } catch (const NotANeuron&) {
+    throw;
+  } catch (const InputError& error) {
+    const Format* const other = format.recognises(bytes) ? nullptr : recognised_format(bytes);
+    if (!other) throw;
+    throw InputError(error.file(), error.line(),
+                     fmt::format("{} (the file looks like {}; if it is, name it {})", error.sentence(),
+                                 other->title, other->extensions[0]));
+  }
+}
+
 }  // namespace
 
 std::span<const Format> formats() { return table; }
@@ -163,21 +224,14 @@ const Format& format_of(const std::filesystem::path& path) {
 
 const Format& format_of(const std::filesystem::path& path, std::string_view bytes) {
   const std::string extension = lower_extension(path);
-  const auto readers = [&](bool any_extension) {
-    std::vector<const Format*> rows;
-    for (const Format& format : table)
-      if (format.read && (any_extension || has(format, extension))) rows.push_back(&format);
-    return rows;
-  };
-  const auto recognised = [&](const std::vector<const Format*>& rows) -> const Format* {
-    const auto row = std::ranges::find_if(rows, [&](const Format* f) { return f->recognises(bytes); });
-    return row == rows.end() ? nullptr : *row;
-  };
-  const std::vector<const Format*> own = readers(false);
-  if (own.size() == 1) return *own[0];  // it says what is wrong with other bytes
-  if (const Format* format = recognised(own)) return *format;
-  if (!own.empty()) return *own[0];
-  if (const Format* format = recognised(readers(true))) return *format;
+  std::vector<const Format*> own;
+  for (const Format& format : table)
+    if (format.read && has(format, extension)) own.push_back(&format);
+  if (own.size() > 1)
+    for (const Format* format : own)
+      if (format->recognises(bytes)) return *format;
+  if (!own.empty()) return *own[0];  // it says what is wrong with other bytes
+  if (const Format* format = recognised_format(bytes)) return *format;
   for (const Format& format : table)
     if (has(format, extension))
       throw InputError(
@@ -188,14 +242,17 @@ const Format& format_of(const std::filesystem::path& path, std::string_view byte
 
 ReadResult read(const std::filesystem::path& path) {
   const MappedFile file(path);
-  return format_of(path, file.text()).read(file.text(), path.string());
+  const Format& format = format_of(path, file.text());
+  return guarded(format, file.text(), path.string(), [&] { return format.read(file.text(), path.string()); });
 }
 
 std::vector<Cell> read_all(const Format& format, std::string_view bytes, const std::string& name) {
-  if (format.read_all) return format.read_all(bytes, name);
-  std::vector<Cell> one;
-  one.push_back({{}, format.read(bytes, name)});
-  return one;
+  return guarded(format, bytes, name, [&] {
+    if (format.read_all) return format.read_all(bytes, name);
+    std::vector<Cell> one;
+    one.push_back({{}, format.read(bytes, name)});
+    return one;
+  });
 }
 
 std::vector<Warning> write(const std::filesystem::path& path, const Morphology& m) {

@@ -10,10 +10,18 @@
 #include <string_view>
 #include <vector>
 
+#include "forest/core/error.h"
 #include "forest/io/keeps.h"
 #include "forest/morphology/morphology.h"
 
 namespace forest::io {
+
+/// A file that may be sound but holds no neuron (a circuit in HDF5, channels in NeuroML). Named by a person it is refused
+/// like any other; found in a folder it is skipped and told.
+class NotANeuron : public InputError {
+ public:
+  using InputError::InputError;
+};
 
 /// A kind of deviation: a format that reads dialects has a table of these.
 struct Oddity {
@@ -60,7 +68,8 @@ const Format& format_of(const std::filesystem::path& path);
 const Format& format_of(const std::filesystem::path& path, std::string_view bytes);
 
 ReadResult read(const std::filesystem::path& path);  // throws InputError
-/// Never empty; the only cell of a file has no name. Throws InputError.
+/// Never empty; the only cell of a file has no name. Throws InputError; where the bytes are those of another kind of file (an
+/// archive, a web page, another format of neurons) its sentence says so.
 std::vector<Cell> read_all(const Format& format, std::string_view bytes, const std::string& name);
 
 /// Whole or not at all. Returns what was lost.

@@ -15,6 +15,7 @@
 #include "forest/morphology/measure.h"
 #include "forest/morphology/validate.h"
 
+#include "tests/real_data.h"
 #include "tests/zoo.h"
 
 namespace forest::io {
@@ -102,6 +103,40 @@ TEST_P(EveryFormat, ReadsBackWhatItWrote) {
     expect_same_neuron(read, specimen.morphology, format.keeps);
     EXPECT_EQ(format.write(read), bytes) << "written again, the bytes differ";
   }
+}
+
+/// From a neuron to this format and on to every other: what the two keep comes through.
+void expect_through_every_other(const Format& format, const Morphology& m) {
+  if (!fits(format, m)) return;
+  const Morphology once = format.read(format.write(m), "once").morphology;
+  expect_same_neuron(once, m, format.keeps);
+  for (const Format& other : formats()) {
+    if (!other.read || !other.write || other.name == format.name) continue;
+    SCOPED_TRACE(other.name);
+    if (fits(other, once))
+      expect_same_neuron(other.read(other.write(once), "twice").morphology, once, other.keeps);
+  }
+}
+
+TEST_P(EveryFormat, LeadsToEveryOther) {
+  if (!GetParam().read || !GetParam().write) GTEST_SKIP() << "is not both read and written";
+  for (const Specimen& specimen : zoo()) {
+    SCOPED_TRACE(specimen.name);
+    expect_through_every_other(GetParam(), specimen.morphology);
+  }
+}
+
+TEST_P(EveryFormat, LeadsTracedNeuronsToEveryOther) {
+  if (!GetParam().read || !GetParam().write) GTEST_SKIP() << "is not both read and written";
+  FOREST_REAL_DATA(folder, "morphologies/real");
+  std::set<std::filesystem::path> populations;
+  for (const char* const extension : {".swc", ".asc", ".h5"})
+    for (const auto& path : files_below(folder, extension))
+      if (populations.insert(path.parent_path()).second) {  // one cell of each
+        SCOPED_TRACE(path.string());
+        expect_through_every_other(GetParam(), read(path).morphology);
+      }
+  EXPECT_GT(populations.size(), 10u);
 }
 
 TEST_P(EveryFormat, WritesTheSameBytesForWhatIsLeftOfANeuron) {
@@ -310,6 +345,31 @@ TEST(Formats, HaveDifferentNamesAndExtensionsOrAreRecognised) {
       EXPECT_TRUE(fresh || format.recognises) << extension;
     }
   }
+}
+
+TEST(Formats, FilesOfOtherKindsAreToldAsWhatTheyAre) {
+  using namespace std::string_view_literals;
+  const std::pair<std::string_view, std::string_view> files[] = {
+      {"", "is empty"},
+      {"\x1f\x8b\x08 ..."sv, "unpack it"},
+      {"PK\x03\x04 ..."sv, "unpack it"},
+      {"<!DOCTYPE HTML><html>404</html>", "is a web page"},
+      {"\0\5\26\7 ..."sv, "macOS"},
+      {"((Axon) (0 0 0 1) (0 1 0 1))", "name it .asc"},
+      {"<neuroml id=\"n\"/>", "name it .nml"},
+  };
+  for (const auto& [bytes, words] : files) {
+    try {
+      read_all(*find_format("swc"), bytes, "cell.swc");
+      ADD_FAILURE() << bytes;
+    } catch (const InputError& error) {
+      EXPECT_NE(error.sentence().find(words), std::string::npos) << error.what();
+    }
+  }
+  EXPECT_THROW(read_all(*find_format("genesis"), "#!/usr/bin/perl\nprint 1;\n", "script.p"), NotANeuron);
+  EXPECT_THROW(read_all(*find_format("neuroml"), "<project/>", "build.xml"), NotANeuron);
+  EXPECT_THROW(read_all(*find_format("asc"), "(\"pia\" (Color Red) (1 2 3 1) (2 3 4 1))", "pia.asc"),
+               NotANeuron);
 }
 
 TEST(Formats, AnUnknownExtensionIsRefusedWithTheKnownOnes) {

@@ -16,12 +16,15 @@
 #include "forest/core/error.h"
 #include "forest/io/genesis_names.h"
 #include "forest/io/oddity.h"
+#include "forest/io/plain_text.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
 namespace {
 
 enum class Odd : std::uint8_t {
+  byte_order_mark,
+  padding,
   parameters,
   prototypes,
   spine_options,
@@ -44,6 +47,8 @@ enum class Odd : std::uint8_t {
 };
 
 constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
+    {"byte-order-mark", false, "the mark is skipped"},
+    {"padding", false, "what stands behind the text is skipped"},
     {"parameters", false, "kept as annotations; they do not change the shape"},
     {"prototypes", false, "kept as annotations; what a prototype holds stands in no cell file"},
     {"spine-options", false, "kept as annotations; the spines they scatter are not made"},
@@ -636,6 +641,7 @@ std::span<const Oddity> genesis_oddities() { return table; }
 
 bool recognises_genesis(std::string_view bytes) {
   bool found = false, in_comment = false;
+  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   each_line(bytes.substr(0, 65536), [&](std::string_view text, std::size_t line) {
     if (line == 1 && text == genesis_marker) return !(found = true);
     text = trim(text);
@@ -653,11 +659,16 @@ bool recognises_genesis(std::string_view bytes) {
   return found;
 }
 
-std::vector<Cell> read_genesis_cells(std::string_view bytes, const std::string& name) {
-  if (bytes.find('\0') != bytes.npos)
+namespace {
+
+std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
+  const PlainText plain = plain_text(bytes, name);
+  if (plain.text.find('\0') != plain.text.npos)
     throw InputError(name, 0, "holds zero bytes; give a cell parameter file of GENESIS, which is plain text");
   Oddities oddities{table};
-  Scan scan = Scanner(name, oddities).scan(bytes);
+  if (plain.byte_order_mark) oddities.add(Odd::byte_order_mark, 1, "the file begins with a byte order mark");
+  if (plain.padding) oddities.add(Odd::padding, 0, "zero bytes or Ctrl-Z stand at the end");
+  Scan scan = Scanner(name, oddities).scan(plain.text);
   std::vector<Group*> groups;
   const auto take = [&](bool prototypes) {
     for (Group& group : scan.groups)
@@ -679,6 +690,18 @@ std::vector<Cell> read_genesis_cells(std::string_view bytes, const std::string& 
   }
   cells[0].read.warnings = oddities.take();
   return cells;
+}
+
+}  // namespace
+
+/// The extension .p is that of many other files too.
+std::vector<Cell> read_genesis_cells(std::string_view bytes, const std::string& name) {
+  try {
+    return cells_of(bytes, name);
+  } catch (const InputError& error) {
+    if (recognises_genesis(bytes)) throw;
+    throw NotANeuron(error.file(), error.line(), error.sentence());
+  }
 }
 
 ReadResult read_genesis(std::string_view bytes, const std::string& name) {

@@ -121,6 +121,8 @@ const Oddly oddly[] = {
     {"stale-diameters", 4,
      std::string(genesis_marker) + "\n*double_endpoint\n//@ends 1 2\ndend_0_1 none 0 0 0 0 9 0 7\n"},
     {"open-comment", 2, "soma none 0 0 0 9\n/* no end"},
+    {"byte-order-mark", 1, "\xef\xbb\xbfsoma none 0 0 0 9\n"},
+    {"padding", 0, "soma none 0 0 0 9\n\x1a"},
     {"several-cells", 0, "soma none 0 0 0 9\n*start_cell /b\nsoma none 0 0 0 5\n"},
 };
 
@@ -146,7 +148,7 @@ TEST(Genesis, WhatHasNoReadingIsRefusedWithItsLine) {
       {1, "soma none 0 {y} 0 9\n"},
       {2, "*relative\nsoma none 1e39 0 0 9\n"},
       {2, "*double_endpoint\nsoma none 0 0 0 9\n"},
-      {0, std::string("soma none 0 0 0 9\0", 18)},
+      {0, std::string("soma none 0\0 0 0 9\n", 19)},
   };
   for (const auto& [line, text] : broken) {
     SCOPED_TRACE(text);

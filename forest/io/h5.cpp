@@ -205,7 +205,8 @@ class CellReader {
 
   void read_version_1() {
     if (members_.has("connectivity"))
-      image_.refuse("holds blood vessels (connectivity), not a neuron; vessels are not read");
+      throw NotANeuron(image_.name(), 0,
+                       "holds blood vessels (connectivity), not a neuron; vessels are not read");
     if (const auto metadata = members_.find("metadata")) {
       const auto version = image_.integers(*metadata, "version");
       if (!version.empty() && (version[0] != 1 || version.size() < 2 || version[1] < 0 || version[1] > 3))
@@ -789,7 +790,7 @@ ReadResult read_cell(const Image& image, const Image::Object& group, const Membe
 }
 
 [[noreturn]] void refuse_without_cells(const Image& image) {
-  image.refuse("holds no neuron: no group of it has the arrays points and structure");
+  throw NotANeuron(image.name(), 0, "holds no neuron: no group of it has the arrays points and structure");
 }
 
 // Writing

@@ -212,65 +212,8 @@ TEST(H5, EveryLayoutOfTheLibraryHoldsTheSameNeuron) {
   EXPECT_EQ(annotation(read(folder / "spine_density.h5").morphology, "postsynaptic_density"), "1 0 0.5");
 }
 
-TEST(H5RealData, TheBrokenCorpusIsReadAsDocumented) {
+TEST(H5RealData, Version2AndContainersHoldTheSameCells) {
   FOREST_REAL_DATA(folder, "morphologies/broken/morphio/h5");
-  struct Expected {
-    std::string_view file;
-    std::size_t sections;
-    std::string_view code;  // told; "" for none, else part of the refusal
-  };
-  const std::vector<Expected> table{
-      {"empty.h5", 0, "holds no neuron"},
-      {"non-valid.h5", 0, "is not an HDF5 file"},
-      {"v1/Neuron-no-soma.h5", 84, ""},
-      {"v1/Neuron.h5", 84, ""},
-      {"v1/glia.h5", 1, ""},
-      {"v1/glia_empty_perimeters.h5", 0, "without perimeters"},
-      {"v1/glia_soma_only.h5", 0, "perimeters-size"},
-      {"v1/glia_wrong_sized_perimeters.h5", 0, "several columns"},
-      {"v1/h5v1.4.h5", 0, "version 1.4"},
-      {"v1/incorrect_point_columns.h5", 0, "has not 4 columns"},
-      {"v1/incorrect_structure_columns.h5", 0, "has not 3 columns"},
-      {"v1/metadata_group_only.h5", 0, "never filled"},
-      {"v1/monodim.h5", 0, "has not 4 columns"},
-      {"v1/simple-broken-section-type.h5", 0, "soma of one point"},
-      {"v1/simple-dendritric-spine.h5", 3, ""},
-      {"v1/simple-negative-section-type.h5", 0, "soma of one point"},
-      {"v1/simple-single-point-soma.h5", 0, "soma of one point"},
-      {"v1/simple-two-point-soma.h5", 6, "soma-two-points"},
-      {"v1/simple.h5", 6, ""},
-      {"v1/single-neurite.h5", 1, ""},
-      {"v1/soma_after_dendrite.h5", 0, "only row 0 may be the soma"},
-      {"v1/soma_no_neurites.h5", 0, ""},
-      {"v1/three-point-soma-two-offset.h5", 0, "only row 0 may be the soma"},
-      {"v1/two_child_unmerged.h5", 8, "single-daughter"},
-      {"v1/unknown_section_type_structure.h5", 0, "begins at point 10 of 2"},
-      {"v2/Neuron.h5", 84, "version-2"},
-      {"vasculature1.h5", 0, "blood vessels"},
-      {"vasculature-broken-section-type.h5", 0, "blood vessels"},
-      {"v1/mitochondria.h5", 1, ""},
-      {"v1/endoplasmic-reticulum.h5", 6, ""},
-      {"v1/reversed_NRN_neurite_order.h5", 2, "empty-section"},
-  };
-  for (const Expected& expected : table) {
-    SCOPED_TRACE(expected.file);
-    try {
-      const ReadResult result = read(folder / expected.file);
-      EXPECT_EQ(result.morphology.sections().size(), expected.sections);
-      if (!expected.code.empty()) {
-        EXPECT_TRUE(told(result, expected.code));
-      } else {
-        for (const Warning& warning : result.warnings)
-          EXPECT_TRUE(warning.code == "single-daughter" || warning.code == "soma-two-points" ||
-                      warning.code == "perimeters-size" || warning.code == "glia-unsaid" ||
-                      warning.code == "joint-missing")
-              << warning.code << ": " << warning.sentence;
-      }
-    } catch (const InputError& error) {
-      EXPECT_EQ(expected.sections, 0u) << error.what();
-      EXPECT_TRUE(!expected.code.empty() && contains(error.sentence(), expected.code)) << error.what();
-    }
-  }
   const Morphology first = read(folder / "v1/Neuron.h5").morphology,
                    second = read(folder / "v2/Neuron.h5").morphology;
   EXPECT_TRUE(std::ranges::equal(first.points(), second.points()));

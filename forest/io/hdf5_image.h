@@ -65,6 +65,7 @@ class Image {
   std::vector<std::int64_t> integers(const Object& object, std::string_view attribute) const;  // empty: none
   std::optional<std::string> text(const Object& object, std::string_view attribute) const;
 
+  const std::string& name() const { return name_; }
   [[noreturn]] void refuse(const std::string& sentence) const;  // throws InputError about this file
 
  private:

@@ -71,7 +71,7 @@ std::string write_gltf(const Model& model) {
     json["accessors"].push_back(std::move(about));
     return json["accessors"].size() - 1;
   };
-  if (!positions.empty()) {  // accessors hold at least one element
+  if (sticks ? !edges_of(model.lines).empty() : !model.mesh.triangles.empty()) {  // accessors are never empty
     node["mesh"] = 0;
     Bounds box;
     std::size_t begin = data.size();

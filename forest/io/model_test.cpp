@@ -187,6 +187,16 @@ TEST(Model, GltfAccessorsLieWithinTheirViewsAndTellTheirBounds) {
   });
 }
 
+TEST(Model, GltfOfNothingToDrawHasNoEmptyAccessor) {
+  MorphologyBuilder b;
+  b.add_section({}, SectionKind::axon, std::vector<Point>{{1, 2, 3, 1}});
+  std::vector<Warning> lost;
+  const Model model = make_model(b.build(), "stump", {.geometry = Geometry::stick}, lost);
+  const std::string bytes = find_model_format("gltf")->write(model);
+  EXPECT_EQ(bytes.find("\"count\":0"), bytes.npos);
+  EXPECT_EQ(bytes.find("\"byteLength\":0"), bytes.npos);
+}
+
 TEST(Model, VrmlBracesBalanceAndEveryFaceHasItsColour) {
   for_models([](const Model& model) {
     const std::string text = written("vrml", model);

@@ -17,6 +17,7 @@
 #include "forest/core/error.h"
 #include "forest/io/keeps.h"
 #include "forest/io/oddity.h"
+#include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
 
 namespace forest::io {
@@ -24,6 +25,7 @@ namespace {
 
 enum class NeuromlOddity : std::uint8_t {
   several_cells,
+  several_documents,
   elsewhere,
   include,
   not_kept,
@@ -35,6 +37,7 @@ enum class NeuromlOddity : std::uint8_t {
   missing_proximal,
   unknown_number,
   diameter,
+  zero_diameter,
   fraction,
   gap,
   several_somata,
@@ -45,6 +48,7 @@ enum class NeuromlOddity : std::uint8_t {
 
 constexpr std::array<Oddity, static_cast<std::size_t>(NeuromlOddity::count)> table{{
     {"several-cells", false, "only the first is read here; import the file to have all"},
+    {"several-documents", false, "the first one is read", "split the file"},
     {"morphology-elsewhere", true, "left out; read that file for its shape"},
     {"include", false, "included files are not opened; name them as well"},
     {"not-kept", false, "left out: shapes are read, not what they do"},
@@ -56,6 +60,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NeuromlOddity::count)> tab
     {"missing-proximal", true, "read as a neurite that begins with a single point"},
     {"unknown-number", true, "read as that of the point before"},
     {"diameter", true, "read as that of the point before"},
+    {"zero-diameter", true, "kept as 0", "give the measured one"},
     {"fraction", true, "read as the nearest of 0 and 1"},
     {"gap", true, "the point it hangs on is put in front"},
     {"several-somata", true, "joined to the first point of the soma"},
@@ -223,7 +228,7 @@ class Document {
           fmt::format("is not XML ({}); write or copy the file again", lower(result.description())));
     root_ = document_.document_element();
     if (local(root_) != "neuroml")
-      throw InputError(name, line(root_),
+      throw NotANeuron(name, line(root_),
                        fmt::format("is not NeuroML: its first element is <{}>, not <neuroml>",
                                    std::string_view(root_.name()).substr(0, 40)));
     if (root_.child("cells") ||
@@ -317,8 +322,8 @@ class Assembler {
       if (!parse(attribute(node, name), *number)) {
         const std::string word = lower(trimmed(attribute(node, name)));
         if (word != "nan" && word != "inf" && word != "-inf")
-          refuse(node,
-                 fmt::format("<{}> has no number {}; a point has x y z and diameter", local(node), name));
+          refuse(node, fmt::format("<{}> has {} = \"{}\", which is no number; a point has x y z and diameter",
+                                   local(node), name, attribute(node, name).substr(0, 40)));
         *number = std::numeric_limits<float>::quiet_NaN();
       }
     p.radius *= .5f;
@@ -429,6 +434,9 @@ class Assembler {
                     [&] { return fmt::format("a diameter of segment {} is negative", s.id); });
       p.radius = before.radius;
     }
+    if (p.radius == 0.f)
+      oddities_.add(NeuromlOddity::zero_diameter, line(s),
+                    [&] { return fmt::format("a diameter of segment {} is 0", s.id); });
   }
 
   void ends() {
@@ -861,6 +869,10 @@ std::vector<Place> find_cells(const Document& document, Oddities& oddities) {
   std::map<std::string_view, xml_node> loose;
   std::map<std::string_view, bool> used;
   std::vector<Place> places;
+  for (xml_node next = document.root().next_sibling(); next; next = next.next_sibling())
+    if (next.type() == pugi::node_element)
+      oddities.add(NeuromlOddity::several_documents, document.line(next),
+                   "another document follows the first");
   for (const xml_node& node : document.root().children())
     if (local(node) == "morphology") loose.emplace(attribute(node, "id"), node);
   for (const xml_node& node : document.root().children()) {
@@ -894,7 +906,7 @@ std::vector<Place> find_cells(const Document& document, Oddities& oddities) {
   for (const xml_node& node : document.root().children())
     if (local(node) == "morphology" && !used.contains(attribute(node, "id"))) places.push_back({{}, node});
   if (places.empty())
-    throw InputError(document.name(), 0,
+    throw NotANeuron(document.name(), 0,
                      oddities.has(NeuromlOddity::elsewhere)
                          ? "holds cells whose morphology is in another file; read that one"
                          : "holds no cell with a morphology; give a file that does");
@@ -1112,23 +1124,7 @@ class Writer {
 
 std::span<const Oddity> neuroml_oddities() { return table; }
 
-bool recognises_neuroml(std::string_view bytes) {
-  // Declaration, comments and other instructions may come before the first element.
-  bytes = bytes.substr(0, 1 << 16);
-  for (std::size_t at = bytes.find('<'); at != bytes.npos; at = bytes.find('<', at)) {
-    const std::string_view rest = bytes.substr(at);
-    if (rest.starts_with("<!--")) {
-      at = bytes.find("-->", at);
-      if (at == bytes.npos) return false;
-    } else if (rest.starts_with("<?") || rest.starts_with("<!")) {
-      ++at;
-    } else {
-      const std::string_view name = rest.substr(1, rest.find_first_of(" \t\r\n/>", 1) - 1);
-      return name.substr(name.find(':') + 1) == "neuroml";
-    }
-  }
-  return false;
-}
+bool recognises_neuroml(std::string_view bytes) { return first_element(bytes) == "neuroml"; }
 
 ReadResult read_neuroml(std::string_view bytes, const std::string& name) {
   const Document document(bytes, name);

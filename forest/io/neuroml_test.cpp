@@ -97,6 +97,8 @@ TEST(Neuroml, DeviationsAreReadAndTold) {
       {"missing-proximal", in_cell(segment(0, -1, to("9")))},
       {"unknown-number", in_cell(stem + segment(1, 0, to("NaN")))},
       {"diameter", in_cell(stem + segment(1, 0, to("20", "-1")))},
+      {"zero-diameter", in_cell(stem + segment(1, 0, to("20", "0")))},
+      {"several-documents", in_cell(stem) + in_cell(stem)},
       {"fraction", in_cell(stem + segment(1, 0, to("20"), " fractionAlong=\"1.5\""))},
       {"gap", in_cell(stem + segment(1, 0, from("12") + to("20")))},
       {"several-somata",
@@ -147,7 +149,7 @@ TEST(Neuroml, WhatCannotBeReadIsRefusedWithItsLine) {
   expect("<neuroml><network id=\"a\"/></neuroml>", 0, "no cell with a morphology");
   expect(in_cell(""), 2, "no segment");
   expect(in_cell(segment(0, -1, from("0"))), 3, "no distal point");
-  expect(in_cell(segment(0, -1, from("0") + to("one"))), 3, "no number x");
+  expect(in_cell(segment(0, -1, from("0") + to("one"))), 3, "x = \"one\", which is no number");
   expect(in_cell(segment(0, 1, to("0")) + segment(1, 0, to("1"))), 3, "its own ancestor");
   expect(in_cell(segment(-5, -1, from("0") + to("1"))), 3, "whole number");
 }

@@ -20,6 +20,8 @@
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/placed_words.h"
+#include "forest/io/plain_text.h"
+#include "forest/io/traced_branch.h"
 
 namespace forest::io {
 namespace {
@@ -41,6 +43,7 @@ enum class NmfOddity : std::uint8_t {
   single_daughter,
   spine_without_place,
   skipped_element,
+  several_documents,
   count
 };
 
@@ -66,6 +69,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
     {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
     {"skipped-element", true, "skipped", "keep the file beside what is made of it"},
+    {"several-documents", false, "the first one is read", "split the file"},
 }};
 
 // Of the file, not of the cell; and what is said in other ways.
@@ -73,8 +77,6 @@ constexpr std::array<std::string_view, 9> silent_elements{"filefacts", "thumbnai
                                                           "images",    "sparcdata",  "scalebar",
                                                           "zsmear",    "resolution", "description"};
 constexpr int circle_points = 16;
-
-bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
 std::string lower(std::string_view text) {
   std::string result(text);
@@ -158,6 +160,9 @@ class Reader {
     if (const std::string_view version = root.attribute("version").value(); version != "4.0")
       oddities_.add(NmfOddity::version, line_of(root),
                     [&] { return fmt::format("the version is \"{}\", not 4.0", version.substr(0, 40)); });
+    for (pugi::xml_node next = root.next_sibling(); next; next = next.next_sibling())
+      if (next.type() == pugi::node_element)
+        oddities_.add(NmfOddity::several_documents, line_of(next), "another document follows the first");
     about_the_file(root);
     for (const pugi::xml_node element : root.children()) {
       const std::string_view what = name_of(element);
@@ -170,9 +175,10 @@ class Reader {
       else
         skip(element);
     }
-    if (ends_.empty() && soma_.points.empty()) throw InputError(name_, 0, "holds neither a tree nor a soma");
+    if (sections_.size() == 0 && soma_.points.empty())
+      throw InputError(name_, 0, "holds neither a tree nor a soma");
     set_soma();
-    for (const Spine& spine : spines_) builder_.add_spine(spine);
+    sections_.add_spines();
     return {builder_.build(), oddities_.take()};
   }
 
@@ -335,48 +341,38 @@ class Reader {
 
   void set_soma() {
     if (soma_.points.empty()) return;
-    soma_.kind = SomaKind::contours;
-    if (soma_.points.size() < 3) {
+    if (soma_.points.size() < 3)
       oddities_.add(NmfOddity::small_outline, 0, [&] {
         return fmt::format("the outline of the soma has {} points", soma_.points.size());
       });
-      if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
-      soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
-    }
-    builder_.set_soma(std::move(soma_));
+    builder_.set_soma(soma_of_outlines(std::move(soma_)));
   }
 
   // Trees --------------------------------------------------------------------------------------------------
 
-  struct Seat {
-    std::size_t points;  // of the branch before it
-    Spine spine;
-    Vec3 head;
-  };
-  struct Branch {
+  struct Branch : TracedBranch {
     pugi::xml_node element, next;
-    SectionId node;  // it leaves from; once its points are over, the section that ends there
     std::vector<Point> points;
-    std::vector<Seat> seats;
+    std::vector<SpineSeat> spines;
     std::size_t branches = 0, daughters = 0;
-    bool over = false, own = false, excused = false;
   };
 
   void tree(const pugi::xml_node& element) {
     const std::string type = lower(element.attribute("type").value());
-    kind_ = type == "axon"                                  ? SectionKind::axon
-            : type == "dendrite"                            ? SectionKind::basal
-            : type == "apical" || type == "apical dendrite" ? SectionKind::apical
-                                                            : SectionKind::undefined;
-    if (kind_ == SectionKind::undefined)
+    const SectionKind kind = type == "axon"                                  ? SectionKind::axon
+                             : type == "dendrite"                            ? SectionKind::basal
+                             : type == "apical" || type == "apical dendrite" ? SectionKind::apical
+                                                                             : SectionKind::undefined;
+    if (kind == SectionKind::undefined)
       oddities_.add(NmfOddity::unknown_type, line_of(element),
                     [&] { return fmt::format("a tree is of type \"{}\"", type.substr(0, 40)); });
     has_last_ = false, last_ = {};
     std::vector<Branch> open;
     const auto begin = [&](const pugi::xml_node& branch, SectionId node) {
-      open.push_back(
-          {.element = branch, .next = branch.first_child(), .node = node, .points = {}, .seats = {}});
-      if (node.valid()) last_ = ends_[node.value()];
+      Branch& b = open.emplace_back();
+      b.element = branch, b.next = branch.first_child();
+      b.node = node, b.kind = kind, b.tag = std::int32_t(kind);
+      if (node.valid()) last_ = sections_.end(node);
     };
     begin(element, {});
     while (!open.empty()) {
@@ -428,38 +424,19 @@ class Reader {
                     root ? "a tree has no points" : "a branch has no points");
     const std::string leaf = asc_word(branch.element.attribute("leaf").value(), "");
     if (branch.own && branch.branches == 0 && !leaf.empty() && leaf != "Normal")
-      builder_.annotate("leaf", fmt::format("{} {}", leaf, place_text(ends_[branch.node.value()])));
+      builder_.annotate("leaf", fmt::format("{} {}", leaf, place_text(sections_.end(branch.node))));
   }
 
   /// The branch has no more points: they become a section.
   void close(Branch& branch, bool root) {
-    std::size_t joint = 0;
-    if (!branch.over && branch.node.valid() && !branch.points.empty()) {
-      const Point& node = ends_[branch.node.value()];
-      const bool repeated = same_place(branch.points[0], node);
-      if (repeated && branch.points.size() == 1) {
-        oddities_.add(NmfOddity::only_branch_point, line_of(branch.element),
-                      "a branch holds only the point it leaves from");
-        branch.points.clear();
-        branch.excused = true;
-      } else if (!repeated) {
-        branch.points.insert(branch.points.begin(), {node.x, node.y, node.z, branch.points[0].radius});
-        joint = 1;
-      }
-    }
-    if (!branch.over && !branch.points.empty()) {
-      if (root) about_the_tree(branch);
-      branch.node = builder_.add_section(branch.node, kind_, branch.points);
-      branch.own = true;
-      ends_.push_back(branch.points.back());
-      float length = 0.f;
-      for (std::size_t i = 1; i < branch.points.size(); ++i)
-        length += (branch.points[i].position() - branch.points[i - 1].position()).norm();
-      lengths_.push_back(std::min(length, std::numeric_limits<float>::max()));
-    }
-    seat_spines(branch, joint);
-    branch.over = true;
-    branch.points.clear();
+    if (root && !branch.points.empty()) about_the_tree(branch);
+    const auto closed = sections_.close(branch, branch.points, branch.spines);
+    if (closed.only_branch_point)
+      oddities_.add(NmfOddity::only_branch_point, line_of(branch.element),
+                    "a branch holds only the point it leaves from");
+    for (std::size_t i = 0; i < closed.lost_spines; ++i)
+      oddities_.add(NmfOddity::spine_without_place, line_of(branch.element),
+                    "a spine stands where its tree has no point");
   }
 
   void about_the_tree(const Branch& branch) {
@@ -471,7 +448,7 @@ class Reader {
   }
 
   void spine(const pugi::xml_node& element, Branch& branch) {
-    Seat seat{branch.points.size(), {}, Vec3::Zero()};
+    SpineSeat seat{.points = branch.points.size(), .spine = {}, .head = Vec3::Zero(), .said = false};
     std::string_view shape = element.attribute("classification").value();
     bool placed = false;
     for (const pugi::xml_node child : element.children()) {
@@ -492,36 +469,9 @@ class Reader {
     }
     seat.spine.shape = spine_shape(shape);
     if (placed)
-      branch.seats.push_back(seat);
+      branch.spines.push_back(seat);
     else
       oddities_.add(NmfOddity::spine_without_place, line_of(element), "a spine has no point");
-  }
-
-  /// `joint`: how many points were put before the branch's own.
-  void seat_spines(Branch& branch, std::size_t joint) {
-    float position = 0.f;
-    std::size_t at = 0;
-    for (Seat& seat : branch.seats) {
-      if (!branch.node.valid()) {
-        oddities_.add(NmfOddity::spine_without_place, line_of(branch.element),
-                      "a spine stands where its tree has no point");
-        continue;
-      }
-      seat.spine.section = branch.node;
-      if (branch.points.empty()) {
-        seat.spine.position = lengths_[branch.node.value()];
-        seat.spine.head = seat.head - ends_[branch.node.value()].position();
-      } else {
-        const std::size_t to = seat.points == 0 ? 0 : seat.points - 1 + joint;
-        for (; at < to; ++at)
-          position += (branch.points[at + 1].position() - branch.points[at].position()).norm();
-        seat.spine.position = std::min(position, std::numeric_limits<float>::max());
-        seat.spine.head = seat.head - branch.points[to].position();
-      }
-      if (!seat.spine.head.allFinite()) seat.spine.head = Vec3::Zero();
-      spines_.push_back(seat.spine);
-    }
-    branch.seats.clear();
   }
 
   const std::string text_;
@@ -532,19 +482,13 @@ class Reader {
   bool has_last_ = false;
 
   MorphologyBuilder builder_;
+  TracedSections sections_{builder_, true};
   Soma soma_;
-  SectionKind kind_ = SectionKind::undefined;
-  std::vector<Point> ends_;  // of each section
-  std::vector<float> lengths_;
-  std::vector<Spine> spines_;
 };
 
 }  // namespace
 
-bool recognises_nmf(std::string_view bytes) {
-  const std::size_t at = bytes.substr(0, 4096).find("<mbf");
-  return at != bytes.npos && at + 4 < bytes.size() && (ends_number(bytes[at + 4]) || bytes[at + 4] == '>');
-}
+bool recognises_nmf(std::string_view bytes) { return first_element(bytes) == "mbf"; }
 
 ReadResult read_nmf(std::string_view bytes, const std::string& name) { return Reader(bytes, name).read(); }
 

@@ -94,6 +94,7 @@ TEST(Nmf, EveryDeviationIsToldWithItsLineAndRead) {
       {"single-daughter", 2, file(tree(stem + a)), 11.},
       {"spine-without-place", 3, file(tree(stem + "<spine classification=\"thin\"/>")), 10.},
       {"skipped-element", 2, file("<vessel/>" + tree(stem)), 10.},
+      {"several-documents", 5, file(tree(stem)) + file(tree(stem)), 10.},
   };
   std::set<std::string_view> seen;
   for (const Deviation& row : table) {

@@ -17,12 +17,15 @@
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/placed_words.h"
+#include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
+#include "forest/io/traced_branch.h"
 
 namespace forest::io {
 namespace {
 
 enum class NtsOddity : std::uint8_t {
+  byte_order_mark,
   columns,
   no_header,
   point_count,
@@ -44,6 +47,7 @@ enum class NtsOddity : std::uint8_t {
 };
 
 constexpr std::array<Oddity, static_cast<std::size_t>(NtsOddity::count)> table{{
+    {"byte-order-mark", false, "the mark is skipped"},
     {"columns", false, "read at the blanks between them"},
     {"no-header", false, "read from the first record"},
     {"point-count", false, "the records that are there are read",
@@ -166,11 +170,10 @@ class Reader {
   explicit Reader(const std::string& name) : name_(name), oddities_(table) {}
 
   ReadResult read(std::string_view bytes) {
-    if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff"))
-      throw InputError(name_, 1, "is written in UTF-16; save it as plain text (ASCII)");
-    if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
-    while (bytes.ends_with('\x1a')) bytes.remove_suffix(1);  // the end of a file under CP/M and DOS
-    each_line(bytes, [&](std::string_view line, std::size_t number) {
+    const PlainText plain = plain_text(bytes, name_);  // padding is usual: CP/M and DOS end files by Ctrl-Z
+    if (plain.byte_order_mark)
+      oddities_.add(NtsOddity::byte_order_mark, 1, "the file begins with a byte order mark");
+    each_line(plain.text, [&](std::string_view line, std::size_t number) {
       line_ = number;
       if (const std::string_view text = trim(line); !text.empty()) this->line(line, text);
       return true;
@@ -444,14 +447,11 @@ class Reader {
     if (sphere_) {
       soma_ = {.kind = SomaKind::sphere, .points = {*sphere_}, .parents = {}, .contour_starts = {}};
     } else if (!soma_.points.empty()) {
-      soma_.kind = SomaKind::contours;
-      if (soma_.points.size() < 3) {
+      if (soma_.points.size() < 3)
         oddities_.add(NtsOddity::small_outline, 0, [&] {
           return fmt::format("the outline of the soma has {} points", soma_.points.size());
         });
-        if (soma_.points.size() == 1) soma_.kind = SomaKind::sphere;
-        soma_ = {.kind = SomaKind::sphere, .points = {soma_.sphere()}, .parents = {}, .contour_starts = {}};
-      }
+      soma_ = soma_of_outlines(std::move(soma_));
     }
     builder_.set_soma(std::move(soma_));
   }

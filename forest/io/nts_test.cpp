@@ -158,6 +158,7 @@ TEST(Nts, EveryDeviationIsToldAndRead) {
   const std::vector<Deviation> table{
       {"columns", 2, "No. points 2\n1 MTO 0 0 0 0 1\n2 NE 0 0 10 0 1\n", 10.},
       {"no-header", 1, file(stem).substr(file(stem).find("     1  MTO")), 10.},
+      {"byte-order-mark", 1, "\xef\xbb\xbf" + file(stem), 10.},
       {"point-count", 0, "No. points 3\n" + file(stem).substr(file(stem).find("     1  MTO")), 10.},
       {"tree-count", 0, file(stem, 2), 10.},
       {"late-comment", 9, file(stem) + "the end\n", 10.},

@@ -20,11 +20,14 @@ namespace {
 
 constexpr std::array<Oddity, static_cast<std::size_t>(SwcOddity::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
+    {"padding", false, "what stands behind the text is skipped"},
     {"line-ends", false, "read as line ends of any system"},
     {"text-header", false, "kept as a comment"},
     {"blank-line", false, "skipped"},
     {"late-comment", false, "kept with the comments of the header"},
     {"trailing-comment", false, "such comments are skipped"},
+    {"trailing-text", false, "kept as a comment", "see whether rows are missing"},
+    {"typography", false, "read as blanks, minus signs and nothing"},
     {"tabs", false, "read as blanks"},
     {"commas", false, "read as blanks"},
     {"decimal-commas", false, "read as decimal points"},

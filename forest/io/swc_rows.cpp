@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
+#include "forest/io/plain_text.h"
 
 namespace forest::io {
 namespace {
@@ -53,13 +54,11 @@ class Scanner {
  public:
   Scanner(const std::string& name, OddityList<SwcOddity>& oddities) : name_(name), oddities_(oddities) {}
 
-  SwcRows scan(std::string_view text) {
-    if (text.starts_with("\xef\xbb\xbf")) {
+  SwcRows scan(std::string_view bytes) {
+    const auto [text, byte_order_mark, padding] = plain_text(bytes, name_);
+    if (byte_order_mark)
       oddities_.add(SwcOddity::byte_order_mark, 1, "the file begins with a byte order mark");
-      text.remove_prefix(3);
-    }
-    if (text.starts_with("\xff\xfe") || text.starts_with("\xfe\xff"))
-      throw InputError(name_, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+    if (padding) oddities_.add(SwcOddity::padding, 0, "zero bytes or Ctrl-Z stand at the end");
     const std::size_t rows = text.size() / 16;
     rows_.ids.reserve(rows), rows_.parents.reserve(rows), rows_.types.reserve(rows),
         rows_.points.reserve(rows);
@@ -71,6 +70,9 @@ class Scanner {
       const std::string last = std::string(text.substr(whole)) + '\n';
       lines(last.data(), last.data() + last.size());
     }
+    for (auto& [line, said] : trailing_) rows_.annotations.emplace_back("comment", std::move(said));
+    if (!trailing_.empty())
+      oddities_.add(SwcOddity::trailing_text, trailing_[0].first, "words follow the last row");
     return std::move(rows_);
   }
 
@@ -127,6 +129,8 @@ class Scanner {
   void add(std::int64_t id, std::int64_t type, Point point, std::int64_t parent) {
     SwcRows& rows = rows_;
     const std::size_t row = rows.ids.size();
+    if (!trailing_.empty()) [[unlikely]]
+      refuse_words(trailing_[0].first, trailing_[0].second);
     if (line_ != row + lines_before_ + 1) {
       lines_before_ = line_ - row - 1;
       rows.jumps.push_back({row, lines_before_});
@@ -255,20 +259,29 @@ class Scanner {
     return true;
   }
 
+  [[noreturn]] void refuse_words(std::size_t line, std::string_view text) {
+    throw InputError(name_, line,
+                     fmt::format("\"{}\" has {} of 7 columns; {}", shown(text), split(text).size(), layout));
+  }
+
   void odd_row(std::string_view text) {
     const std::size_t hash = text.find('#');
-    const std::string_view data = trim(text.substr(0, hash));
+    const std::string plain = without_typography(trim(text.substr(0, hash)));
+    const std::string_view data = trim(plain);
     std::vector<std::string> tokens = split(data);
-    const char first = data[0];
-    if (rows_.size() == 0 && tokens.size() != 1 &&
-        ((first >= 'a' && first <= 'z') || (first >= 'A' && first <= 'Z'))) {
+    if (tokens.empty()) tokens.emplace_back();
+    const bool number =
+        data.empty() || is_digit(data[0]) || data[0] == '-' || data[0] == '+' || data[0] == '.';
+    if (rows_.size() == 0 && tokens.size() != 1 && !number) {
       oddities_.add(SwcOddity::text_header, line_, "a line of words");
       rows_.annotations.emplace_back("comment", text);
       return;
     }
-    if (tokens.size() < columns.size())
-      throw InputError(name_, line_,
-                       fmt::format("\"{}\" has {} of 7 columns; {}", shown(data), tokens.size(), layout));
+    if (rows_.size() > 0 && !number) {  // allowed behind the rows only
+      trailing_.emplace_back(line_, text);
+      return;
+    }
+    if (tokens.size() < columns.size()) refuse_words(line_, data);
     const std::int64_t id = integer(tokens, 0), type = integer(tokens, 1);
     Point point;
     point.x = real(tokens, 2), point.y = real(tokens, 3), point.z = real(tokens, 4),
@@ -281,8 +294,23 @@ class Scanner {
     if (hash != text.npos) oddities_.add(SwcOddity::trailing_comment, line_, "a comment follows the row");
   }
 
-  /// At blanks and commas; but commas inside numbers, of a row that has its columns without them, are decimal
-  /// points.
+  /// What texts have that went through a spreadsheet or a web page: quotation marks, no-break blanks, minus signs of
+  /// typesetters.
+  std::string without_typography(std::string_view data) {
+    constexpr std::array<std::pair<std::string_view, std::string_view>, 4> signs{
+        {{"\xc2\xa0", " "}, {"\xe2\x88\x92", "-"}, {"\xe2\x80\x93", "-"}, {"\"", ""}}};
+    std::string text(data);
+    for (const auto& [sign, plain] : signs)
+      for (std::size_t at = text.find(sign); at != text.npos; at = text.find(sign, at + plain.size())) {
+        text.replace(at, sign.size(), plain);
+        if (is_digit(data[0]) || data[0] == sign[0])
+          oddities_.add(SwcOddity::typography, line_, "a row has quotation marks or signs of typesetting");
+      }
+    return text;
+  }
+
+  /// At blanks, commas and semicolons; but commas inside numbers, of a row that has its columns without them, are
+  /// decimal points.
   std::vector<std::string> split(std::string_view data) {
     const auto at = [&](std::string_view separators) {
       std::vector<std::string> tokens;
@@ -293,7 +321,9 @@ class Scanner {
       }
       return tokens;
     };
-    std::vector<std::string> tokens = at(blanks);
+    const bool semicolons = data.find(';') != data.npos;
+    if (semicolons) oddities_.add(SwcOddity::commas, line_, "columns are separated by semicolons");
+    std::vector<std::string> tokens = at(semicolons ? " \t\v\f;" : blanks);
     if (data.find(',') == data.npos) return tokens;
     const auto inside = [](const std::string& token) { return token.find(',') < token.size() - 1; };
     if (tokens.size() >= columns.size() && std::ranges::any_of(tokens, inside)) {
@@ -343,6 +373,7 @@ class Scanner {
   OddityList<SwcOddity>& oddities_;
   SwcRows rows_;
   std::size_t line_ = 0, lines_before_ = 0, blank_line_ = 0, late_comment_ = 0;
+  std::vector<std::pair<std::size_t, std::string>> trailing_;  // lines of words after a row
   bool footer_ = false;
 };
 

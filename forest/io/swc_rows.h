@@ -16,11 +16,14 @@ namespace forest::io {
 /// The rows of the table swc_oddities(), in its order.
 enum class SwcOddity : std::uint8_t {
   byte_order_mark,
+  padding,
   line_ends,
   text_header,
   blank_line,
   late_comment,
   trailing_comment,
+  trailing_text,
+  typography,
   tabs,
   commas,
   decimal_commas,

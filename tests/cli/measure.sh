@@ -45,7 +45,7 @@ PY
 # One row a section, a bifurcation, a shell.
 for level in section bifurcation shell; do $BRAINFOREST measure fork.swc --level $level --csv $level.csv >/dev/null; done
 [ "$(wc -l <section.csv)" = 4 ] && [ "$(wc -l <bifurcation.csv)" = 2 ]
-[ "$(tail -n 2 shell.csv)" = $'fork.swc,10,1\nfork.swc,20,1' ]
+[ "$(tail -n 2 shell.csv | tr -d '\r')" = $'fork.swc,10,1\nfork.swc,20,1' ]
 
 $BRAINFOREST measure --list --json | python3 -c 'import json,sys; assert len(json.load(sys.stdin)) >= 20'
 

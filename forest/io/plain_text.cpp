@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/plain_text.h"
+
+#include <algorithm>
+
+#include "forest/core/error.h"
+
+namespace forest::io {
+
+PlainText plain_text(std::string_view bytes, const std::string& name) {
+  // Of a text that begins without a mark in Latin letters every second byte is zero.
+  const auto zero = [&](std::size_t at) { return at < bytes.size() && bytes[at] == '\0'; };
+  const bool halves = bytes.size() >= 4 && zero(0) == zero(2) && zero(1) == zero(3) && zero(0) != zero(1);
+  if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") || halves)
+    throw InputError(name, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
+  PlainText result{.text = bytes};
+  if (bytes.starts_with("\xef\xbb\xbf")) {
+    result.byte_order_mark = true;
+    result.text.remove_prefix(3);
+  }
+  while (!result.text.empty() && (result.text.back() == '\0' || result.text.back() == '\x1a')) {
+    result.padding = true;
+    result.text.remove_suffix(1);
+  }
+  return result;
+}
+
+std::string first_element(std::string_view file) {
+  std::string bytes(file.substr(0, 1 << 16));
+  std::erase(bytes, '\0');
+  for (std::size_t at = bytes.find('<'); at != bytes.npos; at = bytes.find('<', at)) {
+    const std::string_view rest = std::string_view(bytes).substr(at);
+    if (rest.starts_with("<!--")) {
+      at = std::min(bytes.find("-->", at), bytes.size());
+    } else if (rest.starts_with("<?") || rest.starts_with("<!")) {
+      ++at;
+    } else {
+      const std::size_t end = rest.find_first_of(" \t\r\n/>", 1);
+      if (end == rest.npos) return {};
+      const std::string_view name = rest.substr(1, end - 1);
+      return std::string(name.substr(name.find(':') + 1));  // npos + 1 == 0
+    }
+  }
+  return {};
+}
+
+}  // namespace forest::io
