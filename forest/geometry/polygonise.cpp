@@ -271,8 +271,9 @@ class BlockMaker {
 };
 
 std::span<const Entry> of_block(const std::vector<Entry>& entries, std::uint64_t block) {
-  const auto range = std::ranges::equal_range(entries, block, {}, &Entry::block);
-  return {range.begin(), range.end()};
+  const auto before = [block](const Entry& e) { return e.block < block; };
+  const auto first = std::partition_point(entries.begin(), entries.end(), before);
+  return {first, std::find_if(first, entries.end(), [block](const Entry& e) { return e.block != block; })};
 }
 
 }  // namespace
@@ -336,7 +337,7 @@ Mesh polygonise(const std::vector<BranchCone>& cones, const std::vector<Joint>& 
   }
   for (auto* list : {&field.near_cones, &field.near_joints}) {
     std::ranges::sort(*list);
-    list->erase(std::ranges::unique(*list).begin(), list->end());
+    list->erase(std::unique(list->begin(), list->end()), list->end());
   }
 
   std::vector<std::uint64_t> places;  // of blocks, ascending, without those that lie within a cone

@@ -834,8 +834,8 @@ void Repository::revise(std::span<const Revision> revisions) {
             impl.ask<int>("select grammar from provenance where neuron = :id", id).value_or(0);
         about.provenance = neuron(r.id)->provenance;
         remove(r.id);
-        if (!impl.insert) impl.insert = std::make_unique<Insert>(*impl.database);
-        Insert& insert = *impl.insert;
+        if (!impl.insert) impl.insert = std::make_unique<Statements>(*impl.database);
+        Statements& insert = *impl.insert;
         Prepared::Data& data = *prepared[i]->data_;
         insert.id = id, insert.population = population, insert.grammar = grammar;
         insert.name = r.name, insert.fingerprint = fingerprint, insert.about = std::move(about);
