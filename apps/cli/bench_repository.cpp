@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench repository: neurons in memory into a repository and back. What is read is compared with what was stored.
+#include <atomic>
 #include <chrono>
+#include <cmath>
 #include <filesystem>
 #include <memory>
+#include <thread>
 #include <unistd.h>
 #include <vector>
 
@@ -14,6 +17,7 @@
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/repository/repository.h"
+#include "forest/statistics/metric.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
@@ -57,6 +61,51 @@ double seconds(Body&& body) {
   return std::chrono::duration<double>(Clock::now() - begin).count();
 }
 
+/// Reads neuron after neuron for as long as it lives, as another program would while this one stores.
+class Reader {
+ public:
+  Reader(const std::string& place, const std::vector<Morphology>& cells)
+      : thread_([this, place, &cells] { read(place, cells); }) {}
+  ~Reader() { stop(); }
+  void stop() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  void check() const {
+    if (!error_.empty()) throw Error("a neuron could not be read while others were stored: " + error_);
+  }
+  std::size_t neurons() const { return neurons_; }
+  double longest_wait() const { return longest_wait_; }  // s
+
+ private:
+  void read(const std::string& place, const std::vector<Morphology>& cells) try {
+    const Repository repository = Repository::open(place, Access::read);
+    for (std::uint32_t last = 1; !stop_;) {
+      longest_wait_ = std::max(longest_wait_, seconds([&] {
+                                 const auto row = repository.neuron(NeuronId(last));
+                                 if (!row) {
+                                   last = 1;
+                                   return;
+                                 }
+                                 if (repository.morphology(row->id) !=
+                                     cells[std::get<Grown>(row->provenance).index % cells.size()])
+                                   throw Error("it is not the one that was stored");
+                                 ++neurons_;
+                                 last += 97;
+                               }));
+      std::this_thread::sleep_for(std::chrono::milliseconds(20));  // as a person, not as a load
+    }
+  } catch (const std::exception& error) {
+    error_ = error.what();
+  }
+
+  std::atomic<bool> stop_ = false;
+  std::size_t neurons_ = 0;
+  double longest_wait_ = 0.;
+  std::string error_;
+  std::thread thread_;  // after what it uses
+};
+
 void run(const Options& options, Console& console) {
   std::vector<Morphology> cells;  // distinct ones; they are stored again and again under other indices
   for (std::uint64_t i = 0; i < 64; ++i) cells.push_back(synthetic_neuron(options, i));
@@ -68,61 +117,96 @@ void run(const Options& options, Console& console) {
 
   Repository repository = Repository::open(path.string(), Access::write);
   const std::string hash = repository.add_grammar("bench", "bench");
-  const auto add = [&](std::uint64_t i, std::uint64_t seed) {
-    NewNeuron neuron;
-    neuron.name = fmt::format("{}-{}", seed, i);
-    neuron.provenance = Grown{"bench", hash, seed, i};
-    repository.add(cells[i % cells.size()], neuron);
+  const auto called = [&](std::uint64_t seed, std::uint64_t i) {
+    return NewNeuron{.name = fmt::format("{}-{}", seed, i), .provenance = Grown{"bench", hash, seed, i}};
   };
-  const std::uint32_t alone = options.neurons / 10;
-  const double batch = seconds([&] {
-    auto transaction = repository.begin();
-    for (std::uint64_t i = 0; i < options.neurons; ++i) add(i, 1);
-    transaction.commit();
-  });
+  const auto add = [&](std::uint64_t seed, std::uint64_t i) {
+    repository.add(cells[i % cells.size()], called(seed, i));
+  };
+  const std::uint32_t some = std::min(options.neurons, 4000u), alone = some / 10;
+
+  Reader reader(path.string(), cells);
   const double parallel = seconds([&] {  // as grow does: made ready on all cores, some at a time
     std::optional<Repository::Transaction> transaction;
     parallel_in_order(
         options.neurons, [&](std::size_t i) { return Prepared(cells[i % cells.size()]); },
         [&](std::size_t i, Prepared&& ready) {
           if (!transaction) transaction.emplace(repository.begin());
-          NewNeuron neuron;
-          neuron.name = fmt::format("3-{}", i);
-          neuron.provenance = Grown{"bench", hash, 3, i};
-          repository.add(std::move(ready), neuron);
+          repository.add(std::move(ready), called(1, i));
           if (i % 500 == 499 || i + 1 == options.neurons) transaction->commit(), transaction.reset();
         });
   });
-  const double single = seconds([&] {
-    for (std::uint64_t i = 0; i < alone; ++i) add(i, 2);
+  reader.stop();
+  reader.check();
+  const double batch = seconds([&] {
+    auto transaction = repository.begin();
+    for (std::uint64_t i = 0; i < some; ++i) add(2, i);
+    transaction.commit();
   });
+  const double single = seconds([&] {
+    for (std::uint64_t i = 0; i < alone; ++i) add(3, i);
+  });
+
   std::vector<NeuronRow> rows;
   const double list = seconds([&] { rows = repository.neurons(); });
+  if (rows.size() != options.neurons + some + alone) throw Error("not every neuron was stored");
   std::vector<Morphology> back;
   const double read = seconds([&] {
-    for (const NeuronRow& row : rows) back.push_back(repository.morphology(row.id));
+    for (std::uint32_t i = 0; i < some; ++i) back.push_back(repository.morphology(rows[i].id));
   });
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    if (back[i] != cells[std::get<Grown>(rows[i].provenance).index % cells.size()] ||
-        rows.size() != 2 * options.neurons + alone)
+  for (std::size_t i = 0; i < back.size(); ++i)
+    if (back[i] != cells[std::get<Grown>(rows[i].provenance).index % cells.size()])
       throw Error(
           "a neuron did not come back as it was stored; this is an error of the program, please report it");
 
+  // The middle two percent of every metric.
+  double slowest = 0.;
+  std::size_t ranges = 0;
+  for (const statistics::Metric& metric : statistics::metrics()) {
+    const auto at = [&](double part) {
+      const std::string number = fmt::format(
+          "(select id from metrics where name = '{}')", metric.name);
+      const Answer value = repository.query(fmt::format(
+          "select value from neuron_metrics where metric = {0} order by value limit 1 offset (select cast(count(*) * {1} "
+          "as integer) from neuron_metrics where metric = {0})",
+          number, part));
+      return value.rows.empty() ? std::nan("") : std::get<double>(value.rows[0][0]);
+    };
+    const double low = at(.49), high = at(.51);
+    if (std::isnan(low)) continue;  // not defined for such neurons
+    ++ranges;
+    std::vector<NeuronRow> found;
+    slowest = std::max(slowest, seconds([&] {
+                         found = repository.neurons_where(
+                             fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
+                       }));
+    if (found.empty()) throw Error(fmt::format("no neuron was found by its {}", metric.name));
+  }
+
   const double bytes = double(std::filesystem::file_size(path)) / double(rows.size());
-  console.table({"neurons of " + std::to_string(options.sections) + " sections", "per second"},
-                {{"stored, all in one transaction", fmt::format("{:.0f}", options.neurons / batch)},
-                 {"the same, prepared on all cores", fmt::format("{:.0f}", options.neurons / parallel)},
-                 {"stored, each in its own", fmt::format("{:.0f}", alone / single)},
-                 {"read", fmt::format("{:.0f}", double(rows.size()) / read)},
-                 {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
-  console.say(fmt::format("{:.0f} bytes a neuron of {} points", bytes, rows[0].points));
+  console.table(
+      {"neurons of " + std::to_string(options.sections) + " sections", "per second"},
+      {{"stored, made ready on all cores", fmt::format("{:.0f}", options.neurons / parallel)},
+       {"the same on one core, in one transaction", fmt::format("{:.0f}", some / batch)},
+       {"stored, each in a transaction of its own", fmt::format("{:.0f}", alone / single)},
+       {"read", fmt::format("{:.0f}", some / read)},
+       {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
+  console.say(fmt::format("{:.0f} bytes a neuron of {} points; another reader got {} neurons meanwhile and waited {:.0f} ms "
+                          "at most; the slowest of {} range queries took {:.0f} ms",
+                          bytes, rows[0].points, reader.neurons(), 1e3 * reader.longest_wait(), ranges,
+                          1e3 * slowest));
   console.print({{"sections_per_neuron", options.sections},
                  {"points_per_neuron", rows[0].points},
-                 {"stored_per_second", options.neurons / batch},
-                 {"stored_on_all_cores_per_second", options.neurons / parallel},
+                 {"neurons", rows.size()},
+                 {"stored_per_second", options.neurons / parallel},
+                 {"stored_on_one_core_per_second", some / batch},
                  {"stored_singly_per_second", alone / single},
-                 {"read_per_second", double(rows.size()) / read},
+                 {"read_per_second", some / read},
                  {"listed_per_second", double(rows.size()) / list},
+                 {"range_query_milliseconds", 1e3 * slowest},
+                 {"range_queries", ranges},
+                 {"read_meanwhile", reader.neurons()},
+                 {"longest_wait_milliseconds", 1e3 * reader.longest_wait()},
                  {"bytes_per_neuron", bytes}});
 }
 

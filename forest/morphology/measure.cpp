@@ -24,7 +24,8 @@ double sum_over_sections(const Morphology& m, Measure measure) {
 }  // namespace
 
 double segment_area(const Point& a, const Point& b) {
-  const double slant = std::hypot(segment_length(a, b), double(b.radius) - a.radius);
+  const double length = segment_length(a, b), taper = double(b.radius) - a.radius;
+  const double slant = std::sqrt(length * length + taper * taper);
   return std::numbers::pi * (double(a.radius) + b.radius) * slant;
 }
 

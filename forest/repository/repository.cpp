@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <soci/soci.h>
 
 #include "forest/core/error.h"
@@ -611,7 +612,10 @@ std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::s
   std::vector<std::int64_t> chosen;
   for (const auto& row : found.rows) chosen.push_back(std::get<std::int64_t>(row[0]));
   std::ranges::sort(chosen);
-  for (NeuronRow& row : neurons(population))
+  constexpr std::size_t many = 10'000;  // more are not asked for one by one
+  const std::string in = chosen.size() < many ? fmt::format("n.id in ({})", fmt::join(chosen, ", ")) : "1 = 1";
+  const std::string name(population);
+  for (NeuronRow& row : impl_->rows("(p.name = :population or :every = '') and :unused = 0 and " + in, name, name, 0))
     if (std::ranges::binary_search(chosen, std::int64_t(row.id.value()))) rows.push_back(std::move(row));
   return rows;
 }

@@ -167,7 +167,19 @@ class Sqlite final : public Database {
   void begin_writing() override { sql_ << "begin immediate"; }  // waits a minute for other writers
   std::string dialect(std::string_view text) const override { return dialect_of(text); }
   int next_id(const std::string& table) override {
-    return value<int>(sql_, fmt::format("select coalesce(max(id), 0) + 1 from {}", table));
+    auto& [of, statement] = next_id_;  // kept, since each of many neurons asks
+    if (of != table) {
+      const std::string text = fmt::format("select coalesce(max(id), 0) + 1 from {}", table);
+      sqlite::sqlite3_stmt* prepared = nullptr;
+      expect(sqlite::sqlite3_prepare_v2(handle(), text.c_str(), int(text.size()), &prepared, nullptr), "next");
+      statement.reset(prepared);
+      of = table;
+    }
+    const int result = sqlite::sqlite3_step(statement.get());
+    const int id = sqlite::sqlite3_column_int(statement.get(), 0);
+    sqlite::sqlite3_reset(statement.get());
+    if (result != SQLITE_ROW) throw soci::sqlite3_soci_error("next", result);
+    return id;
   }
   bool as_text() const override { return false; }
   std::unique_ptr<InsertStatement> prepare_insert(const std::string& table,
@@ -193,6 +205,9 @@ class Sqlite final : public Database {
 
   void open(const std::string& path, int flags) { attach(sql_, path, flags); }
   sqlite::sqlite3* handle() { return static_cast<soci::sqlite3_session_backend&>(*sql_.get_backend()).conn_; }
+
+ private:
+  std::pair<std::string, Statement> next_id_{"", Statement(nullptr, sqlite::sqlite3_finalize)};
 };
 
 Answer Sqlite::ask(const std::string& question) {
@@ -265,7 +280,7 @@ void create(const std::string& path) {
     Sqlite database;
     database.open(part, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE);
     soci::session& sql = database.sql();
-    sql << "pragma page_size = 4096";  // not whatever this SQLite was built with
+    sql << "pragma page_size = 8192";  // a tenth faster to fill than the usual 4096
     database.begin_writing();
     sql << fmt::format("pragma application_id = {}", application_id);
     sql << fmt::format("pragma user_version = {}", schema_version);
