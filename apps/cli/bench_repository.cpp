@@ -164,37 +164,36 @@ void run(const Options& options, Console& console) {
   std::size_t ranges = 0;
   for (const statistics::Metric& metric : statistics::metrics()) {
     const auto at = [&](double part) {
-      const std::string number = fmt::format(
-          "(select id from metrics where name = '{}')", metric.name);
-      const Answer value = repository.query(fmt::format(
-          "select value from neuron_metrics where metric = {0} order by value limit 1 offset (select cast(count(*) * {1} "
-          "as integer) from neuron_metrics where metric = {0})",
-          number, part));
+      const std::string number = fmt::format("(select id from metrics where name = '{}')", metric.name);
+      const Answer value =
+          repository.query(fmt::format("select value from neuron_metrics where metric = {0} order by value "
+                                       "limit 1 offset (select cast(count(*) * {1} "
+                                       "as integer) from neuron_metrics where metric = {0})",
+                                       number, part));
       return value.rows.empty() ? std::nan("") : std::get<double>(value.rows[0][0]);
     };
     const double low = at(.49), high = at(.51);
     if (std::isnan(low)) continue;  // not defined for such neurons
     ++ranges;
     std::vector<NeuronRow> found;
-    slowest = std::max(slowest, seconds([&] {
-                         found = repository.neurons_where(
-                             fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
-                       }));
+    slowest = std::max(
+        slowest, seconds([&] {
+          found = repository.neurons_where(fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
+        }));
     if (found.empty()) throw Error(fmt::format("no neuron was found by its {}", metric.name));
   }
 
   const double bytes = double(std::filesystem::file_size(path)) / double(rows.size());
-  console.table(
-      {"neurons of " + std::to_string(options.sections) + " sections", "per second"},
-      {{"stored, made ready on all cores", fmt::format("{:.0f}", options.neurons / parallel)},
-       {"the same on one core, in one transaction", fmt::format("{:.0f}", some / batch)},
-       {"stored, each in a transaction of its own", fmt::format("{:.0f}", alone / single)},
-       {"read", fmt::format("{:.0f}", some / read)},
-       {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
-  console.say(fmt::format("{:.0f} bytes a neuron of {} points; another reader got {} neurons meanwhile and waited {:.0f} ms "
-                          "at most; the slowest of {} range queries took {:.0f} ms",
-                          bytes, rows[0].points, reader.neurons(), 1e3 * reader.longest_wait(), ranges,
-                          1e3 * slowest));
+  console.table({"neurons of " + std::to_string(options.sections) + " sections", "per second"},
+                {{"stored, made ready on all cores", fmt::format("{:.0f}", options.neurons / parallel)},
+                 {"the same on one core, in one transaction", fmt::format("{:.0f}", some / batch)},
+                 {"stored, each in a transaction of its own", fmt::format("{:.0f}", alone / single)},
+                 {"read", fmt::format("{:.0f}", some / read)},
+                 {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
+  console.say(fmt::format(
+      "{:.0f} bytes a neuron of {} points; another reader got {} neurons meanwhile and waited {:.0f} ms "
+      "at most; the slowest of {} range queries took {:.0f} ms",
+      bytes, rows[0].points, reader.neurons(), 1e3 * reader.longest_wait(), ranges, 1e3 * slowest));
   console.print({{"sections_per_neuron", options.sections},
                  {"points_per_neuron", rows[0].points},
                  {"neurons", rows.size()},

@@ -33,8 +33,9 @@ struct Options {
   bool force = false;
 };
 
-constexpr std::size_t batch = 2000;   // neurons compared at a time
-constexpr std::size_t stored = 500;   // as one transaction: their pages fit into memory, so that readers wait for none
+constexpr std::size_t batch = 2000;  // neurons compared at a time
+constexpr std::size_t stored =
+    500;  // as one transaction: their pages fit into memory, so that readers wait for none
 
 std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& name) {
   return folder / (name + ".swc");

@@ -15,21 +15,21 @@ void parallel_ranges(std::size_t count, std::size_t grain,
 }
 
 void detail::in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
-              const std::function<void(std::size_t, void*)>& take) {
+                      const std::function<void(std::size_t, void*)>& take) {
   using Made = std::pair<std::size_t, std::shared_ptr<void>>;
   using tbb::filter_mode;
   constexpr std::size_t ahead = 64;
   std::size_t next = 0;
   tbb::parallel_pipeline(
       ahead,
-      tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order,
-                                          [&](tbb::flow_control& control) {
-                                            if (next == count) control.stop();
-                                            return next++;
-                                          }) &
-          tbb::make_filter<std::size_t, Made>(filter_mode::parallel, [&](std::size_t i) { return Made(i, make(i)); }) &
-          tbb::make_filter<Made, void>(filter_mode::serial_in_order,
-                                       [&](const Made& made) { take(made.first, made.second.get()); }));
+      tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order, [&](tbb::flow_control& control) {
+        if (next == count) control.stop();
+        return next++;
+      }) & tbb::make_filter<std::size_t, Made>(filter_mode::parallel, [&](std::size_t i) {
+        return Made(i, make(i));
+      }) & tbb::make_filter<Made, void>(filter_mode::serial_in_order, [&](const Made& made) {
+        take(made.first, made.second.get());
+      }));
 }
 
 ThreadLimit::ThreadLimit(unsigned threads) {

@@ -83,11 +83,12 @@ class Arrays final : public InsertStatement {
       statement_.exchange(soci::use(texts_[i]));
     }
     std::string columns_of_rows;
-    for (std::size_t i = 0; i < columns.size(); ++i) columns_of_rows += fmt::format("{}c{}", i ? ", " : "", i);
+    for (std::size_t i = 0; i < columns.size(); ++i)
+      columns_of_rows += fmt::format("{}c{}", i ? ", " : "", i);
     statement_.alloc();
     statement_.prepare(
-        fmt::format("insert into {} ({}) select {} from unnest({}) as rows ({}) on conflict do nothing", table,
-                    names, values, arrays, columns_of_rows));
+        fmt::format("insert into {} ({}) select {} from unnest({}) as rows ({}) on conflict do nothing",
+                    table, names, values, arrays, columns_of_rows));
     statement_.define_and_bind();
   }
 
@@ -114,7 +115,8 @@ class Arrays final : public InsertStatement {
 
  private:
   template <class T>
-  static void append(std::string& array, const InsertColumn& c, const std::vector<T>& values, std::size_t row) {
+  static void append(std::string& array, const InsertColumn& c, const std::vector<T>& values,
+                     std::size_t row) {
     append(array, c, values[row], row);
   }
   template <class Number>

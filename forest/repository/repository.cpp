@@ -76,8 +76,12 @@ class Statements {
     neuron_.with("type", about.type).with("stems", stems_).with("sections", section_count_);
     neuron_.with("points", point_count_).with("spines", spine_count_).with("length", length_);
     neuron_.with("checksum", checksum);
-    const auto unless_traced = [this](std::size_t) { return !std::holds_alternative<Traced>(about.provenance); };
-    const auto unless_grown = [this](std::size_t) { return !std::holds_alternative<Grown>(about.provenance); };
+    const auto unless_traced = [this](std::size_t) {
+      return !std::holds_alternative<Traced>(about.provenance);
+    };
+    const auto unless_grown = [this](std::size_t) {
+      return !std::holds_alternative<Grown>(about.provenance);
+    };
     provenance_.with("neuron", id).with("origin", origin_).with("source_file", file_, unless_traced);
     provenance_.with("source_hash", hash_, unless_traced).with("grammar", grammar, unless_grown);
     provenance_.with("seed", seed_, unless_grown).with("number", index_, unless_grown);
@@ -196,8 +200,8 @@ struct Repository::Impl {
   std::shared_ptr<Database> database;
   soci::session& sql;
   std::unique_ptr<Statements> insert;  // prepared on first use
-  bool writing = false;            // a transaction is open
-  bool failed = false;             // and cannot be committed any more
+  bool writing = false;                // a transaction is open
+  bool failed = false;                 // and cannot be committed any more
   // Those last stored under: thousands of neurons have the same.
   std::pair<std::string, int> known_population, known_grammar;
   std::string known_hash;
@@ -213,9 +217,9 @@ struct Repository::Impl {
     std::vector<int> ids(room(std::size_t(impl.ask<int>("select count(*) from neurons").value_or(0))));
     impl.sql << "select id from neurons order by id", into(ids);
     for (const int id : ids) {
-      const Morphology m = morphology_of(
-          impl.stored(NeuronId(std::size_t(id)), "point_count",
-                      fmt::format("old_sections where neuron = {} order by number", id)));
+      const Morphology m =
+          morphology_of(impl.stored(NeuronId(std::size_t(id)), "point_count",
+                                    fmt::format("old_sections where neuron = {} order by number", id)));
       for (const char* table : {"points", "arbors", "neuron_metrics"})
         impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
       insert.id = id;
@@ -422,8 +426,9 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
         return Added{NeuronId(std::size_t(*there)),
                      *impl.ask<std::string>("select name " + same, insert.population, insert.fingerprint),
                      true};
-      const auto other = impl.ask<int>("select id from neurons where population = :population and name = :name",
-                                       insert.population, insert.name);
+      const auto other =
+          impl.ask<int>("select id from neurons where population = :population and name = :name",
+                        insert.population, insert.name);
       if (!other) continue;  // it was removed since
       if (!neuron.number_if_taken)
         throw Error(
@@ -613,9 +618,11 @@ std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::s
   for (const auto& row : found.rows) chosen.push_back(std::get<std::int64_t>(row[0]));
   std::ranges::sort(chosen);
   constexpr std::size_t many = 10'000;  // more are not asked for one by one
-  const std::string in = chosen.size() < many ? fmt::format("n.id in ({})", fmt::join(chosen, ", ")) : "1 = 1";
+  const std::string in =
+      chosen.size() < many ? fmt::format("n.id in ({})", fmt::join(chosen, ", ")) : "1 = 1";
   const std::string name(population);
-  for (NeuronRow& row : impl_->rows("(p.name = :population or :every = '') and :unused = 0 and " + in, name, name, 0))
+  for (NeuronRow& row :
+       impl_->rows("(p.name = :population or :every = '') and :unused = 0 and " + in, name, name, 0))
     if (std::ranges::binary_search(chosen, std::int64_t(row.id.value()))) rows.push_back(std::move(row));
   return rows;
 }

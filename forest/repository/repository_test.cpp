@@ -616,18 +616,21 @@ std::size_t terminals(const Morphology& m) {
 std::string as_version(int version, const std::string& file) {
   std::string sql =
       "begin; drop view section; drop view junction; alter table sections rename to new; "
-      "create table sections (neuron integer not null, number integer not null, parent integer, arbor integer not null, "
+      "create table sections (neuron integer not null, number integer not null, parent integer, arbor "
+      "integer not null, "
       "branch_order integer not null, length real not null, kind integer not null, tag integer not null, "
       "soma_point integer not null, first_point integer not null, point_count integer not null, "
       "daughters integer not null default 0, area real not null default 0, primary key (neuron, number)) "
       "without rowid; "
       "insert into sections select id >> 24, id & 16777215, parent, arbor, branch_order, length, kind, tag, "
-      "soma_point, sum(points) over (partition by id >> 24 order by id) - points, points, daughters, area from new; "
+      "soma_point, sum(points) over (partition by id >> 24 order by id) - points, points, daughters, area "
+      "from new; "
       "drop table new; ";
   if (version == 1)
-    sql += "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; "
-           "drop table distributions; alter table points drop column packing; "
-           "alter table sections drop column daughters; alter table sections drop column area; ";
+    sql +=
+        "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; "
+        "drop table distributions; alter table points drop column packing; "
+        "alter table sections drop column daughters; alter table sections drop column area; ";
   else
     sql += "create view section as select 1; create view junction as select 1; ";
   return fmt::format("sqlite3 '{}' '{} pragma user_version = {}; commit'", file, sql, version);

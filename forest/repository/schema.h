@@ -216,7 +216,7 @@ create view junction as
   where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
 )sql"}};
 
-inline constexpr int section_bits = 24;  // of sections.id
+inline constexpr int section_bits = 24;                      // of sections.id
 inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository
 
 }  // namespace forest::repository

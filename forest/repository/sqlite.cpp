@@ -66,8 +66,10 @@ void attach(soci::session& sql, const std::string& path, int flags) {
 }
 
 std::string dialect_of(std::string_view text) {
-  constexpr std::pair<std::string_view, std::string_view> words[] = {
-      {"@id", "integer primary key"}, {"@long_id", "integer primary key"}, {"@bytes", "blob"}, {"@by_key", "without rowid"}};
+  constexpr std::pair<std::string_view, std::string_view> words[] = {{"@id", "integer primary key"},
+                                                                     {"@long_id", "integer primary key"},
+                                                                     {"@bytes", "blob"},
+                                                                     {"@by_key", "without rowid"}};
   std::string sql(text);
   for (const auto& [word, ours] : words)
     for (std::size_t at; (at = sql.find(word)) != sql.npos;) sql.replace(at, word.size(), ours);
@@ -171,7 +173,8 @@ class Sqlite final : public Database {
     if (of != table) {
       const std::string text = fmt::format("select coalesce(max(id), 0) + 1 from {}", table);
       sqlite::sqlite3_stmt* prepared = nullptr;
-      expect(sqlite::sqlite3_prepare_v2(handle(), text.c_str(), int(text.size()), &prepared, nullptr), "next");
+      expect(sqlite::sqlite3_prepare_v2(handle(), text.c_str(), int(text.size()), &prepared, nullptr),
+             "next");
       statement.reset(prepared);
       of = table;
     }
@@ -194,9 +197,10 @@ class Sqlite final : public Database {
     soci::rowset<std::string> lines = (sql_.prepare << "pragma integrity_check");
     for (const std::string& line : lines)
       if (line != "ok") findings.push_back(fmt::format("is damaged ({})", line));
-    const int strays = value<int>(
-        sql_, "select (select count(*) from pragma_foreign_key_check) + (select count(*) from sections "
-              "where not exists (select 1 from neurons n where n.id = sections.id >> 24))");
+    const int strays =
+        value<int>(sql_,
+                   "select (select count(*) from pragma_foreign_key_check) + (select count(*) from sections "
+                   "where not exists (select 1 from neurons n where n.id = sections.id >> 24))");
     if (strays) findings.push_back(fmt::format("is damaged ({} rows belong to nothing)", strays));
     return findings;
   }
