@@ -7,9 +7,11 @@
 #include <gtest/gtest.h>
 
 #include "forest/io/png.h"
+#include "forest/render/cpu/cpu_renderer.h"
 #include "forest/render/null/null_renderer.h"
 #include "forest/render/opengl/context.h"
 #include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
 
@@ -49,34 +51,76 @@ TEST_P(Picture, LooksAsItDid) {
   ASSERT_NO_THROW(null.draw(frame));
 
   const render::OffscreenContext context;
-  render::OpenGLRenderer renderer;
-  renderer.load(forest.geometry());
-  renderer.draw(frame);
-  const frame::Image image = renderer.read();
+  render::OpenGLRenderer card;
+  render::CpuRenderer processor;
+  const auto drawn_by = [&](render::Renderer& renderer) {
+    renderer.load(forest.geometry());
+    renderer.draw(frame);
+    return renderer.read();
+  };
+  const frame::Image image = drawn_by(card), other = drawn_by(processor);
   EXPECT_GT(image.covered, .03);
+  EXPECT_NEAR(other.covered, image.covered, .001);
 
   const std::filesystem::path file =
       std::filesystem::path(FOREST_SOURCE_DIR) / "tests" / "golden" / (std::string(golden.name) + ".png");
   if (std::getenv("FOREST_UPDATE_GOLDEN")) io::write_png(file, width, height, image.pixels);
   const io::Picture expected = io::read_png(file);
-  ASSERT_EQ(expected.pixels.size(), image.pixels.size());
-  double sum = 0.;
-  std::size_t far = 0;
-  for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
-    int worst = 0;
-    for (std::size_t c = 0; c < 3; ++c) {
-      const int difference = std::abs(int(image.pixels[i + c]) - int(expected.pixels[i + c]));
-      sum += difference;
-      worst = std::max(worst, difference);
+  for (const frame::Image* seen : {&image, &other}) {
+    SCOPED_TRACE(seen == &image ? card.name() : processor.name());
+    ASSERT_EQ(expected.pixels.size(), seen->pixels.size());
+    double sum = 0.;
+    std::size_t far = 0;
+    for (std::size_t i = 0; i < seen->pixels.size(); i += 4) {
+      int worst = 0;
+      for (std::size_t c = 0; c < 3; ++c) {
+        const int difference = std::abs(int(seen->pixels[i + c]) - int(expected.pixels[i + c]));
+        sum += difference;
+        worst = std::max(worst, difference);
+      }
+      far += worst > 32;
     }
-    far += worst > 32;
+    EXPECT_LT(sum / (3. * width * height), 2.);
+    EXPECT_LT(far, width * height / 50);
   }
-  EXPECT_LT(sum / (3. * width * height), 2.);
-  EXPECT_LT(far, width * height / 50);
 }
 
 INSTANTIATE_TEST_SUITE_P(Golden, Picture, ::testing::ValuesIn(goldens),
                          [](const auto& golden) { return std::string(golden.param.name); });
+
+// A walk with a memory of what was hidden, and a leap in it, shows what a walk without one shows.
+TEST(Chooser, ItsMemoryChangesNoPixel) {
+  const scene::Forest forest =
+      scene::Forest::from_bytes(scene::pack(testing::sample_circuit(300), testing::sample_neurons()));
+  const scene::CameraPath path = scene::walk(forest);
+  const scene::Colouring colouring = scene::colour(forest, scene::ColourBy::type, scene::Background::dark);
+  const frame::Viewport viewport{float(width), float(height)};
+  render::CpuRenderer renderer;
+  renderer.load(forest.geometry());
+  scene::Chooser chooser(forest);
+  std::size_t left_out = 0, revealed = 0;
+  for (const float t : {.5f, .505f, .51f, .52f, .9f, .91f, .1f}) {
+    for (const std::uint32_t samples : {1u, 3u}) {
+      SCOPED_TRACE(t);
+      scene::View view = path.at(t);
+      view.samples = samples;
+      const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
+      const scene::Cut cut = scene::choose(forest, eye, viewport);
+      renderer.draw(scene::compose(forest, view, colouring, cut, width, height));
+      const frame::Image plain = renderer.read();
+      const scene::Cut& guessed = chooser.choose(eye, viewport);
+      frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
+      chooser.complete(frame);
+      renderer.draw(frame);
+      chooser.remember(renderer.seen());
+      EXPECT_EQ(renderer.read().pixels, plain.pixels);
+      left_out += guessed.left_out.size();
+      revealed += chooser.segments() - guessed.segments;
+    }
+  }
+  EXPECT_GT(left_out, 50u);
+  EXPECT_GT(revealed, 0u);
+}
 
 }  // namespace
 }  // namespace forest

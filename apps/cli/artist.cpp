@@ -22,9 +22,12 @@ double milliseconds_since(Clock::time_point start) {
 
 }  // namespace
 
-Artist::Artist(scene::Forest forest)
-    : forest_(std::move(forest)), chooser_(forest_), outline_(scene::outline(forest_)) {
-  renderer_.load(forest_.geometry());
+Artist::Artist(scene::Forest forest, Drawer drawer)
+    : forest_(std::move(forest)),
+      chooser_(forest_),
+      renderer_(make_renderer(drawer)),
+      outline_(scene::outline(forest_)) {
+  renderer_->load(forest_.geometry());
 }
 
 Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline) {
@@ -42,13 +45,13 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
       with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
-  const frame::Timing timing = renderer_.draw(frame);
-  chooser_.remember(renderer_.seen());
+  const frame::Timing timing = renderer_->draw(frame);
+  chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
   drawn.neurons = cut.neurons;
   drawn.draw = timing.draw, drawn.resolve = timing.resolve;
   start = Clock::now();
-  drawn.image = renderer_.read();
+  drawn.image = renderer_->read();
   drawn.read = milliseconds_since(start);
   return drawn;
 }

@@ -4,14 +4,15 @@
 
 #include <filesystem>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "forest/core/progress.h"
-#include "forest/render/opengl/context.h"
-#include "forest/render/opengl/opengl_renderer.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
+
+#include "apps/cli/drawer.h"
 
 namespace forest::cli {
 
@@ -25,18 +26,17 @@ struct Drawn {
 
 class Artist {
  public:
-  explicit Artist(scene::Forest forest);
+  explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic);
 
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   const scene::Forest& forest() const { return forest_; }
-  std::string renderer() const { return renderer_.name(); }
+  std::string renderer() const { return renderer_->name(); }
 
  private:
   scene::Forest forest_;
   scene::Chooser chooser_;
-  render::OffscreenContext context_;
-  render::OpenGLRenderer renderer_;
+  std::unique_ptr<render::Renderer> renderer_;
   std::vector<frame::Overlay> outline_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;

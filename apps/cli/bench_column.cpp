@@ -31,6 +31,7 @@ struct Options {
   std::uint64_t seed = 1;
   double budget = 85.;  // milliseconds a picture
   std::string size = "1280x720";
+  Drawer drawer = Drawer::automatic;
 };
 
 struct Share {
@@ -105,7 +106,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
 void run(const Options& options, Console& console) {
   const scene::Forest forest = column(options, console);
   const auto start = Clock::now();
-  Artist artist(forest);
+  Artist artist(forest, options.drawer);
   const auto [width, height] = parse_size(options.size);
   scene::View first = around(forest, 0.f);
   first.samples = 1;
@@ -170,6 +171,7 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
       ->check(CLI::Range(1., 10000.))
       ->capture_default_str();
   add_size(command, options->size);
+  add_renderer(command, options->drawer);
   add_seed(command, options->seed, "Of the neurons and their places");
   return [options, &console] { run(*options, console); };
 }

@@ -28,6 +28,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::filesystem::path forest, out;
     std::string view, size = "1920x1080";
     bool outline = false;
+    Drawer drawer = Drawer::automatic;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
@@ -35,11 +36,12 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
+  add_renderer(command, options->drawer);
   return [options, &console] {
     const auto [width, height] = parse_size(options->size);
     const scene::Forest forest = scene::Forest::open(options->forest);
     const scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
-    Artist artist(forest);
+    Artist artist(forest, options->drawer);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
     console.print({{"file", options->out.string()},
@@ -62,6 +64,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::vector<std::string> views;
     std::string size = "1280x720";
     FilmPlan plan;
+    Drawer drawer = Drawer::automatic;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
@@ -78,6 +81,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--pictures", options->plan.pictures, "Also write every picture into this folder");
+  add_renderer(command, options->drawer);
   command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
   return [options, &console] {
     FilmPlan plan = options->plan;
@@ -88,7 +92,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (views.size() == 1)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
-    Artist artist(forest);
+    Artist artist(forest, options->drawer);
     const FilmFigures figures = film(artist, path, plan, options->out, console.progress());
     console.print({{"file", options->out.string()},
                    {"pictures", figures.pictures},

@@ -151,7 +151,16 @@ QImage Viewport::seen() {
 
 void Viewport::initializeGL() {
   try {
-    renderer_ = std::make_unique<render::OpenGLRenderer>();
+    auto card = std::make_unique<render::OpenGLRenderer>();
+    card_ = nullptr, processor_ = nullptr;
+    if (card->on_processor()) {
+      auto processor = std::make_unique<render::CpuRenderer>();
+      processor_ = processor.get();
+      renderer_ = std::move(processor);
+    } else {
+      card_ = card.get();
+      renderer_ = std::move(card);
+    }
     renderer_->load(forest_.geometry());
     renderer_name_ = QString::fromStdString(renderer_->name());
   } catch (const std::exception& error) {
@@ -241,7 +250,8 @@ void Viewport::paintGL() {
     if (stage == Stage::refining) refine();
     QOpenGLFunctions* gl = context()->functions();
     gl->glDisable(GL_SCISSOR_TEST);
-    renderer_->show(defaultFramebufferObject());
+    if (card_) card_->show(defaultFramebufferObject());
+    if (processor_) paint(processor_->image());
     // The renderer's opacity says how much of a pixel is covered; the window itself is opaque.
     gl->glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
     gl->glClearColor(0, 0, 0, 1);
@@ -257,6 +267,14 @@ void Viewport::paintGL() {
   Q_EMIT drawn();
   if (glide_ || flies() || stage_ == Stage::refining) update();
   if (stage == Stage::refining && stage_ == Stage::finished) Q_EMIT settled();
+}
+
+void Viewport::paint(const frame::Image& image) {
+  if (image.pixels.empty()) return;
+  QOpenGLPaintDevice device(size() * devicePixelRatioF());
+  QPainter painter(&device);
+  painter.drawImage(
+      0, 0, QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888));
 }
 
 void Viewport::annotate() {

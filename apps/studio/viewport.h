@@ -11,7 +11,9 @@
 #include <optional>
 #include <set>
 
+#include "forest/render/cpu/cpu_renderer.h"
 #include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 
 #include "apps/studio/selection.h"
@@ -92,6 +94,7 @@ class Viewport final : public QOpenGLWidget {
   void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last);
   void refine();
   void took(float milliseconds);
+  void paint(const frame::Image& image);
   void annotate();
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
@@ -101,7 +104,9 @@ class Viewport final : public QOpenGLWidget {
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
   std::optional<Selection> selection_;
-  std::unique_ptr<render::OpenGLRenderer> renderer_;
+  std::unique_ptr<render::Renderer> renderer_;
+  render::OpenGLRenderer* card_ = nullptr;          // the renderer when it is OpenGL's …
+  const render::CpuRenderer* processor_ = nullptr;  // … or this one where there is no graphics card
   QString renderer_name_;
 
   Stage stage_ = Stage::moving;

@@ -18,8 +18,6 @@ void Chooser::complete(frame::Frame& frame) {
   };
 }
 
-void Chooser::remember(const frame::DepthMap& seen) {
-  before_.emplace(seen, eye_->camera(), viewport_);
-}
+void Chooser::remember(const frame::DepthMap& seen) { before_.emplace(seen, eye_->camera(), viewport_); }
 
 }  // namespace forest::scene

@@ -8,14 +8,13 @@
 namespace forest::scene {
 namespace {
 
-constexpr float margin = 2.f;         // pixels that a line may be wider than what it shows, and jitter
+constexpr float margin = 2.f;          // pixels that a line may be wider than what it shows, and jitter
 constexpr float depth_step = 1.0001f;  // more than a step of a pixel's key
 constexpr float tile = float(FOREST_TILE);
 
 }  // namespace
 
-Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera,
-                     const frame::Viewport& viewport)
+Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport)
     : axes_(camera.axes()),
       eye_(camera.eye),
       near_(camera.near),
@@ -50,13 +49,14 @@ bool Occluders::hide(const Sphere& sphere) const {
   const Level& finest = levels_.front();
   const float wide = float(finest.width) * tile, high = float(finest.height) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;
-  auto left = std::uint32_t(std::max(x - reach, 0.f) / tile), top = std::uint32_t(std::max(y - reach, 0.f) / tile);
+  auto left = std::uint32_t(std::max(x - reach, 0.f) / tile),
+       top = std::uint32_t(std::max(y - reach, 0.f) / tile);
   auto right = std::min(std::uint32_t(std::min(x + reach, wide) / tile), finest.width - 1),
        bottom = std::min(std::uint32_t(std::min(y + reach, high) / tile), finest.height - 1);
   // The level at which the rectangle is at most four wide: few look-ups, and little that is not below it.
   const std::uint32_t span = std::max(right - left, bottom - top);
-  const std::size_t k = std::min<std::size_t>(std::size_t(std::max(int(std::bit_width(span)) - 2, 0)),
-                                              levels_.size() - 1);
+  const std::size_t k =
+      std::min<std::size_t>(std::size_t(std::max(int(std::bit_width(span)) - 2, 0)), levels_.size() - 1);
   left >>= k, top >>= k, right >>= k, bottom >>= k;
   const Level& level = levels_[k];
   for (std::uint32_t row = top; row <= bottom; ++row)

@@ -2,6 +2,7 @@
 #include "forest/render/opengl/opengl_renderer.h"
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -10,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/frame/constants.h"
 #include "forest/render/opengl/shaders.h"
 
 namespace forest::render {
@@ -87,41 +89,6 @@ class Program {
   GLuint name_ = 0;
 };
 
-// The 2, 3 sequence of Halton: where in the pixel the subframe is sampled.
-float halton(unsigned index, unsigned base) {
-  float result = 0.f, share = 1.f;
-  for (unsigned i = index + 1; i; i /= base) share /= float(base), result += share * float(i % base);
-  return result;
-}
-
-std::uint32_t half_pair(float a, float b) {
-  const auto half = [](float value) {
-    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
-  };
-  return half(a) | half(b) << 16;
-}
-
-Constants constants_of(const frame::Frame& f) {
-  const Mat3 axes = f.camera.axes();
-  const Vec3 right = axes.col(0), up = axes.col(1), forward = -axes.col(2), eye = f.camera.eye;
-  const Vec3 light = Vec3(-.35f, .75f, -.55f).normalized();
-  const frame::Style& s = f.style;
-  Constants c{};
-  c.eye_x = eye.x(), c.eye_y = eye.y(), c.eye_z = eye.z(), c.focal = f.camera.focal(float(f.height));
-  c.right_x = right.x(), c.right_y = right.y(), c.right_z = right.z();
-  c.up_x = up.x(), c.up_y = up.y(), c.up_z = up.z();
-  c.forward_x = forward.x(), c.forward_y = forward.y(), c.forward_z = forward.z(), c.near = f.camera.near;
-  c.width = f.width, c.height = f.height, c.subframes = f.subframes;
-  c.light_x = light.x(), c.light_y = light.y(), c.light_z = light.z(), c.halo = s.halo;
-  c.fog_red = s.fog_colour.x(), c.fog_green = s.fog_colour.y(), c.fog_blue = s.fog_colour.z(),
-  c.fog_start = s.fog_start;
-  c.top_red = s.background_top.x(), c.top_green = s.background_top.y(), c.top_blue = s.background_top.z();
-  c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(),
-  c.bottom_blue = s.background_bottom.z();
-  c.fog_length = s.fog_length, c.exposure = s.exposure;
-  return c;
-}
-
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -178,9 +145,7 @@ struct OpenGLRenderer::Device {
   void upload(const frame::Frame& f) {
     std::vector<Segment> marks;
     std::vector<Item> mark_items;
-    for (const frame::Overlay& o : f.overlays)
-      marks.push_back({o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius), o.b.x(), o.b.y(), o.b.z(),
-                       o.colour << 16});
+    for (const frame::Overlay& o : f.overlays) marks.push_back(frame::segment_of(o));
     for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
       mark_items.push_back({0, std::uint32_t(i),
                             std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
@@ -289,15 +254,14 @@ struct OpenGLRenderer::Device {
   }
 
   void read_depths() {
-    seen.width = (width + FOREST_TILE - 1) / FOREST_TILE, seen.height = (height + FOREST_TILE - 1) / FOREST_TILE;
+    seen.width = (width + FOREST_TILE - 1) / FOREST_TILE,
+    seen.height = (height + FOREST_TILE - 1) / FOREST_TILE;
     farthest.resize(std::size_t(seen.width) * seen.height);
     glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
     glGetNamedBufferSubData(tiles.name(), 0, GLsizeiptr(farthest.size() * 4), farthest.data());
     seen.depths.resize(farthest.size());
     std::ranges::transform(farthest, seen.depths.begin(), [](std::uint32_t key) {
-      return key == FOREST_KEY_EMPTY
-                 ? INFINITY
-                 : std::exp2(float(key >> 12) / float(FOREST_DEPTH_STEPS) - float(FOREST_DEPTH_BASE));
+      return key == FOREST_KEY_EMPTY ? INFINITY : frame::depth_of_code(key >> 12);
     });
   }
 
@@ -334,6 +298,12 @@ OpenGLRenderer::~OpenGLRenderer() {
 
 std::string OpenGLRenderer::name() const { return reinterpret_cast<const char*>(glGetString(GL_RENDERER)); }
 
+bool OpenGLRenderer::on_processor() const {
+  const std::string driver = name();
+  return std::ranges::any_of(std::array{"llvmpipe", "softpipe", "swrast", "SWR"},
+                             [&](const char* word) { return driver.find(word) != driver.npos; });
+}
+
 void OpenGLRenderer::load(const frame::Geometry& geometry) {
   device_->geometry = geometry;
   device_->segments.upload(geometry.segments);
@@ -347,14 +317,10 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
   d.prepare(f);
   d.seen = {};
   frame::Timing timing;
-  d.constants = constants_of(f);
-  d.constants.last_subframe = std::min(f.last_subframe, f.subframes);
-  for (std::uint32_t subframe = f.first_subframe; subframe < d.constants.last_subframe; ++subframe) {
+  const std::uint32_t last = std::min(f.last_subframe, f.subframes);
+  for (std::uint32_t subframe = f.first_subframe; subframe < last; ++subframe) {
     auto start = std::chrono::steady_clock::now();
-    const bool still = f.subframes == 1;
-    d.constants.subframe = subframe;
-    d.constants.centre_x = .5f * float(f.width) + (still ? 0.f : halton(subframe, 2) - .5f);
-    d.constants.centre_y = .5f * float(f.height) + (still ? 0.f : halton(subframe, 3) - .5f);
+    d.constants = frame::constants_of(f, subframe);
     const std::uint32_t empty = FOREST_KEY_EMPTY;
     glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4),
                               GL_RED_INTEGER, GL_UNSIGNED_INT, &empty);

@@ -21,6 +21,8 @@ class OpenGLRenderer final : public Renderer {
   frame::Image read() override;
   const frame::DepthMap& seen() const override;
   std::string name() const override;
+  /// Whether the driver is a program that draws on the processor, as Mesa's llvmpipe is.
+  bool on_processor() const;
 
   /// Copies the last frame into the bottom left corner of the framebuffer object `target` (a window's), without
   /// leaving the graphics card.

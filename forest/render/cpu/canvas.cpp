@@ -1,0 +1,78 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/render/cpu/canvas.h"
+
+#include <cmath>
+
+#include "forest/core/parallel.h"
+#include "forest/frame/constants.h"
+
+namespace forest::render::cpu {
+namespace {
+
+constexpr std::int32_t tile = std::int32_t(FOREST_TILE);
+constexpr std::int32_t most = 6;  // tiles of a level that a rectangle may cover
+
+std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile; }
+
+}  // namespace
+
+void Canvas::clear(std::uint32_t width, std::uint32_t height) {
+  width_ = std::int32_t(width), height_ = std::int32_t(height);
+  keys_.resize(std::size_t(width) * height);
+  parallel_ranges(keys_.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
+    std::fill(keys_.begin() + std::ptrdiff_t(begin), keys_.begin() + std::ptrdiff_t(end), FOREST_KEY_EMPTY);
+  });
+  looked_ = false;
+}
+
+void Canvas::look() {
+  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
+  fine_.farthest.resize(std::size_t(fine_.width) * std::size_t(fine_.height));
+  parallel_for(std::size_t(fine_.height), 4, [&](std::size_t ty) {
+    std::vector<std::uint32_t> column(std::size_t(width_), 0u);  // the farthest of the tile's rows
+    for (std::int32_t y = std::int32_t(ty) * tile; y < std::min(std::int32_t(ty + 1) * tile, height_); ++y) {
+      const std::uint32_t* keys = row(y);
+      for (std::size_t x = 0; x < column.size(); ++x) column[x] = std::max(column[x], keys[x]);
+    }
+    for (std::int32_t tx = 0; tx < fine_.width; ++tx)
+      fine_.farthest[ty * std::size_t(fine_.width) + std::size_t(tx)] =
+          *std::max_element(column.begin() + tx * tile, column.begin() + std::min((tx + 1) * tile, width_));
+  });
+  coarse_.width = tiles_over(fine_.width), coarse_.height = tiles_over(fine_.height);
+  coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
+  for (std::int32_t y = 0; y < fine_.height; ++y)
+    for (std::int32_t x = 0; x < fine_.width; ++x) {
+      std::uint32_t& far = coarse_.farthest[std::size_t(y / tile * coarse_.width + x / tile)];
+      far = std::max(far, fine_.farthest[std::size_t(y * fine_.width + x)]);
+    }
+  looked_ = true;
+}
+
+bool Canvas::hidden(float left, float top, float right, float bottom, float nearest_code) const {
+  if (!(left < float(width_) && top < float(height_) && right >= 0.f && bottom >= 0.f)) return true;
+  if (!looked_) return false;
+  std::int32_t x0 = std::int32_t(std::max(left, 0.f)) / tile, y0 = std::int32_t(std::max(top, 0.f)) / tile;
+  std::int32_t x1 = std::int32_t(std::min(right, float(width_ - 1))) / tile,
+               y1 = std::int32_t(std::min(bottom, float(height_ - 1))) / tile;
+  const Level* level = &fine_;
+  if ((x1 - x0 + 1) * (y1 - y0 + 1) > most) {
+    level = &coarse_;
+    x0 /= tile, y0 /= tile, x1 /= tile, y1 /= tile;
+    if ((x1 - x0 + 1) * (y1 - y0 + 1) > 4 * most) return false;
+  }
+  const std::uint32_t key = key_of(nearest_code, 0);
+  for (std::int32_t y = y0; y <= y1; ++y)
+    for (std::int32_t x = x0; x <= x1; ++x)
+      if (level->farthest[std::size_t(y * level->width + x)] >= key) return false;
+  return true;
+}
+
+frame::DepthMap Canvas::depth_map() const {
+  frame::DepthMap map{std::uint32_t(fine_.width), std::uint32_t(fine_.height), {}};
+  map.depths.reserve(fine_.farthest.size());
+  for (const std::uint32_t key : fine_.farthest)
+    map.depths.push_back(key == FOREST_KEY_EMPTY ? INFINITY : frame::depth_of_code(key >> 12));
+  return map;
+}
+
+}  // namespace forest::render::cpu

@@ -1,0 +1,67 @@
+// SPDX-License-Identifier: Apache-2.0
+// The keys of all pixels (frame/layout.h) and how far one sees through them.
+#pragma once
+
+#include <algorithm>
+#include <atomic>
+#include <cstdint>
+#include <vector>
+
+#include "forest/frame/frame.h"
+
+#include "forest/render/cpu/arithmetic.h"
+
+namespace forest::render::cpu {
+
+[[gnu::always_inline]] inline float depth_code(float depth) {
+  const float code = (log2_of(depth) + float(FOREST_DEPTH_BASE)) * float(FOREST_DEPTH_STEPS);
+  return smaller(larger(code, 0.f), float(FOREST_DEPTH_MAX));
+}
+
+[[gnu::always_inline]] inline std::uint32_t key_of(float code, std::uint32_t payload) { return std::uint32_t(std::int32_t(code)) << 12 | payload; }
+
+/// Shade 0–1 in five bits, the rounding moved by `noise` so that the mean over subframes is smooth.
+[[gnu::always_inline]] inline std::uint32_t payload_of(std::uint32_t entry, float shade, float noise) {
+  return entry << 5 | std::uint32_t(std::int32_t(smaller(larger(shade * 31.f + noise, 0.f), 31.f)));
+}
+
+class Canvas {
+ public:
+  /// All pixels empty.
+  void clear(std::uint32_t width, std::uint32_t height);
+
+  std::int32_t width() const { return width_; }
+  std::int32_t height() const { return height_; }
+  const std::uint32_t* row(std::int32_t y) const { return &keys_[std::size_t(y) * std::size_t(width_)]; }
+
+  /// The nearest key wins, whichever thread comes first.
+  void put(std::int32_t x, std::int32_t y, std::uint32_t key) {
+    const std::atomic_ref<std::uint32_t> pixel(keys_[std::size_t(y) * std::size_t(width_) + std::size_t(x)]);
+    std::uint32_t seen = pixel.load(std::memory_order_relaxed);
+    while (key < seen && !pixel.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
+    }
+  }
+  std::uint32_t key(std::int32_t x, std::int32_t y) {
+    const std::atomic_ref<std::uint32_t> pixel(keys_[std::size_t(y) * std::size_t(width_) + std::size_t(x)]);
+    return pixel.load(std::memory_order_relaxed);
+  }
+
+  /// Finds the farthest key of every tile: from now on `hidden` knows what has been drawn.
+  void look();
+  /// Whether all that lies within a rectangle of pixels, at a depth code or behind it, is hidden or beside the picture. Looks at
+  /// few tiles; a rectangle that needs more is not hidden.
+  bool hidden(float left, float top, float right, float bottom, float nearest_code) const;
+  frame::DepthMap depth_map() const;
+
+ private:
+  struct Level {
+    std::int32_t width = 0, height = 0;
+    std::vector<std::uint32_t> farthest;
+  };
+  std::int32_t width_ = 0, height_ = 0;
+  std::vector<std::uint32_t> keys_;
+  Level fine_, coarse_;  // tiles, and tiles of tiles
+  bool looked_ = false;
+};
+
+}  // namespace forest::render::cpu

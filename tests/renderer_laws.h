@@ -1,0 +1,207 @@
+// SPDX-License-Identifier: Apache-2.0
+// What holds for every renderer that makes pictures. A room that has one includes this in its test and instantiates it:
+// INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make));
+#pragma once
+
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/render/renderer.h"
+
+namespace forest::render {
+
+using Maker = std::unique_ptr<Renderer> (*)();
+
+class RendererLaws : public testing::TestWithParam<Maker> {};
+
+namespace {
+
+// One neuron at the origin with the given segments, seen from z = 100 µm; 1 µm is about 2.75 pixels.
+struct Fixture {
+  std::unique_ptr<Renderer> renderer;
+  std::vector<frame::Segment> segments;
+  std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
+  std::vector<std::uint8_t> classes{0};
+  std::vector<frame::Item> items;
+  frame::Frame frame;
+
+  explicit Fixture(Maker make) : renderer(make()) {
+    frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
+    frame.width = frame.height = 200;
+    frame.palette.fill(Vec3(1, 0, 0));
+    frame.colour_class = classes;
+    frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
+    frame.style.halo = 0.f;
+  }
+  void add(const Vec3& a, const Vec3& b, float radius) {
+    const std::uint32_t half = std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(radius)));
+    segments.push_back({a.x(), a.y(), a.z(), half | half << 16, b.x(), b.y(), b.z(), 3});
+    items.assign(1, {0, 0, std::uint32_t(segments.size()), 0, 0, 0, 0, 200});
+  }
+  frame::Image draw() {
+    renderer->load({segments, instances});
+    renderer->draw(frame);
+    return renderer->read();
+  }
+};
+
+double red_area(const frame::Image& image) {  // in pixels, by coverage
+  return image.covered * image.width * image.height;
+}
+
+TEST_P(RendererLaws, CapsuleCoversItsProjectedArea) {
+  for (const float radius : {.3f, 1.f, 6.f, 20.f}) {
+    Fixture f(GetParam());
+    f.add({-20, 3, 0}, {15, -8, 0}, radius);
+    f.frame.capsules = f.items;
+    f.frame.subframes = 32;
+    const double scale = f.frame.camera.focal(200.f) / 100.;
+    const double length = Vec3(35, -11, 0).norm(),
+                 expected = scale * scale * (2 * radius * length + M_PI * radius * radius);
+    EXPECT_NEAR(red_area(f.draw()) / expected, 1., radius < 1 ? .12 : .06) << radius;
+  }
+}
+
+TEST_P(RendererLaws, AThinLineCoversItsAreaOnTheMean) {
+  for (const float radius : {.02f, .1f, .4f}) {
+    for (const Vec3& end : {Vec3(15, -8, 0), Vec3(-20, -25, 0), Vec3(20, 25, 0)}) {
+      Fixture f(GetParam());
+      f.add({-20, 3, 0}, end, radius);
+      f.frame.lines = f.items;
+      f.frame.subframes = 64;
+      const double scale = f.frame.camera.focal(200.f) / 100.;
+      const double expected = scale * scale * 2 * radius * (end - Vec3(-20, 3, 0)).norm();
+      const double steps = 64 * 2 * radius * scale;  // of 64 subframes, those that draw it: a whole number
+      EXPECT_NEAR(red_area(f.draw()) / expected, 1., .05 + 1. / steps) << radius;
+    }
+  }
+}
+
+TEST_P(RendererLaws, PictureDrawnInPartsIsThatDrawnAtOnce) {
+  Fixture f(GetParam());
+  f.add({-20, 3, 0}, {15, -8, 0}, 2.f);
+  f.add({-20, -3, 5}, {15, 9, 5}, .1f);
+  f.frame.capsules = f.items;
+  f.frame.subframes = 16;
+  const frame::Image at_once = f.draw();
+  for (const auto& [first, last] : {std::pair(0u, 1u), std::pair(1u, 5u), std::pair(5u, 16u)}) {
+    f.frame.first_subframe = first, f.frame.last_subframe = last;
+    f.renderer->draw(f.frame);
+    EXPECT_EQ(f.renderer->read().pixels == at_once.pixels, last == 16u);
+    EXPECT_GT(f.renderer->read().covered, .5 * at_once.covered);
+  }
+}
+
+TEST_P(RendererLaws, OverlaysAreSeenWhereverTheOriginIs) {
+  for (const float beside : {0.f, 500.f}) {  // the origin in the picture, and far beside it
+    Fixture f(GetParam());
+    f.frame.camera.eye.x() = f.frame.camera.target.x() = beside;
+    const std::vector<frame::Overlay> marks{{Vec3(beside - 10, 0, 0), Vec3(beside + 10, 0, 0), 2.f, 5}};
+    f.frame.overlays = marks;
+    EXPECT_GT(red_area(f.draw()), 300.) << beside;
+  }
+}
+
+TEST_P(RendererLaws, NearerHidesFartherInAnyOrderAndAnyBand) {
+  for (const bool swapped : {false, true}) {
+    Fixture f(GetParam());
+    f.add({-10, 0, swapped ? -20.f : 20.f}, {10, 0, swapped ? -20.f : 20.f}, 8.f);
+    f.segments[0].meta = swapped ? 4 : 3;
+    f.add({-10, 0, swapped ? 20.f : -20.f}, {10, 0, swapped ? 20.f : -20.f}, 3.f);
+    f.segments[1].meta = swapped ? 3 : 4;
+    f.frame.palette[4] = Vec3(0, 1, 0);
+    const std::vector<frame::Item> both{{0, 0, 1, 0, 0, 0, f.segments[0].az, 19},
+                                        {0, 1, 1, 0, 0, 0, f.segments[1].az, 14}};
+    const std::vector<frame::Band> bands{{0, 0, 1}, {0, 0, 2}};
+    f.frame.capsules = both;
+    f.frame.bands = bands;
+    const frame::Image image = f.draw();
+    const std::uint8_t* centre = &image.pixels[4 * (100 * 200 + 100)];
+    EXPECT_GT(centre[0], 60);
+    EXPECT_EQ(centre[1], 0);
+  }
+}
+
+TEST_P(RendererLaws, BandsChangeNoPixel) {
+  Fixture f(GetParam());
+  for (int i = 0; i < 60; ++i) {
+    const float a = float(i) * .7f, z = 40.f - float(i);
+    f.add({30 * std::cos(a), 30 * std::sin(a), z}, {-30 * std::cos(a + .3f), -30 * std::sin(a + .3f), z},
+          .2f + float(i % 7));
+  }
+  std::vector<frame::Item> items;
+  std::vector<frame::Band> bands;
+  for (std::uint32_t i = 0; i < 60; ++i) {
+    items.push_back({0, i, 1, 0, 0, 0, f.segments[i].az, 40});
+    if (i % 10 == 9) bands.push_back({0, 0, i + 1});
+  }
+  f.frame.capsules = items;
+  const frame::Image whole = f.draw();
+  f.frame.bands = bands;
+  EXPECT_EQ(f.draw().pixels, whole.pixels);
+  EXPECT_GT(whole.covered, .2);
+}
+
+TEST_P(RendererLaws, ASphereIsRoundLitFromAboveAndTheSameAsADot) {
+  Fixture f(GetParam());
+  f.add({0, 0, 0}, {0, 0, 0}, 10.f);
+  f.frame.subframes = 16;
+  f.frame.capsules = f.items;
+  const frame::Image image = f.draw();
+  const double scale = f.frame.camera.focal(200.f) / 100.;
+  EXPECT_NEAR(red_area(image), M_PI * 100 * scale * scale, .03 * M_PI * 100 * scale * scale);
+  const auto red = [&](int x, int y) { return image.pixels[4 * std::size_t(y * 200 + x)]; };
+  EXPECT_GT(red(100, 85), red(100, 115));
+  f.frame.capsules = {};
+  f.frame.dots = f.items;
+  EXPECT_NEAR(red_area(f.draw()), red_area(image), .03 * red_area(image));
+}
+
+TEST_P(RendererLaws, WhatLiesBehindTheEyeIsNotDrawn) {
+  Fixture f(GetParam());
+  f.add({0, 0, 150}, {5, 5, 300}, 5.f);
+  f.frame.capsules = f.items;
+  EXPECT_EQ(f.draw().covered, 0.);
+  f.frame.lines = f.items;
+  EXPECT_EQ(f.draw().covered, 0.);
+}
+
+TEST_P(RendererLaws, RefusesAFrameThatBreaksTheContract) {
+  Fixture f(GetParam());
+  f.add({0, 0, 0}, {1, 1, 1}, 1.f);
+  f.renderer->load({f.segments, f.instances});
+  f.frame.width = 0;
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
+}
+
+TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
+  Fixture f(GetParam());
+  f.add({-20, 3, 0}, {15, -8, 0}, 9.f);
+  f.add({-20, -3, -30}, {25, 9, -30}, .4f);
+  f.frame.subframes = 4;
+  f.frame.capsules = f.items;
+  const frame::Image whole = f.draw();
+  const std::vector<frame::Item> first{{0, 0, 1, 0, 0, 0, 0, 200}}, second{{0, 1, 1, 0, 0, 0, 0, 200}};
+  f.frame.capsules = first;
+  int asked = 0;
+  f.frame.rest = [&](const frame::DepthMap& seen) {
+    ++asked;
+    EXPECT_EQ(seen.width, 25u);
+    EXPECT_EQ(seen.depths.size(), 625u);
+    EXPECT_NEAR(seen.depths[12 * 25 + 12], 92.f, 1.f);  // near the front of the capsule, the farthest of 64 pixels
+    EXPECT_TRUE(std::isinf(seen.depths[0]));
+    frame::Lists more;
+    more.capsules = second;
+    return more;
+  };
+  EXPECT_EQ(f.draw().pixels, whole.pixels);
+  EXPECT_EQ(asked, 4);
+  EXPECT_EQ(f.renderer->seen().depths.size(), 625u);
+}
+
+}  // namespace
+}  // namespace forest::render
