@@ -103,7 +103,7 @@ void repair(const io::Format& format, const io::Cell& cell, std::string_view ori
             const Put& put, Checked& checked) {
   const io::Format& writer = format.write ? format : *io::find_format("swc");
   fs::path mended = to;
-  if (!format.write) mended.replace_extension(std::string(writer.extensions[0]));
+  if (!format.write) mended += writer.extensions[0];  // cell.xml.swc, as there may be a cell.swc
   const std::string copy = writer.write(cell.read.morphology);
   Json passages = Json::array(), findings = Json::array();
   for (const io::Passage& p : io::difference(copy, original))
@@ -160,7 +160,7 @@ void report(const std::vector<Checked>& files, Console& console) {
   }
   if (!rows.empty())
     console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
-  console.say(fmt::format("{} files without a finding, {} with some, {} not read{}{}", sound, odd, failed,
+  console.say(fmt::format("{} without a finding, {} with some, {} not read{}{}", counted(sound, "file"), odd, failed,
                           skipped ? fmt::format(", {} skipped", skipped) : "",
                           mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
   console.print({{"sound", sound},
@@ -170,7 +170,8 @@ void report(const std::vector<Checked>& files, Console& console) {
                  {"mended", mended},
                  {"files", list}});
   if (failed)
-    throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
+    throw Error(
+        fmt::format("{} of {} could not be read; the table says why", failed, counted(files.size(), "file")));
 }
 
 void check_repository(const std::string& repo, Console& console) {

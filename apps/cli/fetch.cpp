@@ -221,7 +221,8 @@ std::function<void()> fetch_cells(CLI::App& command, Console& console) {
                    "Write them into this folder, with what is said of them as JSON beside")
       ->type_name("DIR");
   CLI::Option* repo =
-      into->add_option("--repo", options->repo, "Store them in this repository; made when there is none");
+      into->add_option("--repo", options->repo, "Store them in this repository; made when there is none")
+          ->type_name("REPO");
   into->require_option(1, 2);
   must_be_name(
       *command.add_option("--population", options->population, "The population they are to belong to")

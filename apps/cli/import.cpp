@@ -147,8 +147,9 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
   console.table({"file", "neuron", "sections", "warnings", ""}, lines);
   console.say(fmt::format(
       "{} stored, {} already there, {} not read, {} skipped{}", stored, there, failed, skipped,
-      warnings ? fmt::format("; {} warnings{}", warnings, options.verbose ? "" : ", shown by --verbose")
-               : ""));
+      warnings
+          ? fmt::format("; {}{}", counted(warnings, "warning"), options.verbose ? "" : ", shown by --verbose")
+          : ""));
   report_oddities(files, console);
   console.print({{"repository", options.repo},
                  {"population", options.about.population},
@@ -160,7 +161,8 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                  {"files", list}});
   if (failed)
     throw Error(
-        fmt::format("{} of {} files could not be read; the sentences above say why", failed, files.size()));
+        fmt::format("{} of {} could not be read; the sentences above say why", failed,
+                    counted(files.size(), "file")));
 }
 
 /// What a workbook cannot be imported with. Its neurons have their populations and say the rest themselves.
@@ -248,9 +250,11 @@ std::function<void()> import_files(CLI::App& command, Console& console) {
           "wrote, whose changes are taken over")
       ->required()
       ->type_name("FILES");
-  command.add_option("--repo", options->repo, "The repository; made when there is none")
+  command
+      .add_option("--repo", options->repo,
+                  "The repository, made when there is none: a file, or postgresql://role@host/database")
       ->required()
-      ->type_name("FILE");
+      ->type_name("REPO");
   must_be_name(
       *command.add_option("--population", options->about.population, "The population they are to belong to")
            ->capture_default_str());

@@ -46,27 +46,34 @@ enum class Odd : std::uint8_t {
   count
 };
 
+// A file written anew holds the shape; what GENESIS computes with becomes comments.
+constexpr std::string_view keep_the_file = "keep the file beside what is made of it";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"padding", false, "what stands behind the text is skipped"},
-    {"parameters", false, "kept as annotations; they do not change the shape"},
-    {"prototypes", false, "kept as annotations; what a prototype holds stands in no cell file"},
-    {"spine-options", false, "kept as annotations; the spines they scatter are not made"},
-    {"unknown-option", true, "skipped"},
-    {"channels", false, "kept as annotations"},
-    {"unknown-diameter", true, "read as the diameter of the parent"},
-    {"missing-parent", true, "read as a root"},
-    {"duplicate-name", true, "a parent means the last one above"},
-    {"several-roots", true, "kept as a tree of its own, attached to no soma"},
-    {"several-somata", true, "read as a neurite of undefined kind"},
+    {"parameters", false, "kept as annotations; they do not change the shape", keep_the_file},
+    {"prototypes", false, "kept as annotations; what a prototype holds stands in no cell file", keep_the_file},
+    {"spine-options", false, "kept as annotations; the spines they scatter are not made", keep_the_file},
+    {"unknown-option", true, "skipped", keep_the_file},
+    {"channels", false, "kept as annotations", keep_the_file},
+    {"unknown-diameter", true, "read as the diameter of the parent", "measure it where thickness matters"},
+    {"missing-parent", true, "read as a root", "give it the parent it was traced from"},
+    {"duplicate-name", true, "a parent means the last one above", "give each compartment a name of its own"},
+    {"several-roots", true, "kept as a tree of its own, attached to no soma",
+     "give it a parent if it belongs to the cell"},
+    {"several-somata", true, "read as a neurite of its parent's kind",
+     "split the file if it holds several cells"},
     {"soma-inside", true, "the tree is turned so that it begins at the soma"},
     {"sphere-outside", true, "read as a point of its branch"},
     {"no-length", true, "left out: it ends where it begins"},
     {"gap", true, "bridged by a straight piece"},
-    {"unknown-kind", false, "read as of its parent's kind, or of undefined kind where that has none"},
+    {"unknown-kind", false, "read as of its parent's kind, or of undefined kind where that has none",
+     "nothing, or give it a name that tells its kind, such as dend or axon"},
     {"stale-diameters", true, "read by its diameter, as it was changed by hand"},
-    {"open-comment", false, "read as a comment to the end of the file"},
-    {"several-cells", false, "the first one is read; convert and import take them all"},
+    {"open-comment", false, "read as a comment to the end of the file", "see whether compartments are missing"},
+    {"several-cells", false, "the first one is read; convert and import take them all",
+     "nothing, or split the file"},
 }};
 
 using Oddities = OddityList<Odd>;

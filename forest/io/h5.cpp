@@ -48,6 +48,8 @@ enum class H5Oddity : std::uint8_t {
   count
 };
 
+constexpr std::string_view keep_the_file = "keep the file beside what is made of it";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"several-cells", false, "only the first is read here; import the file to have all"},
     {"version-2", false, "converted to what version 1 has"},
@@ -56,18 +58,19 @@ constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"soma-two-points", false, "read as a cylinder between them"},
     {"root-marker", false, "read as roots that leave from no soma"},
     {"self-parent", false, "read as roots"},
-    {"missing-parent", false, "read as roots"},
+    {"missing-parent", false, "read as roots", "give them the parents they were traced from"},
     {"child-first", false,
      "the order of rows does not matter; sections that organelles name keep their old numbers"},
     {"joint-missing", false, "the parent's last point is put in front"},
-    {"single-daughter", false, "kept as sections of their own"},
-    {"unknown-place", false, "read as those of the point before"},
-    {"negative-radius", false, "read as those of the point before"},
-    {"type-custom", false, "read as neurites of custom kind, the numbers kept"},
+    {"single-daughter", false, "kept as sections of their own", "nothing, if sections begin there"},
+    {"unknown-place", false, "read as those of the point before", "look them up in the tracing"},
+    {"negative-radius", false, "read as those of the point before", "measure them where thickness matters"},
+    {"type-custom", false, "read as neurites of custom kind, the numbers kept",
+     "nothing, where all who read it know the numbers"},
     {"glia-unsaid", false, "read as glia"},
-    {"perimeters-size", false, "left out"},
-    {"organelles-odd", false, "left out"},
-    {"not-kept", false, "left out"},
+    {"perimeters-size", false, "left out", keep_the_file},
+    {"organelles-odd", false, "left out", keep_the_file},
+    {"not-kept", false, "left out", keep_the_file},
 }};
 
 using Oddities = OddityList<H5Oddity>;

@@ -42,6 +42,20 @@ constexpr double shortest = .99e-6;  // µm; the float next to 1e-6 is below it
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
 
+Soma kept_soma(const Soma& soma, const Keeps& keeps) {
+  const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
+                       (soma.kind == SomaKind::contours && !keeps.contours);
+  if (!simpler) return soma;
+  return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
+}
+
+// An outline drawn without thickness counts only where it is written as one.
+std::size_t points_without_radius(const Morphology& m, const Keeps& keeps) {
+  const auto flat = [](const Point& p) { return p.radius == 0.f; };
+  const Soma soma = kept_soma(m.soma(), keeps);
+  return std::size_t(std::ranges::count_if(m.points(), flat) + std::ranges::count_if(soma.points, flat));
+}
+
 // A row for each thing that can be lost.
 struct Loss {
   bool Keeps::*kept;
@@ -125,11 +139,7 @@ constexpr Loss loss_table[] = {
      },
      "{} sections without length are given one of about 1e-6 µm, since a simulator divides by it"},
     {&Keeps::zero_radii, "zero-radii",
-     [](const Morphology& m, const Keeps&) {
-       const auto zero = [](const Point& p) { return p.radius == 0.f; };
-       return std::size_t(std::ranges::count_if(m.points(), zero) +
-                          std::ranges::count_if(m.soma().points, zero));
-     },
+     [](const Morphology& m, const Keeps& keeps) { return points_without_radius(m, keeps); },
      "{} points have no diameter; they are written so, but a simulator needs one to compute"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
@@ -148,13 +158,6 @@ bool has_length(std::span<const Point> points) {
   double length = 0.;
   for (std::size_t k = 1; k < points.size(); ++k) length += segment_length(points[k - 1], points[k]);
   return length >= shortest;
-}
-
-Soma kept_soma(const Soma& soma, const Keeps& keeps) {
-  const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
-                       (soma.kind == SomaKind::contours && !keeps.contours);
-  if (!simpler) return soma;
-  return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
 }
 
 std::vector<SectionId> depth_first(const Morphology& m) {
@@ -190,9 +193,7 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
       if (const std::size_t count = loss.count(m, keeps))
         warnings.push_back({0, loss.code, fmt::format(fmt::runtime(loss.sentence), count)});
   if (keeps.least_diameter > 0.f) {
-    const auto flat = [](const Point& p) { return p.radius == 0.f; };
-    const auto count = std::ranges::count_if(m.points(), flat) + std::ranges::count_if(m.soma().points, flat);
-    if (count)
+    if (const auto count = points_without_radius(m, keeps))
       warnings.push_back({0, "diameters-lifted",
                           fmt::format("{} diameters of 0 become {} µm", count, keeps.least_diameter)});
   }
