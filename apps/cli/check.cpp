@@ -160,8 +160,8 @@ void report(const std::vector<Checked>& files, Console& console) {
   }
   if (!rows.empty())
     console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
-  console.say(fmt::format("{} without a finding, {} with some, {} not read{}{}", counted(sound, "file"), odd, failed,
-                          skipped ? fmt::format(", {} skipped", skipped) : "",
+  console.say(fmt::format("{} without a finding, {} with some, {} not read{}{}", counted(sound, "file"), odd,
+                          failed, skipped ? fmt::format(", {} skipped", skipped) : "",
                           mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
   console.print({{"sound", sound},
                  {"odd", odd},

@@ -215,12 +215,11 @@ void run(Options options, Console& console) {
                  {"failed", failed},
                  {"skipped", skipped},
                  {"files", list}});
-  console.say(fmt::format(
-      "{} written as {}, {} not read, {} skipped, {} told above{}", written, target.title(), failed, skipped,
-      counted(lost, "loss", "losses"),
-      oddities && !options.verbose
-          ? fmt::format("; {} of the files, shown by --verbose", counted(oddities, "oddity", "oddities"))
-          : ""));
+  console.say(fmt::format("{} written as {}, {} not read, {} skipped, {} told above{}", written,
+                          target.title(), failed, skipped, counted(lost, "loss", "losses"),
+                          oddities && !options.verbose ? fmt::format("; {} of the files, shown by --verbose",
+                                                                     counted(oddities, "oddity", "oddities"))
+                                                       : ""));
   if (failed)
     throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
                             files.size()));

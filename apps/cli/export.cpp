@@ -104,10 +104,8 @@ void run(const Options& options, Console& console) {
       console.warn(fmt::format("{}: {}: {}", escaped(files[i].string()), loss.code, loss.sentence));
       lost.push_back({{"code", loss.code}, {"sentence", loss.sentence}});
     }
-    list.push_back({{"id", rows[i].id.value()},
-                    {"name", rows[i].name},
-                    {"file", files[i].string()},
-                    {"losses", lost}});
+    list.push_back(
+        {{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}, {"losses", lost}});
   }
   console.print({{"format", options.format}, {"files", list}});
   console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));

@@ -160,9 +160,8 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                  {"warnings", warnings},
                  {"files", list}});
   if (failed)
-    throw Error(
-        fmt::format("{} of {} could not be read; the sentences above say why", failed,
-                    counted(files.size(), "file")));
+    throw Error(fmt::format("{} of {} could not be read; the sentences above say why", failed,
+                            counted(files.size(), "file")));
 }
 
 /// What a workbook cannot be imported with. Its neurons have their populations and say the rest themselves.

@@ -53,7 +53,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"padding", false, "what stands behind the text is skipped"},
     {"parameters", false, "kept as annotations; they do not change the shape", keep_the_file},
-    {"prototypes", false, "kept as annotations; what a prototype holds stands in no cell file", keep_the_file},
+    {"prototypes", false, "kept as annotations; prototypes themselves are left out", keep_the_file},
     {"spine-options", false, "kept as annotations; the spines they scatter are not made", keep_the_file},
     {"unknown-option", true, "skipped", keep_the_file},
     {"channels", false, "kept as annotations", keep_the_file},
@@ -71,7 +71,8 @@ constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
     {"unknown-kind", false, "read as of its parent's kind, or of undefined kind where that has none",
      "nothing, or give it a name that tells its kind, such as dend or axon"},
     {"stale-diameters", true, "read by its diameter, as it was changed by hand"},
-    {"open-comment", false, "read as a comment to the end of the file", "see whether compartments are missing"},
+    {"open-comment", false, "read as a comment to the end of the file",
+     "see whether compartments are missing"},
     {"several-cells", false, "the first one is read; convert and import take them all",
      "nothing, or split the file"},
 }};
@@ -300,6 +301,7 @@ class Scanner {
         break;
       case Option::make_prototype:
         scan_.groups[words.size() > 1 ? find_group(words[1]) : group_].prototype = true;
+        keep(Odd::prototypes);
         break;
       case Option::parameter:
         keep(Odd::parameters);

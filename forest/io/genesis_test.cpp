@@ -168,6 +168,7 @@ TEST(Genesis, CellsOfOneFileAreApartAndPrototypesAreNone) {
       "cells.p");
   ASSERT_EQ(cells.size(), 2u);
   EXPECT_EQ(cells[1].name, "/two");
+  EXPECT_EQ(std::ranges::count(cells[0].read.warnings, std::string_view("prototypes"), &Warning::code), 1);
   EXPECT_NEAR(total_length(cells[0].read.morphology), 9., 1e-6);
   EXPECT_NEAR(total_length(cells[1].read.morphology), 7., 1e-6);
 }

@@ -81,6 +81,18 @@ TEST(Keeps, JoinedSectionsKeepTheirLengthAndTheirSpines) {
   EXPECT_EQ(losses(m, keeps)[0].code, "sections-joined");
 }
 
+TEST(Keeps, AnOutlineThatBecomesASphereHasNoPointsWithoutRadius) {
+  MorphologyBuilder b;
+  b.set_soma({.kind = SomaKind::contours,
+              .points = {{5, 0, 0, 0}, {0, 5, 0, 0}, {-5, 0, 0, 0}},
+              .parents = {},
+              .contour_starts = {0}});
+  const Morphology m = b.build();
+  ASSERT_EQ(losses(m, {.contours = false, .zero_radii = false}).size(), 1u);
+  EXPECT_EQ(losses(m, {.contours = false, .least_diameter = 1e-6f})[0].code, "soma-simplified");
+  EXPECT_EQ(losses(m, {.zero_radii = false})[0].code, "zero-radii");
+}
+
 TEST(Keeps, CoordinatesAreRoundedToTheStep) {
   MorphologyBuilder b;
   b.set_soma(zoo_parts::sphere(5.04f));

@@ -48,4 +48,20 @@ cmp odd.swc kept.swc || fail "checking changed the file"
 /usr/bin/python3 -c 'import json; f = json.load(open("again.json"))["files"][0]["findings"]; assert not [x for x in f if "--repair" in x["mend"]], f'
 "$program" grow --grammar motoneuron --count 1 --seed 3 --repo r.db >/dev/null
 [[ $("$program" check --repo r.db) == *"all is well"* ]] || fail "a sound repository is not said to be one"
+
+# What a format cannot hold is told by export as well.
+"$program" export --repo r.db --format nts --out nts >/dev/null 2>lost.txt
+grep -q '^nts/.*\.nts: rounded: ' lost.txt || fail "export says nothing of what is lost"
+refuses "is a folder; convert into it with --format" "$program" convert "cells/$first" cells
+
+# Two files of one stem are mended side by side, and a log that quotes a file is none.
+mkdir twins
+printf '1 1 0 0 0 5 -1\r\n2 3 0 5 0 1 1\r\n3 3 0 9 0 1 2\r\n' >twins/cell.swc
+printf '<mbf version="3.0"><tree type="Axon"><point x="0" y="5" z="0" d="2"/><point x="0" y="9" z="0" d="2"/></tree></mbf>' >twins/cell.xml
+"$program" check twins --repair both >/dev/null
+for made in cell.swc cell.swc.log.json cell.xml.swc cell.xml.swc.log.json; do
+  [[ -s both/$made ]] || fail "there is no both/$made"
+done
+"$program" check both --json 2>/dev/null >both.json
+/usr/bin/python3 -c 'import json; d = json.load(open("both.json")); assert len(d["files"]) == 2 and d["failed"] == 0, d'
 echo "convert.sh: all is well"
