@@ -66,6 +66,32 @@ TEST(Asc, SpinesSitOnTheirPoint) {
   EXPECT_EQ(m.spines()[3], (Spine{SectionId(2), 9.f, Vec3(0, 1, 0), 1.f, 0.f, SpineShape::unknown}));
 }
 
+TEST(Asc, BracketsWithinASpineSayNothing) {
+  const Morphology bare = neuron("((Dendrite) (0 0 0 1) <(0 2 0 .5)> (0 10 0 1))");
+  const Morphology bracketed = neuron("((Dendrite) (0 0 0 1) <( (Color Red) (0 2 0 .5) )> (0 10 0 1))");
+  ASSERT_EQ(bracketed.spines().size(), 1u);
+  EXPECT_EQ(bracketed.spines()[0], bare.spines()[0]);
+  EXPECT_EQ(bracketed.points().size(), 2u);
+}
+
+TEST(Asc, TheSomaIsKnownByOtherWordsToo) {
+  for (const std::string_view word : {"CellBody", "Soma", "cell body 2", "SOMA_1"}) {
+    SCOPED_TRACE(word);
+    const Morphology m =
+        neuron(fmt::format("(\"{0}\" {1} (5 0 0 0) (0 5 0 0) (-5 0 0 0) (0 -5 0 0))", word,
+                           word.find_first_of(" _") != word.npos ? "(Closed)" : fmt::format("({})", word)));
+    EXPECT_FLOAT_EQ(m.soma().sphere().radius, 5.f);
+    EXPECT_EQ(m.sections().size(), 0u);
+  }
+}
+
+TEST(Asc, ANamedBlockWithinATreeIsKeptAndTheTreeGoesOn) {
+  const Morphology m =
+      neuron("((Axon) (0 0 0 1) (0 10 0 1) (\"layer\" (Closed) (9 9 9 1) (8 8 8 1)) (0 20 0 1))");
+  EXPECT_DOUBLE_EQ(total_length(m), 20.);
+  EXPECT_EQ(m.annotations(), (Annotations{{"contour", "(\"layer\" (Closed) (9 9 9 1) (8 8 8 1))"}}));
+}
+
 TEST(Asc, WhatIsNoNeuriteIsKeptAsItsText) {
   const auto [m, warnings] = read_asc(
       "(ImageCoords)\n(Sections S1 \"a \\\" 3 100 0) ; none\n(Dot (Color RGB (1, 2, 3))\n (Name \"m;1\") (1 "

@@ -84,11 +84,17 @@ std::string lower(std::string_view text) {
   return result;
 }
 
-/// Without a prefix of its name space.
-std::string_view name_of(const pugi::xml_node& element) {
-  const std::string_view name = element.name();
-  return name.substr(name.find(':') + 1);
-}
+std::string_view name_of(const pugi::xml_node& element) { return element.name(); }
+
+/// Takes the prefixes of name spaces from the names of all elements.
+struct TakePrefixes : pugi::xml_tree_walker {
+  bool for_each(pugi::xml_node& element) override {
+    const std::string_view name = element.name();
+    if (const auto colon = name.find(':'); colon != name.npos)
+      element.set_name(std::string(name.substr(colon + 1)).c_str());
+    return true;
+  }
+};
 
 std::string_view trimmed(std::string_view text) {
   const auto first = text.find_first_not_of(" \t\r\n");
@@ -154,6 +160,8 @@ class Reader {
       throw InputError(
           name_, line_at(std::size_t(std::max<std::ptrdiff_t>(parsed.offset, 0))),
           fmt::format("the XML is broken ({}); get the whole file or mend it there", parsed.description()));
+    TakePrefixes walker;
+    document.traverse(walker);
     pugi::xml_node root = document.document_element();
     if (name_of(root) != "mbf")
       throw InputError(name_, line_of(root), "has no <mbf> element; Neurolucida XML is all inside of one");

@@ -2,6 +2,7 @@
 #include "forest/io/nmf.h"
 
 #include <algorithm>
+#include <cctype>
 #include <set>
 
 #include <fmt/format.h>
@@ -200,6 +201,35 @@ TEST(Nmf, LatinLettersBecomeUtf8AndCirclesOutlines) {
           .morphology;
   EXPECT_EQ(m.annotations()[0].second, "5 µm");
   EXPECT_NEAR(m.soma().sphere().radius, 5., 1e-5);
+}
+
+TEST(Nmf, PrefixesOfANameSpaceAreSeenThrough) {
+  std::string text;
+  for (std::size_t i = 0; i < sample().size(); ++i) {
+    const bool opens = sample()[i] == '<' && std::isalpha(static_cast<unsigned char>(sample()[i + 1]));
+    const bool closes = i > 0 && sample()[i] == '/' && sample()[i - 1] == '<';
+    text += sample()[i];
+    if (opens || closes) text += "n:";
+  }
+  ASSERT_TRUE(recognises_nmf(text));
+  const auto [m, warnings] = read_nmf(text, "cell.xml");
+  EXPECT_TRUE(warnings.empty());
+  const Morphology bare = read_nmf(sample(), "cell.xml").morphology;
+  EXPECT_TRUE(std::ranges::equal(m.points(), bare.points()));
+  EXPECT_TRUE(std::ranges::equal(m.spines(), bare.spines()));
+  EXPECT_EQ(m.annotations(), bare.annotations());
+}
+
+TEST(Nmf, Utf16IsRecognisedAndRefusedByASentence) {
+  std::string wide = "\xff\xfe";
+  for (const char c : sample()) (wide += c) += '\0';
+  EXPECT_TRUE(recognises_nmf(wide));
+  try {
+    read_nmf(wide, "cell.xml");
+    FAIL() << "was read";
+  } catch (const InputError& error) {
+    EXPECT_NE(std::string_view(error.what()).find("UTF-16; save it as UTF-8"), std::string_view::npos);
+  }
 }
 
 TEST(Nmf, IsRecognisedByItsElement) {

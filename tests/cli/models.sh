@@ -10,7 +10,14 @@ for geometry in stick cylinder surface; do
     [[ $geometry == stick && $extension == stl ]] && continue
     "$program" convert "$cell" $geometry.$extension --geometry $geometry --sides 6 --detail 4 >/dev/null 2>&1
   done
-  /usr/bin/python3 -c 'import sys, xml.etree.ElementTree as x; x.parse(sys.argv[1]).getroot().find("Scene/Shape")[1].tag' $geometry.x3d
+done
+# VRML and X3D are read by a parser of their standards, which refuses what is spoilt.
+/usr/bin/python3 "$FOREST_SOURCE_DIR/tests/vrml97.py" {stick,cylinder,surface}.{wrl,x3d} >read.txt
+[[ $(wc -l <read.txt) == 6 ]]
+sed 's/coordIndex/coordindex/' stick.wrl >spoilt.wrl
+sed 's/colorIndex="0/colorIndex="-2/; s/colorIndex="[1-9]/colorIndex="99/' stick.x3d >spoilt.x3d
+for spoilt in spoilt.wrl spoilt.x3d; do
+  if /usr/bin/python3 "$FOREST_SOURCE_DIR/tests/vrml97.py" $spoilt 2>/dev/null; then exit 1; fi
 done
 
 "$program" convert "$cell" again.ply --geometry surface --detail 4 --threads 1 >/dev/null 2>&1

@@ -133,10 +133,14 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
     if (size.x * size.y > 16u * most) return false;
   }
   uint code = uint(depth_code(nearest)) << 12;
-  for (uint y = first.y; y <= last.y; ++y)
-    for (uint x = first.x; x <= last.x; ++x)
-      if (texelFetch(tiles_seen, int(start + y * wide + x)).x >= code) return false;
-  return true;
+  // One loop, tested at its end: llvmpipe goes through a loop's body once more than its slowest thread asks for.
+  uvec2 at = first;
+  bool seen;
+  do {
+    seen = texelFetch(tiles_seen, int(start + at.y * wide + at.x)).x >= code;
+    if (++at.x > last.x) at = uvec2(first.x, at.y + 1u);
+  } while (!seen && at.y <= last.y);
+  return !seen;
 }
 
 float width_in_pixels(Capsule c) { return view.focal * (c.ra / c.a.z + c.rb / c.b.z); }
@@ -170,10 +174,17 @@ void draw_line(Capsule c) {
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5 * float(thickness - 1);
   float z = za + (float(first) + 0.5 - p.x) * rise;
-  for (int x = first; x < last; ++x) {
-    int low = max(int(floor(y)), 0), high = min(int(floor(y)) + thickness, limit_y);
-    for (int across = low; across < high; ++across) put(steep ? across : x, steep ? x : across, z, payload);
-    y += slope;
-    z += rise;
-  }
+  // One loop over the pixels of all scan lines, tested at its end (see hidden).
+  int x = first, across = int(floor(y)), left = thickness;
+  do {
+    if (across >= 0 && across < limit_y) put(steep ? across : x, steep ? x : across, z, payload);
+    ++across;
+    if (--left == 0) {
+      ++x;
+      y += slope;
+      z += rise;
+      across = int(floor(y));
+      left = thickness;
+    }
+  } while (x < last);
 }

@@ -32,11 +32,13 @@ void main() {
     float octave = float(key >> 12) / FOREST_DEPTH_STEPS, z = exp2(octave - FOREST_DEPTH_BASE);
     int ix = int(x), iy = int(y);
     float rim = 0.0;
-    if (view.halo > 0.0) {
-      const ivec2 ring[8] = ivec2[8](ivec2(1, 0), ivec2(-1, 0), ivec2(0, 1), ivec2(0, -1), ivec2(2, 2), ivec2(-2, 2), ivec2(2, -2), ivec2(-2, -2));
-      for (int i = 0; i < 8; ++i) rim += clamp((octave - depth_at(ix + ring[i].x, iy + ring[i].y)) * 40.0, 0.0, 1.0);
-      rim *= view.halo / 8.0;
-    }
+    int count = view.halo > 0.0 ? 8 : 1, i = 0;
+    do {
+      int sign = 1 - 2 * (i & 1);
+      ivec2 to = i < 2 ? ivec2(sign, 0) : i < 4 ? ivec2(0, sign) : ivec2(2 * sign, i < 6 ? 2 : -2);
+      rim += clamp((octave - depth_at(ix + to.x, iy + to.y)) * 40.0, 0.0, 1.0);
+    } while (++i < count);
+    rim *= view.halo / 8.0;
     vec3 base = texelFetch(palette, int(entry)).rgb;
     float fog = 1.0 - exp(-max(0.0, z - view.fog_start) / view.fog_length);
     colour = mix(base * (0.16 + 1.05 * shade * shade) * exp(-1.1 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
