@@ -75,10 +75,17 @@ void run(const Options& options, Console& console) {
     });
     console.progress().end();
   };
+  const auto written = [&](std::size_t i, const Morphology& m) {
+    try {
+      return format.write(m);
+    } catch (const LimitError& error) {
+      throw LimitError(fmt::format("neuron {}: {}", shown(rows[i].name), error.what()));
+    }
+  };
   if (!options.force && holds_files(options.out)) {
     Overwrites overwrites;
     each("comparing", [&](std::size_t i, const auto& neuron) {
-      if (fs::exists(files[i])) overwrites.look(files[i], format.write(neuron()));
+      if (fs::exists(files[i])) overwrites.look(files[i], written(i, neuron()));
     });
     overwrites.refuse();
   }
@@ -94,7 +101,7 @@ void run(const Options& options, Console& console) {
   each("exporting", [&](std::size_t i, const auto& neuron) {
     const Morphology m = neuron();
     losses[i] = io::losses(m, format.keeps);
-    write_file(files[i], std::string_view(format.write(m)));
+    write_file(files[i], std::string_view(written(i, m)));
   });
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
