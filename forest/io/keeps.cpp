@@ -102,6 +102,13 @@ constexpr Loss loss_table[] = {
        });
      },
      "{} neurites that leave from no soma are joined to it"},
+    {&Keeps::soma_points, "attachments-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(m, [](const Morphology& n, SectionId s) {
+         return !n.section(s).parent.valid() && n.section(s).soma_point >= 0;
+       });
+     },
+     "that {} neurites leave from the soma is left out"},
     {&Keeps::joints, "joint-radii-lost",
      [](const Morphology& m, const Keeps&) {
        return count_sections(m, [](const Morphology& n, SectionId s) {
@@ -285,6 +292,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     const std::int32_t tag = kept_tag(s, keeps);
     std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
     if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
+    if (!keeps.soma_points) soma_point = -1;
     builder.add_section(parent, kind, points, tag, soma_point);
   }
   if (keeps.spines)

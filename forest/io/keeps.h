@@ -29,6 +29,7 @@ struct Keeps {
   bool cylinders = true;         // a soma of several points; else a sphere of its mean size
   bool contours = true;          // a soma of outlines; else a sphere of their mean radius
   bool loose_roots = true;       // neurites that leave from no soma
+  bool soma_points = true;       // which soma point a neurite leaves from
   bool joints = true;            // a daughter's own radius at the branch point
   bool single_daughters = true;  // a node with one daughter; else the two are one section
   bool stumps = true;            // a root of a single point

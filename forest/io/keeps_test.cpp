@@ -81,6 +81,19 @@ TEST(Keeps, JoinedSectionsKeepTheirLengthAndTheirSpines) {
   EXPECT_EQ(losses(m, keeps)[0].code, "sections-joined");
 }
 
+TEST(Keeps, WhereNeuritesLeaveFromTheSomaIsToldWhenItIsLost) {
+  MorphologyBuilder b;
+  b.set_soma(zoo_parts::sphere(5));
+  b.add_section({}, SectionKind::basal, zoo_parts::Points{{0, 50, 0, 1}, {0, 60, 0, 1}}, 3, 0);
+  const Morphology m = b.build();
+  const Keeps keeps{.soma_points = false};
+  ASSERT_EQ(losses(m, keeps).size(), 1u);
+  EXPECT_EQ(losses(m, keeps)[0].code, "attachments-lost");
+  const Morphology left = as_kept(m, keeps);
+  EXPECT_EQ(left.section(SectionId(0)).soma_point, -1);
+  EXPECT_TRUE(losses(left, keeps).empty());
+}
+
 TEST(Keeps, AnOutlineThatBecomesASphereHasNoPointsWithoutRadius) {
   MorphologyBuilder b;
   b.set_soma({.kind = SomaKind::contours,

@@ -32,6 +32,7 @@ ReadResult read_nts(std::string_view bytes, const std::string& name);
 std::string write_nts(const Morphology& morphology);
 
 inline constexpr Keeps nts_keeps{.cylinders = false,
+                                 .soma_points = false,
                                  .single_daughters = false,
                                  .spine_sizes = false,
                                  .order = false,
