@@ -18,6 +18,7 @@
 #include "forest/io/keeps.h"
 #include "forest/io/oddity.h"
 #include "forest/io/plain_text.h"
+#include "forest/io/soma_place.h"
 #include "forest/io/swc_rows.h"
 
 namespace forest::io {
@@ -796,12 +797,15 @@ class Assembler {
   std::vector<Run> runs_;
 };
 
+void read_notes(const xml_node& owner, MorphologyBuilder& builder) {
+  for (const xml_node& node : owner.children())
+    if (local(node) == "notes")
+      if (const std::string_view text = trimmed(node.text().get()); !text.empty())
+        builder.annotate("notes", std::string(text));
+}
+
 void read_properties(const xml_node& owner, MorphologyBuilder& builder, std::vector<Spine>& spines) {
   for (const xml_node& node : owner.children()) {
-    if (local(node) == "notes") {
-      const std::string_view text = trimmed(node.text().get());
-      if (!text.empty()) builder.annotate("notes", std::string(text));
-    }
     if (local(node) != "property") continue;
     const std::string_view tag = attribute(node, "tag"), value = attribute(node, "value");
     if (tag == marker_tag) continue;
@@ -848,8 +852,10 @@ ReadResult read_cell(const Document& document, const Place& place, Oddities& odd
     MorphologyBuilder builder;
     std::vector<Spine> spines;
     const bool ours = has_marker(place.cell);
+    read_notes(document.root(), builder);  // what is said of the file is said of each of its cells
     for (const xml_node& owner : {place.cell, place.morphology})
       if (owner) {
+        read_notes(owner, builder);
         read_properties(owner, builder, spines);
         for (const xml_node& node : owner.children()) {
           const std::string_view kind = local(node);
@@ -903,8 +909,7 @@ std::vector<Place> find_cells(const Document& document, Oddities& oddities) {
     } else if (kind == "include") {
       oddities.add(NeuromlOddity::include, document.line(node),
                    [&] { return fmt::format("{} is included", attribute(node, "href").substr(0, 80)); });
-    } else if (node.type() == pugi::node_element && kind != "morphology" && kind != "notes" &&
-               kind != "annotation") {
+    } else if (node.type() == pugi::node_element && kind != "morphology" && kind != "notes") {
       oddities.add(NeuromlOddity::not_kept, document.line(node),
                    [&] { return fmt::format("there is <{}>", kind.substr(0, 40)); });
     }
@@ -950,7 +955,7 @@ std::string escaped(std::string_view text) {
 
 class Writer {
  public:
-  explicit Writer(const Morphology& m) : m_(m) {}
+  explicit Writer(const Morphology& m) : m_(m), soma_place_(m) {}
 
   std::string write() {
     text_ = R"(<?xml version="1.0" encoding="UTF-8"?>
@@ -1059,8 +1064,8 @@ class Writer {
     Joint joint;
     if (s.parent.valid())
       joint = {last_[s.parent.value()], false};
-    else if (s.soma_point >= 0 && !joints_.empty())
-      joint = joints_[std::min(std::size_t(s.soma_point), joints_.size() - 1)];
+    else if (const std::int32_t place = soma_place_(SectionId(i)); place >= 0)
+      joint = joints_[std::size_t(place)];
     first_.push_back(count_);
     if (points.size() == 1) {
       // A lone point; on the soma it is told from a segment of no length by its name.
@@ -1120,6 +1125,7 @@ class Writer {
   }
 
   const Morphology& m_;
+  SomaPlaces soma_place_;
   std::string text_;
   std::int64_t count_ = 0, soma_segments_ = 0;
   std::vector<Joint> joints_;               // of soma points
