@@ -196,10 +196,17 @@ struct Group {
   std::unordered_map<std::string_view, std::int32_t> by_name;  // views of the file
 };
 
+/// What a line says of its cell, by the group it stands in; with `on` of those that begin below as well.
+struct Said {
+  std::size_t group = 0;
+  bool on = false;
+  std::pair<std::string, std::string> annotation;
+};
+
 struct Scan {
   bool ours = false;
   std::vector<Group> groups;
-  Annotations annotations;
+  std::vector<Said> said;
 };
 
 class Scanner {
@@ -215,8 +222,7 @@ class Scanner {
       } else if (scan_.ours && text.starts_with(genesis_note)) {
         const std::string_view note = text.substr(genesis_note.size());
         const std::size_t end = std::min(note.find(' '), note.size());
-        scan_.annotations.emplace_back(unescaped_note(note.substr(0, end)),
-                                       unescaped_note(note.substr(std::min(end + 1, note.size()))));
+        say(unescaped_note(note.substr(0, end)), unescaped_note(note.substr(std::min(end + 1, note.size()))));
       } else if (scan_.ours && text.starts_with(genesis_ends)) {
         ends_ = text.substr(genesis_ends.size());
       } else {
@@ -230,11 +236,14 @@ class Scanner {
   }
 
  private:
+  void say(std::string key, std::string value, bool on = false) {
+    scan_.said.push_back({group_, on, {std::move(key), std::move(value)}});
+  }
+
   std::string without_comments(std::string_view text) {
     std::string rest;
     const auto comment = [&](std::string_view words) {
-      if (const std::string_view t = trim(words); !t.empty() && !scan_.ours)
-        scan_.annotations.emplace_back("comment", t);
+      if (const std::string_view t = trim(words); !t.empty() && !scan_.ours) say("comment", std::string(t));
     };
     while (!text.empty()) {
       if (in_comment_) {
@@ -270,7 +279,7 @@ class Scanner {
 
   void option(const std::vector<std::string_view>& words, std::string_view text) {
     const auto keep = [&](Odd odd) {
-      scan_.annotations.emplace_back("genesis", text);
+      say("genesis", std::string(text), odd == Odd::parameters || odd == Odd::prototypes);
       oddities_.add(odd, line_, [&] { return fmt::format("there is an option {}", shown(words[0])); });
     };
     const std::optional<Option> option = option_of(words[0]);
@@ -381,7 +390,7 @@ class Scanner {
     if (words.size() > needed) {
       std::string channels(words[0]);
       for (std::size_t i = needed; i < words.size(); ++i) channels += ' ', channels += words[i];
-      scan_.annotations.emplace_back("channels", std::move(channels));
+      say("channels", std::move(channels));
       oddities_.add(Odd::channels, line_, "a compartment has channels");
     }
     const auto number = std::int32_t(group.compartments.size());
@@ -691,11 +700,19 @@ std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
   if (groups.size() > 1)
     oddities.add(Odd::several_cells, 0, [&] { return fmt::format("there are {} cells", groups.size()); });
   if (groups.empty()) groups.push_back(&scan.groups[0]);
+  // What stands outside of the cells (a header, a prototype that is left out) is said of all.
+  const auto is_of = [&](const Said& said, std::size_t number) {
+    const bool of_a_cell = std::ranges::find(groups, &scan.groups[said.group]) != groups.end();
+    return !of_a_cell || said.group == number || (said.on && said.group < number);
+  };
   for (Group* const group : groups) {
     Cell& cell = cells.emplace_back();
     if (groups.size() > 1) cell.name = group->name;
+    Annotations annotations;
+    for (const Said& said : scan.said)
+      if (is_of(said, std::size_t(group - scan.groups.data()))) annotations.push_back(said.annotation);
     cell.read.morphology =
-        Assembler(std::move(group->compartments), scan.ours, oddities).assemble(scan.annotations);
+        Assembler(std::move(group->compartments), scan.ours, oddities).assemble(annotations);
   }
   cells[0].read.warnings = oddities.take();
   return cells;

@@ -173,6 +173,27 @@ TEST(Genesis, CellsOfOneFileAreApartAndPrototypesAreNone) {
   EXPECT_NEAR(total_length(cells[1].read.morphology), 7., 1e-6);
 }
 
+TEST(Genesis, WhatIsSaidOfACellIsItsOwn) {
+  const std::vector<Cell> cells = read_genesis_cells(
+      "// of both\n*start_cell /library/s\n*compt /library/x\nneck none 0 1 0 .1\n*makeproto /library/s\n"
+      "*start_cell /one\n// the first\n*set_global RM 1\nsoma none 0 0 0 9 Na 1\n*rand_spines 3 13 1 7 1 /x\n"
+      "*start_cell /two\n// the second\n*set_global RM 2\nsoma none 0 0 0 5\n",
+      "cells.p");
+  ASSERT_EQ(cells.size(), 2u);
+  const Annotations outside{
+      {"comment", "of both"}, {"genesis", "*compt /library/x"}, {"genesis", "*makeproto /library/s"}};
+  Annotations one = outside, two = outside;
+  one.insert(one.end(), {{"comment", "the first"},
+                         {"genesis", "*set_global RM 1"},
+                         {"channels", "soma Na 1"},
+                         {"genesis", "*rand_spines 3 13 1 7 1 /x"}});
+  // Parameters hold for the lines below, of whatever cell.
+  two.insert(two.end(),
+             {{"genesis", "*set_global RM 1"}, {"comment", "the second"}, {"genesis", "*set_global RM 2"}});
+  EXPECT_EQ(cells[0].read.morphology.annotations(), one);
+  EXPECT_EQ(cells[1].read.morphology.annotations(), two);
+}
+
 /// What GENESIS computes of a written file: cylinders by their diameter, spheres where there is no length.
 struct Membrane {
   double area = 0., length = 0.;
