@@ -43,7 +43,7 @@ constexpr std::array table{
            .read = read_swc,
            .read_all = nullptr,
            .write = write_swc,
-           .keeps = {}},
+           .keeps = swc_keeps},
     Format{.name = "hoc",
            .title = "NEURON cell template (hoc)",
            .extensions = hoc_extensions,

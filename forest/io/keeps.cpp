@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
@@ -47,6 +48,27 @@ Soma kept_soma(const Soma& soma, const Keeps& keeps) {
                        (soma.kind == SomaKind::contours && !keeps.contours);
   if (!simpler) return soma;
   return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
+}
+
+// Whether an annotation comes back as it is where others become comment lines.
+bool keeps_key(const std::pair<std::string, std::string>& annotation, const Keeps& keeps) {
+  const auto& [key, value] = annotation;
+  if (keeps.keys || std::ranges::find(keeps.own_keys, key) != keeps.own_keys.end()) return true;
+  return swc_comment(key + " x").first == key && !key.starts_with("FOREST_") &&
+         value.find_first_of("\r\n") == value.npos;
+}
+
+// As it is, or a comment for each line of it.
+void annotate(MorphologyBuilder& builder, const std::pair<std::string, std::string>& annotation,
+              const Keeps& keeps) {
+  const auto& [key, value] = annotation;
+  if (keeps_key(annotation, keeps)) return builder.annotate(key, value);
+  const std::string text = key == "comment" ? value : key + ' ' + value;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
+    builder.annotate("comment", text.substr(begin, end - begin));
+    begin = end + 1;
+  }
 }
 
 // An outline drawn without thickness counts only where it is written as one.
@@ -159,6 +181,12 @@ constexpr Loss loss_table[] = {
      "the heads and shapes of {} spines are left out, where they sit is kept"},
     {&Keeps::annotations, "annotations-lost",
      [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
+    {&Keeps::keys, "keys-lost",
+     [](const Morphology& m, const Keeps& keeps) {
+       return std::size_t(
+           std::ranges::count_if(m.annotations(), [&](const auto& a) { return !keeps_key(a, keeps); }));
+     },
+     "{} annotations become comments, for the format has no place for their keys or for several lines"},
 };
 
 bool has_length(std::span<const Point> points) {
@@ -305,7 +333,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
       builder.add_spine(spine);
     }
   if (keeps.annotations)
-    for (const auto& [key, value] : m.annotations()) builder.annotate(key, value);
+    for (const auto& annotation : m.annotations()) annotate(builder, annotation, keeps);
   return builder.build();
 }
 
