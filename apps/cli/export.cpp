@@ -37,10 +37,8 @@ struct Options {
 
 void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Console& console) {
   const bool csv = options.format == "csv";
-  const fs::path first = csv ? options.out / "summary.csv" : options.out;
-  if (!options.force && fs::exists(first))  // a person may have written into it
-    throw Error(
-        fmt::format("{} is there already; choose another name, or replace it with --force", first.string()));
+  const std::vector<fs::path> wanted = table_files(options.out, csv);
+  if (!options.force) refuse_existing(wanted);
   const auto files = export_tables(options.repo, rows, options.out, csv, console);
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const fs::path& file : files) list.push_back(file.string());
