@@ -50,7 +50,10 @@ struct Target {
 
 Target target_of(const fs::path& path) {
   if (const io::ModelFormat* model = io::model_format_of(path)) return {.model = model};
-  return {.neuron = &io::format_of(path)};
+  std::vector<std::string_view> models;
+  for (const io::ModelFormat& format : io::model_formats())
+    models.insert(models.end(), format.extensions.begin(), format.extensions.end());
+  return {.neuron = &io::format_of(path, models)};
 }
 
 Target find_target(std::string_view name) {
