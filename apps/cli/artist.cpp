@@ -10,7 +10,6 @@
 #include "forest/core/error.h"
 #include "forest/io/film.h"
 #include "forest/io/png.h"
-#include "forest/scene/cut.h"
 
 namespace forest::cli {
 namespace {
@@ -23,7 +22,8 @@ double milliseconds_since(Clock::time_point start) {
 
 }  // namespace
 
-Artist::Artist(scene::Forest forest) : forest_(std::move(forest)), outline_(scene::outline(forest_)) {
+Artist::Artist(scene::Forest forest)
+    : forest_(std::move(forest)), chooser_(forest_), outline_(scene::outline(forest_)) {
   renderer_.load(forest_.geometry());
 }
 
@@ -36,14 +36,16 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   auto start = Clock::now();
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  const scene::Cut cut = scene::choose(forest_, eye, viewport);
+  const scene::Cut& cut = chooser_.choose(eye, viewport);
   drawn.cull = milliseconds_since(start);
-  drawn.segments = cut.segments;
-  drawn.neurons = cut.neurons;
   const auto lines =
       with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
-  const frame::Timing timing =
-      renderer_.draw(scene::compose(forest_, view, *colouring_, cut, width, height, lines));
+  frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
+  chooser_.complete(frame);
+  const frame::Timing timing = renderer_.draw(frame);
+  chooser_.remember(renderer_.seen());
+  drawn.segments = chooser_.segments();
+  drawn.neurons = cut.neurons;
   drawn.draw = timing.draw, drawn.resolve = timing.resolve;
   start = Clock::now();
   drawn.image = renderer_.read();

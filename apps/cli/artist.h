@@ -9,6 +9,7 @@
 #include "forest/core/progress.h"
 #include "forest/render/opengl/context.h"
 #include "forest/render/opengl/opengl_renderer.h"
+#include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
 
@@ -18,7 +19,7 @@ namespace forest::cli {
 struct Drawn {
   double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
   std::uint64_t segments = 0;                            // drawn
-  std::uint32_t neurons = 0;                             // in sight
+  std::uint32_t neurons = 0;                             // in sight and not hidden
   frame::Image image;
 };
 
@@ -33,6 +34,7 @@ class Artist {
 
  private:
   scene::Forest forest_;
+  scene::Chooser chooser_;
   render::OffscreenContext context_;
   render::OpenGLRenderer renderer_;
   std::vector<frame::Overlay> outline_;

@@ -57,6 +57,7 @@ Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
 Viewport::Viewport(scene::Forest forest, const scene::View& view, QWidget* parent)
     : QOpenGLWidget(parent),
       forest_(std::move(forest)),
+      chooser_(forest_),
       settings_{.view = view},
       colouring_(scene::colour(forest_, view.colour_by, view.background)),
       outline_(scene::outline(forest_)) {
@@ -182,17 +183,18 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
   if (first == 0)
-    cut_ =
-        scene::choose(forest_, scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
-                      {float(w), float(h)});
+    chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
+                    {float(w), float(h)});
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
-  frame::Frame frame = scene::compose(forest_, view, colouring, cut_, w, h, overlays);
+  frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
+  chooser_.complete(frame);
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
-  figures_.segments = cut_.segments, figures_.neurons = cut_.neurons;
+  chooser_.remember(renderer_->seen());
+  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.cut().neurons;
   figures_.samples = last, figures_.error = view.detail.error;
 }
 

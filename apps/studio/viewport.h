@@ -96,6 +96,7 @@ class Viewport final : public QOpenGLWidget {
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;
+  scene::Chooser chooser_;
   Settings settings_;
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
@@ -104,8 +105,7 @@ class Viewport final : public QOpenGLWidget {
   QString renderer_name_;
 
   Stage stage_ = Stage::moving;
-  scene::Cut cut_;             // of the picture that is shown
-  std::uint32_t refined_ = 0;  // samples of it that are drawn
+  std::uint32_t refined_ = 0;  // samples that are drawn of the picture that is shown
   float sample_milliseconds_ = 20.f;
   float milliseconds_ = 0.f;   // of a moving picture, smoothed
   scene::Budget budget_{45.};  // of a moving picture

@@ -35,7 +35,14 @@ void check(const Frame& frame, const Geometry& geometry) {
   require(frame.colour_class.size() == geometry.instances.size(), "every instance needs a colour class");
   for (const std::uint8_t colour : frame.colour_class)
     require(colour < 16, "a colour class must be below 16");
-  for (const auto list : {frame.dots, frame.lines, frame.capsules})
+  check(static_cast<const Lists&>(frame), geometry);
+  for (const Overlay& o : frame.overlays)
+    require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
+            "an overlay must be finite and its colour a palette entry");
+}
+
+void check(const Lists& lists, const Geometry& geometry) {
+  for (const auto list : {lists.dots, lists.lines, lists.capsules})
     for (const Item& item : list) {
       require(item.instance < geometry.instances.size(), "an item names an instance that is not there");
       require(item.segment_count <= cluster_size, "an item has more segments than a cluster");
@@ -44,21 +51,18 @@ void check(const Frame& frame, const Geometry& geometry) {
       require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
               "an item's sphere must be finite");
     }
-  for (const auto list : {frame.dots, frame.lines, frame.capsules})
+  for (const auto list : {lists.dots, lists.lines, lists.capsules})
     require(list.size() < (1u << 26), "a list must have fewer than 67,108,864 items");
-  for (const Item& item : frame.dots) require(item.segment_count == 1, "a dot is one segment");
+  for (const Item& item : lists.dots) require(item.segment_count == 1, "a dot is one segment");
   Band before;
-  for (const Band& b : frame.bands) {
+  for (const Band& b : lists.bands) {
     require(b.dots >= before.dots && b.lines >= before.lines && b.capsules >= before.capsules,
             "bands must follow one another");
     before = b;
   }
-  require(frame.bands.empty() || (before.dots == frame.dots.size() && before.lines == frame.lines.size() &&
-                                  before.capsules == frame.capsules.size()),
+  require(lists.bands.empty() || (before.dots == lists.dots.size() && before.lines == lists.lines.size() &&
+                                  before.capsules == lists.capsules.size()),
           "the last band must end where the lists end");
-  for (const Overlay& o : frame.overlays)
-    require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
-            "an overlay must be finite and its colour a palette entry");
 }
 
 }  // namespace forest::frame

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
 #include <vector>
@@ -50,7 +51,21 @@ struct Band {
   std::uint32_t dots = 0, lines = 0, capsules = 0;
 };
 
-struct Frame {
+struct Lists {
+  std::span<const Item> dots;      // small spheres: one segment an item
+  std::span<const Item> lines;     // thin runs
+  std::span<const Item> capsules;  // runs near enough to have a surface
+  std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
+};
+
+/// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,
+/// along the view); infinite where a pixel shows nothing.
+struct DepthMap {
+  std::uint32_t width = 0, height = 0;  // squares
+  std::vector<float> depths;
+};
+
+struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
@@ -60,11 +75,10 @@ struct Frame {
   Style style;
   Palette palette = black_palette();
   std::span<const std::uint8_t> colour_class;  // one an instance, 0–15
-  std::span<const Item> dots;                  // small spheres: one segment an item
-  std::span<const Item> lines;                 // thin runs
-  std::span<const Item> capsules;              // runs near enough to have a surface
-  std::span<const Band> bands;  // the last one ends at the ends of the lists; none: all is one band
   std::span<const Overlay> overlays;
+  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
+  /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
+  std::function<Lists(const DepthMap&)> rest;
 };
 
 /// 8-bit sRGB, rows from the top, 4 bytes a pixel (alpha 255).
@@ -80,5 +94,6 @@ struct Timing {
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);
+void check(const Lists& lists, const Geometry& geometry);
 
 }  // namespace forest::frame

@@ -16,6 +16,8 @@ class Renderer {
   virtual frame::Timing draw(const frame::Frame& frame) = 0;
   /// The pixels of the last frame.
   virtual frame::Image read() = 0;
+  /// How far one saw in the last subframe of the last frame, before its `rest` was drawn; empty when it had none.
+  virtual const frame::DepthMap& seen() const = 0;
   /// Who draws, for people ("llvmpipe (LLVM 15.0.6, 256 bits)").
   virtual std::string name() const = 0;
 };

@@ -24,23 +24,36 @@ frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t coun
   return {instance, first, count, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
 }
 
-void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& frustum, std::uint32_t index,
-                   Cut& cut) {
-  const frame::Instance& instance = forest.instances()[index];
-  const Neuron& neuron = forest.neurons()[instance.morphology];
-  if (!neuron.cluster_count) return;
+constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
+
+// What is looked at, and what is known to be hidden.
+struct Look {
+  const Forest& forest;
+  const Eye& eye;
+  const frame::Frustum& frustum;
+  const Occluders* occluders;  // may be null
+  bool keep;                   // what they hide
+};
+
+void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
+  const frame::Instance& instance = look.forest.instances()[index];
   const Placed placed{{instance.x, instance.y, instance.z},
                       Quat(instance.qw, instance.qx, instance.qy, instance.qz)};
-  const auto clusters = forest.clusters();
+  const auto clusters = look.forest.clusters();
+  const Eye& eye = look.eye;
   const Detail& detail = eye.detail();
   std::uint32_t open[64];
   int depth = 0;
-  open[depth++] = neuron.first_cluster;
-  const std::uint64_t before = cut.segments;
+  open[depth++] = from;
   while (depth) {
-    const Cluster& c = clusters[open[--depth]];
+    const std::uint32_t at = open[--depth];
+    const Cluster& c = clusters[at];
     const Sphere sphere = placed(c);
-    if (!frustum.may_see(sphere)) continue;
+    if (!look.frustum.may_see(sphere)) continue;
+    if (look.occluders && look.occluders->hide(sphere)) {
+      if (look.keep) cut.left_out.push_back({index, at});
+      continue;
+    }
     if (!c.is_leaf() && depth + 2 <= 64 && !eye.good_enough(sphere, c.error)) {
       open[depth++] = c.children[1];
       open[depth++] = c.children[0];
@@ -53,19 +66,49 @@ void choose_neuron(const Forest& forest, const Eye& eye, const frame::Frustum& f
         .push_back(item(index, c.first_segment, count, sphere));
     cut.segments += count;
   }
-  if (neuron.soma_radius > 0.f) {
-    const Sphere soma{placed.position, neuron.soma_radius};
-    if (frustum.may_see(soma)) {
-      const bool large = neuron.soma_radius * eye.magnification(soma) > dot_limit;
-      (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, soma));
-      ++cut.segments;
-    }
+}
+
+void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
+  const frame::Instance& instance = look.forest.instances()[index];
+  const Neuron& neuron = look.forest.neurons()[instance.morphology];
+  const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
+  if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
+  if (look.occluders && look.occluders->hide(sphere)) {
+    if (look.keep) cut.left_out.push_back({index, soma});
+    return;
   }
+  const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
+  (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, sphere));
+  ++cut.segments;
+}
+
+void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
+  const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
+  if (!neuron.cluster_count) return;
+  const std::uint64_t before = cut.segments;
+  choose_clusters(look, index, neuron.first_cluster, cut);
+  choose_soma(look, index, cut);
   cut.neurons += cut.segments > before;
 }
 
-void append(std::vector<frame::Item>& to, const std::vector<frame::Item>& from) {
-  to.insert(to.end(), from.begin(), from.end());
+void append(auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); }
+
+// What `choose_one(i, cut)` adds for each i below `count`, in this order.
+Cut in_chunks(std::size_t count, auto&& choose_one) {
+  std::vector<Cut> parts((count + chunk - 1) / chunk);
+  parallel_for(parts.size(), 1, [&](std::size_t p) {
+    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i) choose_one(i, parts[p]);
+  });
+  Cut whole;
+  for (const Cut& part : parts) {
+    append(whole.dots, part.dots);
+    append(whole.lines, part.lines);
+    append(whole.capsules, part.capsules);
+    append(whole.left_out, part.left_out);
+    whole.segments += part.segments;
+    whole.neurons += part.neurons;
+  }
+  return whole;
 }
 
 // Sorts a list from near to far, in steps of a 1/64 octave, and returns where each step begins.
@@ -107,26 +150,27 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 
 }  // namespace
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport) {
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before) {
   const frame::Frustum frustum(eye.camera(), viewport);
-  const std::size_t count = forest.instances().size();
-  std::vector<Cut> parts((count + chunk - 1) / chunk);
-  parallel_for(parts.size(), 1, [&](std::size_t p) {
-    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i)
-      choose_neuron(forest, eye, frustum, std::uint32_t(i), parts[p]);
+  const Look look{forest, eye, frustum, before, true};
+  Cut cut = in_chunks(forest.instances().size(),
+                      [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
+  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
+               capsules = sort_near_to_far(cut.capsules, eye);
+  cut.bands = bands_of(dots, lines, capsules);
+  return cut;
+}
+
+Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
+             std::span<const LeftOut> left_out, const Occluders& now) {
+  const frame::Frustum frustum(eye.camera(), viewport);
+  const Look look{forest, eye, frustum, &now, false};
+  return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
+    if (left_out[i].cluster == soma)
+      choose_soma(look, left_out[i].instance, part);
+    else
+      choose_clusters(look, left_out[i].instance, left_out[i].cluster, part);
   });
-  Cut whole;
-  for (const Cut& part : parts) {
-    append(whole.dots, part.dots);
-    append(whole.lines, part.lines);
-    append(whole.capsules, part.capsules);
-    whole.segments += part.segments;
-    whole.neurons += part.neurons;
-  }
-  const Starts dots = sort_near_to_far(whole.dots, eye), lines = sort_near_to_far(whole.lines, eye),
-               capsules = sort_near_to_far(whole.capsules, eye);
-  whole.bands = bands_of(dots, lines, capsules);
-  return whole;
 }
 
 }  // namespace forest::scene

@@ -282,7 +282,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.width = width, f.height = height, f.subframes = view.samples;
   f.palette = colouring.palette;
   f.colour_class = colouring.classes;
-  f.dots = cut.dots, f.lines = cut.lines, f.capsules = cut.capsules, f.bands = cut.bands;
+  static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;
   frame::Style& s = f.style;
   s.halo = view.halo;

@@ -11,10 +11,12 @@ class NullRenderer final : public Renderer {
   void load(const frame::Geometry& geometry) override;
   frame::Timing draw(const frame::Frame& frame) override;
   frame::Image read() override;  // black, of the last frame's size
+  const frame::DepthMap& seen() const override { return seen_; }
   std::string name() const override { return "null"; }
 
  private:
   frame::Geometry geometry_;
+  frame::DepthMap seen_;
   std::uint32_t width_ = 0, height_ = 0;
 };
 

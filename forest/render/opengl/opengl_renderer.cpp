@@ -136,7 +136,8 @@ struct OpenGLRenderer::Device {
     std::uint32_t count = 0;
     std::size_t segments = 0;
   };
-  enum { capsule_list, dot_list, line_list, overlay_list, list_count };
+  enum { capsule_list, dot_list, line_list, list_count };
+  using ListSet = std::array<List, list_count>;
   static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
 
   Program dots{"dots", shaders::dots}, lines{"lines", shaders::lines},
@@ -145,25 +146,36 @@ struct OpenGLRenderer::Device {
       tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
   Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
       large_queue, tiles;
-  std::array<List, list_count> lists{
-      {{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}, {&capsules, FOREST_OVERLAY, {}}}};
+  ListSet lists{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}},
+      rest{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}};
+  List overlays{&capsules, FOREST_OVERLAY, {}};
+  frame::DepthMap seen;
+  std::vector<std::uint32_t> farthest;
   frame::Geometry geometry;
   Constants constants{};
   std::uint32_t width = 0, height = 0;
   GLuint texture = 0, framebuffer = 0;
   std::uint32_t texture_width = 0, texture_height = 0;
 
-  void upload(const frame::Frame& f) {
-    const auto set = [](List& list, std::span<const Item> items) {
-      list.items.upload(items);
-      list.count = std::uint32_t(items.size());
-      list.segments = 0;
-      for (const Item& item : items) list.segments += item.segment_count;
-    };
-    set(lists[capsule_list], f.capsules);
-    set(lists[dot_list], f.dots);
-    set(lists[line_list], f.lines);
+  static void set(List& list, std::span<const Item> items) {
+    list.items.upload(items);
+    list.count = std::uint32_t(items.size());
+    list.segments = 0;
+    for (const Item& item : items) list.segments += item.segment_count;
+  }
 
+  void upload(ListSet& to, const frame::Lists& from) {
+    set(to[capsule_list], from.capsules);
+    set(to[dot_list], from.dots);
+    set(to[line_list], from.lines);
+    std::size_t longest = overlays.segments;
+    for (const List& list : to) longest = std::max(longest, list.segments);
+    queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
+    queue.bind_texels(6, GL_R32UI);
+    queue.bind(3);
+  }
+
+  void upload(const frame::Frame& f) {
     std::vector<Segment> marks;
     std::vector<Item> mark_items;
     for (const frame::Overlay& o : f.overlays)
@@ -174,7 +186,8 @@ struct OpenGLRenderer::Device {
                             std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
                             0, 0, INFINITY});  // never culled as a whole
     overlay_segments.upload(std::span<const Segment>(marks));
-    set(lists[overlay_list], mark_items);
+    set(overlays, mark_items);
+    upload(lists, f);
 
     colour_classes.upload(f.colour_class);
     std::array<float, 4 * std::tuple_size_v<frame::Palette>> colours{};
@@ -189,21 +202,16 @@ struct OpenGLRenderer::Device {
     image.reserve(pixels * 4);
     sums.reserve(f.subframes > 1 ? pixels * 16 : 16);
     tiles.reserve((pixels / 32 + width + height + 64) * 4);
-    std::size_t longest = 1;
-    for (const List& list : lists) longest = std::max(longest, list.segments);
-    queue.reserve(16 + 4 * longest);
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
     instances.bind_texels(1, GL_RGBA32UI);
     keys.bind_texels(3, GL_R32UI);
     colour_classes.bind_texels(4, GL_R8UI);
     palette.bind_texels(5, GL_RGBA32F);
-    queue.bind_texels(6, GL_R32UI);
     large_queue.bind_texels(7, GL_R32UI);
     tiles.bind_texels(8, GL_R32UI);
     keys.bind(0);
     sums.bind(1);
     image.bind(2);
-    queue.bind(3);
     large_queue.bind(4);
     tiles.bind(5);
   }
@@ -251,18 +259,46 @@ struct OpenGLRenderer::Device {
     }
   }
 
-  void draw_bands(std::span<const frame::Band> bands) {
+  // @param first_band  nothing is drawn yet
+  void draw_bands(ListSet& set, std::span<const frame::Band> bands, bool first_band) {
+    const frame::Band whole{set[dot_list].count, set[line_list].count, set[capsule_list].count};
+    if (bands.empty()) bands = std::span(&whole, 1);
     frame::Band from;
     for (const frame::Band& to : bands) {
       const bool first = &to == &bands.front();
       if (!first) find_tiles();
-      draw(lists[capsule_list], from.capsules, to.capsules, first);
-      draw(lists[dot_list], from.dots, to.dots, first);
-      draw(lists[line_list], from.lines, to.lines, first);
+      draw(set[capsule_list], from.capsules, to.capsules, first && first_band);
+      draw(set[dot_list], from.dots, to.dots, first && first_band);
+      draw(set[line_list], from.lines, to.lines, first && first_band);
       from = to;
     }
-    draw(lists[overlay_list], 0, lists[overlay_list].count, true);
+  }
+
+  void draw_subframe(const frame::Frame& f) {
+    draw_bands(lists, f.bands, true);
+    if (f.rest) {
+      find_tiles();
+      read_depths();
+      const frame::Lists more = f.rest(seen);
+      frame::check(more, geometry);
+      upload(rest, more);
+      draw_bands(rest, more.bands, false);
+    }
+    draw(overlays, 0, overlays.count, true);
     glMemoryBarrier(written_for_readers);
+  }
+
+  void read_depths() {
+    seen.width = (width + FOREST_TILE - 1) / FOREST_TILE, seen.height = (height + FOREST_TILE - 1) / FOREST_TILE;
+    farthest.resize(std::size_t(seen.width) * seen.height);
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glGetNamedBufferSubData(tiles.name(), 0, GLsizeiptr(farthest.size() * 4), farthest.data());
+    seen.depths.resize(farthest.size());
+    std::ranges::transform(farthest, seen.depths.begin(), [](std::uint32_t key) {
+      return key == FOREST_KEY_EMPTY
+                 ? INFINITY
+                 : std::exp2(float(key >> 12) / float(FOREST_DEPTH_STEPS) - float(FOREST_DEPTH_BASE));
+    });
   }
 
   void draw_texture() {
@@ -309,10 +345,7 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
   frame::check(f, d.geometry);
   d.upload(f);
   d.prepare(f);
-  const frame::Band whole{std::uint32_t(f.dots.size()), std::uint32_t(f.lines.size()),
-                          std::uint32_t(f.capsules.size())};
-  const std::span<const frame::Band> bands = f.bands.empty() ? std::span(&whole, 1) : f.bands;
-
+  d.seen = {};
   frame::Timing timing;
   d.constants = constants_of(f);
   d.constants.last_subframe = std::min(f.last_subframe, f.subframes);
@@ -325,7 +358,7 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
     const std::uint32_t empty = FOREST_KEY_EMPTY;
     glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4),
                               GL_RED_INTEGER, GL_UNSIGNED_INT, &empty);
-    d.draw_bands(bands);
+    d.draw_subframe(f);
     glFinish();
     timing.draw += milliseconds_since(start);
     start = std::chrono::steady_clock::now();
@@ -353,6 +386,8 @@ frame::Image OpenGLRenderer::read() {
   image.covered = covered / 255. / double(std::max<std::size_t>(1, image.pixels.size() / 4));
   return image;
 }
+
+const frame::DepthMap& OpenGLRenderer::seen() const { return device_->seen; }
 
 void OpenGLRenderer::show(unsigned target) {
   Device& d = *device_;

@@ -19,6 +19,7 @@ class OpenGLRenderer final : public Renderer {
   void load(const frame::Geometry& geometry) override;
   frame::Timing draw(const frame::Frame& frame) override;
   frame::Image read() override;
+  const frame::DepthMap& seen() const override;
   std::string name() const override;
 
   /// Copies the last frame into the bottom left corner of the framebuffer object `target` (a window's), without

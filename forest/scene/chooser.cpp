@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/chooser.h"
+
+namespace forest::scene {
+
+const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport) {
+  eye_ = eye, viewport_ = viewport;
+  revealed_segments_ = drawings_ = 0;
+  return cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr);
+}
+
+void Chooser::complete(frame::Frame& frame) {
+  frame.rest = [this](const frame::DepthMap& seen) {
+    revealed_ =
+        revealed(forest_, *eye_, viewport_, cut_.left_out, Occluders(seen, eye_->camera(), viewport_));
+    revealed_segments_ += revealed_.segments, ++drawings_;
+    return revealed_.lists();
+  };
+}
+
+void Chooser::remember(const frame::DepthMap& seen) {
+  before_.emplace(seen, eye_->camera(), viewport_);
+}
+
+}  // namespace forest::scene

@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Pictures of one forest, one after the other: what the last one hid is guessed to be hidden in the next, and looked at
+// again once the rest is drawn. The pictures are those that would be drawn without a guess; they are drawn sooner.
+#pragma once
+
+#include <optional>
+
+#include "forest/scene/cut.h"
+
+namespace forest::scene {
+
+class Chooser {
+ public:
+  explicit Chooser(Forest forest) : forest_(std::move(forest)) {}
+
+  /// The cut of the next picture; valid until the one after it.
+  const Cut& choose(const Eye& eye, const frame::Viewport& viewport);
+  const Cut& cut() const { return cut_; }
+  /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
+  void complete(frame::Frame& frame);
+  /// To be told after each drawing of such a frame.
+  void remember(const frame::DepthMap& seen);
+
+  /// Of the last picture, all subframes' mean: chosen and revealed.
+  std::uint64_t segments() const { return cut_.segments + (drawings_ ? revealed_segments_ / drawings_ : 0); }
+
+ private:
+  Forest forest_;
+  std::optional<Eye> eye_;
+  frame::Viewport viewport_;
+  std::optional<Occluders> before_;
+  Cut cut_, revealed_;
+  std::uint64_t revealed_segments_ = 0, drawings_ = 0;
+};
+
+}  // namespace forest::scene
