@@ -54,6 +54,7 @@ struct Checked {
   bool skipped = false;  // it holds no neuron, and lay in a folder
   std::vector<Found> found;
   fs::path mended;
+  std::size_t together = 0;  // of so many cells, which are not mended together
   bool can_be_mended() const {
     return std::ranges::any_of(found, [](const Found& f) { return f.mend == by_repair; });
   }
@@ -103,7 +104,7 @@ void repair(const io::Format& format, const io::Cell& cell, std::string_view ori
             const Put& put, Checked& checked) {
   const io::Format& writer = format.write ? format : *io::find_format("swc");
   fs::path mended = to;
-  if (!format.write) mended.replace_extension(std::string(writer.extensions[0]));
+  if (!format.write) mended += writer.extensions[0];  // cell.xml.swc, as there may be a cell.swc
   const std::string copy = writer.write(cell.read.morphology);
   Json passages = Json::array(), findings = Json::array();
   for (const io::Passage& p : io::difference(copy, original))
@@ -128,8 +129,7 @@ void check_file(Checked& checked, const Options& options, const fs::path& to, co
     for (const io::Cell& cell : cells) look_at(cell, checked);
     if (to.empty() || !checked.can_be_mended()) return;
     if (cells.size() > 1)
-      checked.error = fmt::format("{}: holds {} cells, which are not mended together; convert it first",
-                                  escaped(checked.path.string()), cells.size());
+      checked.together = cells.size();
     else
       repair(format, cells[0], file.text(), to, put, checked);
   } catch (const InputError& error) {
@@ -141,11 +141,11 @@ void check_file(Checked& checked, const Options& options, const fs::path& to, co
 void report(const std::vector<Checked>& files, Console& console) {
   Json list = Json::array();
   std::vector<std::vector<std::string>> rows;
-  std::size_t sound = 0, odd = 0, failed = 0, skipped = 0, mended = 0;
+  std::size_t sound = 0, odd = 0, failed = 0, skipped = 0, mended = 0, together = 0;
   for (const Checked& file : files) {
     const std::string path = escaped(file.path.string());
     (file.skipped ? skipped : !file.error.empty() ? failed : file.found.empty() ? sound : odd) += 1;
-    mended += !file.mended.empty();
+    mended += !file.mended.empty(), together += file.together > 0;
     Json entry{{"file", path}, {"format", file.format}, {"findings", Json::array()}};
     for (const Found& f : file.found) {
       entry["findings"].push_back(json_of(f));
@@ -156,21 +156,34 @@ void report(const std::vector<Checked>& files, Console& console) {
       rows.push_back({path, "", file.skipped ? "skipped" : "not-read", file.error, ""});
     }
     if (!file.mended.empty()) entry["mended"] = escaped(file.mended.string());
+    if (file.together) {
+      const std::string why = fmt::format("holds {} cells, which are not mended together", file.together);
+      entry["not_mended"] = why;
+      rows.push_back({path, "", "not-mended", why, "convert it first, which gives each cell a file"});
+    }
     list.push_back(std::move(entry));
   }
   if (!rows.empty())
     console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
-  console.say(fmt::format("{} files without a finding, {} with some, {} not read{}{}", sound, odd, failed,
-                          skipped ? fmt::format(", {} skipped", skipped) : "",
-                          mended ? fmt::format("; {} mended, each with a log beside it", mended) : ""));
+  console.say(fmt::format("{} without a finding, {} with some, {} not read{}{}", counted(sound, "file"), odd,
+                          failed, skipped ? fmt::format(", {} skipped", skipped) : "",
+                          mended ? fmt::format("; {} mended, each with a log beside it", mended) : "") +
+              (together ? fmt::format("; {} of several cells not mended", together) : ""));
   console.print({{"sound", sound},
                  {"odd", odd},
                  {"failed", failed},
                  {"skipped", skipped},
                  {"mended", mended},
+                 {"not_mended", together},
                  {"files", list}});
   if (failed)
-    throw Error(fmt::format("{} of {} files could not be read; the table says why", failed, files.size()));
+    throw Error(
+        fmt::format("{} of {} could not be read; the table says why", failed, counted(files.size(), "file")));
+  if (together)
+    throw Error(
+        fmt::format("{} of {}, of several cells, {} not mended; convert such a file first, which gives "
+                    "each cell one of its own",
+                    together, counted(files.size(), "file"), together == 1 ? "was" : "were"));
 }
 
 void check_repository(const std::string& repo, Console& console) {
@@ -227,8 +240,9 @@ std::function<void()> check(CLI::App& command, Console& console) {
   command.add_option("files", options->files, "Neuron files, or folders with such files below them")
       ->type_name("FILES");
   command
-      .add_option("--repo", options->repo,
-                  "A repository to look through: its tables and the checksum of every neuron")
+      .add_option(
+          "--repo", options->repo,
+          "A repository to look through: its tables, the checksum of every neuron and what follows from it")
       ->type_name("REPO");
   command
       .add_option("--repair", options->repair,

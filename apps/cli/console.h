@@ -49,8 +49,8 @@ class Console {
   ProgressBar bar_;
 };
 
-/// "1 finding", "2 findings".
-std::string counted(std::size_t count, std::string_view noun);
+/// "1 finding", "2 findings", "2 losses": an s where no plural is given.
+std::string counted(std::size_t count, std::string_view noun, std::string_view plural = {});
 
 /// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the
 /// installation.

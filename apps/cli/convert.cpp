@@ -50,7 +50,10 @@ struct Target {
 
 Target target_of(const fs::path& path) {
   if (const io::ModelFormat* model = io::model_format_of(path)) return {.model = model};
-  return {.neuron = &io::format_of(path)};
+  std::vector<std::string_view> models;
+  for (const io::ModelFormat& format : io::model_formats())
+    models.insert(models.end(), format.extensions.begin(), format.extensions.end());
+  return {.neuron = &io::format_of(path, models)};
 }
 
 Target find_target(std::string_view name) {
@@ -156,6 +159,9 @@ void run(Options options, Console& console) {
   fs::path single;
   if (options.out.empty()) {
     single = options.files[1];
+    if (fs::is_directory(single))
+      throw Error(fmt::format("{} is a folder; convert into it with --format NAME --out {}", single.string(),
+                              single.string()));
     options.files.pop_back();
   }
   const Target target = single.empty() ? find_target(options.format) : target_of(single);
@@ -212,11 +218,11 @@ void run(Options options, Console& console) {
                  {"failed", failed},
                  {"skipped", skipped},
                  {"files", list}});
-  console.say(fmt::format("{} written as {}, {} not read, {} skipped, {} kinds of loss told above{}", written,
-                          target.title(), failed, skipped, lost,
-                          oddities && !options.verbose
-                              ? fmt::format("; {} oddities of the files, shown by --verbose", oddities)
-                              : ""));
+  console.say(fmt::format("{} written as {}, {} not read, {} skipped, {} told above{}", written,
+                          target.title(), failed, skipped, counted(lost, "loss", "losses"),
+                          oddities && !options.verbose ? fmt::format("; {} of the files, shown by --verbose",
+                                                                     counted(oddities, "oddity", "oddities"))
+                                                       : ""));
   if (failed)
     throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
                             files.size()));

@@ -37,15 +37,13 @@ struct Options {
 
 void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Console& console) {
   const bool csv = options.format == "csv";
-  const fs::path first = csv ? options.out / "summary.csv" : options.out;
-  if (!options.force && fs::exists(first))  // a person may have written into it
-    throw Error(
-        fmt::format("{} is there already; choose another name, or replace it with --force", first.string()));
+  const std::vector<fs::path> wanted = table_files(options.out, csv);
+  if (!options.force) refuse_existing(wanted);
   const auto files = export_tables(options.repo, rows, options.out, csv, console);
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   for (const fs::path& file : files) list.push_back(file.string());
   console.print({{"format", options.format}, {"neurons", rows.size()}, {"files", list}});
-  console.say(fmt::format("{} neurons are written to {}", rows.size(), options.out.string()));
+  console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
 }
 
 void run(const Options& options, Console& console) {
@@ -69,16 +67,23 @@ void run(const Options& options, Console& console) {
     parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
       const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
       for (std::size_t i = begin; i < end; ++i) {
-        use(files[i], [&] { return format.write(repository.morphology(rows[i].id)); });
+        use(i, [&] { return repository.morphology(rows[i].id); });
         console.progress().advance();
       }
     });
     console.progress().end();
   };
+  const auto written = [&](std::size_t i, const Morphology& m) {
+    try {
+      return format.write(m);
+    } catch (const LimitError& error) {
+      throw LimitError(fmt::format("neuron {}: {}", shown(rows[i].name), error.what()));
+    }
+  };
   if (!options.force && holds_files(options.out)) {
     Overwrites overwrites;
-    each("comparing", [&](const fs::path& file, const auto& bytes) {
-      if (fs::exists(file)) overwrites.look(file, bytes());
+    each("comparing", [&](std::size_t i, const auto& neuron) {
+      if (fs::exists(files[i])) overwrites.look(files[i], written(i, neuron()));
     });
     overwrites.refuse();
   }
@@ -90,12 +95,23 @@ void run(const Options& options, Console& console) {
       throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written",
                               options.out.string(), error.message()));
 
-  each("exporting",
-       [](const fs::path& file, const auto& bytes) { write_file(file, std::string_view(bytes())); });
+  std::vector<std::vector<io::Warning>> losses(rows.size());
+  each("exporting", [&](std::size_t i, const auto& neuron) {
+    const Morphology m = neuron();
+    losses[i] = io::losses(m, format.keeps);
+    write_file(files[i], std::string_view(written(i, m)));
+  });
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < rows.size(); ++i)
-    list.push_back({{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}});
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    nlohmann::ordered_json lost = nlohmann::ordered_json::array();
+    for (const io::Warning& loss : losses[i]) {
+      console.warn(fmt::format("{}: {}: {}", escaped(files[i].string()), loss.code, loss.sentence));
+      lost.push_back({{"code", loss.code}, {"sentence", loss.sentence}});
+    }
+    list.push_back(
+        {{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}, {"losses", lost}});
+  }
   console.print({{"format", options.format}, {"files", list}});
   console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
 }

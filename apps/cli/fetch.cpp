@@ -20,6 +20,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/oddities.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
@@ -37,7 +38,7 @@ struct Options {
   std::size_t limit = 100, max_megabytes = 200;
   fetch::CacheOptions cache;
   fetch::Manners manners;
-  bool force = false;
+  bool force = false, verbose = false;
 };
 
 /// A cell that was asked for, and what became of it.
@@ -45,7 +46,8 @@ struct Arrival {
   std::string name;
   std::optional<fetch::Record> record;  // from a query; of a name it is still to be fetched
   fetch::Swc swc = {};
-  std::size_t bytes = 0, sections = 0, warnings = 0;
+  std::size_t bytes = 0, sections = 0;
+  std::vector<io::Warning> oddities = {};
   fs::path file = {};
   std::optional<Added> added = {};
   std::string error = {};  // empty when all went well
@@ -115,7 +117,7 @@ void fetch_one(Arrival& cell, const Options& options, fetch::Service& service,
   });
   cell.bytes = cell.swc.bytes.size();
   cell.sections = read.morphology.sections().size();
-  cell.warnings = read.warnings.size();
+  cell.oddities = std::move(read.warnings);
   if (!options.out.empty()) write_files(cell, options);
   if (!options.repo.empty()) store(cell, read.morphology, options, repository);
 }
@@ -141,7 +143,7 @@ void report(const std::vector<Arrival>& cells, const fetch::Selection& selection
                     {"bytes", cell.bytes},
                     {"hash", cell.swc.hash},
                     {"sections", cell.sections},
-                    {"warnings", cell.warnings}});
+                    {"warnings", cell.oddities.size()}});
       cached += cell.swc.cached;
     } else {
       entry["error"] = cell.error;
@@ -151,7 +153,7 @@ void report(const std::vector<Arrival>& cells, const fetch::Selection& selection
     const bool well = cell.error.empty();
     lines.push_back({escaped(cell.name), escaped(about.archive), escaped(about.species),
                      escaped(about.region), escaped(about.type), well ? std::to_string(cell.sections) : "-",
-                     well ? std::to_string(cell.warnings) : "-", outcome(cell)});
+                     well ? std::to_string(cell.oddities.size()) : "-", outcome(cell)});
   }
   console.table({"neuron", "archive", "species", "region", "type", "sections", "warnings", ""}, lines);
   console.say(fmt::format(
@@ -159,6 +161,9 @@ void report(const std::vector<Arrival>& cells, const fetch::Selection& selection
       selection.total > selection.records.size()
           ? fmt::format("; {} match the query, --limit says how many are fetched", selection.total)
           : ""));
+  std::vector<OddFile> odd;
+  for (const Arrival& cell : cells) odd.push_back({escaped(cell.name), &cell.oddities});
+  report_oddities(odd, console);
   Json result{{"from", options.from}, {"fetched", cells.size() - failed}, {"from_cache", cached},
               {"failed", failed},     {"matching", selection.total},      {"cells", list}};
   if (!selection.error.empty()) result["error"] = selection.error;
@@ -191,6 +196,7 @@ void run(const Options& options, Console& console) {
   for (Arrival& cell : cells) {
     try {
       fetch_one(cell, options, service, repository);
+      if (options.verbose) tell_oddities({escaped(cell.name), &cell.oddities}, console);
     } catch (const Error& error) {
       cell.error = error.what();
       console.warn(fmt::format("{}: {}", escaped(cell.name), cell.error));
@@ -221,7 +227,8 @@ std::function<void()> fetch_cells(CLI::App& command, Console& console) {
                    "Write them into this folder, with what is said of them as JSON beside")
       ->type_name("DIR");
   CLI::Option* repo =
-      into->add_option("--repo", options->repo, "Store them in this repository; made when there is none");
+      into->add_option("--repo", options->repo, "Store them in this repository; made when there is none")
+          ->type_name("REPO");
   into->require_option(1, 2);
   must_be_name(
       *command.add_option("--population", options->population, "The population they are to belong to")
@@ -252,6 +259,8 @@ std::function<void()> fetch_cells(CLI::App& command, Console& console) {
   must_be_whole(
       *command.add_option("--max-size", options->max_megabytes, "Largest file in MB")->capture_default_str(),
       1, 100'000);
+  command.add_flag("--verbose", options->verbose,
+                   "Show every oddity: cell, line, what stands there and how it was read");
   add_force(command, options->force);
   command.parse_complete_callback([options] {
     if (options->names.empty() && options->query.empty())

@@ -104,7 +104,8 @@ bool may_skip(const Error& error, const fs::path& path, const std::vector<std::s
 
 void Overwrites::look(const fs::path& to, std::string_view bytes) {
   std::error_code none;
-  if (!fs::is_regular_file(to, none)) return;
+  // What leads to an open file (/dev/stdout) is a stream, wherever the shell has sent it.
+  if (!fs::is_regular_file(fs::symlink_status(followed(to), none))) return;
   bool same = false;
   try {
     same = MappedFile(to).text() == bytes;
@@ -123,6 +124,22 @@ void Overwrites::refuse() const {
                   "replace with --force",
                   repository::escaped(found_.begin()->string()),
                   more ? fmt::format(", as do {}", counted(more, "more file")) : ""));
+}
+
+void write_unless_there(const fs::path& to, std::string_view bytes, bool force) {
+  Overwrites overwrites;
+  if (!force) overwrites.look(to, bytes);
+  overwrites.refuse();
+  write_file(to, bytes);
+}
+
+void refuse_existing(const std::vector<fs::path>& files) {
+  std::error_code none;
+  for (const fs::path& file : files)
+    if (fs::exists(file, none))
+      throw Error(fmt::format(
+          "{} is there already, so nothing was written; choose another name, or replace it with --force",
+          repository::escaped(file.string())));
 }
 
 bool holds_files(const fs::path& folder) {

@@ -39,6 +39,12 @@ class Overwrites {
   std::set<std::filesystem::path> found_;
 };
 
+/// One file, unless another holds something else there and `force` is not given.
+void write_unless_there(const std::filesystem::path& to, std::string_view bytes, bool force);
+
+/// Throws Error when one of them is there, whatever it holds: people write into tables.
+void refuse_existing(const std::vector<std::filesystem::path>& files);
+
 /// Whether there may be something to overwrite: the folder is there and not empty.
 bool holds_files(const std::filesystem::path& folder);
 

@@ -25,6 +25,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/oddities.h"
 #include "apps/cli/revise.h"
 #include "apps/cli/verb.h"
 
@@ -94,33 +95,6 @@ const char* outcome(const Arrival& file) {
                                      : "stored";
 }
 
-/// What was odd, a line a kind: in how many files, where first, and what can be done.
-void report_oddities(const std::vector<Arrival>& files, Console& console) {
-  struct Kind {
-    std::size_t files = 0, times = 0;
-    std::string place, sentence, mending;
-    const Arrival* last = nullptr;
-  };
-  std::map<std::string_view, Kind> kinds;
-  for (const Arrival& file : files)
-    for (const io::Warning& w : file.oddities) {
-      Kind& kind = kinds[w.code];
-      if (kind.times++ == 0) {
-        kind.place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
-        kind.sentence = escaped(w.sentence);
-        kind.mending = w.mending.empty() ? "brainforest check --repair writes it so" : w.mending;
-      }
-      kind.files += std::exchange(kind.last, &file) != &file;
-    }
-  if (kinds.empty()) return;
-  std::vector<std::vector<std::string>> lines;
-  for (const auto& [code, kind] : kinds)
-    lines.push_back({std::string(code), std::to_string(kind.files), std::to_string(kind.times), kind.place,
-                     kind.sentence, kind.mending});
-  console.table({"what was odd", "files", "times", "first at", "and how it was read", "what you can do"},
-                lines);
-}
-
 void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
   std::vector<std::vector<std::string>> lines;
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -147,9 +121,12 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
   console.table({"file", "neuron", "sections", "warnings", ""}, lines);
   console.say(fmt::format(
       "{} stored, {} already there, {} not read, {} skipped{}", stored, there, failed, skipped,
-      warnings ? fmt::format("; {} warnings{}", warnings, options.verbose ? "" : ", shown by --verbose")
-               : ""));
-  report_oddities(files, console);
+      warnings
+          ? fmt::format("; {}{}", counted(warnings, "warning"), options.verbose ? "" : ", shown by --verbose")
+          : ""));
+  std::vector<OddFile> odd;
+  for (const Arrival& file : files) odd.push_back({escaped(file.path.string()), &file.oddities});
+  report_oddities(odd, console);
   console.print({{"repository", options.repo},
                  {"population", options.about.population},
                  {"stored", stored},
@@ -159,8 +136,8 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                  {"warnings", warnings},
                  {"files", list}});
   if (failed)
-    throw Error(
-        fmt::format("{} of {} files could not be read; the sentences above say why", failed, files.size()));
+    throw Error(fmt::format("{} of {} could not be read; the sentences above say why", failed,
+                            counted(files.size(), "file")));
 }
 
 /// What a workbook cannot be imported with. Its neurons have their populations and say the rest themselves.
@@ -208,11 +185,7 @@ void run(const Options& options, Console& console) {
         console.warn(file.skipped ? file.error + "; skipped" : file.error);
         continue;
       }
-      if (options.verbose)
-        for (const io::Warning& w : file.oddities) {
-          const std::string place = escaped(file.path.string()) + (w.line ? fmt::format(":{}", w.line) : "");
-          console.warn(fmt::format("{}: {}: {}", place, w.code, w.sentence));
-        }
+      if (options.verbose) tell_oddities({escaped(file.path.string()), &file.oddities}, console);
       NewNeuron neuron = options.about;
       neuron.name = file.name;
       neuron.number_if_taken = true;
@@ -248,9 +221,11 @@ std::function<void()> import_files(CLI::App& command, Console& console) {
           "wrote, whose changes are taken over")
       ->required()
       ->type_name("FILES");
-  command.add_option("--repo", options->repo, "The repository; made when there is none")
+  command
+      .add_option("--repo", options->repo,
+                  "The repository, made when there is none: a file, or postgresql://role@host/database")
       ->required()
-      ->type_name("FILE");
+      ->type_name("REPO");
   must_be_name(
       *command.add_option("--population", options->about.population, "The population they are to belong to")
            ->capture_default_str());

@@ -22,6 +22,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -36,7 +37,7 @@ struct Options {
   std::vector<std::string> metrics;
   std::string kind = "all", level = "neuron";
   std::filesystem::path csv;
-  bool list = false;
+  bool list = false, force = false;
 };
 
 /// What the terminal shows of several neurons when no metric is asked for; all of them would not fit.
@@ -287,7 +288,7 @@ void run(const Options& options, Console& console) {
   }
   if (unread == measured.size()) throw Error("no neuron could be read, so nothing was measured");
 
-  if (!options.csv.empty()) write_file(options.csv, csv(header, all));
+  if (!options.csv.empty()) write_unless_there(options.csv, csv(header, all), options.force);
   if (console.json) {
     console.print(json(options, header, all));
   } else if (options.level == "neuron" && all.size() == 1) {
@@ -342,6 +343,7 @@ std::function<void()> measure(CLI::App& command, Console& console) {
       ->type_name("LEVEL")
       ->capture_default_str();
   command.add_option("--csv", options->csv, "Write the table to this file")->type_name("FILE");
+  add_force(command, options->force);
   command.add_flag("--list", options->list, "Show all metrics and what they are");
   command.parse_complete_callback([options] {
     if (!options->list && options->files.empty() && options->repo.empty())

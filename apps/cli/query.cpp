@@ -6,12 +6,13 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "forest/core/file.h"
 #include "forest/io/workbook.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -22,6 +23,7 @@ using repository::Answer;
 struct Options {
   std::string question, repo;
   std::filesystem::path csv;
+  bool force = false;
 };
 
 struct ToText {
@@ -51,7 +53,8 @@ void run(const Options& options, Console& console) {
   auto repository = repository::Repository::open(options.repo, repository::Access::read);
   const Answer answer = repository.query(options.question);
   if (!options.csv.empty()) {
-    write_file(options.csv, std::string_view(csv_of(answer)));
+    const std::string csv = csv_of(answer);
+    write_unless_there(options.csv, csv, options.force);
     console.say(fmt::format("{} rows are written to {}", answer.rows.size(), options.csv.string()));
   } else {
     std::vector<std::vector<std::string>> lines;
@@ -84,6 +87,7 @@ std::function<void()> query(CLI::App& command, Console& console) {
       ->required()
       ->type_name("REPO");
   command.add_option("--csv", options->csv, "Write the answer into this file");
+  add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }
 

@@ -54,6 +54,10 @@ constexpr Sheet sheets[] = {
      "neuron, section"},
     {"annotations", "neuron, number, name, value", "annotations", "neuron, number", "name value"}};
 
+/// Of a whole workbook, in its order.
+constexpr std::array<std::string_view, 7> sheet_names{"summary", "neurons",     "sections", "junctions",
+                                                      "metrics", "annotations", "points"};
+
 TableSheet sheet_of(Repository& repository, const Sheet& sheet, const std::string& ids) {
   const std::string_view key = std::string_view(sheet.id).substr(0, std::string_view(sheet.id).find(','));
   repository::Answer answer = repository.query(fmt::format("select {} from {} where {} in ({}) order by {}",
@@ -227,6 +231,21 @@ std::vector<TableSheet> sheets_of(Repository& repository, const std::vector<repo
   for (auto& row : first.rows) row.emplace_back(version[std::get<std::int64_t>(row[0])]);
   if (points) tables.push_back(points_sheet(repository, neurons));
   return tables;
+}
+
+std::vector<std::filesystem::path> table_files(const std::filesystem::path& out, bool csv) {
+  std::string extension = out.extension().string();
+  for (char& c : extension) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  if (!csv && extension != ".xlsx")
+    throw Error(fmt::format("{}: a workbook's name ends in .xlsx; change the name, or choose --format csv",
+                            out.string()));
+  if (!csv) return {out};
+  if (extension == ".csv" || extension == ".xlsx")
+    throw Error(fmt::format("{}: csv is one file a sheet, so --out names the folder for them; leave {} out",
+                            out.string(), extension));
+  std::vector<std::filesystem::path> files;
+  for (const std::string_view sheet : sheet_names) files.push_back(out / fmt::format("{}.csv", sheet));
+  return files;
 }
 
 std::vector<std::filesystem::path> export_tables(const std::string& repo,

@@ -18,6 +18,10 @@ class Console;
 std::vector<io::TableSheet> sheets_of(repository::Repository& repository,
                                       const std::vector<repository::NeuronRow>& neurons, bool points);
 
+/// The files of export_tables, points among them whether they fit or not. Throws Error when `out` has the extension of
+/// something else.
+std::vector<std::filesystem::path> table_files(const std::filesystem::path& out, bool csv);
+
 /// The workbook, one sheet each: summary (with charts), neurons, sections, junctions, metrics, annotations, points. What
 /// does not fit into a workbook is told.
 /// @param out  an .xlsx file, or with `csv` a folder for one file a sheet

@@ -11,6 +11,7 @@
 //     "contour", "text" or "asc".
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,7 +32,8 @@ ReadResult read_asc(std::string_view bytes, const std::string& name);
 /// FOREST_, which read_asc understands and others skip.
 std::string write_asc(const Morphology& morphology);
 
-inline constexpr Keeps asc_keeps{.order = false};
+inline constexpr std::array<std::string_view, 6> asc_keys{"leaf", "tree", "marker", "contour", "text", "asc"};
+inline constexpr Keeps asc_keeps{.keys = false, .own_keys = asc_keys, .order = false};
 
 /// Every deviation that is read.
 std::span<const Oddity> asc_oddities();

@@ -43,7 +43,7 @@ constexpr std::array table{
            .read = read_swc,
            .read_all = nullptr,
            .write = write_swc,
-           .keeps = {}},
+           .keeps = swc_keeps},
     Format{.name = "hoc",
            .title = "NEURON cell template (hoc)",
            .extensions = hoc_extensions,
@@ -128,12 +128,14 @@ bool has(const Format& format, std::string_view extension) {
   return std::ranges::find(format.extensions, extension) != format.extensions.end();
 }
 
-[[noreturn]] void refuse_extension(const std::filesystem::path& path, bool written) {
+[[noreturn]] void refuse_extension(const std::filesystem::path& path, bool written,
+                                   std::span<const std::string_view> others = {}) {
   std::string known;
   for (const Format& format : table)
     if (written ? format.write != nullptr : format.read != nullptr)
       for (const std::string_view extension : format.extensions)
         if (known.find(std::string(extension) + ",") == known.npos) known += std::string(extension) + ", ";
+  for (const std::string_view other : others) known += std::string(other) + ", ";
   known.resize(known.size() - 2);
   throw InputError(path.string(), 0,
                    fmt::format("the extension '{}' belongs to no known format; known are {}",
@@ -210,7 +212,7 @@ const Format* find_format(std::string_view name) {
   return row == table.end() ? nullptr : &*row;
 }
 
-const Format& format_of(const std::filesystem::path& path) {
+const Format& format_of(const std::filesystem::path& path, std::span<const std::string_view> others) {
   const std::string extension = lower_extension(path);
   const Format* only_read = nullptr;
   for (const Format& format : table)
@@ -219,7 +221,7 @@ const Format& format_of(const std::filesystem::path& path) {
       only_read = &format;
     }
   if (only_read) return *only_read;
-  refuse_extension(path, true);
+  refuse_extension(path, true, others);
 }
 
 const Format& format_of(const std::filesystem::path& path, std::string_view bytes) {

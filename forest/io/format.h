@@ -62,8 +62,8 @@ struct Format {
 std::span<const Format> formats();
 const Format* find_format(std::string_view name);  // null when unknown
 
-/// By extension, for writing; throws InputError naming the known ones.
-const Format& format_of(const std::filesystem::path& path);
+/// By extension, for writing; throws InputError naming the known ones, and with them those `others` that the caller knows.
+const Format& format_of(const std::filesystem::path& path, std::span<const std::string_view> others = {});
 /// For reading: by extension and, where that does not decide, by content; throws InputError.
 const Format& format_of(const std::filesystem::path& path, std::string_view bytes);
 

@@ -46,27 +46,35 @@ enum class Odd : std::uint8_t {
   count
 };
 
+// A file written anew holds the shape; what GENESIS computes with becomes comments.
+constexpr std::string_view keep_the_file = "keep the file beside what is made of it";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"padding", false, "what stands behind the text is skipped"},
-    {"parameters", false, "kept as annotations; they do not change the shape"},
-    {"prototypes", false, "kept as annotations; what a prototype holds stands in no cell file"},
-    {"spine-options", false, "kept as annotations; the spines they scatter are not made"},
-    {"unknown-option", true, "skipped"},
-    {"channels", false, "kept as annotations"},
-    {"unknown-diameter", true, "read as the diameter of the parent"},
-    {"missing-parent", true, "read as a root"},
-    {"duplicate-name", true, "a parent means the last one above"},
-    {"several-roots", true, "kept as a tree of its own, attached to no soma"},
-    {"several-somata", true, "read as a neurite of undefined kind"},
+    {"parameters", false, "kept as annotations; they do not change the shape", keep_the_file},
+    {"prototypes", false, "kept as annotations; prototypes themselves are left out", keep_the_file},
+    {"spine-options", false, "kept as annotations; the spines they scatter are not made", keep_the_file},
+    {"unknown-option", true, "skipped", keep_the_file},
+    {"channels", false, "kept as annotations", keep_the_file},
+    {"unknown-diameter", true, "read as the diameter of the parent", "measure it where thickness matters"},
+    {"missing-parent", true, "read as a root", "give it the parent it was traced from"},
+    {"duplicate-name", true, "a parent means the last one above", "give each compartment a name of its own"},
+    {"several-roots", true, "kept as a tree of its own, attached to no soma",
+     "give it a parent if it belongs to the cell"},
+    {"several-somata", true, "read as a neurite of its parent's kind",
+     "split the file if it holds several cells"},
     {"soma-inside", true, "the tree is turned so that it begins at the soma"},
     {"sphere-outside", true, "read as a point of its branch"},
     {"no-length", true, "left out: it ends where it begins"},
     {"gap", true, "bridged by a straight piece"},
-    {"unknown-kind", false, "read as of its parent's kind, or of undefined kind where that has none"},
+    {"unknown-kind", false, "read as of its parent's kind, or of undefined kind where that has none",
+     "nothing, or give it a name that tells its kind, such as dend or axon"},
     {"stale-diameters", true, "read by its diameter, as it was changed by hand"},
-    {"open-comment", false, "read as a comment to the end of the file"},
-    {"several-cells", false, "the first one is read; convert and import take them all"},
+    {"open-comment", false, "read as a comment to the end of the file",
+     "see whether compartments are missing"},
+    {"several-cells", false, "the first one is read; convert and import take them all",
+     "nothing, or split the file"},
 }};
 
 using Oddities = OddityList<Odd>;
@@ -188,10 +196,17 @@ struct Group {
   std::unordered_map<std::string_view, std::int32_t> by_name;  // views of the file
 };
 
+/// What a line says of its cell, by the group it stands in; with `on` of those that begin below as well.
+struct Said {
+  std::size_t group = 0;
+  bool on = false;
+  std::pair<std::string, std::string> annotation;
+};
+
 struct Scan {
   bool ours = false;
   std::vector<Group> groups;
-  Annotations annotations;
+  std::vector<Said> said;
 };
 
 class Scanner {
@@ -207,8 +222,7 @@ class Scanner {
       } else if (scan_.ours && text.starts_with(genesis_note)) {
         const std::string_view note = text.substr(genesis_note.size());
         const std::size_t end = std::min(note.find(' '), note.size());
-        scan_.annotations.emplace_back(unescaped_note(note.substr(0, end)),
-                                       unescaped_note(note.substr(std::min(end + 1, note.size()))));
+        say(unescaped_note(note.substr(0, end)), unescaped_note(note.substr(std::min(end + 1, note.size()))));
       } else if (scan_.ours && text.starts_with(genesis_ends)) {
         ends_ = text.substr(genesis_ends.size());
       } else {
@@ -222,11 +236,14 @@ class Scanner {
   }
 
  private:
+  void say(std::string key, std::string value, bool on = false) {
+    scan_.said.push_back({group_, on, {std::move(key), std::move(value)}});
+  }
+
   std::string without_comments(std::string_view text) {
     std::string rest;
     const auto comment = [&](std::string_view words) {
-      if (const std::string_view t = trim(words); !t.empty() && !scan_.ours)
-        scan_.annotations.emplace_back("comment", t);
+      if (const std::string_view t = trim(words); !t.empty() && !scan_.ours) say("comment", std::string(t));
     };
     while (!text.empty()) {
       if (in_comment_) {
@@ -262,7 +279,7 @@ class Scanner {
 
   void option(const std::vector<std::string_view>& words, std::string_view text) {
     const auto keep = [&](Odd odd) {
-      scan_.annotations.emplace_back("genesis", text);
+      say("genesis", std::string(text), odd == Odd::parameters || odd == Odd::prototypes);
       oddities_.add(odd, line_, [&] { return fmt::format("there is an option {}", shown(words[0])); });
     };
     const std::optional<Option> option = option_of(words[0]);
@@ -293,6 +310,7 @@ class Scanner {
         break;
       case Option::make_prototype:
         scan_.groups[words.size() > 1 ? find_group(words[1]) : group_].prototype = true;
+        keep(Odd::prototypes);
         break;
       case Option::parameter:
         keep(Odd::parameters);
@@ -372,7 +390,7 @@ class Scanner {
     if (words.size() > needed) {
       std::string channels(words[0]);
       for (std::size_t i = needed; i < words.size(); ++i) channels += ' ', channels += words[i];
-      scan_.annotations.emplace_back("channels", std::move(channels));
+      say("channels", std::move(channels));
       oddities_.add(Odd::channels, line_, "a compartment has channels");
     }
     const auto number = std::int32_t(group.compartments.size());
@@ -682,11 +700,19 @@ std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
   if (groups.size() > 1)
     oddities.add(Odd::several_cells, 0, [&] { return fmt::format("there are {} cells", groups.size()); });
   if (groups.empty()) groups.push_back(&scan.groups[0]);
+  // What stands outside of the cells (a header, a prototype that is left out) is said of all.
+  const auto is_of = [&](const Said& said, std::size_t number) {
+    const bool of_a_cell = std::ranges::find(groups, &scan.groups[said.group]) != groups.end();
+    return !of_a_cell || said.group == number || (said.on && said.group < number);
+  };
   for (Group* const group : groups) {
     Cell& cell = cells.emplace_back();
     if (groups.size() > 1) cell.name = group->name;
+    Annotations annotations;
+    for (const Said& said : scan.said)
+      if (is_of(said, std::size_t(group - scan.groups.data()))) annotations.push_back(said.annotation);
     cell.read.morphology =
-        Assembler(std::move(group->compartments), scan.ours, oddities).assemble(scan.annotations);
+        Assembler(std::move(group->compartments), scan.ours, oddities).assemble(annotations);
   }
   cells[0].read.warnings = oddities.take();
   return cells;

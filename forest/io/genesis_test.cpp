@@ -168,8 +168,30 @@ TEST(Genesis, CellsOfOneFileAreApartAndPrototypesAreNone) {
       "cells.p");
   ASSERT_EQ(cells.size(), 2u);
   EXPECT_EQ(cells[1].name, "/two");
+  EXPECT_EQ(std::ranges::count(cells[0].read.warnings, std::string_view("prototypes"), &Warning::code), 1);
   EXPECT_NEAR(total_length(cells[0].read.morphology), 9., 1e-6);
   EXPECT_NEAR(total_length(cells[1].read.morphology), 7., 1e-6);
+}
+
+TEST(Genesis, WhatIsSaidOfACellIsItsOwn) {
+  const std::vector<Cell> cells = read_genesis_cells(
+      "// of both\n*start_cell /library/s\n*compt /library/x\nneck none 0 1 0 .1\n*makeproto /library/s\n"
+      "*start_cell /one\n// the first\n*set_global RM 1\nsoma none 0 0 0 9 Na 1\n*rand_spines 3 13 1 7 1 /x\n"
+      "*start_cell /two\n// the second\n*set_global RM 2\nsoma none 0 0 0 5\n",
+      "cells.p");
+  ASSERT_EQ(cells.size(), 2u);
+  const Annotations outside{
+      {"comment", "of both"}, {"genesis", "*compt /library/x"}, {"genesis", "*makeproto /library/s"}};
+  Annotations one = outside, two = outside;
+  one.insert(one.end(), {{"comment", "the first"},
+                         {"genesis", "*set_global RM 1"},
+                         {"channels", "soma Na 1"},
+                         {"genesis", "*rand_spines 3 13 1 7 1 /x"}});
+  // Parameters hold for the lines below, of whatever cell.
+  two.insert(two.end(),
+             {{"genesis", "*set_global RM 1"}, {"comment", "the second"}, {"genesis", "*set_global RM 2"}});
+  EXPECT_EQ(cells[0].read.morphology.annotations(), one);
+  EXPECT_EQ(cells[1].read.morphology.annotations(), two);
 }
 
 /// What GENESIS computes of a written file: cylinders by their diameter, spheres where there is no length.

@@ -48,6 +48,8 @@ enum class H5Oddity : std::uint8_t {
   count
 };
 
+constexpr std::string_view keep_the_file = "keep the file beside what is made of it";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"several-cells", false, "only the first is read here; import the file to have all"},
     {"version-2", false, "converted to what version 1 has"},
@@ -56,18 +58,19 @@ constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"soma-two-points", false, "read as a cylinder between them"},
     {"root-marker", false, "read as roots that leave from no soma"},
     {"self-parent", false, "read as roots"},
-    {"missing-parent", false, "read as roots"},
+    {"missing-parent", false, "read as roots", "give them the parents they were traced from"},
     {"child-first", false,
      "the order of rows does not matter; sections that organelles name keep their old numbers"},
     {"joint-missing", false, "the parent's last point is put in front"},
-    {"single-daughter", false, "kept as sections of their own"},
-    {"unknown-place", false, "read as those of the point before"},
-    {"negative-radius", false, "read as those of the point before"},
-    {"type-custom", false, "read as neurites of custom kind, the numbers kept"},
+    {"single-daughter", false, "kept as sections of their own", "nothing, if sections begin there"},
+    {"unknown-place", false, "read as those of the point before", "look them up in the tracing"},
+    {"negative-radius", false, "read as those of the point before", "measure them where thickness matters"},
+    {"type-custom", false, "read as neurites of custom kind, the numbers kept",
+     "nothing, where all who read it know the numbers"},
     {"glia-unsaid", false, "read as glia"},
-    {"perimeters-size", false, "left out"},
-    {"organelles-odd", false, "left out"},
-    {"not-kept", false, "left out"},
+    {"perimeters-size", false, "left out", keep_the_file},
+    {"organelles-odd", false, "left out", keep_the_file},
+    {"not-kept", false, "left out", keep_the_file},
 }};
 
 using Oddities = OddityList<H5Oddity>;
@@ -469,12 +472,13 @@ class CellReader {
         });
       }
     }
-    if (const auto single = std::ranges::find(daughters, 1); single != daughters.end())
-      oddities_.add(H5Oddity::single_daughter, 0, [&] {
-        return fmt::format("{} sections are their parent's only daughter", std::ranges::count(daughters, 1));
-      });
-
     read_own(sections);
+    std::vector<std::int64_t> only;
+    for (std::size_t i = 0; i < count; ++i)
+      if (parents[i] >= 0 && daughters[std::size_t(parents[i])] == 1) only.push_back(std::int64_t(i));
+    if (!only.empty() && only != own_nodes_)
+      oddities_.add(H5Oddity::single_daughter, 0,
+                    [&] { return fmt::format("{} sections are their parent's only daughter", only.size()); });
     builder_.set_soma(std::move(soma_));
     if (!perimeters_.empty())
       perimeters_.erase(perimeters_.begin(), perimeters_.begin() + std::ptrdiff_t(base));
@@ -578,6 +582,7 @@ class CellReader {
       for (const std::int64_t start : integers("contour_starts"))
         soma_.contour_starts.push_back(std::uint32_t(start));
     }
+    own_nodes_ = integers("single_daughters");
     if (own.has("root_soma_points")) {
       const auto places = integers("root_soma_points");
       std::size_t next = 0;
@@ -741,6 +746,7 @@ class CellReader {
   bool has_soma_ = false;
   Soma soma_;
   std::vector<Spine> spines_;
+  std::vector<std::int64_t> own_nodes_;  // sections that are only daughters and meant to be
   Annotations own_annotations_;
 };
 
@@ -859,7 +865,7 @@ class Writer {
     const Soma& soma = m_.soma();
     const bool has_soma = soma.kind != SomaKind::none;
     std::vector<float> numbers;
-    std::vector<std::int32_t> rows, types, places;
+    std::vector<std::int32_t> rows, types, places, nodes;
     if (has_soma) {
       add_points(numbers, soma.kind == SomaKind::contours ? soma.points : circle(soma.sphere()));
       rows = {0, std::int32_t(soma_type), -1};
@@ -876,6 +882,7 @@ class Writer {
       rows.push_back(first_point_ + std::int32_t(s.first_point));
       rows.push_back(known ? type : std::int32_t(SectionKind::custom));
       rows.push_back(s.parent.valid() ? std::int32_t(s.parent.value()) + has_soma : has_soma ? 0 : -1);
+      if (s.parent.valid() && m_.children(s.parent).size() == 1) nodes.push_back(std::int32_t(i));
       if (s.parent.valid()) continue;
       places.push_back(s.soma_point);
       usual = usual && s.soma_point == (has_soma ? 0 : -1);
@@ -885,6 +892,7 @@ class Writer {
     file_.write(path("structure"), rows, 3);
     if (!plain) file_.write(own("types"), types);
     if (!usual) file_.write(own("root_soma_points"), places);
+    if (!nodes.empty()) file_.write(own("single_daughters"), nodes);
     if (soma.kind == SomaKind::sphere || soma.kind == SomaKind::cylinders) {
       std::vector<float> exact;
       add_points(exact, soma.points);

@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
@@ -41,6 +42,41 @@ bool joins(const Morphology& m, SectionId daughter, const Keeps& keeps) {
 constexpr double shortest = .99e-6;  // µm; the float next to 1e-6 is below it
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }
+
+Soma kept_soma(const Soma& soma, const Keeps& keeps) {
+  const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
+                       (soma.kind == SomaKind::contours && !keeps.contours);
+  if (!simpler) return soma;
+  return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
+}
+
+// Whether an annotation comes back as it is where others become comment lines.
+bool keeps_key(const std::pair<std::string, std::string>& annotation, const Keeps& keeps) {
+  const auto& [key, value] = annotation;
+  if (keeps.keys || std::ranges::find(keeps.own_keys, key) != keeps.own_keys.end()) return true;
+  return swc_comment(key + " x").first == key && !key.starts_with("FOREST_") &&
+         value.find_first_of("\r\n") == value.npos;
+}
+
+// As it is, or a comment for each line of it.
+void annotate(MorphologyBuilder& builder, const std::pair<std::string, std::string>& annotation,
+              const Keeps& keeps) {
+  const auto& [key, value] = annotation;
+  if (keeps_key(annotation, keeps)) return builder.annotate(key, value);
+  const std::string text = key == "comment" ? value : key + ' ' + value;
+  for (std::size_t begin = 0; begin <= text.size();) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
+    builder.annotate("comment", text.substr(begin, end - begin));
+    begin = end + 1;
+  }
+}
+
+// An outline drawn without thickness counts only where it is written as one.
+std::size_t points_without_radius(const Morphology& m, const Keeps& keeps) {
+  const auto flat = [](const Point& p) { return p.radius == 0.f; };
+  const Soma soma = kept_soma(m.soma(), keeps);
+  return std::size_t(std::ranges::count_if(m.points(), flat) + std::ranges::count_if(soma.points, flat));
+}
 
 // A row for each thing that can be lost.
 struct Loss {
@@ -88,6 +124,13 @@ constexpr Loss loss_table[] = {
        });
      },
      "{} neurites that leave from no soma are joined to it"},
+    {&Keeps::soma_points, "attachments-lost",
+     [](const Morphology& m, const Keeps&) {
+       return count_sections(m, [](const Morphology& n, SectionId s) {
+         return !n.section(s).parent.valid() && n.section(s).soma_point >= 0;
+       });
+     },
+     "that {} neurites leave from the soma is left out"},
     {&Keeps::joints, "joint-radii-lost",
      [](const Morphology& m, const Keeps&) {
        return count_sections(m, [](const Morphology& n, SectionId s) {
@@ -125,11 +168,7 @@ constexpr Loss loss_table[] = {
      },
      "{} sections without length are given one of about 1e-6 µm, since a simulator divides by it"},
     {&Keeps::zero_radii, "zero-radii",
-     [](const Morphology& m, const Keeps&) {
-       const auto zero = [](const Point& p) { return p.radius == 0.f; };
-       return std::size_t(std::ranges::count_if(m.points(), zero) +
-                          std::ranges::count_if(m.soma().points, zero));
-     },
+     [](const Morphology& m, const Keeps& keeps) { return points_without_radius(m, keeps); },
      "{} points have no diameter; they are written so, but a simulator needs one to compute"},
     {&Keeps::spines, "spines-lost", [](const Morphology& m, const Keeps&) { return m.spines().size(); },
      "{} spines are left out"},
@@ -142,19 +181,18 @@ constexpr Loss loss_table[] = {
      "the heads and shapes of {} spines are left out, where they sit is kept"},
     {&Keeps::annotations, "annotations-lost",
      [](const Morphology& m, const Keeps&) { return m.annotations().size(); }, "{} annotations are left out"},
+    {&Keeps::keys, "keys-lost",
+     [](const Morphology& m, const Keeps& keeps) {
+       return std::size_t(
+           std::ranges::count_if(m.annotations(), [&](const auto& a) { return !keeps_key(a, keeps); }));
+     },
+     "{} annotations become comments, for the format has no place for their keys or for several lines"},
 };
 
 bool has_length(std::span<const Point> points) {
   double length = 0.;
   for (std::size_t k = 1; k < points.size(); ++k) length += segment_length(points[k - 1], points[k]);
   return length >= shortest;
-}
-
-Soma kept_soma(const Soma& soma, const Keeps& keeps) {
-  const bool simpler = (soma.kind == SomaKind::cylinders && !keeps.cylinders) ||
-                       (soma.kind == SomaKind::contours && !keeps.contours);
-  if (!simpler) return soma;
-  return {.kind = SomaKind::sphere, .points = {soma.sphere()}, .parents = {}, .contour_starts = {}};
 }
 
 std::vector<SectionId> depth_first(const Morphology& m) {
@@ -190,9 +228,7 @@ std::vector<Warning> losses(const Morphology& m, const Keeps& keeps) {
       if (const std::size_t count = loss.count(m, keeps))
         warnings.push_back({0, loss.code, fmt::format(fmt::runtime(loss.sentence), count)});
   if (keeps.least_diameter > 0.f) {
-    const auto flat = [](const Point& p) { return p.radius == 0.f; };
-    const auto count = std::ranges::count_if(m.points(), flat) + std::ranges::count_if(m.soma().points, flat);
-    if (count)
+    if (const auto count = points_without_radius(m, keeps))
       warnings.push_back({0, "diameters-lifted",
                           fmt::format("{} diameters of 0 become {} µm", count, keeps.least_diameter)});
   }
@@ -284,6 +320,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
     const std::int32_t tag = kept_tag(s, keeps);
     std::int32_t soma_point = parent.valid() ? -1 : s.soma_point;
     if (!keeps.loose_roots && !parent.valid() && has_soma) soma_point = std::max(soma_point, 0);
+    if (!keeps.soma_points) soma_point = -1;
     builder.add_section(parent, kind, points, tag, soma_point);
   }
   if (keeps.spines)
@@ -296,7 +333,7 @@ Morphology as_kept(const Morphology& m, const Keeps& keeps) {
       builder.add_spine(spine);
     }
   if (keeps.annotations)
-    for (const auto& [key, value] : m.annotations()) builder.annotate(key, value);
+    for (const auto& annotation : m.annotations()) annotate(builder, annotation, keeps);
   return builder.build();
 }
 

@@ -6,6 +6,7 @@
 #include <cstddef>
 #include <cstdint>
 #include <limits>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -29,6 +30,7 @@ struct Keeps {
   bool cylinders = true;         // a soma of several points; else a sphere of its mean size
   bool contours = true;          // a soma of outlines; else a sphere of their mean radius
   bool loose_roots = true;       // neurites that leave from no soma
+  bool soma_points = true;       // which soma point a neurite leaves from
   bool joints = true;            // a daughter's own radius at the branch point
   bool single_daughters = true;  // a node with one daughter; else the two are one section
   bool stumps = true;            // a root of a single point
@@ -39,6 +41,9 @@ struct Keeps {
   bool spines = true;
   bool spine_sizes = true;  // heads, necks and shapes of spines; else only where they sit
   bool annotations = true;
+  bool keys =
+      true;  // of annotations; else only the header keys of SWC and own_keys, and all others are comments
+  std::span<const std::string_view> own_keys = {};
   float least_diameter = 0.f;  // a diameter of 0 becomes this, µm, where a format refuses it
   bool order = true;           // the order of sections; else depth first: a branch, then all that hangs on it
   float step = 0.f;            // coordinates and diameters are rounded to this, µm; 0: not at all

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/keeps.h"
 
+#include <array>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -79,6 +81,57 @@ TEST(Keeps, JoinedSectionsKeepTheirLengthAndTheirSpines) {
   EXPECT_FLOAT_EQ(left.spines()[0].position, 14.f);
   ASSERT_EQ(losses(m, keeps).size(), 1u);
   EXPECT_EQ(losses(m, keeps)[0].code, "sections-joined");
+}
+
+TEST(Keeps, WhereNeuritesLeaveFromTheSomaIsToldWhenItIsLost) {
+  MorphologyBuilder b;
+  b.set_soma(zoo_parts::sphere(5));
+  b.add_section({}, SectionKind::basal, zoo_parts::Points{{0, 50, 0, 1}, {0, 60, 0, 1}}, 3, 0);
+  const Morphology m = b.build();
+  const Keeps keeps{.soma_points = false};
+  ASSERT_EQ(losses(m, keeps).size(), 1u);
+  EXPECT_EQ(losses(m, keeps)[0].code, "attachments-lost");
+  const Morphology left = as_kept(m, keeps);
+  EXPECT_EQ(left.section(SectionId(0)).soma_point, -1);
+  EXPECT_TRUE(losses(left, keeps).empty());
+}
+
+TEST(Keeps, AnnotationsWhoseKeysAFormatLacksBecomeCommentsAndAreToldOnce) {
+  constexpr std::array<std::string_view, 1> own{"leaf"};
+  const Keeps keeps{.keys = false, .own_keys = own};
+  MorphologyBuilder b;
+  const Annotations kept{
+      {"leaf", "Incomplete 1 2 3"}, {"CREATURE", "rat"}, {"SOMA_AREA", "7"}, {"comment", "x"}};
+  for (const auto& [key, value] : kept) b.annotate(key, value);
+  EXPECT_TRUE(losses(b.build(), keeps).empty());
+  for (const auto& [key, value] : kept) b.annotate(key, value);
+  b.annotate("reference_doi", "10.1/a");
+  b.annotate("notes", "of two\nlines");
+  b.annotate("CREATURE X", "a key of two words");
+  b.annotate("FOREST_NODE", "2");
+  const Morphology m = b.build();
+  const std::vector<Warning> told = losses(m, keeps);
+  ASSERT_EQ(told.size(), 1u);
+  EXPECT_EQ(told[0].code, "keys-lost");
+  EXPECT_TRUE(told[0].sentence.starts_with("4 annotations become comments")) << told[0].sentence;
+  Annotations left = kept;
+  for (const char* const line :
+       {"reference_doi 10.1/a", "notes of two", "lines", "CREATURE X a key of two words", "FOREST_NODE 2"})
+    left.emplace_back("comment", line);
+  EXPECT_EQ(as_kept(m, keeps).annotations(), left);
+  EXPECT_TRUE(losses(as_kept(m, keeps), keeps).empty());
+}
+
+TEST(Keeps, AnOutlineThatBecomesASphereHasNoPointsWithoutRadius) {
+  MorphologyBuilder b;
+  b.set_soma({.kind = SomaKind::contours,
+              .points = {{5, 0, 0, 0}, {0, 5, 0, 0}, {-5, 0, 0, 0}},
+              .parents = {},
+              .contour_starts = {0}});
+  const Morphology m = b.build();
+  ASSERT_EQ(losses(m, {.contours = false, .zero_radii = false}).size(), 1u);
+  EXPECT_EQ(losses(m, {.contours = false, .least_diameter = 1e-6f})[0].code, "soma-simplified");
+  EXPECT_EQ(losses(m, {.zero_radii = false})[0].code, "zero-radii");
 }
 
 TEST(Keeps, CoordinatesAreRoundedToTheStep) {

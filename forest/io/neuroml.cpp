@@ -18,6 +18,7 @@
 #include "forest/io/keeps.h"
 #include "forest/io/oddity.h"
 #include "forest/io/plain_text.h"
+#include "forest/io/soma_place.h"
 #include "forest/io/swc_rows.h"
 
 namespace forest::io {
@@ -46,24 +47,30 @@ enum class NeuromlOddity : std::uint8_t {
   count
 };
 
+constexpr std::string_view keep_the_file = "keep the file beside what is made of it";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(NeuromlOddity::count)> table{{
     {"several-cells", false, "only the first is read here; import the file to have all"},
     {"several-documents", false, "the first one is read", "split the file"},
-    {"morphology-elsewhere", true, "left out; read that file for its shape"},
-    {"include", false, "included files are not opened; name them as well"},
-    {"not-kept", false, "left out: shapes are read, not what they do"},
-    {"groups-not-kept", false, "used as far as they say kinds and sections, else left out"},
-    {"duplicate-id", true, "children hang on the first segment of that number"},
-    {"missing-parent", true, "read as a root"},
+    {"morphology-elsewhere", true, "left out; read that file for its shape", "give the file that holds it"},
+    {"include", false, "included files are not opened; name them as well",
+     "give the included files as well, where they hold cells"},
+    {"not-kept", false, "left out: shapes are read, not what they do", keep_the_file},
+    {"groups-not-kept", false, "used as far as they say kinds and sections, else left out", keep_the_file},
+    {"duplicate-id", true, "children hang on the first segment of that number",
+     "give each segment a number of its own"},
+    {"missing-parent", true, "read as a root", "give it the parent it was traced from"},
     {"child-first", false, "the order of segments does not matter"},
-    {"several-roots", true, "kept as a tree of its own, attached to no soma point"},
-    {"missing-proximal", true, "read as a neurite that begins with a single point"},
-    {"unknown-number", true, "read as that of the point before"},
-    {"diameter", true, "read as that of the point before"},
+    {"several-roots", true, "kept as a tree of its own, attached to no soma point",
+     "give it a parent if it belongs to the cell"},
+    {"missing-proximal", true, "read as a neurite that begins with a single point",
+     "give it a proximal point or a parent"},
+    {"unknown-number", true, "read as that of the point before", "look it up in the tracing"},
+    {"diameter", true, "read as that of the point before", "measure it where thickness matters"},
     {"zero-diameter", true, "kept as 0", "give the measured one"},
     {"fraction", true, "read as the nearest of 0 and 1"},
     {"gap", true, "the point it hangs on is put in front"},
-    {"several-somata", true, "joined to the first point of the soma"},
+    {"several-somata", true, "joined to the first point of the soma", "split the cell if it is several"},
     {"soma-inside-neurite", true, "read as a neurite of undefined kind"},
     {"group", true, "the reference is skipped"},
 }};
@@ -790,12 +797,15 @@ class Assembler {
   std::vector<Run> runs_;
 };
 
+void read_notes(const xml_node& owner, MorphologyBuilder& builder) {
+  for (const xml_node& node : owner.children())
+    if (local(node) == "notes")
+      if (const std::string_view text = trimmed(node.text().get()); !text.empty())
+        builder.annotate("notes", std::string(text));
+}
+
 void read_properties(const xml_node& owner, MorphologyBuilder& builder, std::vector<Spine>& spines) {
   for (const xml_node& node : owner.children()) {
-    if (local(node) == "notes") {
-      const std::string_view text = trimmed(node.text().get());
-      if (!text.empty()) builder.annotate("notes", std::string(text));
-    }
     if (local(node) != "property") continue;
     const std::string_view tag = attribute(node, "tag"), value = attribute(node, "value");
     if (tag == marker_tag) continue;
@@ -842,8 +852,10 @@ ReadResult read_cell(const Document& document, const Place& place, Oddities& odd
     MorphologyBuilder builder;
     std::vector<Spine> spines;
     const bool ours = has_marker(place.cell);
+    read_notes(document.root(), builder);  // what is said of the file is said of each of its cells
     for (const xml_node& owner : {place.cell, place.morphology})
       if (owner) {
+        read_notes(owner, builder);
         read_properties(owner, builder, spines);
         for (const xml_node& node : owner.children()) {
           const std::string_view kind = local(node);
@@ -897,8 +909,7 @@ std::vector<Place> find_cells(const Document& document, Oddities& oddities) {
     } else if (kind == "include") {
       oddities.add(NeuromlOddity::include, document.line(node),
                    [&] { return fmt::format("{} is included", attribute(node, "href").substr(0, 80)); });
-    } else if (node.type() == pugi::node_element && kind != "morphology" && kind != "notes" &&
-               kind != "annotation") {
+    } else if (node.type() == pugi::node_element && kind != "morphology" && kind != "notes") {
       oddities.add(NeuromlOddity::not_kept, document.line(node),
                    [&] { return fmt::format("there is <{}>", kind.substr(0, 40)); });
     }
@@ -944,7 +955,7 @@ std::string escaped(std::string_view text) {
 
 class Writer {
  public:
-  explicit Writer(const Morphology& m) : m_(m) {}
+  explicit Writer(const Morphology& m) : m_(m), soma_place_(m) {}
 
   std::string write() {
     text_ = R"(<?xml version="1.0" encoding="UTF-8"?>
@@ -1053,8 +1064,8 @@ class Writer {
     Joint joint;
     if (s.parent.valid())
       joint = {last_[s.parent.value()], false};
-    else if (s.soma_point >= 0 && !joints_.empty())
-      joint = joints_[std::min(std::size_t(s.soma_point), joints_.size() - 1)];
+    else if (const std::int32_t place = soma_place_(SectionId(i)); place >= 0)
+      joint = joints_[std::size_t(place)];
     first_.push_back(count_);
     if (points.size() == 1) {
       // A lone point; on the soma it is told from a segment of no length by its name.
@@ -1114,6 +1125,7 @@ class Writer {
   }
 
   const Morphology& m_;
+  SomaPlaces soma_place_;
   std::string text_;
   std::int64_t count_ = 0, soma_segments_ = 0;
   std::vector<Joint> joints_;               // of soma points

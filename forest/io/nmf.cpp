@@ -172,8 +172,10 @@ class Reader {
       if (next.type() == pugi::node_element)
         oddities_.add(NmfOddity::several_documents, line_of(next), "another document follows the first");
     about_the_file(root);
+    bool outlines = false;  // of layers, or markers
     for (const pugi::xml_node element : root.children()) {
       const std::string_view what = name_of(element);
+      outlines = outlines || what == "contour" || what == "marker";
       if (what == "tree")
         tree(element);
       else if (what == "contour")
@@ -183,8 +185,11 @@ class Reader {
       else
         skip(element);
     }
-    if (sections_.size() == 0 && soma_.points.empty())
-      throw InputError(name_, 0, "holds neither a tree nor a soma");
+    if (sections_.size() == 0 && soma_.points.empty()) {
+      const char* const sentence = "holds neither a tree nor a soma; a tree is <tree> with <point>s";
+      if (outlines) throw NotANeuron(name_, 0, sentence);
+      throw InputError(name_, 0, sentence);
+    }
     set_soma();
     sections_.add_spines();
     return {builder_.build(), oddities_.take()};

@@ -13,6 +13,7 @@
 //     ("eutectic", "FS x y z"), ("outline" or "dots", "x y z d; …").
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -31,9 +32,13 @@ ReadResult read_nts(std::string_view bytes, const std::string& name);
 /// Throws LimitError when a place, a diameter or the number of points does not fit into its column.
 std::string write_nts(const Morphology& morphology);
 
+inline constexpr std::array<std::string_view, 4> nts_keys{"Text", "eutectic", "outline", "dots"};
 inline constexpr Keeps nts_keeps{.cylinders = false,
+                                 .soma_points = false,
                                  .single_daughters = false,
                                  .spine_sizes = false,
+                                 .keys = false,
+                                 .own_keys = nts_keys,
                                  .order = false,
                                  .step = .1f,
                                  .largest_tag = 9999,

@@ -28,6 +28,8 @@ PlainText plain_text(std::string_view bytes, const std::string& name) {
 std::string first_element(std::string_view file) {
   std::string bytes(file.substr(0, 1 << 16));
   std::erase(bytes, '\0');
+  const std::size_t before = bytes.find_first_not_of(" \t\r\n\xef\xbb\xbf\xff\xfe");
+  if (before == bytes.npos || bytes[before] != '<') return {};  // a log that quotes one
   for (std::size_t at = bytes.find('<'); at != bytes.npos; at = bytes.find('<', at)) {
     const std::string_view rest = std::string_view(bytes).substr(at);
     if (rest.starts_with("<!--")) {

@@ -13,6 +13,7 @@
 //   - Comment lines are kept as annotations: `# KEY value`, or ("comment", text).
 #pragma once
 
+#include <array>
 #include <span>
 #include <string>
 #include <string_view>
@@ -32,6 +33,9 @@ ReadResult read_swc(std::string_view bytes, const std::string& name);
 /// same type, spines) is kept in comment lines that begin with FOREST_, which read_swc understands and others
 /// skip.
 std::string write_swc(const Morphology& morphology);
+
+inline constexpr std::array<std::string_view, 1> swc_keys{"synapse"};
+inline constexpr Keeps swc_keeps{.keys = false, .own_keys = swc_keys};
 
 /// Every deviation that is read, in the order of enum SwcOddity (swc_rows.h).
 std::span<const Oddity> swc_oddities();

@@ -55,6 +55,9 @@ class Insert {
     return *this;
   }
 
+  const std::string& table() const { return table_; }
+  const std::vector<InsertColumn>& columns() const { return columns_; }
+
   /// Stores `count` rows, which every vector must have; returns how many were not there already, by some unique column.
   std::size_t run(std::size_t count = 1);
 

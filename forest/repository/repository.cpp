@@ -5,6 +5,7 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <cmath>
 #include <numeric>
 #include <span>
 #include <unordered_map>
@@ -16,6 +17,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
+#include "forest/core/parallel.h"
 #include "forest/repository/database.h"
 #include "forest/repository/insert.h"
 #include "forest/repository/names.h"
@@ -122,27 +124,136 @@ class Statements {
 
   /// False when the population has the name or the fingerprint by now, from another program.
   bool run(const Morphology& m) {
+    fill(m);
+    if (!neuron_.run()) return false;
+    provenance_.run();
+    soma_.run();
+    run_shape();
+    run(spines_, rows.spines.size());
+    run(annotations_, rows.annotations.size());
+    return true;
+  }
+
+  /// What the tables hold otherwise than this neuron, of all that follows from its points: "length of sections is 1 in row 2,
+  /// not 14.5", and how much more there is. Empty when nothing is.
+  std::string deviation(Database& database, const Morphology& m) {
+    fill(m), fill_shape();
+    number(std::max(rows.arbors.size(), rows.spines.size()));
+    struct Part {
+      const Insert& insert;
+      std::size_t rows;
+      std::string from;
+      std::string_view columns = {};  // all when empty, the others are no numbers of the shape
+    };
+    const auto of = [&](const char* table, const char* order) {
+      return fmt::format("{} where neuron = {}{}", table, id, order);
+    };
+    std::string first;
+    std::size_t more = 0;
+    for (const Part& part :
+         {Part{neuron_, 1, fmt::format("neurons where id = {}", id), " stems sections points spines length "},
+          Part{soma_, 1, of("somata", "")},
+          Part{arbors_, rows.arbors.size(), of("arbors", " order by number")},
+          Part{sections_, rows.sections.size(), of_sections(id) + " order by id"},
+          Part{metrics_, rows.metric.size(), of("neuron_metrics", " order by metric")},
+          Part{spines_, rows.spines.size(), of("spines", " order by number")}}) {
+      std::vector<const InsertColumn*> columns;
+      std::vector<std::string_view> names;
+      for (const InsertColumn& c : part.insert.columns())
+        if (!c.bytes &&
+            (part.columns.empty() || part.columns.find(fmt::format(" {} ", c.name)) != part.columns.npos))
+          columns.push_back(&c), names.emplace_back(c.name);
+      const Answer answer = database.ask(fmt::format("select {} from {}", fmt::join(names, ", "), part.from));
+      if (answer.rows.size() != part.rows) {
+        if (first.empty())
+          first = fmt::format("{} has {} rows, not {}", part.insert.table(), answer.rows.size(), part.rows);
+        ++more;
+        continue;
+      }
+      for (std::size_t row = 0; row < part.rows; ++row)
+        for (std::size_t c = 0; c < columns.size(); ++c) {
+          const Answer::Value &stored = answer.rows[row][c], expected = value_of(*columns[c], row);
+          if (same(stored, expected)) continue;
+          if (first.empty())
+            first = fmt::format("{} of {} is {} in row {}, not {}", names[c], part.insert.table(),
+                                shown(stored), row, shown(expected));
+          ++more;
+        }
+    }
+    return more > 1 ? fmt::format("{}, and {} more values", first, more - 1) : first;
+  }
+
+  /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
+  void run_shape() {
+    fill_shape();
+    if (!data_.empty()) points_.run();
+    run(arbors_, rows.arbors.size());
+    sections_.run(rows.sections.size());
+    metrics_.run(rows.metric.size());
+  }
+
+ private:
+  /// A table with `count` rows of this neuron.
+  void run(Insert& insert, std::size_t count) {
+    number(count);
+    insert.run(count);
+  }
+  void number(std::size_t count) {
+    for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(int(i));
+  }
+
+  static Answer::Value value_of(const InsertColumn& column, std::size_t row) {
+    if (column.is_null && column.is_null(row)) return {};
+    const auto value = []<class T>(const T& v) -> Answer::Value {
+      if constexpr (std::is_integral_v<T>)
+        return std::int64_t(v);
+      else
+        return v;
+    };
+    return std::visit(
+        [&]<class T>(const T* v) {
+          if constexpr (requires { typename T::allocator_type; } && !std::is_same_v<T, std::string>)
+            return value((*v)[row]);
+          else
+            return value(*v);
+        },
+        column.values);
+  }
+  /// Sums of another compiler's order may differ in their last digits.
+  static bool same(const Answer::Value& a, const Answer::Value& b) {
+    const double *x = std::get_if<double>(&a), *y = std::get_if<double>(&b);
+    if (!x || !y) return a == b;
+    return *x == *y || std::abs(*x - *y) <= 1e-9 * std::max({1., std::abs(*x), std::abs(*y)});
+  }
+  static std::string shown(const Answer::Value& value) {
+    return std::visit(
+        []<class T>(const T& v) -> std::string {
+          if constexpr (std::is_same_v<T, std::monostate>)
+            return "nothing";
+          else
+            return fmt::format("{}", v);
+        },
+        value);
+  }
+
+  void fill(const Morphology& m) {
     stems_ = int(m.roots().size());
     section_count_ = int(m.sections().size());
     point_count_ = int(m.points().size());
     spine_count_ = int(m.spines().size());
     length_ = 0.;
     for (const double length : rows.arbors.length) length_ += length;
-    if (!neuron_.run()) return false;
 
     const auto* traced = std::get_if<Traced>(&about.provenance);
     const auto* grown = std::get_if<Grown>(&about.provenance);
     origin_ = traced ? "traced" : "grown";
     if (traced) file_ = escaped(traced->file), hash_ = escaped(traced->hash);
     if (grown) seed_ = std::bit_cast<long long>(grown->seed), index_ = std::bit_cast<long long>(grown->index);
-    provenance_.run();
 
     const Point sphere = m.soma().sphere();
     soma_kind_ = name_of(rows.soma_kind);
     sphere_ = {sphere.x, sphere.y, sphere.z, sphere.radius};
     area_ = m.soma().area();
-    soma_.run();
-    run_shape();
 
     spine_section_.clear(), spine_shape_.clear();
     for (Reals& column : spine_) column.clear();
@@ -153,32 +264,17 @@ class Statements {
       spine_section_.push_back(int(s.section.value()));
       spine_shape_.push_back(int(s.shape));
     }
-    run(spines_, rows.spines.size());
 
     key_.clear(), value_.clear();
     for (const auto& [key, value] : rows.annotations)
       key_.push_back(escaped(key)), value_.push_back(escaped(value));
-    run(annotations_, rows.annotations.size());
-    return true;
   }
 
-  /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
-  void run_shape() {
+  void fill_shape() {
     packing_ = packed_points.empty() ? 0 : 1;
     data_ = packing_ ? packed_points : rows.points;
-    if (!data_.empty()) points_.run();
-    run(arbors_, rows.arbors.size());
     section_ids_.resize(rows.sections.size());
     std::iota(section_ids_.begin(), section_ids_.end(), first_section(id));
-    sections_.run(rows.sections.size());
-    metrics_.run(rows.metric.size());
-  }
-
- private:
-  /// A table with `count` rows of this neuron.
-  void run(Insert& insert, std::size_t count) {
-    for (std::size_t i = numbers_.size(); i < count; ++i) numbers_.push_back(int(i));
-    insert.run(count);
   }
 
   int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0, packing_ = 0;
@@ -354,6 +450,8 @@ struct Repository::Impl {
                               int id) const;
   /// The rows of one neuron; `points` and `from` tell where its sections stand, which differs between versions.
   Rows stored(NeuronId id, const char* points, const std::string& from) const;
+  /// What is wrong with these neurons, at most a sentence each.
+  std::vector<std::string> findings(const Repository& repository, std::span<const NeuronRow> neurons) const;
 };
 
 Repository::Repository(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -864,6 +962,40 @@ void Repository::revise(std::span<const Revision> revisions) {
   });
 }
 
+std::vector<std::string> Repository::Impl::findings(const Repository& repository,
+                                                    std::span<const NeuronRow> neurons) const {
+  std::vector<std::string> findings(neurons.size());
+  std::vector<std::optional<Morphology>> whole(neurons.size());
+  for (std::size_t i = 0; i < neurons.size(); ++i) try {
+      whole[i] = repository.morphology(neurons[i].id);
+    } catch (const Error& error) {
+      findings[i] = error.what();
+    }
+  std::vector<Rows> expected(neurons.size());
+  parallel_for(neurons.size(), 1, [&](std::size_t i) {
+    if (whole[i]) expected[i] = rows_of(*whole[i]);
+  });
+  const auto known = read([&] { return ask<int>("select count(*) from metrics").value_or(0); });
+  Statements statements(*database);
+  for (std::size_t i = 0; i < neurons.size(); ++i) {
+    if (!whole[i]) continue;
+    Rows& rows = statements.rows = std::move(expected[i]);
+    for (; !rows.metric.empty() && rows.metric.back() > known;
+         rows.metric.pop_back())  // this program knows more
+      rows.metric_value.pop_back();
+    statements.id = number_of(neurons[i].id);
+    if (const std::string why = read([&] { return statements.deviation(*database, *whole[i]); });
+        !why.empty())
+      findings[i] = fmt::format(
+          "{}: neuron {} (id {}) is not what its points say ({}); take it out with 'brainforest remove' and "
+          "import or "
+          "grow it again",
+          place, shown(neurons[i].name), statements.id, why);
+  }
+  std::erase(findings, "");
+  return findings;
+}
+
 std::vector<std::string> Repository::check(Progress& progress) const {
   std::vector<std::string> findings;
   try {
@@ -873,13 +1005,11 @@ std::vector<std::string> Repository::check(Progress& progress) const {
     });
     const auto rows = neurons();
     progress.begin("checking", rows.size());
-    for (const NeuronRow& row : rows) {
-      try {
-        morphology(row.id);
-      } catch (const Error& error) {
-        findings.emplace_back(error.what());
-      }
-      progress.advance();
+    constexpr std::size_t together = 64;  // on all cores
+    for (std::size_t first = 0; first < rows.size(); first += together) {
+      const auto some = std::span(rows).subspan(first, std::min(together, rows.size() - first));
+      for (std::string& finding : impl_->findings(*this, some)) findings.push_back(std::move(finding));
+      progress.advance(some.size());
     }
     progress.end();
   } catch (const Error& error) {

@@ -175,8 +175,9 @@ class Repository {
   /// From then on this object can only read. Throws Error that says what is not understood.
   Answer query(const std::string& question);
 
-  /// Looks at every byte that matters: the database's own structure and the checksum of every neuron. Returns
-  /// one sentence for each thing found; empty when all is well.
+  /// Looks at every byte that matters: the database's own structure, the checksum of every neuron, and the numbers that
+  /// follow from it (of its sections, arbors, metrics …), on all cores. Returns one sentence for each thing found; empty
+  /// when all is well.
   std::vector<std::string> check(Progress& progress = Progress::none()) const;
 
  private:

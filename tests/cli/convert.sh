@@ -48,4 +48,52 @@ cmp odd.swc kept.swc || fail "checking changed the file"
 /usr/bin/python3 -c 'import json; f = json.load(open("again.json"))["files"][0]["findings"]; assert not [x for x in f if "--repair" in x["mend"]], f'
 "$program" grow --grammar motoneuron --count 1 --seed 3 --repo r.db >/dev/null
 [[ $("$program" check --repo r.db) == *"all is well"* ]] || fail "a sound repository is not said to be one"
+
+# What a format cannot hold is told by export as well.
+"$program" export --repo r.db --format nts --out nts >/dev/null 2>lost.txt
+grep -q '^nts/.*\.nts: rounded: ' lost.txt || fail "export says nothing of what is lost"
+refuses "is a folder; convert into it with --format" "$program" convert "cells/$first" cells
+
+# Two files of one stem are mended side by side, and a log that quotes a file is none.
+mkdir twins
+printf '1 1 0 0 0 5 -1\r\n2 3 0 5 0 1 1\r\n3 3 0 9 0 1 2\r\n' >twins/cell.swc
+printf '<mbf version="3.0"><tree type="Axon"><point x="0" y="5" z="0" d="2"/><point x="0" y="9" z="0" d="2"/></tree></mbf>' >twins/cell.xml
+"$program" check twins --repair both >/dev/null
+for made in cell.swc cell.swc.log.json cell.xml.swc cell.xml.swc.log.json; do
+  [[ -s both/$made ]] || fail "there is no both/$made"
+done
+"$program" check both --json 2>/dev/null >both.json
+/usr/bin/python3 -c 'import json; d = json.load(open("both.json")); assert len(d["files"]) == 2 and d["failed"] == 0, d'
+
+# Models are among what a file can be called.
+refuses ".glb, .obj" "$program" convert "cells/$first" cell.foo
+
+# A file of several cells is read and not mended, and says so for itself; its cells are converted one by one.
+printf '\xef\xbb\xbf*start_cell /a\nsoma none 0 0 0 9\nd soma 0 9 0 nan\n*start_cell /b\nsoma none 0 0 0 5\nd soma 0 7 0 1\n' >pair.p
+refuses "1 of 2 files, of several cells, was not mended; convert" "$program" check pair.p odd.swc --repair several
+[[ -s several/odd.swc && ! -e several/pair.p ]] || fail "the other file is not mended"
+"$program" check pair.p --repair several --json >several.json 2>/dev/null || true
+/usr/bin/python3 - <<'PY2'
+import json
+report = json.load(open("several.json"))
+assert (report["failed"], report["odd"], report["not_mended"], report["mended"]) == (0, 1, 1, 0), report
+assert report["files"][0]["not_mended"].startswith("holds 2 cells"), report
+PY2
+"$program" check pair.p >/dev/null || fail "a file of several cells is called a failure without --repair"
+
+# Keys that a format has no place for are told, once.
+printf '<neuroml><cell id="c"><notes>of Doe</notes><property tag="age" value="7"/><morphology id="m"><segment id="0"><proximal x="0" y="0" z="0" diameter="2"/><distal x="0" y="9" z="0" diameter="2"/></segment></morphology></cell></neuroml>' >notes.nml
+for extension in swc asc nts; do
+  "$program" convert notes.nml notes.$extension >/dev/null 2>lost.txt
+  [[ $(grep -c "^notes.$extension: keys-lost: 2 annotations become comments" lost.txt) == 1 ]] || fail "$extension: $(cat lost.txt)"
+  "$program" convert notes.$extension again.nml --force >/dev/null
+  grep -q 'tag="comment" value="age 7"' again.nml || fail "$extension: the annotation is gone"
+done
+"$program" convert notes.nml notes.h5 2>lost.txt >/dev/null
+[[ ! -s lost.txt ]] || fail "HDF5 keeps all keys, but said: $(cat lost.txt)"
+
+# A cell as tracers leave it, whose neurites are on no soma: in every format they hang on the one they begin at.
+printf '("CellBody" (CellBody) (5 0 0 0) (0 5 0 0) (-5 0 0 0) (0 -5 0 0))\n((Dendrite) (0 6 0 2) (0 20 0 1) Normal)\n' >traced.asc
+"$program" convert traced.asc traced.nml >/dev/null 2>&1
+[[ $(grep -c '<parent segment="0"/>' traced.nml) == 1 ]] || fail "the dendrite hangs on no soma in NeuroML"
 echo "convert.sh: all is well"

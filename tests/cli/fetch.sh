@@ -22,6 +22,7 @@ for i in 0 1 2 3 4; do cp grown/motoneuron-3-0000$i.swc cells/plain-$i.swc; done
 for trick in busy ill away gone page nonsense file circle moved short huge flood silent wrong cut changed weak slow liar; do
   cp grown/motoneuron-3-00000.swc cells/$trick-1.swc
 done
+sed -i 40G cells/plain-4.swc  # a blank line among the rows
 mv cells/slow-1.swc slow.swc && for i in 1 2 3; do cat slow.swc; done | awk '{print} NR%3==0 {print "# a line that makes the file longer"}' >comments
 { cat slow.swc; sed 's/^/# /' comments; } >cells/slow-1.swc && cp cells/slow-1.swc cells/slow-2.swc
 
@@ -40,6 +41,13 @@ cmp out/plain-0.swc cells/plain-0.swc
 [ "$(json 'd["record"]["reference_doi"], d["record"]["license"], d["bytes"]' <out/plain-0.json)" = "['10.1000/xyz'] CC BY 4.0 $(stat -c %s cells/plain-0.swc)" ]
 grep -q '"User-Agent": "BrainForest/[0-9.]* (brainforest fetch)"' log.jsonl
 [ "$(ls out | wc -l)" = 4 ]
+
+# What is odd in the files is told by kind, and with --verbose one by one.
+fetch plain-4 plain-0 --out odd >said.txt 2>err.txt
+grep -q '^blank-line  *1  *1  *plain-4:41  *.*brainforest check --repair writes it so' said.txt
+! grep -q blank-line err.txt
+fetch plain-4 --out odd --verbose 2>err.txt >said.txt
+grep -q '^plain-4:41: blank-line: ' err.txt
 
 # What has come is not asked for again, also without a network; a damaged entry of the cache is.
 before=$(requests .)

@@ -14,6 +14,7 @@ printf '1 1 0 0 0 5 -1\n2 3 0 5 0 -1 1\n3 0 0 15 0 1 2\n' >box/odd.swc
 # Files that are no neurons, though they are called so.
 echo '<project><target/></project>' >box/build.xml
 echo '<neuroml id="n"><ionChannel id="k"/></neuroml>' >box/channel.nml
+printf '<mbf version="4.0"><contour name="Pia"><point x="0" y="5" z="0" d="2"/></contour></mbf>' >box/slide.xml
 printf '#!/usr/bin/perl\nprint 1;\n' >box/script.p
 printf '\0\5\26\7 resource' >box/__MACOSX/._a.swc
 /usr/bin/python3 -c 'import h5py; h5py.File("box/data.h5", "w")["x"] = 1' 2>/dev/null || true
@@ -35,6 +36,7 @@ says() { grep -qF -- "$1" report.txt said.txt || { cat report.txt said.txt; fail
 says "box/build.xml:1: is not NeuroML: its first element is <project>, not <neuroml>; skipped"
 says "holds no cell with a morphology; give a file that does; skipped"
 says "box/script.p:1: "
+says "box/slide.xml: holds neither a tree nor a soma"
 says "box/__MACOSX/._a.swc: holds what macOS notes beside a file"
 says "box/empty.swc: is empty; copy or export it again"
 says "box/lost.swc: is a web page"

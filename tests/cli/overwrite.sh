@@ -58,6 +58,19 @@ refuses $BRAINFOREST check wide.swc --repair .
 $BRAINFOREST check wide.swc --repair mended >/dev/null
 $BRAINFOREST check wide.swc --repair mended >/dev/null
 
+# query and measure: the same table again is fine, another one under the name is not.
+ask() { $BRAINFOREST query "$1" --repo cells.db --csv answer.csv "${@:2}" >/dev/null; }
+ask 'select 1 as one'
+ask 'select 1 as one'
+refuses $BRAINFOREST query 'select 2 as two' --repo cells.db --csv answer.csv
+ask 'select 2 as two' --force
+grep -q '^two' answer.csv
+$BRAINFOREST measure wide.swc --csv wide.csv >/dev/null
+$BRAINFOREST measure wide.swc --csv wide.csv >/dev/null
+refuses $BRAINFOREST measure kept --csv wide.csv
+$BRAINFOREST measure kept --csv wide.csv --force >/dev/null
+[ "$(wc -l <wide.csv)" = 3 ]
+
 # Links stay and lead; what is no regular file takes the bytes and stays.
 mkdir linked && touch linked/target && ln -s linked/target link.swc
 $BRAINFOREST convert wide.swc link.swc --force >/dev/null

@@ -36,3 +36,22 @@ PY
 [ ! -e /nowhere ]
 if $BRAINFOREST export --repo r.db --format xlsx --out cells.xlsx 2>err.txt; then exit 1; fi  # an edited workbook is not lost
 grep -q -- --force err.txt
+
+# Any of the CSV files that is there is not lost either, and what has the name of something else is no target.
+refuses() {  # words, arguments
+  local words=$1 got=0
+  shift
+  $BRAINFOREST export --repo r.db "$@" >/dev/null 2>err.txt || got=$?
+  [ "$got" = 1 ] && grep -q -- "$words" err.txt || { echo "status $got, said: $(cat err.txt)"; exit 1; }
+}
+for sheet in summary neurons sections junctions metrics annotations points; do
+  rm -rf edited && mkdir edited && echo mine >edited/$sheet.csv
+  refuses "edited/$sheet.csv is there already.*--force" --format csv --out edited
+  [ "$(cat edited/*)" = mine ]
+done
+$BRAINFOREST export --repo r.db --format csv --out edited --force >/dev/null
+[ "$(ls edited | wc -l)" = 7 ]
+refuses 'a.xls: a workbook.s name ends in .xlsx' --format xlsx --out a.xls
+refuses 'a.csv: csv is one file a sheet' --format csv --out a.csv
+refuses 'a.XLSX: csv is one file a sheet' --format csv --out a.XLSX
+[ ! -e a.xls ] && [ ! -e a.csv ] && [ ! -e a.XLSX ]
