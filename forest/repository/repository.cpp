@@ -50,6 +50,16 @@ void check_name(std::string_view what, std::string_view name) {
                             shown(name), what, max_name));
 }
 
+// What a column of text, or of whole numbers, answered.
+std::string text_of(const Answer::Value& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  return text ? *text : "";
+}
+std::int64_t number_in(const Answer::Value& value) {
+  const auto* number = std::get_if<std::int64_t>(&value);
+  return number ? *number : 0;
+}
+
 /// Two neurons of a population with the same fingerprint came from the same source.
 std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
   if (const auto* grown = std::get_if<Grown>(&provenance))
@@ -210,25 +220,40 @@ struct Repository::Impl {
       : place(at), database(std::move(open)), sql(database->sql()) {}
 
   /// What an earlier version stored, with what this one knows of it besides.
-  static void refill(Database& database) {
+  static void refill(Database& database, int from) {
     Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
-    impl.writing = true;
-    Statements insert(database);
-    std::vector<int> ids(room(std::size_t(impl.ask<int>("select count(*) from neurons").value_or(0))));
-    impl.sql << "select id from neurons order by id", into(ids);
+    if (from < 3) impl.refill_shapes();
+    impl.refill_grammars();
+  }
+
+  /// Before version 3 a section was named by two numbers, before version 2 points were not packed.
+  void refill_shapes() {
+    Statements all(*database);
+    std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from neurons").value_or(0))));
+    sql << "select id from neurons order by id", into(ids);
     for (const int id : ids) {
       const Morphology m =
-          morphology_of(impl.stored(NeuronId(std::size_t(id)), "point_count",
-                                    fmt::format("old_sections where neuron = {} order by number", id)));
+          morphology_of(stored(NeuronId(std::size_t(id)), "point_count",
+                               fmt::format("old_sections where neuron = {} order by number", id)));
       for (const char* table : {"points", "arbors", "neuron_metrics"})
-        impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
-      insert.id = id;
-      insert.rows = rows_of(m);
-      insert.packed_points = packed(m.points());
-      insert.run_shape();
+        sql << fmt::format("delete from {} where neuron = {}", table, id);
+      all.id = id;
+      all.rows = rows_of(m);
+      all.packed_points = packed(m.points());
+      all.run_shape();
     }
-    impl.sql << "drop table old_sections";
-    impl.writing = false;
+    sql << "drop table old_sections";
+  }
+
+  /// Before version 4 the text of a grammar was one line.
+  void refill_grammars() {
+    std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from grammars").value_or(0))));
+    sql << "select id from grammars order by id", into(ids);
+    for (const int id : ids) {
+      const std::string text =
+          escaped_lines(unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
+      sql << "update grammars set text = :text where id = :id", use(text), use(id);
+    }
   }
 
   /// Calls `body`; errors of the database become sentences.
@@ -442,7 +467,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
 std::string Repository::add_grammar(std::string_view name, std::string_view text) {
   check_name("grammar", name);
   return impl_->write([&] {
-    const std::string hash = hash_of(text), kept_name(name), kept_text = escaped(text);
+    const std::string hash = hash_of(text), kept_name(name), kept_text = escaped_lines(text);
     if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {
       const int id = impl_->database->next_id("grammars");
       impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on "
@@ -459,6 +484,64 @@ std::optional<std::string> Repository::grammar(std::string_view hash) const {
                                         std::string(hash));
     return text ? std::optional(unescaped(*text)) : std::nullopt;
   });
+}
+
+std::vector<GrammarRow> Repository::grammars() const {
+  const Answer found = impl_->read([&] {
+    return impl_->database->ask("select name, hash, text, version, neurons from grammar order by name, version");
+  });
+  std::vector<GrammarRow> grammars;
+  for (const auto& row : found.rows)
+    grammars.push_back({.name = text_of(row[0]),
+                        .hash = text_of(row[1]),
+                        .text = unescaped(text_of(row[2])),
+                        .version = int(number_in(row[3])),
+                        .neurons = std::size_t(number_in(row[4]))});
+  return grammars;
+}
+
+int Repository::add_distribution(std::string_view name, std::string_view population, std::string_view text) {
+  check_name("distribution", name);
+  if (!population.empty()) check_name("population", population);
+  return impl_->write([&] {
+    const std::string kept_name(name), kept_text = escaped_lines(text);
+    const int of = population.empty() ? 0 : impl_->population(std::string(population));
+    const std::string same = "from distributions where name = :name and coalesce(population, 0) = :population";
+    for (;;) {
+      const int newest = impl_->ask<int>("select max(version) " + same, kept_name, of).value_or(0);
+      if (newest && impl_->ask<std::string>("select text " + same + " and version = :version", kept_name, of,
+                                            newest) == kept_text)
+        return newest;
+      const int id = impl_->database->next_id("distributions"), next = newest + 1;
+      impl_->sql << "insert into distributions (id, population, name, version, text) values "
+                    "(:id, nullif(:population, 0), :name, :version, :text) on conflict do nothing",
+          use(id), use(of), use(kept_name), use(next), use(kept_text);
+      if (impl_->ask<int>("select id from distributions where id = :id", id)) return next;
+    }  // else another program was quicker, and this is the version after its
+  });
+}
+
+std::vector<DistributionRow> Repository::distributions() const {
+  const Answer found = impl_->read([&] {
+    return impl_->database->ask(
+        "select name, coalesce(population, ''), text, version from distribution order by 2, 1, 4");
+  });
+  std::vector<DistributionRow> distributions;
+  for (const auto& row : found.rows)
+    distributions.push_back({.name = text_of(row[0]),
+                             .population = text_of(row[1]),
+                             .text = unescaped(text_of(row[2])),
+                             .version = int(number_in(row[3]))});
+  return distributions;
+}
+
+std::optional<DistributionRow> Repository::distribution(std::string_view name, std::string_view population,
+                                                        int version) const {
+  std::optional<DistributionRow> found;
+  for (DistributionRow& row : distributions())
+    if (row.name == name && row.population == population && (!version || row.version == version))
+      found = std::move(row);  // the newest comes last
+  return found;
 }
 
 Repository::Transaction Repository::begin() {
@@ -789,9 +872,8 @@ std::vector<std::string> Repository::versions(std::span<const NeuronId> ids) con
   for (const auto& row : found.rows) {
     std::string all;
     for (const Answer::Value& value : row) {
-      const auto* text = std::get_if<std::string>(&value);
-      const auto* number = std::get_if<std::int64_t>(&value);
-      const std::string field = text ? *text : fmt::format("{}", number ? *number : 0);
+      const std::string field =
+          std::holds_alternative<std::string>(value) ? text_of(value) : fmt::format("{}", number_in(value));
       all += fmt::format("{} {}", field.size(), field);  // so that no two rows look alike
     }
     known[std::get<std::int64_t>(row[0])] = "v" + hash_of(all).substr(0, 16);  // no spreadsheet's number
@@ -871,6 +953,11 @@ std::vector<std::string> Repository::check(Progress& progress) const {
       for (const std::string& finding : impl_->database->examine_structure())
         findings.push_back(fmt::format("{}: {}", impl_->place, finding));
     });
+    for (const GrammarRow& grammar : grammars())
+      if (hash_of(grammar.text) != grammar.hash)
+        findings.push_back(
+            fmt::format("{}: the text of grammar {} (version {}) is damaged; restore the repository from a backup",
+                        impl_->place, shown(grammar.name), grammar.version));
     const auto rows = neurons();
     progress.begin("checking", rows.size());
     for (const NeuronRow& row : rows) {

@@ -81,6 +81,20 @@ struct PopulationRow {
   double length = 0.;  // µm
 };
 
+/// A grammar as it was stored. Another text of the same name is its next version.
+struct GrammarRow {
+  std::string name, hash, text;
+  int version = 0;          // of this name, counted from 1 in the order of storing
+  std::size_t neurons = 0;  // grown from it, in this repository
+};
+
+/// What is known of a population, in the notation of grammars: declarations that end on `distribution NAME…`.
+struct DistributionRow {
+  std::string name, population;  // population empty: of none in particular
+  std::string text;
+  int version = 0;  // of this name and population, counted from 1; an earlier one is never changed
+};
+
 /// One tree of a neuron: a root section and everything below it.
 struct ArborRow {
   SectionId root;
@@ -135,6 +149,14 @@ class Repository {
   /// asks for.
   std::string add_grammar(std::string_view name, std::string_view text);
   std::optional<std::string> grammar(std::string_view hash) const;
+  std::vector<GrammarRow> grammars() const;  // by name and version
+
+  /// Keeps the text of a distribution as the next version of its name, unless the newest one has just that text; returns
+  /// the version. The population is made on first use; "": of none in particular. The text is not looked into.
+  int add_distribution(std::string_view name, std::string_view population, std::string_view text);
+  std::vector<DistributionRow> distributions() const;  // by population, name and version
+  /// Version 0: the newest.
+  std::optional<DistributionRow> distribution(std::string_view name, std::string_view population, int version = 0) const;
 
   /// Many calls as one transaction, which is what makes thousands of neurons a second:
   ///   auto transaction = repository.begin(); …add…; transaction.commit();
@@ -175,7 +197,7 @@ class Repository {
   /// From then on this object can only read. Throws Error that says what is not understood.
   Answer query(const std::string& question);
 
-  /// Looks at every byte that matters: the database's own structure and the checksum of every neuron. Returns
+  /// Looks at every byte that matters: the database's own structure, the checksum of every neuron and the hash of every grammar. Returns
   /// one sentence for each thing found; empty when all is well.
   std::vector<std::string> check(Progress& progress = Progress::none()) const;
 

@@ -214,6 +214,18 @@ create view junction as
          s.daughters, s.branch_order, s.end_x as x, s.end_y as y, s.end_z as z, s.end_diameter as diameter
   from neurons n cross join sections s join populations p on p.id = n.population
   where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
+)sql"},
+    // What is known, for people: grammars and distributions by name and version. The program writes the texts of grammars
+    // anew, with their lines. A population of 0 is none.
+    Migration{4, R"sql(
+create unique index distributions_by_name on distributions (coalesce(population, 0), name, version);
+create view grammar as
+  select g.id, g.name, row_number() over (partition by g.name order by g.id) as version, g.hash, g.text,
+         (select count(*) from provenance o where o.grammar = g.id) as neurons
+  from grammars g;
+create view distribution as
+  select d.id, d.name, p.name as population, d.version, d.text
+  from distributions d left join populations p on p.id = d.population;
 )sql"}};
 
 inline constexpr int section_bits = 24;                      // of sections.id
