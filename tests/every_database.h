@@ -69,7 +69,9 @@ class EveryDatabase : public RepositoryTest, public testing::WithParamInterface<
   std::string place_, name_;  // of the database on the server
 };
 
-inline std::string bytes_of(const std::filesystem::path& path) { return std::string(MappedFile(path).text()); }
+inline std::string bytes_of(const std::filesystem::path& path) {
+  return std::string(MappedFile(path).text());
+}
 
 inline std::string message(const std::function<void()>& body) {
   try {

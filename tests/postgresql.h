@@ -20,7 +20,8 @@ class PostgresqlServer {
   }
   /// One that may be halted; it does not run on a machine without PostgreSQL.
   explicit PostgresqlServer(const std::string& name)
-      : folder_(std::filesystem::temp_directory_path() / ("forest-postgresql-" + name + std::to_string(::getpid()))),
+      : folder_(std::filesystem::temp_directory_path() /
+                ("forest-postgresql-" + name + std::to_string(::getpid()))),
         owner_(::getpid()) {
     const auto [said, good] = script("start");
     if (good) port_ = said.substr(0, said.find('\n'));

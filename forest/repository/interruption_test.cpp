@@ -43,9 +43,14 @@ std::size_t killed_after(std::size_t signs, double microseconds,
 /// Rows of every table that belong to no neuron.
 std::int64_t strays(const std::string& place) {
   Repository repository = Repository::open(place, Access::read);
-  std::string sum = "select (select count(*) from sections where not exists (select 1 from neurons n where n.id = sections.id >> 24))";
-  for (const char* table : {"provenance", "somata", "arbors", "points", "spines", "annotations", "neuron_metrics"})
-    sum += fmt::format(" + (select count(*) from {0} where not exists (select 1 from neurons n where n.id = {0}.neuron))", table);
+  std::string sum =
+      "select (select count(*) from sections where not exists (select 1 from neurons n where n.id = "
+      "sections.id >> 24))";
+  for (const char* table :
+       {"provenance", "somata", "arbors", "points", "spines", "annotations", "neuron_metrics"})
+    sum += fmt::format(
+        " + (select count(*) from {0} where not exists (select 1 from neurons n where n.id = {0}.neuron))",
+        table);
   return std::get<std::int64_t>(repository.query(sum).rows.at(0).at(0));
 }
 
@@ -56,8 +61,8 @@ TEST_P(EveryDatabase, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) {
   std::size_t before = 0, interrupted = 0, partly = 0;
   for (int round = 0; round < (is_file() ? 200 : 60); ++round) {
     if (round && round % 8 == 0) renew(), before = 0;
-    const std::size_t said =
-        killed_after(before + random.below(4), random.uniform(0., is_file() ? 4000. : 20'000.), [&](const auto& sign) {
+    const std::size_t said = killed_after(
+        before + random.below(4), random.uniform(0., is_file() ? 4000. : 20'000.), [&](const auto& sign) {
           Repository repository = Repository::open(place_, Access::write);
           for (std::size_t i = 0; i < source.size(); ++i) {
             repository.add(source[i], called(std::to_string(i)));
@@ -95,13 +100,15 @@ TEST_P(EveryDatabase, AKilledBatchIsStoredWholeOrNotAtAll) {
     const std::size_t said = killed_after(random.below(21), random.uniform(0., 2000.), [&](const auto& sign) {
       Repository repository = Repository::open(place_, Access::write);
       auto transaction = repository.begin();
-      repository.add_distribution("ratio", "default", "text");
-      for (std::size_t i = 1; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i))), sign();
+      repository.add_model({.name = "bush", .text = "text", .distributions = {{"ratio", "text"}}});
+      for (std::size_t i = 1; i < source.size(); ++i)
+        repository.add(source[i], called(std::to_string(i))), sign();
       transaction.commit();
       sign();
     });
     const std::size_t now = whole_neurons(place_, source);
     EXPECT_TRUE(now == 1 || now == source.size()) << now;
+    EXPECT_EQ(Repository::open(place_, Access::read).models().size(), now == 1 ? 0u : 1u);
     EXPECT_EQ(Repository::open(place_, Access::read).distributions().size(), now == 1 ? 0u : 1u);
     EXPECT_TRUE(said < source.size() || now == source.size());
     EXPECT_EQ(strays(place_), 0);
@@ -151,22 +158,30 @@ const std::string grammar_text = "axiom: A\nA -> \\(90) F(1) A\n";
 /// What makes the tables those of an older version, in either database.
 std::string as_version(int version) {
   std::string sql =
-      "drop view grammar; drop view distribution; drop index distributions_by_name; "
+      "drop view model; drop view distribution; drop index distributions_by_name; "
+      "drop table model_distributions; drop table models; "
       "update grammars set text = 'axiom: A\\x0AA -> \\\\(90) F(1) A\\x0A'; ";
   if (version == 3) return sql;
   sql +=
       "drop view section; drop view junction; alter table sections rename to later; "
-      "create table sections (neuron integer not null, number integer not null, parent integer, arbor integer not null, "
-      "branch_order integer not null, length double precision not null, kind integer not null, tag integer not null, "
+      "create table sections (neuron integer not null, number integer not null, parent integer, arbor "
+      "integer not null, "
+      "branch_order integer not null, length double precision not null, kind integer not null, tag integer "
+      "not null, "
       "soma_point integer not null, first_point integer not null, point_count integer not null, "
-      "daughters integer not null default 0, area double precision not null default 0, primary key (neuron, number)); "
-      "insert into sections select cast(id >> 24 as integer), cast(id & 16777215 as integer), parent, arbor, branch_order, "
+      "daughters integer not null default 0, area double precision not null default 0, primary key (neuron, "
+      "number)); "
+      "insert into sections select cast(id >> 24 as integer), cast(id & 16777215 as integer), parent, arbor, "
+      "branch_order, "
       "length, kind, tag, soma_point, "
-      "cast(sum(points) over (partition by id >> 24 order by id) - points as integer), points, daughters, area from later; "
+      "cast(sum(points) over (partition by id >> 24 order by id) - points as integer), points, daughters, "
+      "area from later; "
       "drop table later; ";
-  if (version == 2) return sql + "create view section as select 1 as one; create view junction as select 1 as one; ";
+  if (version == 2)
+    return sql + "create view section as select 1 as one; create view junction as select 1 as one; ";
   return sql +
-         "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; drop table distributions; "
+         "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; drop table "
+         "distributions; "
          "alter table points drop column packing; alter table sections drop column daughters; "
          "alter table sections drop column area; ";
 }
@@ -208,7 +223,10 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
       if (is_file()) {
         unfinished += bytes_of(file_) == old_bytes || std::filesystem::exists(file_ + "-journal");
       } else {
-        unfinished += server.run(fmt::format("select 1 / (case version when {} then 1 else 0 end) from brainforest_schema", version), name_);
+        unfinished += server.run(
+            fmt::format("select 1 / (case version when {} then 1 else 0 end) from brainforest_schema",
+                        version),
+            name_);
       }
       EXPECT_EQ(whole_neurons(place_, source), source.size()) << "opening it again ends what was begun";
     }
@@ -223,11 +241,13 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
     EXPECT_EQ(count(is_file() ? "select count(*) from sqlite_master where name like 'old%'"
                               : "select count(*) from pg_class where relname like 'old%'"),
               0);
-    EXPECT_EQ(repository.query("select text from grammar").rows[0][0], Answer::Value(grammar_text));
+    EXPECT_EQ(repository.query("select text from model where name = 'bush' and version = 1").rows[0][0],
+              Answer::Value(grammar_text));
     const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
     EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
     EXPECT_EQ(Repository::open(place_, Access::write).add_distribution("ratio", "default", "text"), 1);
-    EXPECT_EQ(Repository::open(place_, Access::write).add(neuron(99), called("another")).already_there, false);
+    EXPECT_EQ(Repository::open(place_, Access::write).add(neuron(99), called("another")).already_there,
+              false);
   }
   EXPECT_GT(unfinished, 0u) << "none was killed before it was done, so this has tested nothing";
 }
@@ -240,8 +260,9 @@ TEST_P(EveryDatabase, TwoProgramsMayBringAnOlderRepositoryUpToDate) {
     for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
   }
   const std::string script = (folder_ / "older.sql").string();
-  write_file(script, is_file() ? fmt::format("begin;\n{}\npragma user_version = 2;\ncommit;\n", as_version(2))
-                               : fmt::format("{}\nupdate brainforest_schema set version = 2;\n", as_version(2)));
+  write_file(script, is_file()
+                         ? fmt::format("begin;\n{}\npragma user_version = 2;\ncommit;\n", as_version(2))
+                         : fmt::format("{}\nupdate brainforest_schema set version = 2;\n", as_version(2)));
   if (is_file())
     ASSERT_EQ(std::system(fmt::format("sqlite3 -bail '{}' <'{}'", file_, script).c_str()), 0);
   else
@@ -249,7 +270,8 @@ TEST_P(EveryDatabase, TwoProgramsMayBringAnOlderRepositoryUpToDate) {
   std::array<pid_t, 4> children{};
   for (pid_t& child : children)
     child = in_child([&] {
-      if (Repository::open(place_, Access::read).neurons().size() != source.size()) throw Error("neurons are missing");
+      if (Repository::open(place_, Access::read).neurons().size() != source.size())
+        throw Error("neurons are missing");
     });
   for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
   EXPECT_EQ(whole_neurons(place_, source), source.size());
@@ -306,7 +328,8 @@ TEST(Postgresql, AServerThatStopsIsASentenceAndLosesNothing) {
   for (std::size_t i = 0; i < 400; ++i) source.push_back(neuron(i, 100));
   const auto is_sentence = [&](const std::string& said) {
     EXPECT_THAT(said, testing::StartsWith(place + ": "));
-    EXPECT_THAT(said, testing::AnyOf(HasSubstr("the server is shutting down"), HasSubstr("the connection to the server is lost")));
+    EXPECT_THAT(said, testing::AnyOf(HasSubstr("the server is shutting down"),
+                                     HasSubstr("the connection to the server is lost")));
     EXPECT_EQ(std::ranges::count(said, '\n'), 0);
   };
   std::size_t there = 0;
@@ -323,7 +346,8 @@ TEST(Postgresql, AServerThatStopsIsASentenceAndLosesNothing) {
         is_sentence(message([&] { repository.add_distribution("ratio", "default", "text"); }));
         is_sentence(message([&] { repository.remove(NeuronId(1)); }));
       }
-      EXPECT_THAT(message([&] { Repository::open(place, Access::read); }), HasSubstr("the server cannot be reached"));
+      EXPECT_THAT(message([&] { Repository::open(place, Access::read); }),
+                  HasSubstr("the server cannot be reached"));
     }
     ASSERT_TRUE(server.resume());
     EXPECT_EQ(whole_neurons(place, source), there);
@@ -344,13 +368,15 @@ TEST(Postgresql, AServerThatStopsIsASentenceAndLosesNothing) {
       });
       std::size_t stored = there;
       const std::string said = message([&] {
-        for (; stored < source.size(); ++stored) repository.add(source[stored], called(std::to_string(stored)));
+        for (; stored < source.size(); ++stored)
+          repository.add(source[stored], called(std::to_string(stored)));
       });
       halting.join();
       is_sentence(said);
       ASSERT_TRUE(server.resume());
       const std::size_t now = whole_neurons(place, source);
-      EXPECT_TRUE(now == stored || now == stored + 1) << now << " where " << stored << " were said to be stored";
+      EXPECT_TRUE(now == stored || now == stored + 1)
+          << now << " where " << stored << " were said to be stored";
       there = now;
     }
     EXPECT_EQ(strays(place), 0);

@@ -16,8 +16,8 @@ RC_GTEST_PROP(Names, EscapingLosesNothing, (const std::string& bytes)) {
 }
 
 RC_GTEST_PROP(Names, EscapingLinesLosesNothing, ()) {
-  const auto bytes = *rc::gen::container<std::string>(
-      rc::gen::oneOf(rc::gen::arbitrary<char>(), rc::gen::element('\\', 'x', '4', 'A', '\n', '\t', '(', '\xc3', '\xa9')));
+  const auto bytes = *rc::gen::container<std::string>(rc::gen::oneOf(
+      rc::gen::arbitrary<char>(), rc::gen::element('\\', 'x', '4', 'A', '\n', '\t', '(', '\xc3', '\xa9')));
   const std::string text = escaped_lines(bytes);
   RC_ASSERT(unescaped(text) == bytes);
   std::string line = text;

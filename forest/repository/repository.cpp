@@ -5,8 +5,10 @@
 #include <array>
 #include <bit>
 #include <cassert>
+#include <map>
 #include <numeric>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -250,8 +252,8 @@ struct Repository::Impl {
     std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from grammars").value_or(0))));
     sql << "select id from grammars order by id", into(ids);
     for (const int id : ids) {
-      const std::string text =
-          escaped_lines(unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
+      const std::string text = escaped_lines(
+          unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
       sql << "update grammars set text = :text where id = :id", use(text), use(id);
     }
   }
@@ -375,6 +377,13 @@ struct Repository::Impl {
     return number;
   }
 
+  int keep_grammar(const std::string& name, std::string_view text);  // its id
+  /// The id and version of a distribution of a population, by its id or 0.
+  std::pair<int, int> keep_distribution(const std::string& name, int population, std::string_view text);
+  /// The id and version of a new version, or 0 and the newest when that one (with `anew`) or any has this grammar.
+  std::pair<int, int> keep_model(const std::string& name, int grammar, int population,
+                                 const std::string& origin, bool anew);
+
   std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
                               int id) const;
   /// The rows of one neuron; `points` and `from` tell where its sections stand, which differs between versions.
@@ -464,17 +473,122 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
   });
 }
 
+// ── What is known ──
+
+int Repository::Impl::keep_grammar(const std::string& name, std::string_view text) {
+  const std::string hash = hash_of(text),
+                    find = "select id from grammars where hash = :hash and name = :name";
+  if (const auto there = ask<int>(find, hash, name)) return *there;
+  const std::string kept = escaped_lines(text);
+  const int id = database->next_id("grammars");
+  sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on conflict do "
+         "nothing",
+      use(id), use(name), use(hash), use(kept);
+  return *ask<int>(find, hash, name);  // another program may have been quicker
+}
+
+std::pair<int, int> Repository::Impl::keep_distribution(const std::string& name, int population,
+                                                        std::string_view text) {
+  const std::string kept = escaped_lines(text);
+  const std::string same = " from distributions where name = :name and coalesce(population, 0) = :population";
+  for (;;) {
+    const int newest = ask<int>("select max(version)" + same, name, population).value_or(0);
+    const std::string of_newest = same + " and version = :version";
+    if (newest && ask<std::string>("select text" + of_newest, name, population, newest) == kept)
+      return {*ask<int>("select id" + of_newest, name, population, newest), newest};
+    const int id = database->next_id("distributions"), next = newest + 1;
+    sql << "insert into distributions (id, population, name, version, text) values "
+           "(:id, nullif(:population, 0), :name, :version, :text) on conflict do nothing",
+        use(id), use(population), use(name), use(next), use(kept);
+    if (ask<int>("select id from distributions where id = :id", id)) return {id, next};
+  }  // else another program was quicker, and this is the version after its
+}
+
+std::pair<int, int> Repository::Impl::keep_model(const std::string& name, int grammar, int population,
+                                                 const std::string& origin, bool anew) {
+  for (;;) {
+    const int newest = ask<int>("select max(version) from models where name = :name", name).value_or(0);
+    const std::string there = "select coalesce(population, 0) from models where name = :name and ";
+    const int before = ask<int>(there + "version = :version", name, newest).value_or(0);
+    const int of = population ? population : before;
+    const std::string same = there + "grammar = :grammar" + (anew ? " and version = :version" : "");
+    const auto known = anew ? ask<int>(same, name, grammar, newest) : ask<int>(same, name, grammar);
+    if (known && (!anew || *known == of)) return {0, newest};
+    const int id = database->next_id("models"), next = newest + 1;
+    const std::string program = FOREST_VERSION, words = escaped(origin);
+    sql << "insert into models (id, name, version, grammar, population, origin, program) values "
+           "(:id, :name, :version, :grammar, nullif(:population, 0), :origin, :program) on conflict do "
+           "nothing",
+        use(id), use(name), use(next), use(grammar), use(of), use(words), use(program);
+    if (ask<int>("select id from models where id = :id", id)) return {id, next};
+  }  // else another program was quicker
+}
+
+std::pair<int, bool> Repository::add_model(const NewModel& model) {
+  Impl& impl = *impl_;
+  check_name("model", model.name);
+  if (!model.population.empty()) check_name("population", model.population);
+  for (const auto& [name, text] : model.distributions) check_name("distribution", model.name + "." + name);
+  return impl.write([&] {
+    const int population = model.population.empty() ? 0 : impl.population(model.population);
+    const int grammar = impl.keep_grammar(model.name, model.text);
+    const auto [id, version] = impl.keep_model(model.name, grammar, population, model.origin, true);
+    if (!id) return std::pair(version, true);
+    const int of = impl.ask<int>("select population from models where id = :id", id).value_or(0);
+    for (const auto& [name, text] : model.distributions) {
+      const int distribution = impl.keep_distribution(model.name + "." + name, of, text).first;
+      impl.sql << "insert into model_distributions (model, distribution) values (:id, :distribution) on "
+                  "conflict do nothing",
+          use(id), use(distribution);
+    }
+    return std::pair(version, false);
+  });
+}
+
+std::vector<ModelRow> Repository::models() const {
+  const auto [found, parts] = impl_->read([&] {
+    return std::pair(
+        impl_->database->ask("select id, name, version, coalesce(population, ''), origin, program, hash, "
+                             "text, neurons from model"),
+        impl_->database->ask("select m.model, d.name, d.version from model_distributions m join "
+                             "distributions d on d.id = m.distribution"));
+  });
+  std::map<std::int64_t, ModelRow> by_id;
+  for (const auto& row : found.rows)
+    by_id[number_in(row[0])] = {.name = text_of(row[1]),
+                                .population = text_of(row[3]),
+                                .origin = unescaped(text_of(row[4])),
+                                .hash = text_of(row[6]),
+                                .text = unescaped(text_of(row[7])),
+                                .program = text_of(row[5]),
+                                .version = int(number_in(row[2])),
+                                .neurons = std::size_t(number_in(row[8])),
+                                .distributions = {}};
+  for (const auto& row : parts.rows)
+    by_id[number_in(row[0])].distributions.emplace_back(text_of(row[1]), int(number_in(row[2])));
+  std::vector<ModelRow> models;
+  for (auto& [id, model] : by_id) {
+    std::ranges::sort(model.distributions);
+    models.push_back(std::move(model));
+  }
+  std::ranges::sort(models, {}, [](const ModelRow& m) { return std::tie(m.name, m.version); });
+  return models;
+}
+
+std::optional<ModelRow> Repository::model(std::string_view name, int version) const {
+  std::optional<ModelRow> found;
+  for (ModelRow& row : models())
+    if (row.name == name && (!version || row.version == version))
+      found = std::move(row);  // the newest comes last
+  return found;
+}
+
 std::string Repository::add_grammar(std::string_view name, std::string_view text) {
   check_name("grammar", name);
   return impl_->write([&] {
-    const std::string hash = hash_of(text), kept_name(name), kept_text = escaped_lines(text);
-    if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {
-      const int id = impl_->database->next_id("grammars");
-      impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on "
-                    "conflict do nothing",
-          use(id), use(kept_name), use(hash), use(kept_text);
-    }
-    return hash;
+    const std::string model(name);
+    impl_->keep_model(model, impl_->keep_grammar(model, text), 0, "neurons were grown from it", false);
+    return hash_of(text);
   });
 }
 
@@ -486,45 +600,18 @@ std::optional<std::string> Repository::grammar(std::string_view hash) const {
   });
 }
 
-std::vector<GrammarRow> Repository::grammars() const {
-  const Answer found = impl_->read([&] {
-    return impl_->database->ask("select name, hash, text, version, neurons from grammar order by name, version");
-  });
-  std::vector<GrammarRow> grammars;
-  for (const auto& row : found.rows)
-    grammars.push_back({.name = text_of(row[0]),
-                        .hash = text_of(row[1]),
-                        .text = unescaped(text_of(row[2])),
-                        .version = int(number_in(row[3])),
-                        .neurons = std::size_t(number_in(row[4]))});
-  return grammars;
-}
-
 int Repository::add_distribution(std::string_view name, std::string_view population, std::string_view text) {
   check_name("distribution", name);
   if (!population.empty()) check_name("population", population);
   return impl_->write([&] {
-    const std::string kept_name(name), kept_text = escaped_lines(text);
     const int of = population.empty() ? 0 : impl_->population(std::string(population));
-    const std::string same = "from distributions where name = :name and coalesce(population, 0) = :population";
-    for (;;) {
-      const int newest = impl_->ask<int>("select max(version) " + same, kept_name, of).value_or(0);
-      if (newest && impl_->ask<std::string>("select text " + same + " and version = :version", kept_name, of,
-                                            newest) == kept_text)
-        return newest;
-      const int id = impl_->database->next_id("distributions"), next = newest + 1;
-      impl_->sql << "insert into distributions (id, population, name, version, text) values "
-                    "(:id, nullif(:population, 0), :name, :version, :text) on conflict do nothing",
-          use(id), use(of), use(kept_name), use(next), use(kept_text);
-      if (impl_->ask<int>("select id from distributions where id = :id", id)) return next;
-    }  // else another program was quicker, and this is the version after its
+    return impl_->keep_distribution(std::string(name), of, text).second;
   });
 }
 
 std::vector<DistributionRow> Repository::distributions() const {
   const Answer found = impl_->read([&] {
-    return impl_->database->ask(
-        "select name, coalesce(population, ''), text, version from distribution order by 2, 1, 4");
+    return impl_->database->ask("select name, coalesce(population, ''), text, version from distribution");
   });
   std::vector<DistributionRow> distributions;
   for (const auto& row : found.rows)
@@ -532,6 +619,8 @@ std::vector<DistributionRow> Repository::distributions() const {
                              .population = text_of(row[1]),
                              .text = unescaped(text_of(row[2])),
                              .version = int(number_in(row[3]))});
+  std::ranges::sort(distributions, {},
+                    [](const DistributionRow& d) { return std::tie(d.population, d.name, d.version); });
   return distributions;
 }
 
@@ -953,11 +1042,11 @@ std::vector<std::string> Repository::check(Progress& progress) const {
       for (const std::string& finding : impl_->database->examine_structure())
         findings.push_back(fmt::format("{}: {}", impl_->place, finding));
     });
-    for (const GrammarRow& grammar : grammars())
-      if (hash_of(grammar.text) != grammar.hash)
-        findings.push_back(
-            fmt::format("{}: the text of grammar {} (version {}) is damaged; restore the repository from a backup",
-                        impl_->place, shown(grammar.name), grammar.version));
+    for (const ModelRow& model : models())
+      if (hash_of(model.text) != model.hash)
+        findings.push_back(fmt::format(
+            "{}: the text of model {} (version {}) is damaged; restore the repository from a backup",
+            impl_->place, shown(model.name), model.version));
     const auto rows = neurons();
     progress.begin("checking", rows.size());
     for (const NeuronRow& row : rows) {
