@@ -201,13 +201,12 @@ class Postgresql final : public Database {
                     PQclear);
     };
     struct End {
-      PGconn* connection;  // null inside another transaction
-      ~End() {
-        if (connection) PQclear(PQexec(connection, "rollback"));
-      }
+      PGconn* connection;
+      bool alone;  // not inside another transaction
+      ~End() { PQclear(PQexec(connection, alone ? "rollback" : "close question")); }
     };
     const bool alone = PQtransactionStatus(connection) == PQTRANS_IDLE;
-    const End end{alone ? connection : nullptr};
+    const End end{connection, alone};
     if (alone) begin_reading();
     // A cursor is declared for a question and nothing else: no copy to a file, no other command, no second one.
     Result result = send("declare question no scroll cursor for " + question);
