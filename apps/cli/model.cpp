@@ -240,7 +240,7 @@ class PassingFolder {
 void open_editor(const fs::path& file) {
   const pid_t child = ::fork();
   if (child == 0) {
-    ::execl("/bin/sh", "sh", "-c", "exec ${EDITOR:-vi} \"$0\"", file.c_str(), nullptr);
+    ::execl("/bin/sh", "sh", "-c", R"(eval "exec ${EDITOR:-vi} \"\$0\"")", file.c_str(), nullptr);
     ::_exit(127);
   }
   int status = 0;

@@ -48,7 +48,7 @@ TEXT
   fails_with 1 "model 'bush' has no version 3; its newest is 2" $model show bush@3 --repo "$repo"
 
   # edit: what the editor leaves is the next version; as it was, no grammar, or an editor that fails: nothing.
-  EDITOR='sed -i s/^steps:.*/steps:\ 7/' $model edit bush@1 --repo "$repo" >out.txt
+  EDITOR="sed -i 's/^steps:.*/steps: 7/'" $model edit bush@1 --repo "$repo" >out.txt
   grep -q '^bush  *3  stored$' out.txt
   [ "$($model show bush --repo "$repo")" = "$(sed 's/^steps:.*/steps: 7/; s/uniform(10, 50)/uniform(20, 40)/' second.lsys)" ]
   [ "$($model list --repo "$repo" --json | json '[(m["origin"], m["population"]) for m in d if m["name"] == "bush"]')" = "[('edited from version 1', 'L5')]" ]
@@ -74,7 +74,7 @@ TEXT
   $model diff bush --repo "$repo" >step.txt
   [ "$(grep -c '^[-+][^-+]' step.txt)" = 4 ]
   $model diff bush bush@3 --repo "$repo" | grep -q 'are the same text'
-  [ "$($model diff bush --repo "$repo" --json | json 'd["from"]["version"], d["to"]["version"], d["diff"][:10]')" = "(2, 3, '--- bush@2')" ]
+  [ "$($model diff bush --repo "$repo" --json | json 'd["from"]["version"], d["to"]["version"], d["diff"][:10]')" = '2 3 --- bush@2' ]
   fails_with 1 'pyramidal@1 has no version before it' $model diff pyramidal --repo "$repo"
 
   # export, and back: nothing new. A file that holds something else stays.
