@@ -108,6 +108,18 @@ TEXT
   fails_with 2 '--repo' $BRAINFOREST grow --model bush --out x
   $BRAINFOREST check --repo "$repo" | grep -q 'all is well'
 
+  # The questions of the page are answered.
+  python3 - "$FOREST_SOURCE_DIR/docs/repository/knowledge.md" >questions <<'PY'
+import re, sys
+for block in re.findall("```sql(.*?)```", open(sys.argv[1]).read(), re.S):
+    for question in block.split(";")[:-1]:
+        print(" ".join(re.sub("--.*", "", question).split()).replace("pyramidal", "bush").replace("motoneuron", "bush"))
+PY
+  [ "$(wc -l <questions)" = 3 ]
+  while read -r question; do $BRAINFOREST query "$question" --repo "$repo" >>answers.txt; done <questions
+  grep -q '^bush-1-00001' answers.txt
+  grep -q '^3 rows' answers.txt
+
   # Hostile names and texts.
   { cat bush.lsys; printf '# \033[31mred\007 \xff\r\n'; } >odd.lsys
   $model import odd.lsys --name "'); drop table models; --" --repo "$repo" >out.txt
