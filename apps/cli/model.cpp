@@ -161,12 +161,14 @@ void show(const Options& options, Console& console) {
 }
 
 void import_models(const Options& options, Console& console) {
+  const auto built_in = built_in_grammars();
   std::vector<NewModel> models;  // all are read before one is stored
   for (const std::string& name : options.names) {
     const lsystem::Grammar grammar = find_grammar(name);
     const std::string own = escaped(grammar.name);  // a file may have any
     models.push_back(
-        model_of(grammar, options.name.empty() ? own : options.name, options.population, "from " + name));
+        model_of(grammar, options.name.empty() ? own : options.name, options.population,
+                 (std::ranges::count(built_in, name) ? "the built-in grammar " : "from ") + name));
   }
   Repository repository = Repository::open(options.repo, Access::write);
   std::vector<Kept> kept;

@@ -32,7 +32,7 @@ TEXT
   [ "$($model import bush.lsys --repo "$repo" --json | json 'd["models"][0]["version"]')" = 2 ]
   cp bush.lsys second.lsys
   [ "$($model list --repo "$repo" --json | json '[(m["name"], m["version"], m["population"], len(m["distributions"]) > 0, m["origin"]) for m in d]')" = \
-    "[('bush', 2, 'L5', True, 'from bush.lsys'), ('pyramidal', 1, 'L5', True, 'from pyramidal')]" ]
+    "[('bush', 2, 'L5', True, 'from bush.lsys'), ('pyramidal', 1, 'L5', True, 'the built-in grammar pyramidal')]" ]
   [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 3 ]
   [ "$($model list --repo "$repo" --population none --json | json 'd')" = '[]' ]
   $model list --repo "$repo" | grep -q '^bush  *2  L5  *2  *0  from bush.lsys$'
