@@ -1,7 +1,7 @@
 #!/usr/bin/env bash
 # A private PostgreSQL server for tests: postgresql.sh start DIR prints its port on the loopback; postgresql.sh stop DIR ends
-# it and removes the folder; postgresql.sh halt DIR [fast|immediate] ends it only, and resume DIR PORT goes on. The superuser is `forest`, without a password. It runs as another user where this one is root,
-# which PostgreSQL refuses.
+# it and removes the folder; postgresql.sh halt DIR [fast|immediate] ends it only, and resume DIR PORT goes on. The superuser
+# is `forest`, without a password. It runs as another user where this one is root, which PostgreSQL refuses.
 set -euo pipefail
 bin=$(ls -d /usr/lib/postgresql/*/bin 2>/dev/null | sort -V | tail -1)
 [[ -n $bin ]] || { echo "postgresql.sh: there is no PostgreSQL here; install Debian's package postgresql" >&2; exit 77; }

@@ -251,14 +251,14 @@ void open_editor(const fs::path& file) {
 }
 
 void edit(const Options& options, Console& console) {
-  Repository repository = open_to_write(options.repo);
-  const ModelRow model = find_model(repository, options.names[0]);
+  const ModelRow model =
+      find_model(open_to_write(options.repo), options.names[0]);  // closed while one thinks
   PassingFolder folder;
   const fs::path file = folder.path / (file_name(model.name) + ".lsys");
   write_file(file, std::string_view(model.text));
   open_editor(file);
   const std::string text(MappedFile(file).text());
-  if (text == model.text) {
+  if (text == model.text && options.population.empty()) {
     console.say(fmt::format("{} is as it was; nothing is stored", full_name(model)));
     return console.print({{"repository", options.repo}, {"models", Json::array()}});
   }
@@ -274,7 +274,7 @@ void edit(const Options& options, Console& console) {
   }
   if (next.population.empty()) next.population = model.population;
   try {
-    const auto [version, already_there] = repository.add_model(next);
+    const auto [version, already_there] = open_to_write(options.repo).add_model(next);
     tell({{model.name, version, already_there}}, options.repo, console);
   } catch (const Error&) {
     folder.keep = true;

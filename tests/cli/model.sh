@@ -54,11 +54,14 @@ TEXT
   [ "$($model list --repo "$repo" --json | json '[(m["origin"], m["population"]) for m in d if m["name"] == "bush"]')" = "[('edited from version 1', 'L5')]" ]
   EDITOR=true $model edit bush --repo "$repo" | grep -q 'bush@3 is as it was; nothing is stored'
   fails_with 1 'the editor ended with an error, so nothing is stored' env EDITOR=false $BRAINFOREST model edit bush --repo "$repo"
+  EDITOR=true $model edit bush --repo "$repo" --population L6 --json | grep -q '"version": 4'
+  EDITOR='sed -i "1s/.*/# A bush of layer 5/"' $model edit bush@3 --repo "$repo" >out.txt
+  [ "$($model list --repo "$repo" --all --json | json '[m["population"] for m in d if m["name"] == "bush"]')" = "['L5', 'L5', 'L5', 'L6', 'L5']" ]
   mkdir -p passing
   fails_with 1 'nothing is stored and the text is kept' env TMPDIR="$PWD/passing" EDITOR='sed -i s/^axiom/axion/' $BRAINFOREST model edit bush --repo "$repo"
   grep -q 'bush.lsys:6' err.txt
   grep -q '^axion' passing/*/bush.lsys
-  [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 4 ]
+  [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 6 ]
 
   # diff: what patch reads, of two versions or of the last step.
   [ "$($model diff bush@1 bush@2 --repo "$repo")" = '--- bush@1
@@ -71,10 +74,10 @@ TEXT
 +distribution turn = uniform(10, 50)
  axiom: Soma(10) Basal !(2) A(2)
  grow: A(d) { r = ratio() } -> F(10, d) [ +(turn()) A(r * d) ] -(turn()) A(d)' ]
-  $model diff bush --repo "$repo" >step.txt
+  $model diff bush@3 --repo "$repo" >step.txt
   [ "$(grep -c '^[-+][^-+]' step.txt)" = 4 ]
-  $model diff bush bush@3 --repo "$repo" | grep -q 'are the same text'
-  [ "$($model diff bush --repo "$repo" --json | json 'd["from"]["version"], d["to"]["version"], d["diff"][:10]')" = '2 3 --- bush@2' ]
+  $model diff bush@4 bush@3 --repo "$repo" | grep -q 'are the same text'
+  [ "$($model diff bush --repo "$repo" --json | json 'd["from"]["version"], d["to"]["version"], d["diff"][:10]')" = '4 5 --- bush@4' ]
   fails_with 1 'pyramidal@1 has no version before it' $model diff pyramidal --repo "$repo"
 
   # export, and back: nothing new. A file that holds something else stays.
@@ -97,13 +100,13 @@ TEXT
   head -c 2000 /dev/urandom >noise.lsys
   fails_with 1 'noise.lsys' $model import noise.lsys --repo "$repo"
   fails_with 2 '--name is for one file' $model import good.lsys bush.lsys --name other --repo "$repo"
-  [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 4 ]
+  [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 6 ]
 
   # A model grows neurons, which name it; growing makes no version of a text that is there.
   $BRAINFOREST grow --model bush@2 --count 3 --seed 1 --repo "$repo" --out grown >out.txt
   $BRAINFOREST grow --grammar second.lsys --count 3 --seed 1 --out same >out.txt
   cmp <(grep -v '^#' grown/bush-1-00002.swc) <(grep -v '^#' same/second-1-00002.swc)
-  [ "$($model list --repo "$repo" --all --json | json '[m["neurons"] for m in d if m["name"] == "bush"]')" = '[0, 3, 0]' ]
+  [ "$($model list --repo "$repo" --all --json | json '[m["neurons"] for m in d if m["name"] == "bush"]')" = '[0, 3, 0, 0, 0]' ]
   fails_with 1 "there is no model 'shrub'" $BRAINFOREST grow --model shrub --repo "$repo"
   fails_with 2 '--repo' $BRAINFOREST grow --model bush --out x
   $BRAINFOREST check --repo "$repo" | grep -q 'all is well'
@@ -118,7 +121,7 @@ PY
   [ "$(wc -l <questions)" = 3 ]
   while read -r question; do $BRAINFOREST query "$question" --repo "$repo" >>answers.txt; done <questions
   grep -q '^bush-1-00001' answers.txt
-  grep -q '^3 rows' answers.txt
+  grep -q '^5 rows' answers.txt
 
   # Hostile names and texts.
   { cat bush.lsys; printf '# \033[31mred\007 \xff\r\n'; } >odd.lsys
