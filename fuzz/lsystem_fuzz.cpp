@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Any bytes are a grammar, a neuron as a string, or an error with a sentence. What is a grammar grows for a few steps.
+#include <algorithm>
 #include <cstdint>
 #include <cstdlib>
 #include <string>
@@ -15,6 +16,12 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   try {
     lsystem::Grammar grammar = lsystem::parse(text, "input");
     grammar.limit = 1000;
+    for (std::size_t i = 0; i < std::min<std::size_t>(grammar.declarations.size(), 8); ++i)
+      try {  // what was read is read again, alone
+        (void)lsystem::parse(text_of(grammar.declarations[i], grammar) + "axiom: F\ngrow: F -> F\n", "alone");
+      } catch (const Error&) {
+        std::abort();
+      }
     (void)lsystem::interpret(lsystem::derive(grammar, 1, 0, 6), grammar);
   } catch (const Error&) {
   }

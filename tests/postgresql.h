@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// A private PostgreSQL server for the tests of one program, started when it is first asked for.
+// Private PostgreSQL servers for the tests of one program; the shared one is started when it is first asked for.
 #pragma once
 
 #include <array>
@@ -13,11 +13,24 @@ namespace forest {
 
 class PostgresqlServer {
  public:
-  /// Empty on a machine without PostgreSQL.
+  /// The one that most tests share.
   static const PostgresqlServer& get() {
-    static const PostgresqlServer server;
+    static const PostgresqlServer server("shared");
     return server;
   }
+  /// One that may be halted; it does not run on a machine without PostgreSQL.
+  explicit PostgresqlServer(const std::string& name)
+      : folder_(std::filesystem::temp_directory_path() /
+                ("forest-postgresql-" + name + std::to_string(::getpid()))),
+        owner_(::getpid()) {
+    const auto [said, good] = script("start");
+    if (good) port_ = said.substr(0, said.find('\n'));
+  }
+  PostgresqlServer(const PostgresqlServer&) = delete;
+  ~PostgresqlServer() {
+    if (runs() && owner_ == ::getpid()) script("stop");
+  }
+
   bool runs() const { return !port_.empty(); }
   /// The address of a database; `role` must exist.
   std::string address(const std::string& database, const std::string& role = "forest") const {
@@ -25,23 +38,22 @@ class PostgresqlServer {
   }
   /// SQL as the superuser, by the server's own client.
   bool run(const std::string& sql, const std::string& database = "postgres") const {
-    return command("psql -X -q -v ON_ERROR_STOP=1 -h 127.0.0.1 -p " + port_ + " -U forest -d " + database +
-                   " -c \"" + sql + "\" >/dev/null 2>&1")
-        .second;
+    return command(client(database) + " -c \"" + sql + "\" >/dev/null 2>&1").second;
   }
+  bool run_file(const std::string& path, const std::string& database) const {
+    return command(client(database) + " -1 -f " + path + " >/dev/null").second;
+  }
+  /// Ends the server, as a failing machine (immediate) or its owner (fast) would.
+  bool halt(const std::string& how) const { return script("halt", how).second; }
+  bool resume() const { return script("resume", port_).second; }
 
  private:
-  PostgresqlServer()
-      : folder_(std::filesystem::temp_directory_path() / ("forest-postgresql-" + std::to_string(::getpid()))),
-        owner_(::getpid()) {
-    const auto [said, good] = command(FOREST_SOURCE_DIR "/tests/postgresql.sh start " + folder_.string());
-    if (good) port_ = said.substr(0, said.find('\n'));
+  std::pair<std::string, bool> script(const std::string& verb, const std::string& more = "") const {
+    return command(FOREST_SOURCE_DIR "/tests/postgresql.sh " + verb + " " + folder_.string() + " " + more);
   }
-  ~PostgresqlServer() {
-    if (runs() && owner_ == ::getpid())
-      command(FOREST_SOURCE_DIR "/tests/postgresql.sh stop " + folder_.string());
+  std::string client(const std::string& database) const {
+    return "psql -X -q -v ON_ERROR_STOP=1 -h 127.0.0.1 -p " + port_ + " -U forest -d " + database;
   }
-
   static std::pair<std::string, bool> command(const std::string& line) {
     std::string said;
     FILE* pipe = ::popen(line.c_str(), "r");

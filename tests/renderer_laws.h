@@ -192,7 +192,8 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
     ++asked;
     EXPECT_EQ(seen.width, 25u);
     EXPECT_EQ(seen.depths.size(), 625u);
-    EXPECT_NEAR(seen.depths[12 * 25 + 12], 92.f, 1.f);  // near the front of the capsule, the farthest of 64 pixels
+    EXPECT_NEAR(seen.depths[12 * 25 + 12], 92.f,
+                1.f);  // near the front of the capsule, the farthest of 64 pixels
     EXPECT_TRUE(std::isinf(seen.depths[0]));
     frame::Lists more;
     more.capsules = second;

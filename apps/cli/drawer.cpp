@@ -44,8 +44,9 @@ std::unique_ptr<render::Renderer> make_renderer(Drawer drawer) {
 
 void add_renderer(CLI::App& command, Drawer& drawer) {
   command
-      .add_option("--renderer", drawer,
-                  "Who draws: opengl (a graphics card or Mesa's llvmpipe), cpu, or auto: the card where there is one")
+      .add_option(
+          "--renderer", drawer,
+          "Who draws: opengl (a graphics card or Mesa's llvmpipe), cpu, or auto: the card where there is one")
       ->transform(CLI::CheckedTransformer(names))
       ->option_text("auto|opengl|cpu");
 }

@@ -2,11 +2,13 @@
 #include "apps/cli/grammars.h"
 
 #include <algorithm>
+#include <charconv>
 #include <filesystem>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
 
@@ -37,6 +39,40 @@ lsystem::Grammar find_grammar(const std::string& name_or_path) {
                      fmt::format("there is no such grammar; give a file or one of {}",
                                  fmt::join(built_in_grammars(), ", ")));
   return lsystem::parse_file(name_or_path);
+}
+
+Reference reference_of(const std::string& text) {
+  const std::size_t at = text.rfind('@');
+  if (at == text.npos || at == 0) return {text};
+  int version = 0;
+  const char* const end = text.data() + text.size();
+  const auto [rest, error] = std::from_chars(text.data() + at + 1, end, version);
+  return error == std::errc() && rest == end && version > 0 ? Reference{text.substr(0, at), version}
+                                                            : Reference{text};
+}
+
+repository::ModelRow find_model(const repository::Repository& repository, const std::string& reference) {
+  using repository::shown;
+  const auto [name, version] = reference_of(reference);
+  if (auto model = repository.model(name, version)) return *model;
+  if (auto model = repository.model(reference)) return *model;  // a name that ends like a version
+  if (const auto newest = repository.model(name))
+    throw Error(
+        fmt::format("model {} has no version {}; its newest is {}", shown(name), version, newest->version));
+  std::vector<std::string> known;
+  for (const repository::ModelRow& model : repository.models())
+    if (model.version == 1) known.push_back(model.name);
+  throw Error(fmt::format("there is no model {}; {}", shown(name),
+                          known.empty() ? "store one with brainforest model import"
+                                        : fmt::format("those that are there: {}", fmt::join(known, ", "))));
+}
+
+lsystem::Grammar grammar_of_model(const std::string& repo, const std::string& reference) {
+  const auto model = find_model(repository::Repository::open(repo, repository::Access::read), reference);
+  lsystem::Grammar grammar =
+      lsystem::parse(model.text, fmt::format("{}@{} in {}", model.name, model.version, repo));
+  grammar.name = model.name;
+  return grammar;
 }
 
 }  // namespace forest::cli

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// Grammars by name: those that come with the project lie in the folder grammars of data_folder().
+// Grammars by name: those that come with the project lie in the folder grammars of data_folder(), models in a repository.
 #pragma once
 
 #include <string>
 #include <vector>
 
 #include "forest/lsystem/grammar.h"
+#include "forest/repository/repository.h"
 
 namespace forest::cli {
 
@@ -14,5 +15,18 @@ std::vector<std::string> built_in_grammars();
 
 /// A built-in grammar by its name, any other by the path of its file. Throws InputError when there is none.
 lsystem::Grammar find_grammar(const std::string& name_or_path);
+
+/// What NAME or NAME@version names.
+struct Reference {
+  std::string name;
+  int version = 0;  // 0: the newest
+};
+Reference reference_of(const std::string& text);
+
+/// A model by its reference. Throws Error that says which there are.
+repository::ModelRow find_model(const repository::Repository& repository, const std::string& reference);
+
+/// The grammar of a model in the repository at `repo`, by the model's name.
+lsystem::Grammar grammar_of_model(const std::string& repo, const std::string& reference);
 
 }  // namespace forest::cli

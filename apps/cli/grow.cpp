@@ -14,6 +14,7 @@
 #include "forest/core/parallel.h"
 #include "forest/io/format.h"
 #include "forest/morphology/measure.h"
+#include "forest/repository/names.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
@@ -26,7 +27,7 @@ namespace forest::cli {
 namespace {
 
 struct Options {
-  std::string grammar, repo, population;
+  std::string grammar, model, repo, population;
   std::filesystem::path out;
   std::size_t count = 1;
   std::uint64_t seed = 0;
@@ -38,7 +39,7 @@ constexpr std::size_t stored =
     500;  // as one transaction: their pages fit into memory, so that readers wait for none
 
 std::filesystem::path file_of(const std::filesystem::path& folder, const std::string& name) {
-  return folder / (name + ".swc");
+  return folder / (repository::file_name(name) + ".swc");  // a model may have any name
 }
 
 struct Ready {
@@ -136,7 +137,8 @@ void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, 
 }
 
 void run(const Options& options, Console& console) {
-  const lsystem::Grammar grammar = find_grammar(options.grammar);
+  const lsystem::Grammar grammar =
+      options.model.empty() ? find_grammar(options.grammar) : grammar_of_model(options.repo, options.model);
   refuse_to_replace(options, grammar, console);
   std::vector<std::unique_ptr<Destination>> destinations;
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
@@ -178,11 +180,13 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> grow(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command
-      .add_option("--grammar", options->grammar,
-                  fmt::format("{}, or a file in the notation of docs/lsystem/notation.md",
-                              fmt::join(built_in_grammars(), ", ")))
-      ->required();
+  CLI::Option_group* from = command.add_option_group("from", "what grows");
+  from->add_option("--grammar", options->grammar,
+                   fmt::format("{}, or a file in the notation of docs/lsystem/notation.md",
+                               fmt::join(built_in_grammars(), ", ")));
+  CLI::Option* model =
+      from->add_option("--model", options->model, "A model of the repository: NAME, or NAME@version");
+  from->require_option(1);
   command.add_option("--count", options->count, "Neurons to grow")
       ->check(CLI::Range(1, 100'000'000))
       ->capture_default_str();
@@ -191,6 +195,7 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
   into->add_option("--out", options->out, "Write them into this folder as SWC files");
   into->require_option(1, 2);
+  model->needs(repo);
   add_force(command, options->force);
   command.add_option("--population", options->population, "Their population; by default the grammar's name")
       ->needs(repo);

@@ -23,7 +23,7 @@ std::string missing_verb(const CLI::App& app) {
   for (const CLI::App* sub : at->get_subcommands([](const CLI::App*) { return true; }))
     names += (names.empty() ? "" : ", ") + sub->get_name();
   if (names.empty()) return {};
-  const char* kind = at == &app ? "verb" : "benchmark";
+  const char* kind = at == &app ? "verb" : at->get_name() == "bench" ? "benchmark" : "action";
   for (const std::string& word : at->remaining())
     if (!word.starts_with('-'))
       return fmt::format("there is no {} {}; there are: {}", kind, forest::repository::shown(word), names);

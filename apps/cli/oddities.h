@@ -12,7 +12,7 @@ namespace forest::cli {
 class Console;
 
 struct OddFile {
-  std::string name;                         // as shown to people
+  std::string name;                          // as shown to people
   const std::vector<io::Warning>* oddities;  // of it
 };
 

@@ -79,8 +79,9 @@ void run(const Options& options, Console& console) {
 std::function<void()> query(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
-      .add_option("question", options->question,
-                  "A select on the views neuron, section, junction and metric, or on the tables")
+      .add_option(
+          "question", options->question,
+          "A select on the views neuron, section, junction, metric, model and distribution, or on the tables")
       ->required()
       ->type_name("SQL");
   command.add_option("--repo", options->repo, "The repository: a file, or postgresql://role@host/database")

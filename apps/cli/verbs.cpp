@@ -17,6 +17,7 @@ std::function<void()> remove_neurons(CLI::App&, Console&);
 std::function<void()> convert(CLI::App&, Console&);
 std::function<void()> check(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
+std::function<void()> model(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
 std::function<void()> plant(CLI::App&, Console&);
 std::function<void()> bench(CLI::App&, Console&);
@@ -56,6 +57,11 @@ std::span<const Verb> verbs() {
        check},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
        "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
+      {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
+       "brainforest model import pyramidal --repo cells.db\n"
+       "  brainforest model edit pyramidal --repo cells.db\n"
+       "  brainforest model diff pyramidal --repo cells.db",
+       model},
       {"grow", "Grow neurons from a grammar",
        "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",

@@ -50,7 +50,8 @@ Constants constants_of(const Frame& f, std::uint32_t subframe) {
 }
 
 Segment segment_of(const Overlay& o) {
-  return {o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius), o.b.x(), o.b.y(), o.b.z(), o.colour << 16};
+  return {o.a.x(), o.a.y(), o.a.z(), half_pair(o.radius, o.radius),
+          o.b.x(), o.b.y(), o.b.z(), o.colour << 16};
 }
 
 float depth_of_code(std::uint32_t code) {

@@ -6,6 +6,8 @@
 #include <cmath>
 #include <filesystem>
 #include <map>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -283,6 +285,7 @@ class Parser {
       if (end == std::string::npos) end = clean_.size();
       text_.enter(begin, end);
       if (text_.more()) statement();
+      if (!declared_.empty()) keep_declaration(begin, end);
       begin = end + 1;
     }
     text_.enter(clean_.size(), clean_.size());
@@ -316,6 +319,21 @@ class Parser {
   struct Arity {
     int least = 0, most = int(most_parameters);
   };
+
+  /// What it uses is found by its names; a parameter of the same name makes it one too many, which does no harm.
+  void keep_declaration(std::size_t begin, std::size_t end) {
+    end = clean_.find_last_not_of(" \t\r\n", end - 1) + 1;
+    const std::size_t line = std::min(clean_.find('\n', end), clean_.size());  // with a comment behind it
+    if (grammar_.text.substr(end, line - end).find("/*") == std::string::npos) end = line;
+    Declaration declaration{std::exchange(declared_, {}), begin, end, {}, std::exchange(draws_, false)};
+    for (std::size_t at = begin, stop; at < end; at = std::max(stop, at + 1)) {
+      for (stop = at; stop < end && is_name(clean_[stop]);) ++stop;
+      const auto used = declarations_.find(std::string_view(clean_).substr(at, stop - at));
+      if (used != declarations_.end()) declaration.uses.push_back(used->second);
+    }
+    declarations_.emplace(declaration.name, std::uint32_t(grammar_.declarations.size()));
+    grammar_.declarations.push_back(std::move(declaration));
+  }
 
   void statement() {
     struct Row {
@@ -388,7 +406,7 @@ class Parser {
     if (meanings_.contains(name) || name == "if" ||
         std::ranges::find(functions(), name, &Function::name) != functions().end())
       text_.fail_at(place, fmt::format("'{}' has a meaning already; choose another name", name));
-    return name;
+    return declared_ = name;
   }
 
   void define() {
@@ -409,7 +427,7 @@ class Parser {
     meanings_[name] = {.kind = Meaning::cell, .index = index};
   }
 
-  void distribution() { callable(true); }
+  void distribution() { callable(draws_ = true); }
   void function() { callable(false); }
   void callable(bool may_draw) {
     const std::size_t place = text_.at();
@@ -637,6 +655,9 @@ class Parser {
   std::vector<Symbol> ignored_;
   std::vector<Program> cells_;
   Meanings meanings_;
+  std::map<std::string, std::uint32_t, std::less<>> declarations_;
+  std::string declared_;  // by the statement that is read, and whether that is a distribution
+  bool draws_ = false;
   bool closed_ = false;  // no new symbols
 };
 
@@ -646,6 +667,21 @@ Grammar parse(std::string_view text, const std::string& file) { return Parser(te
 
 Grammar parse_file(const std::filesystem::path& path) {
   return parse(MappedFile(path).text(), path.string());
+}
+
+std::string text_of(const Declaration& declaration, const Grammar& grammar) {
+  std::vector<const Declaration*> needed{&declaration};
+  std::set<std::uint32_t> seen;
+  for (std::size_t i = 0; i < needed.size(); ++i)
+    for (const std::uint32_t use : needed[i]->uses)
+      if (seen.insert(use).second) needed.push_back(&grammar.declarations[use]);
+  std::ranges::sort(needed, {}, &Declaration::begin);
+  std::string text;
+  for (const Declaration* d : needed) {
+    text += std::string_view(grammar.text).substr(d->begin, d->end - d->begin);
+    text += '\n';
+  }
+  return text;
 }
 
 Word parse_word(std::string_view text, const Grammar& grammar) { return Parser(text, grammar).word(); }

@@ -59,6 +59,14 @@ struct Production {
   Program values;  // of all parameters of the successor, in order
 };
 
+/// A statement that gives a name to a value, a function, a distribution or a table.
+struct Declaration {
+  std::string name;
+  std::size_t begin = 0, end = 0;   // in Grammar::text
+  std::vector<std::uint32_t> uses;  // declarations above, which it needs
+  bool draws = false;               // a distribution
+};
+
 /// An L-system, compiled. A plain value; not changed after parse().
 struct Grammar {
   std::string file, name, title;        // name: the file's, without folder and extension
@@ -69,7 +77,8 @@ struct Grammar {
   std::vector<bool> ignored;                               // by symbol: not seen by contexts
   std::vector<Symbol> drawn_as;  // by symbol: the turtle's that it stands for; F_l and its like are F
   std::vector<Table> tables;
-  Program cell;  // one store a value that is drawn once a neuron
+  std::vector<Declaration> declarations;  // in the order of the text
+  Program cell;                           // one store a value that is drawn once a neuron
   std::size_t cell_values = 0;
   std::vector<Shape> axiom;
   Program axiom_values;
@@ -85,6 +94,9 @@ struct Grammar {
 /// @param file  named in errors
 Grammar parse(std::string_view text, const std::string& file);
 Grammar parse_file(const std::filesystem::path& path);
+
+/// A declaration as a text that stands alone: before it all that it needs, a line each.
+std::string text_of(const Declaration& declaration, const Grammar& grammar);
 
 /// Reads a word of the grammar's symbols with constant parameters, "B(2)A(4,4)". Throws InputError.
 Word parse_word(std::string_view text, const Grammar& grammar);

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 #include <rapidcheck/gtest.h>
 
@@ -196,6 +197,41 @@ RC_GTEST_PROP(Grammar, AnyTextIsReadOrRefused, ()) {
   try {
     parse(text, "cut");
   } catch (const InputError&) {
+  }
+}
+
+TEST(Declaration, StandsAloneWithAllItNeeds) {
+  const Grammar g = parse(
+      "#define half 0.5\n"
+      "#define other 2\n"
+      "table mean = 1: 0.9, 2: 0.7\n\n"
+      "# about the ratio, which\n"
+      "cell shift = normal(0, half)\n"
+      "function at(order) = mean(order) +\n  shift\n"
+      "distribution ratio(order) = normal(at(order), 0.1)  # of diameters\n"
+      "distribution tilt = uniform(-1, 1)  /* a long\n comment */\n"
+      "axiom: A\ngrow: A -> F(ratio(1)) +(tilt())\n",
+      "test");
+  std::vector<std::string> distributions;
+  for (const Declaration& d : g.declarations)
+    if (d.draws) distributions.push_back(text_of(d, g));
+  ASSERT_EQ(distributions.size(), 2u);
+  EXPECT_EQ(distributions[0],
+            "#define half 0.5\ntable mean = 1: 0.9, 2: 0.7\ncell shift = normal(0, half)\n"
+            "function at(order) = mean(order) +\n  shift\n"
+            "distribution ratio(order) = normal(at(order), 0.1)  # of diameters\n");
+  EXPECT_EQ(distributions[1], "distribution tilt = uniform(-1, 1)\n");
+  EXPECT_EQ(g.declarations.front().name, "half");
+  for (const char* name : {"motoneuron", "purkinje", "pyramidal"}) {
+    const Grammar real = parse_file(fmt::format("{}/data/grammars/{}.lsys", FOREST_SOURCE_DIR, name));
+    std::size_t count = 0;
+    for (const Declaration& d : real.declarations) {
+      const Grammar alone = parse(text_of(d, real) + "axiom: A\ngrow: A -> F\n", "alone");
+      EXPECT_EQ(alone.declarations.back().name, d.name);
+      EXPECT_EQ(text_of(alone.declarations.back(), alone), text_of(d, real));
+      count += d.draws;
+    }
+    EXPECT_GT(count, 2u) << name;
   }
 }
 

@@ -43,14 +43,17 @@ std::unique_ptr<Database> connect(const std::string& place, bool write, Refill r
                               : connect_sqlite(place, write, refill);
 }
 
-void migrate(Database& database, int from) {
+void migrate(Database& database, int from, Refill refill) {
   for (const Migration& step : migrations) {
     if (step.to <= from) continue;
     run_script(database, step.sql);
     if (step.to == 1) fill_section_kinds(database.sql());
     if (step.to == 2) fill_metrics(database.sql());
   }
-  if (from == 0) database.sql() << "drop table old_sections";  // else refill() empties it
+  if (from > 0)
+    refill(database, from);
+  else
+    database.sql() << "drop table old_sections";
 }
 
 }  // namespace forest::repository

@@ -49,8 +49,8 @@ class Database {
   soci::session sql_;
 };
 
-/// Brings what an older version stored into the new tables, in the transaction that makes them.
-using Refill = void (*)(Database& database);
+/// Brings what version `from` stored into the new tables, in the transaction that makes them.
+using Refill = void (*)(Database& database, int from);
 
 /// Opens `place`, which must be a repository this program can read; with `write` it is made when there is none, so that
 /// whoever looks sees none or a whole one, and brought to the newest schema. Throws InputError.
@@ -60,8 +60,9 @@ std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, R
 std::unique_ptr<Database> connect_postgresql(const std::string& place, bool write, Refill refill);
 bool is_postgresql(std::string_view place);
 
-/// Runs what schema.h asks for between two versions, in the open transaction; `from` 0: everything.
-void migrate(Database& database, int from);
+/// Runs what schema.h asks for after version `from`, in the open transaction, then `refill`; `from` 0: everything, and there
+/// is nothing to refill.
+void migrate(Database& database, int from, Refill refill);
 
 template <class T>
 T value(soci::session& sql, const std::string& query) {

@@ -76,6 +76,19 @@ std::string escaped(std::string_view bytes) {
   return replaced(doubled, "\\x", [](std::string_view c) { return !is_control(c); });
 }
 
+std::string escaped_lines(std::string_view bytes) {
+  const auto kept = [](std::string_view c) { return !is_control(c) || c == "\n" || c == "\r" || c == "\t"; };
+  std::string doubled;  // only the backslashes that would be read as the mark of something
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    doubled += bytes[i];
+    const std::string_view next = bytes.substr(i + 1);
+    if (bytes[i] != '\\' || next.empty()) continue;
+    const std::size_t length = character(next);
+    if (next[0] == '\\' || next[0] == 'x' || !length || !kept(next.substr(0, length))) doubled += '\\';
+  }
+  return replaced(doubled, "\\x", kept);
+}
+
 std::string unescaped(std::string_view text) {
   std::string bytes;
   bytes.reserve(text.size());

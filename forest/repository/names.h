@@ -18,7 +18,9 @@ bool is_name(std::string_view text);
 /// Bytes as text that can be stored and read by a person: what is no UTF-8 and control characters become
 /// \xHH, and a backslash becomes \\ so that nothing is lost.
 std::string escaped(std::string_view bytes);
-std::string unescaped(std::string_view text);  // the inverse
+/// The same of a text of many lines: ends of lines, tabs and most backslashes stay as they are.
+std::string escaped_lines(std::string_view bytes);
+std::string unescaped(std::string_view text);  // the inverse of both
 
 /// The start of a long or strange text, to be quoted in a sentence.
 std::string shown(std::string_view text);

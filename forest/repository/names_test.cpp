@@ -15,6 +15,17 @@ RC_GTEST_PROP(Names, EscapingLosesNothing, (const std::string& bytes)) {
   RC_ASSERT(unescaped(escaped(bytes)) == bytes);
 }
 
+RC_GTEST_PROP(Names, EscapingLinesLosesNothing, ()) {
+  const auto bytes = *rc::gen::container<std::string>(rc::gen::oneOf(
+      rc::gen::arbitrary<char>(), rc::gen::element('\\', 'x', '4', 'A', '\n', '\t', '(', '\xc3', '\xa9')));
+  const std::string text = escaped_lines(bytes);
+  RC_ASSERT(unescaped(text) == bytes);
+  std::string line = text;
+  for (char& c : line)
+    if (c == '\n' || c == '\r' || c == '\t') c = ' ';
+  RC_ASSERT(line.empty() || line.size() > max_name || is_name(line));
+}
+
 RC_GTEST_PROP(Names, EscapedBytesAreAName, (const std::string& bytes)) {
   RC_PRE(!bytes.empty());
   RC_ASSERT(is_name(escaped(bytes)));
@@ -46,6 +57,7 @@ TEST(Names, APersonCanReadWhatIsEscaped) {
   EXPECT_EQ(escaped("caf\xe9"), "caf\\xE9");
   EXPECT_EQ(escaped("naïve"), "naïve");
   EXPECT_EQ(escaped("a\\b\n"), "a\\\\b\\x0A");
+  EXPECT_EQ(escaped_lines("F(1) \\(90)\n\tμ: \xb5\r\n"), "F(1) \\(90)\n\tμ: \\xB5\r\n");
   EXPECT_EQ(file_name("a/b"), "a%2Fb");
   EXPECT_EQ(file_name("cell 7 (left)"), "cell 7 (left)");
   EXPECT_EQ(file_name(".."), "%2E.");

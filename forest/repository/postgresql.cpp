@@ -287,8 +287,7 @@ class Postgresql final : public Database {
     sql_ << fmt::format("select pg_advisory_xact_lock({})", application_id);
     const int from = version();
     if (from < schema_version) {
-      migrate(*this, from);
-      if (from > 0) refill(*this);
+      migrate(*this, from, refill);
       if (from == 0) {
         sql_ << "create table brainforest_schema (version integer not null)";
         sql_ << "insert into brainforest_schema (version) values (0)";

@@ -6,8 +6,10 @@
 #include <bit>
 #include <cassert>
 #include <cmath>
+#include <map>
 #include <numeric>
 #include <span>
+#include <tuple>
 #include <unordered_map>
 #include <utility>
 
@@ -50,6 +52,16 @@ void check_name(std::string_view what, std::string_view name) {
   if (!is_name(name))
     throw Error(fmt::format("{} is no name for a {}; take 1 to {} bytes of UTF-8 without control characters",
                             shown(name), what, max_name));
+}
+
+// What a column of text, or of whole numbers, answered.
+std::string text_of(const Answer::Value& value) {
+  const auto* text = std::get_if<std::string>(&value);
+  return text ? *text : "";
+}
+std::int64_t number_in(const Answer::Value& value) {
+  const auto* number = std::get_if<std::int64_t>(&value);
+  return number ? *number : 0;
 }
 
 /// Two neurons of a population with the same fingerprint came from the same source.
@@ -306,25 +318,40 @@ struct Repository::Impl {
       : place(at), database(std::move(open)), sql(database->sql()) {}
 
   /// What an earlier version stored, with what this one knows of it besides.
-  static void refill(Database& database) {
+  static void refill(Database& database, int from) {
     Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
-    impl.writing = true;
-    Statements insert(database);
-    std::vector<int> ids(room(std::size_t(impl.ask<int>("select count(*) from neurons").value_or(0))));
-    impl.sql << "select id from neurons order by id", into(ids);
+    if (from < 3) impl.refill_shapes();
+    impl.refill_grammars();
+  }
+
+  /// Before version 3 a section was named by two numbers, before version 2 points were not packed.
+  void refill_shapes() {
+    Statements all(*database);
+    std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from neurons").value_or(0))));
+    sql << "select id from neurons order by id", into(ids);
     for (const int id : ids) {
       const Morphology m =
-          morphology_of(impl.stored(NeuronId(std::size_t(id)), "point_count",
-                                    fmt::format("old_sections where neuron = {} order by number", id)));
+          morphology_of(stored(NeuronId(std::size_t(id)), "point_count",
+                               fmt::format("old_sections where neuron = {} order by number", id)));
       for (const char* table : {"points", "arbors", "neuron_metrics"})
-        impl.sql << fmt::format("delete from {} where neuron = {}", table, id);
-      insert.id = id;
-      insert.rows = rows_of(m);
-      insert.packed_points = packed(m.points());
-      insert.run_shape();
+        sql << fmt::format("delete from {} where neuron = {}", table, id);
+      all.id = id;
+      all.rows = rows_of(m);
+      all.packed_points = packed(m.points());
+      all.run_shape();
     }
-    impl.sql << "drop table old_sections";
-    impl.writing = false;
+    sql << "drop table old_sections";
+  }
+
+  /// Before version 4 the text of a grammar was one line.
+  void refill_grammars() {
+    std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from grammars").value_or(0))));
+    sql << "select id from grammars order by id", into(ids);
+    for (const int id : ids) {
+      const std::string text = escaped_lines(
+          unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
+      sql << "update grammars set text = :text where id = :id", use(text), use(id);
+    }
   }
 
   /// Calls `body`; errors of the database become sentences.
@@ -446,6 +473,13 @@ struct Repository::Impl {
     return number;
   }
 
+  int keep_grammar(const std::string& name, std::string_view text);  // its id
+  /// The id and version of a distribution of a population, by its id or 0.
+  std::pair<int, int> keep_distribution(const std::string& name, int population, std::string_view text);
+  /// The id and version of a new version, or 0 and the newest when that one (with `anew`) or any has this grammar.
+  std::pair<int, int> keep_model(const std::string& name, int grammar, int population,
+                                 const std::string& origin, bool anew);
+
   std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
                               int id) const;
   /// The rows of one neuron; `points` and `from` tell where its sections stand, which differs between versions.
@@ -537,17 +571,122 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
   });
 }
 
+// ── What is known ──
+
+int Repository::Impl::keep_grammar(const std::string& name, std::string_view text) {
+  const std::string hash = hash_of(text),
+                    find = "select id from grammars where hash = :hash and name = :name";
+  if (const auto there = ask<int>(find, hash, name)) return *there;
+  const std::string kept = escaped_lines(text);
+  const int id = database->next_id("grammars");
+  sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on conflict do "
+         "nothing",
+      use(id), use(name), use(hash), use(kept);
+  return *ask<int>(find, hash, name);  // another program may have been quicker
+}
+
+std::pair<int, int> Repository::Impl::keep_distribution(const std::string& name, int population,
+                                                        std::string_view text) {
+  const std::string kept = escaped_lines(text);
+  const std::string same = " from distributions where name = :name and coalesce(population, 0) = :population";
+  for (;;) {
+    const int newest = ask<int>("select max(version)" + same, name, population).value_or(0);
+    const std::string of_newest = same + " and version = :version";
+    if (newest && ask<std::string>("select text" + of_newest, name, population, newest) == kept)
+      return {*ask<int>("select id" + of_newest, name, population, newest), newest};
+    const int id = database->next_id("distributions"), next = newest + 1;
+    sql << "insert into distributions (id, population, name, version, text) values "
+           "(:id, nullif(:population, 0), :name, :version, :text) on conflict do nothing",
+        use(id), use(population), use(name), use(next), use(kept);
+    if (ask<int>("select id from distributions where id = :id", id)) return {id, next};
+  }  // else another program was quicker, and this is the version after its
+}
+
+std::pair<int, int> Repository::Impl::keep_model(const std::string& name, int grammar, int population,
+                                                 const std::string& origin, bool anew) {
+  for (;;) {
+    const int newest = ask<int>("select max(version) from models where name = :name", name).value_or(0);
+    const std::string there = "select coalesce(population, 0) from models where name = :name and ";
+    const int before = ask<int>(there + "version = :version", name, newest).value_or(0);
+    const int of = population ? population : before;
+    const std::string same = there + "grammar = :grammar" + (anew ? " and version = :version" : "");
+    const auto known = anew ? ask<int>(same, name, grammar, newest) : ask<int>(same, name, grammar);
+    if (known && (!anew || *known == of)) return {0, newest};
+    const int id = database->next_id("models"), next = newest + 1;
+    const std::string program = FOREST_VERSION, words = escaped(origin);
+    sql << "insert into models (id, name, version, grammar, population, origin, program) values "
+           "(:id, :name, :version, :grammar, nullif(:population, 0), :origin, :program) on conflict do "
+           "nothing",
+        use(id), use(name), use(next), use(grammar), use(of), use(words), use(program);
+    if (ask<int>("select id from models where id = :id", id)) return {id, next};
+  }  // else another program was quicker
+}
+
+std::pair<int, bool> Repository::add_model(const NewModel& model) {
+  Impl& impl = *impl_;
+  check_name("model", model.name);
+  if (!model.population.empty()) check_name("population", model.population);
+  for (const auto& [name, text] : model.distributions) check_name("distribution", model.name + "." + name);
+  return impl.write([&] {
+    const int population = model.population.empty() ? 0 : impl.population(model.population);
+    const int grammar = impl.keep_grammar(model.name, model.text);
+    const auto [id, version] = impl.keep_model(model.name, grammar, population, model.origin, true);
+    if (!id) return std::pair(version, true);
+    const int of = impl.ask<int>("select population from models where id = :id", id).value_or(0);
+    for (const auto& [name, text] : model.distributions) {
+      const int distribution = impl.keep_distribution(model.name + "." + name, of, text).first;
+      impl.sql << "insert into model_distributions (model, distribution) values (:id, :distribution) on "
+                  "conflict do nothing",
+          use(id), use(distribution);
+    }
+    return std::pair(version, false);
+  });
+}
+
+std::vector<ModelRow> Repository::models() const {
+  const auto [found, parts] = impl_->read([&] {
+    return std::pair(
+        impl_->database->ask("select id, name, version, coalesce(population, ''), origin, program, hash, "
+                             "text, neurons from model"),
+        impl_->database->ask("select m.model, d.name, d.version from model_distributions m join "
+                             "distributions d on d.id = m.distribution"));
+  });
+  std::map<std::int64_t, ModelRow> by_id;
+  for (const auto& row : found.rows)
+    by_id[number_in(row[0])] = {.name = text_of(row[1]),
+                                .population = text_of(row[3]),
+                                .origin = unescaped(text_of(row[4])),
+                                .hash = text_of(row[6]),
+                                .text = unescaped(text_of(row[7])),
+                                .program = text_of(row[5]),
+                                .version = int(number_in(row[2])),
+                                .neurons = std::size_t(number_in(row[8])),
+                                .distributions = {}};
+  for (const auto& row : parts.rows)
+    by_id[number_in(row[0])].distributions.emplace_back(text_of(row[1]), int(number_in(row[2])));
+  std::vector<ModelRow> models;
+  for (auto& [id, model] : by_id) {
+    std::ranges::sort(model.distributions);
+    models.push_back(std::move(model));
+  }
+  std::ranges::sort(models, {}, [](const ModelRow& m) { return std::tie(m.name, m.version); });
+  return models;
+}
+
+std::optional<ModelRow> Repository::model(std::string_view name, int version) const {
+  std::optional<ModelRow> found;
+  for (ModelRow& row : models())
+    if (row.name == name && (!version || row.version == version))
+      found = std::move(row);  // the newest comes last
+  return found;
+}
+
 std::string Repository::add_grammar(std::string_view name, std::string_view text) {
   check_name("grammar", name);
   return impl_->write([&] {
-    const std::string hash = hash_of(text), kept_name(name), kept_text = escaped(text);
-    if (!impl_->ask<int>("select id from grammars where hash = :hash and name = :name", hash, kept_name)) {
-      const int id = impl_->database->next_id("grammars");
-      impl_->sql << "insert into grammars (id, name, hash, text) values (:id, :name, :hash, :text) on "
-                    "conflict do nothing",
-          use(id), use(kept_name), use(hash), use(kept_text);
-    }
-    return hash;
+    const std::string model(name);
+    impl_->keep_model(model, impl_->keep_grammar(model, text), 0, "neurons were grown from it", false);
+    return hash_of(text);
   });
 }
 
@@ -557,6 +696,39 @@ std::optional<std::string> Repository::grammar(std::string_view hash) const {
                                         std::string(hash));
     return text ? std::optional(unescaped(*text)) : std::nullopt;
   });
+}
+
+int Repository::add_distribution(std::string_view name, std::string_view population, std::string_view text) {
+  check_name("distribution", name);
+  if (!population.empty()) check_name("population", population);
+  return impl_->write([&] {
+    const int of = population.empty() ? 0 : impl_->population(std::string(population));
+    return impl_->keep_distribution(std::string(name), of, text).second;
+  });
+}
+
+std::vector<DistributionRow> Repository::distributions() const {
+  const Answer found = impl_->read([&] {
+    return impl_->database->ask("select name, coalesce(population, ''), text, version from distribution");
+  });
+  std::vector<DistributionRow> distributions;
+  for (const auto& row : found.rows)
+    distributions.push_back({.name = text_of(row[0]),
+                             .population = text_of(row[1]),
+                             .text = unescaped(text_of(row[2])),
+                             .version = int(number_in(row[3]))});
+  std::ranges::sort(distributions, {},
+                    [](const DistributionRow& d) { return std::tie(d.population, d.name, d.version); });
+  return distributions;
+}
+
+std::optional<DistributionRow> Repository::distribution(std::string_view name, std::string_view population,
+                                                        int version) const {
+  std::optional<DistributionRow> found;
+  for (DistributionRow& row : distributions())
+    if (row.name == name && row.population == population && (!version || row.version == version))
+      found = std::move(row);  // the newest comes last
+  return found;
 }
 
 Repository::Transaction Repository::begin() {
@@ -887,9 +1059,8 @@ std::vector<std::string> Repository::versions(std::span<const NeuronId> ids) con
   for (const auto& row : found.rows) {
     std::string all;
     for (const Answer::Value& value : row) {
-      const auto* text = std::get_if<std::string>(&value);
-      const auto* number = std::get_if<std::int64_t>(&value);
-      const std::string field = text ? *text : fmt::format("{}", number ? *number : 0);
+      const std::string field =
+          std::holds_alternative<std::string>(value) ? text_of(value) : fmt::format("{}", number_in(value));
       all += fmt::format("{} {}", field.size(), field);  // so that no two rows look alike
     }
     known[std::get<std::int64_t>(row[0])] = "v" + hash_of(all).substr(0, 16);  // no spreadsheet's number
@@ -1003,6 +1174,11 @@ std::vector<std::string> Repository::check(Progress& progress) const {
       for (const std::string& finding : impl_->database->examine_structure())
         findings.push_back(fmt::format("{}: {}", impl_->place, finding));
     });
+    for (const ModelRow& model : models())
+      if (hash_of(model.text) != model.hash)
+        findings.push_back(fmt::format(
+            "{}: the text of model {} (version {}) is damaged; restore the repository from a backup",
+            impl_->place, shown(model.name), model.version));
     const auto rows = neurons();
     progress.begin("checking", rows.size());
     constexpr std::size_t together = 64;  // on all cores

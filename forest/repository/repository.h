@@ -19,6 +19,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -81,6 +82,35 @@ struct PopulationRow {
   double length = 0.;  // µm
 };
 
+/// What is known of a population, in the notation of grammars: declarations that end on `distribution NAME…`.
+struct DistributionRow {
+  std::string name, population;  // population empty: of none in particular
+  std::string text;
+  int version = 0;  // of this name and population, counted from 1; an earlier one is never changed
+
+  bool operator==(const DistributionRow&) const = default;
+};
+
+/// A text that grows neurons, to be stored as the next version of its name.
+struct NewModel {
+  std::string name;             // see names.h
+  std::string text;             // a grammar, whole: it is not looked into
+  std::string population = {};  // that it describes; empty: that of the version before, or none in particular
+  std::string origin = {};      // how it came to be, in words for people: "from pyramidal.lsys"
+  /// Its distributions, each a text that stands alone. They are kept as distributions of its population, by the names
+  /// "MODEL.NAME" and with versions of their own: those that did not change stay the same.
+  std::vector<std::pair<std::string, std::string>> distributions = {};
+};
+
+/// A version of a model as it was stored.
+struct ModelRow {
+  std::string name, population, origin, hash, text;
+  std::string program;                                     // version of Brain Forest that stored it
+  int version = 0;                                         // counted from 1; an earlier one is never changed
+  std::size_t neurons = 0;                                 // grown from it, in this repository
+  std::vector<std::pair<std::string, int>> distributions;  // name ("MODEL.NAME") and version of each, by name
+};
+
 /// One tree of a neuron: a root section and everything below it.
 struct ArborRow {
   SectionId root;
@@ -131,10 +161,27 @@ class Repository {
   Added add(Prepared prepared, const NewNeuron& neuron);
   Added add(const Morphology& morphology, const NewNeuron& neuron);
 
-  /// Keeps the text of a grammar (once, however often it is given) and returns the hash Grown::grammar_hash
-  /// asks for.
+  // ── What is known ──
+
+  /// Stores a model as the next version of its name, unless the newest version has this text and population. Returns the
+  /// version, and whether it was there. Throws Error when a name is none.
+  std::pair<int, bool> add_model(const NewModel& model);
+  std::vector<ModelRow> models() const;  // by name and version
+  /// Version 0: the newest.
+  std::optional<ModelRow> model(std::string_view name, int version = 0) const;
+
+  /// Keeps the text that neurons are grown from and returns the hash Grown::grammar_hash asks for. When no version of the
+  /// model has the text it is the next one.
   std::string add_grammar(std::string_view name, std::string_view text);
   std::optional<std::string> grammar(std::string_view hash) const;
+
+  /// Keeps the text of a distribution as the next version of its name, unless the newest one has just that text; returns
+  /// the version. The population is made on first use; "": of none in particular. The text is not looked into.
+  int add_distribution(std::string_view name, std::string_view population, std::string_view text);
+  std::vector<DistributionRow> distributions() const;  // by population, name and version
+  /// Version 0: the newest.
+  std::optional<DistributionRow> distribution(std::string_view name, std::string_view population,
+                                              int version = 0) const;
 
   /// Many calls as one transaction, which is what makes thousands of neurons a second:
   ///   auto transaction = repository.begin(); …add…; transaction.commit();
@@ -171,12 +218,12 @@ class Repository {
   /// a neuron is not of that version any more, or a name is none or taken.
   void revise(std::span<const Revision> revisions);
 
-  /// One question in SQL, on the views neuron, section, junction, metric and the tables (docs/repository/schema.md).
+  /// One question in SQL, on the views neuron, section, junction, metric, model, distribution and the tables (docs/repository/schema.md).
   /// From then on this object can only read. Throws Error that says what is not understood.
   Answer query(const std::string& question);
 
-  /// Looks at every byte that matters: the database's own structure, the checksum of every neuron, and the numbers that
-  /// follow from it (of its sections, arbors, metrics …), on all cores. Returns one sentence for each thing found; empty
+  /// Looks at every byte that matters: the database's own structure, the checksum of every neuron, the hash of every
+  /// grammar, and the numbers that follow from it (of its sections, arbors, metrics …), on all cores. Returns one sentence for each thing found; empty
   /// when all is well.
   std::vector<std::string> check(Progress& progress = Progress::none()) const;
 

@@ -1,19 +1,16 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/repository/repository.h"
 
+#include <array>
 #include <csignal>
-#include <fcntl.h>
 #include <filesystem>
 #include <fstream>
-#include <functional>
-#include <thread>
 #include <unistd.h>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/resource.h>
-#include <sys/wait.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -23,7 +20,7 @@
 #include "forest/repository/names.h"
 #include "forest/repository/schema.h"
 
-#include "tests/postgresql.h"
+#include "tests/every_database.h"
 
 namespace forest::repository {
 namespace {
@@ -32,99 +29,8 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 using namespace std::string_literals;
 
-/// A folder of its own for each test.
-class RepositoryTest : public testing::Test {
- protected:
-  void SetUp() override {
-    folder_ = fs::temp_directory_path() / fmt::format("forest-repository-{}", ::getpid());
-    fs::remove_all(folder_);
-    fs::create_directories(folder_);
-    file_ = (folder_ / "cells.db").string();
-  }
-  void TearDown() override { fs::remove_all(folder_); }
-
-  fs::path folder_;
-  std::string file_;
-};
-
-/// The same of every database: place_ names a repository that does not exist yet.
-class EveryDatabase : public RepositoryTest, public testing::WithParamInterface<std::string> {
- protected:
-  void SetUp() override {
-    RepositoryTest::SetUp();
-    place_ = file_;
-    if (GetParam() == "sqlite") return;
-    const auto& server = PostgresqlServer::get();
-    if (!server.runs()) {
-      if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
-      GTEST_SKIP() << "there is no PostgreSQL here";
-    }
-    static int count = 0;
-    const std::string name = fmt::format("cells{}", ++count);
-    ASSERT_TRUE(server.run("create database " + name));
-    place_ = server.address(name);
-  }
-  bool is_file() const { return place_ == file_; }
-
-  std::string place_;
-};
-
 INSTANTIATE_TEST_SUITE_P(Databases, EveryDatabase, testing::Values("sqlite", "postgresql"),
                          [](const auto& row) { return row.param; });
-
-std::string bytes_of(const fs::path& path) { return std::string(MappedFile(path).text()); }
-
-std::string message(const std::function<void()>& body) {
-  try {
-    body();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "no error";
-}
-
-/// A random neuron that uses everything a Morphology has.
-Morphology neuron(std::uint64_t number, std::size_t sections = 40, std::size_t points = 6) {
-  Random random(7, number);
-  const auto value = [&] { return float(random.uniform() * 200. - 100.); };
-  const auto point = [&] { return Point{value(), value(), value(), float(random.uniform())}; };
-  MorphologyBuilder builder;
-  Soma soma;
-  soma.kind = SomaKind(number % 4);
-  const std::size_t soma_points = std::array<std::size_t, 4>{0, 1, 5, 9}[number % 4];
-  for (std::size_t i = 0; i < soma_points; ++i) soma.points.push_back(point());
-  if (soma.kind == SomaKind::cylinders) soma.parents = {-1, 0, 0, 1, 3};
-  if (soma.kind == SomaKind::contours) soma.contour_starts = {0, 4};
-  builder.set_soma(soma);
-  for (std::size_t s = 0; s < sections; ++s) {
-    std::vector<Point> run(1 + std::size_t(random.uniform() * double(points)));
-    for (Point& p : run) p = point();
-    const bool root = s == 0 || random.uniform() < 0.1;
-    const SectionId parent = root ? SectionId() : SectionId(std::size_t(random.uniform() * double(s)));
-    const auto kind =
-        std::array{SectionKind::undefined, SectionKind::axon,        SectionKind::basal, SectionKind::apical,
-                   SectionKind::custom,    SectionKind::unspecified, SectionKind::glia}[s % 7];
-    builder.add_section(parent, kind, run, kind == SectionKind::custom ? 1000 + int(s) : int(kind),
-                        root ? int(s) - 1 : -1);
-    if (s % 5 == 0)
-      builder.add_spine({.section = SectionId(s),
-                         .position = value(),
-                         .head = {value(), value(), value()},
-                         .head_diameter = 0.3f,
-                         .neck_diameter = 0.1f,
-                         .shape = SpineShape(s % 6)});
-  }
-  builder.annotate("species", "rat");
-  builder.annotate("comment \xe9 \\x41 \\", "Latin-1 \xb5m, a zero \0, a newline \n"s);
-  builder.annotate("", "");
-  return builder.build();
-}
-
-NewNeuron called(std::string name, std::string population = "default") {
-  return {.name = name,
-          .population = std::move(population),
-          .provenance = Traced{name + ".swc", "hash of " + name}};
-}
 
 TEST_P(EveryDatabase, GivesBackExactlyWhatWasStored) {
   std::vector<Morphology> neurons;
@@ -397,74 +303,6 @@ TEST_P(EveryDatabase, PopulationsAreSummedUp) {
   EXPECT_TRUE(repository.neurons("none").empty());
 }
 
-/// Runs `body` in another process and returns its pid.
-pid_t in_child(const std::function<void()>& body) {
-  const pid_t pid = ::fork();
-  if (pid != 0) return pid;
-  try {
-    body();
-  } catch (const std::exception& error) {
-    fmt::print(stderr, "child: {}\n", error.what());
-    ::_exit(1);
-  }
-  ::_exit(0);
-}
-
-/// The exit status of a child; -1 when a signal ended it.
-int wait_for(pid_t pid) {
-  int status = 0;
-  ::waitpid(pid, &status, 0);
-  return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
-}
-
-/// Every neuron in the file is whole and the one its name says; returns how many there are.
-std::size_t whole_neurons(const std::string& file, const std::vector<Morphology>& source) {
-  const Repository repository = Repository::open(file, Access::read);
-  EXPECT_THAT(repository.check(), testing::IsEmpty());
-  const auto rows = repository.neurons();
-  for (const NeuronRow& row : rows) EXPECT_EQ(repository.morphology(row.id), source.at(std::stoul(row.name)));
-  return rows.size();
-}
-
-TEST_F(RepositoryTest, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) {
-  std::vector<Morphology> source;
-  for (std::size_t i = 0; i < 40; ++i) source.push_back(neuron(i, 50 + i % 7 * 150, 10));
-  Random random(1);
-  std::size_t before = 0, interrupted = 0;
-  for (int round = 0; round < 200; ++round) {
-    if (round % 8 == 0) fs::remove(file_), before = 0;
-    int pipe[2];
-    ASSERT_EQ(::pipe(pipe), 0);
-    const pid_t child = in_child([&] {
-      Repository repository = Repository::open(file_, Access::write);
-      for (std::size_t i = 0; i < source.size(); ++i) {
-        repository.add(source[i], called(std::to_string(i)));
-        if (::write(pipe[1], "+", 1) != 1) ::_exit(1);
-      }
-    });
-    ::close(pipe[1]);
-    std::size_t said = 0;
-    char byte = 0;
-    for (std::size_t wanted = before + random.below(4); said < wanted && ::read(pipe[0], &byte, 1) == 1;)
-      ++said;
-    ::usleep(std::uint32_t(random.uniform(0., 4000.)));
-    ::kill(child, SIGKILL);
-    wait_for(child);
-    while (::read(pipe[0], &byte, 1) == 1) ++said;
-    ::close(pipe[0]);
-    interrupted += fs::exists(file_ + "-journal");
-    if (!fs::exists(file_)) {
-      EXPECT_EQ(said, 0u);
-      continue;
-    }
-    const std::size_t now = whole_neurons(file_, source);
-    EXPECT_GE(now, said);
-    EXPECT_GE(now, before);
-    before = now;
-  }
-  EXPECT_GT(interrupted, 0u) << "none was killed while it wrote, so this has tested nothing";
-}
-
 TEST_F(RepositoryTest, TheJournalOfARepositoryThatIsGoneDoesNoHarm) {
   std::vector<Morphology> source;
   for (std::size_t i = 0; i < 3; ++i) source.push_back(neuron(i, 3000));
@@ -609,72 +447,6 @@ TEST_P(EveryDatabase, AnswersQuestionsInSqlAndLetsNothingBeWritten) {
   EXPECT_FALSE(fs::exists("/tmp/forest-attached.db") || fs::exists("/tmp/forest-copied"));
 }
 
-std::size_t terminals(const Morphology& m) {
-  std::size_t count = 0;
-  for (std::size_t i = 0; i < m.sections().size(); ++i) count += m.is_terminal(SectionId(i));
-  return count;
-}
-
-/// As an older version stored it.
-std::string as_version(int version, const std::string& file) {
-  std::string sql =
-      "begin; drop view section; drop view junction; alter table sections rename to new; "
-      "create table sections (neuron integer not null, number integer not null, parent integer, arbor "
-      "integer not null, "
-      "branch_order integer not null, length real not null, kind integer not null, tag integer not null, "
-      "soma_point integer not null, first_point integer not null, point_count integer not null, "
-      "daughters integer not null default 0, area real not null default 0, primary key (neuron, number)) "
-      "without rowid; "
-      "insert into sections select id >> 24, id & 16777215, parent, arbor, branch_order, length, kind, tag, "
-      "soma_point, sum(points) over (partition by id >> 24 order by id) - points, points, daughters, area "
-      "from new; "
-      "drop table new; ";
-  if (version == 1)
-    sql +=
-        "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; "
-        "drop table distributions; alter table points drop column packing; "
-        "alter table sections drop column daughters; alter table sections drop column area; ";
-  else
-    sql += "create view section as select 1; create view junction as select 1; ";
-  return fmt::format("sqlite3 '{}' '{} pragma user_version = {}; commit'", file, sql, version);
-}
-
-TEST_F(RepositoryTest, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
-  std::vector<Morphology> source;
-  for (std::size_t i = 0; i < 30; ++i) source.push_back(neuron(i, 60));
-  std::vector<NeuronRow> rows;
-  {
-    Repository repository = Repository::open(file_, Access::write);
-    for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
-    rows = repository.neurons();
-  }
-  const std::string new_one = bytes_of(file_);
-  Random random(3);
-  for (const int version : {1, 2}) {
-    write_file(file_, new_one);
-    ASSERT_EQ(std::system(as_version(version, file_).c_str()), 0);
-    const std::string old = bytes_of(file_);
-    for (int round = 0; round < 8; ++round) {
-      write_file(file_, old);
-      const pid_t child = in_child([&] { Repository::open(file_, Access::read); });
-      ::usleep(std::uint32_t(random.uniform(0., 30'000.)));
-      ::kill(child, SIGKILL);
-      wait_for(child);
-      EXPECT_EQ(whole_neurons(file_, source), source.size()) << "opening it again ends what was begun";
-    }
-    Repository repository = Repository::open(file_, Access::read);
-    EXPECT_EQ(repository.neurons_where("total_length > 0").size(), source.size());
-    const auto count = [&](const char* question) {
-      return std::get<std::int64_t>(repository.query(question).rows[0][0]);
-    };
-    EXPECT_EQ(count("select count(*) from junction where junction = 'terminal' and neuron = 5"),
-              std::int64_t(terminals(source[4])));
-    EXPECT_EQ(count("select count(*) from sqlite_master where name like 'old%' or name = 'new'"), 0);
-    const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
-    EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
-  }
-}
-
 TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
   const auto& server = PostgresqlServer::get();
   if (!server.runs()) {
@@ -694,32 +466,6 @@ TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
   EXPECT_THAT(message([&] { Repository::open(theirs, Access::write); }), HasSubstr("may not write"));
   EXPECT_THAT(message([&] { Repository::open(server.address("nowhere"), Access::read); }),
               HasSubstr("the server cannot be reached"));
-}
-
-TEST(Postgresql, AKilledProgramLeavesWholeNeurons) {
-  const auto& server = PostgresqlServer::get();
-  if (!server.runs()) GTEST_SKIP() << "there is no PostgreSQL here";
-  ASSERT_TRUE(server.run("create database killed"));
-  const std::string place = server.address("killed");
-  std::vector<Morphology> source;
-  for (std::size_t i = 0; i < 40; ++i) source.push_back(neuron(i, 50 + i % 7 * 50));
-  Random random(2);
-  std::size_t before = 0;
-  for (int round = 0; round < 25; ++round) {
-    const pid_t child = in_child([&] {
-      Repository repository = Repository::open(place, Access::write);
-      for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
-    });
-    ::usleep(std::uint32_t(random.uniform(0., 60'000.)));
-    ::kill(child, SIGKILL);
-    wait_for(child);
-    std::size_t now = before;
-    const std::string said = message([&] { now = whole_neurons(place, source); });
-    EXPECT_TRUE(said == "no error" || (before == 0 && said.find("holds no repository") != said.npos)) << said;
-    EXPECT_GE(now, before);
-    before = now;
-  }
-  EXPECT_GT(before, 0u);
 }
 
 TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {

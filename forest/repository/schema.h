@@ -214,6 +214,36 @@ create view junction as
          s.daughters, s.branch_order, s.end_x as x, s.end_y as y, s.end_z as z, s.end_diameter as diameter
   from neurons n cross join sections s join populations p on p.id = n.population
   where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
+)sql"},
+    // What is known, for people: models, which are grammars by name and version with their distributions. The program
+    // writes the texts of grammars anew, with their lines. A population of 0 is none.
+    Migration{4, R"sql(
+create unique index distributions_by_name on distributions (coalesce(population, 0), name, version);
+create table models (
+  id         @id,
+  name       text    not null,
+  version    integer not null,        -- counted from 1; an earlier one is never changed
+  grammar    integer not null references grammars (id),
+  population integer references populations (id),  -- that it describes; null: none in particular
+  origin     text    not null,        -- how this version came to be, in words
+  program    text    not null,
+  unique (name, version)
+);
+create table model_distributions (
+  model        integer not null references models (id),
+  distribution integer not null references distributions (id),
+  primary key (model, distribution)
+) @by_key;
+insert into models (name, version, grammar, origin, program)
+  select g.name, row_number() over (partition by g.name order by g.id), g.id, 'neurons were grown from it', ''
+  from grammars g order by g.id;
+create view model as
+  select m.id, m.name, m.version, p.name as population, m.origin, m.program, g.hash, g.text,
+         (select count(*) from provenance o where o.grammar = g.id) as neurons
+  from models m join grammars g on g.id = m.grammar left join populations p on p.id = m.population;
+create view distribution as
+  select d.id, d.name, p.name as population, d.version, d.text
+  from distributions d left join populations p on p.id = d.population;
 )sql"}};
 
 inline constexpr int section_bits = 24;                      // of sections.id

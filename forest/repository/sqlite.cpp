@@ -288,7 +288,7 @@ void create(const std::string& path) {
     database.begin_writing();
     sql << fmt::format("pragma application_id = {}", application_id);
     sql << fmt::format("pragma user_version = {}", schema_version);
-    migrate(database, 0);
+    migrate(database, 0, nullptr);
     sql << "commit";
     database
         .begin_writing();  // whoever finds the file now waits, and none believes the journal of an earlier one to be its own
@@ -338,8 +338,7 @@ void bring_up_to_date(Sqlite& database, Refill refill) {
   database.begin_writing();
   const int from =
       value<int>(database.sql(), "pragma user_version");  // another program may have been quicker
-  migrate(database, from);
-  refill(database);
+  migrate(database, from, refill);
   database.sql() << fmt::format("pragma user_version = {}", schema_version);
   database.sql() << "commit";
 }

@@ -91,9 +91,9 @@ void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_
   std::ranges::sort(begins);
   std::ranges::sort(ends);
   const auto only = [](const auto& list, std::uint32_t node) -> std::int64_t {
-    const auto [low, high] =
-        std::ranges::equal_range(list, node, {}, &std::pair<std::uint32_t, std::uint32_t>::first);
-    return high - low == 1 ? std::int64_t(low->second) : -1;
+    const auto first = std::ranges::lower_bound(list, std::pair(node, 0u));
+    const auto at_node = [&](auto place) { return place != list.end() && place->first == node; };
+    return at_node(first) && !at_node(first + 1) ? std::int64_t(first->second) : -1;
   };
   std::vector<std::uint32_t> into(strips.size());  // the strip that swallowed this one
   std::iota(into.begin(), into.end(), 0u);

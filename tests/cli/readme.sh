@@ -2,6 +2,7 @@
 # Every command of the README's first steps, in its order, works as it stands there; only the film is made smaller.
 ln -s "$FOREST_SOURCE_DIR/data" data
 export PATH="$(dirname "$BRAINFOREST"):$PATH"
+export EDITOR="sed -i '\$ a # mine'"
 brainforest grow --grammar data/grammars/motoneuron.lsys --count 3 --seed 7 --out cells/  # the reader's own cells
 
 grep '^brainforest ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' |  # a window needs a display, a service a network

@@ -27,7 +27,8 @@ namespace forest::render::cpu {
 [[gnu::always_inline]] inline float exp2_of(float x) {
   x = smaller(larger(x, -126.f), 126.f);
   const float whole = std::floor(x), f = x - whole;
-  const float power = 1.f + f * (.69315308f + f * (.24015361f + f * (.05582631f + f * (.00898934f + f * .00187758f))));
+  const float power =
+      1.f + f * (.69315308f + f * (.24015361f + f * (.05582631f + f * (.00898934f + f * .00187758f))));
   return power * std::bit_cast<float>((std::int32_t(whole) + 127) << 23);
 }
 
@@ -35,7 +36,9 @@ namespace forest::render::cpu {
 [[gnu::always_inline]] inline float exp_of(float x) { return exp2_of(1.44269504f * x); }
 
 /// A half-precision number that is not negative, not infinite.
-[[gnu::always_inline]] inline float from_half(std::uint32_t bits) { return std::bit_cast<float>((bits & 0x7fff) << 13) * 0x1p112f; }
+[[gnu::always_inline]] inline float from_half(std::uint32_t bits) {
+  return std::bit_cast<float>((bits & 0x7fff) << 13) * 0x1p112f;
+}
 
 [[gnu::always_inline]] inline float fraction(float x) { return x - std::floor(x); }
 
@@ -43,7 +46,8 @@ inline constexpr float golden = .61803399f;
 
 /// Interleaved gradient noise (Jimenez 2014), moved by the subframe.
 [[gnu::always_inline]] inline float noise_at(std::int32_t x, std::int32_t y, std::uint32_t subframe) {
-  return fraction(52.9829189f * fraction(.06711056f * float(x) + .00583715f * float(y)) + golden * float(subframe));
+  return fraction(52.9829189f * fraction(.06711056f * float(x) + .00583715f * float(y)) +
+                  golden * float(subframe));
 }
 
 }  // namespace forest::render::cpu

@@ -8,7 +8,6 @@
 #include <vector>
 
 #include "forest/frame/frame.h"
-
 #include "forest/render/cpu/arithmetic.h"
 
 namespace forest::render::cpu {
@@ -18,7 +17,9 @@ namespace forest::render::cpu {
   return smaller(larger(code, 0.f), float(FOREST_DEPTH_MAX));
 }
 
-[[gnu::always_inline]] inline std::uint32_t key_of(float code, std::uint32_t payload) { return std::uint32_t(std::int32_t(code)) << 12 | payload; }
+[[gnu::always_inline]] inline std::uint32_t key_of(float code, std::uint32_t payload) {
+  return std::uint32_t(std::int32_t(code)) << 12 | payload;
+}
 
 /// Shade 0–1 in five bits, the rounding moved by `noise` so that the mean over subframes is smooth.
 [[gnu::always_inline]] inline std::uint32_t payload_of(std::uint32_t entry, float shade, float noise) {

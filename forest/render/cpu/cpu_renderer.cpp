@@ -31,7 +31,8 @@ struct CpuRenderer::State {
     frame::Band from;
     for (const frame::Band& to : lists.bands.empty() ? std::span(&whole, 1) : lists.bands) {
       if (from.dots || from.lines || from.capsules) canvas.look();
-      cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules), cpu::Kind::capsules, canvas);
+      cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules),
+                 cpu::Kind::capsules, canvas);
       cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
       cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines, canvas);
       from = to;
@@ -50,10 +51,12 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   s.seen = {};
   s.picture.colour_class = f.colour_class;
   frame::Timing timing;
-  for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes); ++subframe) {
+  for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes);
+       ++subframe) {
     auto start = Clock::now();
     const frame::Constants c = s.picture.constants = frame::constants_of(f, subframe);
-    s.picture.to_camera << c.right_x, c.right_y, c.right_z, c.up_x, c.up_y, c.up_z, c.forward_x, c.forward_y, c.forward_z;
+    s.picture.to_camera << c.right_x, c.right_y, c.right_z, c.up_x, c.up_y, c.up_z, c.forward_x, c.forward_y,
+        c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
     s.canvas.clear(f.width, f.height);

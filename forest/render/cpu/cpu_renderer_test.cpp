@@ -34,8 +34,8 @@ TEST(CpuRenderer, TheNumberOfThreadsChangesNoPixel) {
     Fixture f(+[]() -> std::unique_ptr<Renderer> { return std::make_unique<CpuRenderer>(); });
     for (int i = 0; i < 60; ++i) {
       const float a = float(i) * .7f;
-      f.add({30 * std::cos(a), 30 * std::sin(a), 40.f - float(i)}, {-30 * std::cos(a), -30 * std::sin(a), 0.f},
-            .05f * float(i % 17));
+      f.add({30 * std::cos(a), 30 * std::sin(a), 40.f - float(i)},
+            {-30 * std::cos(a), -30 * std::sin(a), 0.f}, .05f * float(i % 17));
     }
     std::vector<frame::Item> items;
     for (std::uint32_t i = 0; i < 3000; ++i) items.push_back({0, i % 60, 1, 0, 0, 0, 0, 80});

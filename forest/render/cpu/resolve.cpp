@@ -22,7 +22,8 @@ double srgb(double light) {
 float encoded(float light) {
   static const auto table = [] {
     std::array<float, steps + 2> t{};
-    for (std::size_t i = 0; i < t.size(); ++i) t[i] = float(255. * std::min(1., srgb(double(i) / double(steps))));
+    for (std::size_t i = 0; i < t.size(); ++i)
+      t[i] = float(255. * std::min(1., srgb(double(i) / double(steps))));
     return t;
   }();
   const float at = smaller(larger(light, 0.f), 1.f) * float(steps);
@@ -31,7 +32,8 @@ float encoded(float light) {
 }
 
 // Depths of a row in octaves, `beside` pixels more at both ends.
-[[gnu::target_clones("default", "arch=haswell")]] void octaves_of(const std::uint32_t* keys, std::size_t width, float* octaves) {
+[[gnu::target_clones("default", "arch=haswell")]] void octaves_of(const std::uint32_t* keys,
+                                                                  std::size_t width, float* octaves) {
   for (std::size_t x = 0; x < width; ++x)
     octaves[x + beside] = float(std::int32_t(keys[x] >> 12)) * (1.f / float(FOREST_DEPTH_STEPS));
   for (std::size_t i = 0; i < beside; ++i)
@@ -49,17 +51,18 @@ struct Shading {
   float halo, fog_start, fog_length;
 };
 
-[[gnu::target_clones("default", "arch=haswell")]] void shade(const Shading& s, std::size_t begin, std::size_t end,
-                                                      float* __restrict lit, float* __restrict fog) {
-  const float *up2 = s.rows[0] + beside, *up = s.rows[1] + beside, *here = s.rows[2] + beside, *down = s.rows[3] + beside,
-              *down2 = s.rows[4] + beside;
+[[gnu::target_clones("default", "arch=haswell")]] void shade(const Shading& s, std::size_t begin,
+                                                             std::size_t end, float* __restrict lit,
+                                                             float* __restrict fog) {
+  const float *up2 = s.rows[0] + beside, *up = s.rows[1] + beside, *here = s.rows[2] + beside,
+              *down = s.rows[3] + beside, *down2 = s.rows[4] + beside;
   const float strength = -1.1f * s.halo / 8.f * 1.44269504f, per_length = -1.44269504f / s.fog_length,
               fog_start = s.fog_start;
   for (std::size_t x = begin; x < end; ++x) {
     const float o = here[x];
-    const float rim = nearer(o, here[x + 1]) + nearer(o, *(here + x - 1)) + nearer(o, down[x]) + nearer(o, up[x]) +
-                      nearer(o, down2[x + 2]) + nearer(o, *(down2 + x - 2)) + nearer(o, up2[x + 2]) +
-                      nearer(o, *(up2 + x - 2));
+    const float rim = nearer(o, here[x + 1]) + nearer(o, *(here + x - 1)) + nearer(o, down[x]) +
+                      nearer(o, up[x]) + nearer(o, down2[x + 2]) + nearer(o, *(down2 + x - 2)) +
+                      nearer(o, up2[x + 2]) + nearer(o, *(up2 + x - 2));
     const float light = float(std::int32_t(s.keys[x] & 31)) * (1.f / 31.f);
     const float z = exp2_of(o - float(FOREST_DEPTH_BASE));
     lit[x] = (.16f + 1.05f * light * light) * exp2_of(strength * rim);
@@ -69,10 +72,11 @@ struct Shading {
 
 }  // namespace
 
-void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palette& palette, std::vector<float>& sums,
-             frame::Image& image) {
+void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palette& palette,
+             std::vector<float>& sums, frame::Image& image) {
   const auto width = std::size_t(canvas.width()), height = std::size_t(canvas.height());
-  const bool first = c.subframe == 0, keep = c.subframe + 1 < c.subframes, show = c.subframe + 1 >= c.last_subframe;
+  const bool first = c.subframe == 0, keep = c.subframe + 1 < c.subframes,
+             show = c.subframe + 1 >= c.last_subframe;
   if (c.subframes > 1) sums.resize(width * height * 4);
   image.width = c.width, image.height = c.height;
   image.pixels.resize(width * height * 4);
@@ -84,7 +88,9 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
   parallel_for(chunks, 1, [&](std::size_t chunk) {
     const std::size_t begin = chunk * rows_at_once, end = std::min(height, begin + rows_at_once);
     std::vector<float> octaves((rows_at_once + 2 * beside) * padded), lit(width), fog(width);
-    const auto row_of = [&](std::size_t y) { return &octaves[(y + beside - begin) * padded]; };  // y may be `beside` outside
+    const auto row_of = [&](std::size_t y) {
+      return &octaves[(y + beside - begin) * padded];
+    };  // y may be `beside` outside
     for (std::size_t k = 0; k < end - begin + 2 * beside; ++k) {
       const std::size_t y = std::min(std::max(begin + k, beside) - beside, height - 1);
       octaves_of(canvas.row(std::int32_t(y)), width, &octaves[k * padded]);
@@ -126,7 +132,8 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
         if (keep)
           for (std::size_t i = 0; i < 4; ++i) sums[4 * at + i] = sum[i];
         if (!show) continue;
-        for (int i = 0; i < 3; ++i) pixel[i] = std::uint8_t(smaller(encoded(sum[i] * exposure) + noise, 255.f));
+        for (int i = 0; i < 3; ++i)
+          pixel[i] = std::uint8_t(smaller(encoded(sum[i] * exposure) + noise, 255.f));
         pixel[3] = std::uint8_t(255.f * sum[3] * share + .5f);
         alpha += pixel[3];
       }

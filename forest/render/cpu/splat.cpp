@@ -10,19 +10,20 @@
 namespace forest::render::cpu {
 namespace {
 
-constexpr std::size_t grain = 64;      // items a thread takes at once
-constexpr float tube_width = 7.f;      // pixels; below, a capsule is shaded by its distance from the axis on screen
+constexpr std::size_t grain = 64;  // items a thread takes at once
+constexpr float tube_width =
+    7.f;  // pixels; below, a capsule is shaded by its distance from the axis on screen
 constexpr std::size_t run = FOREST_CLUSTER_SIZE;
 
 // The segments of an item in camera coordinates (x right, y up, z depth), cut at the near distance, and in pixels.
 struct Run {
   std::size_t count = 0;
   float ax[run], ay[run], az[run], ra[run], bx[run], by[run], bz[run], rb[run];
-  float px[run], py[run], qx[run], qy[run];        // pixels of both ends
-  float code_a[run], code_b[run];                  // of their depths
-  float width[run];                                // pixels; below 0: nothing of it lies before the eye
-  float mean_width[run], rank[run], shade[run];    // of its branch; in [0, 1); of a line
-  std::uint32_t entry[run];                        // of the palette
+  float px[run], py[run], qx[run], qy[run];      // pixels of both ends
+  float code_a[run], code_b[run];                // of their depths
+  float width[run];                              // pixels; below 0: nothing of it lies before the eye
+  float mean_width[run], rank[run], shade[run];  // of its branch; in [0, 1); of a line
+  std::uint32_t entry[run];                      // of the palette
 };
 
 void load(const Picture& picture, const frame::Item& item, Run& r) {
@@ -42,8 +43,8 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
 }
 
 // From the coordinates of their neuron to pixels: camera = turn · p + at.
-[[gnu::target_clones("default", "arch=haswell")]] void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light,
-                                                        Run& r) {
+[[gnu::target_clones("default", "arch=haswell")]] void project(const frame::Constants& c, const Mat3& turn,
+                                                               const Vec3& at, const Vec3& light, Run& r) {
   const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
               m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
   const float tx = at.x(), ty = at.y(), tz = at.z(), lx = light.x(), ly = light.y(), lz = light.z();
@@ -119,7 +120,8 @@ void draw_line(const Run& r, std::size_t i, Canvas& canvas) {
 void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  float wp = c.focal * r.ra[i] / r.az[i], wq = c.focal * r.rb[i] / r.bz[i], za = r.code_a[i], zb = r.code_b[i];
+  float wp = c.focal * r.ra[i] / r.az[i], wq = c.focal * r.rb[i] / r.bz[i], za = r.code_a[i],
+        zb = r.code_b[i];
   constexpr float octave = 1.442695f * float(FOREST_DEPTH_STEPS);
   const float bulge = octave * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
   const bool steep = std::abs(qy - py) > std::abs(qx - px);
@@ -146,9 +148,10 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
     for (std::int32_t y = low; y < high; ++y) {
       const float t = (float(y) + .5f - centre) * inverse, h = std::sqrt(std::max(0.f, 1.f - t * t));
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
-      canvas.put(at_x, at_y,
-                 key_of(std::max(z - bulge * h, 0.f),
-                        payload_of(r.entry[i], .5f + t * lit_side + h * lit_front, noise_at(at_x, at_y, c.subframe))));
+      canvas.put(
+          at_x, at_y,
+          key_of(std::max(z - bulge * h, 0.f), payload_of(r.entry[i], .5f + t * lit_side + h * lit_front,
+                                                          noise_at(at_x, at_y, c.subframe))));
     }
   }
 }
@@ -201,8 +204,9 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
     for (std::int32_t y = low; y < high; ++y) {
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
       if (canvas.key(at_x, at_y) < nearest) continue;
-      const Vec3 ray = Vec3((float(at_x) + .5f - c.centre_x) / c.focal, (c.centre_y - float(at_y) - .5f) / c.focal, 1.f)
-                           .normalized();
+      const Vec3 ray =
+          Vec3((float(at_x) + .5f - c.centre_x) / c.focal, (c.centre_y - float(at_y) - .5f) / c.focal, 1.f)
+              .normalized();
       Hit hit;
       if (!nested) {
         const float shift = a.dot(ray);
@@ -223,8 +227,9 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
         if (std::isinf(hit.t)) continue;
       }
       const float z = std::max(hit.t * ray.z(), c.near);
-      canvas.put(at_x, at_y, key_of(depth_code(z), payload_of(r.entry[i], .5f + .5f * hit.normal.dot(picture.light),
-                                                             noise_at(at_x, at_y, c.subframe))));
+      canvas.put(at_x, at_y,
+                 key_of(depth_code(z), payload_of(r.entry[i], .5f + .5f * hit.normal.dot(picture.light),
+                                                  noise_at(at_x, at_y, c.subframe))));
     }
   };
   constexpr std::int32_t shared = 128;  // scan lines from which on other threads help
@@ -242,12 +247,13 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
   if (canvas.hidden(std::min(r.px[i], r.qx[i]) - reach, std::min(r.py[i], r.qy[i]) - reach,
-                    std::max(r.px[i], r.qx[i]) + reach, std::max(r.py[i], r.qy[i]) + reach, depth_code(nearest)) &&
+                    std::max(r.px[i], r.qx[i]) + reach, std::max(r.py[i], r.qy[i]) + reach,
+                    depth_code(nearest)) &&
       nearest > c.near)
     return;
   const float distance = std::hypot(r.qx[i] - r.px[i], r.qy[i] - r.py[i]);
-  2.f * width < tube_width && distance > .5f * width ? draw_tube(picture, r, i, canvas)
-                                                    : draw_capsule(picture, r, i, canvas);
+  2.f * width<tube_width && distance> .5f * width ? draw_tube(picture, r, i, canvas)
+                                                  : draw_capsule(picture, r, i, canvas);
 }
 
 // Small spheres: as render/opengl/shaders/dots.glsl.
@@ -268,11 +274,14 @@ void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) 
              right = std::int32_t(std::min(std::floor(px + radius - .5f), float(canvas.width() - 1)));
   for (std::int32_t y = top; y <= bottom; ++y)
     for (std::int32_t x = left; x <= right; ++x) {
-      const float dx = (float(x) + .5f - px) / radius, dy = (float(y) + .5f - py) / radius, h = 1.f - dx * dx - dy * dy;
+      const float dx = (float(x) + .5f - px) / radius, dy = (float(y) + .5f - py) / radius,
+                  h = 1.f - dx * dx - dy * dy;
       if (h <= 0.f) continue;
       const Vec3 normal(dx, -dy, -std::sqrt(h));
-      canvas.put(x, y, key_of(depth_code(std::max(z + r.ra[0] * normal.z(), c.near)),
-                              payload_of(r.entry[0], .5f + .5f * normal.dot(picture.light), noise_at(x, y, c.subframe))));
+      canvas.put(
+          x, y,
+          key_of(depth_code(std::max(z + r.ra[0] * normal.z(), c.near)),
+                 payload_of(r.entry[0], .5f + .5f * normal.dot(picture.light), noise_at(x, y, c.subframe))));
     }
 }
 
@@ -289,7 +298,8 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       const float nearest = centre.z() - item.radius;
       if (nearest > c.near) {
         const float reach = c.focal * item.radius * centre.norm() / (centre.z() * nearest) + 2.f;
-        const float x = c.centre_x + c.focal * centre.x() / centre.z(), y = c.centre_y - c.focal * centre.y() / centre.z();
+        const float x = c.centre_x + c.focal * centre.x() / centre.z(),
+                    y = c.centre_y - c.focal * centre.y() / centre.z();
         if (canvas.hidden(x - reach, y - reach, x + reach, y + reach, depth_code(nearest))) continue;
       }
       const frame::Instance& instance = picture.geometry.instances[item.instance];
@@ -307,7 +317,8 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
           for (std::size_t i = 0; i < r.count; ++i) draw_near(picture, r, i, canvas);
           break;
         case Kind::dots:
-          draw_dot(picture, r, fraction(float(item.instance) * .7548777f + golden * float(c.subframe)), canvas);
+          draw_dot(picture, r, fraction(float(item.instance) * .7548777f + golden * float(c.subframe)),
+                   canvas);
       }
     }
   });
@@ -321,7 +332,8 @@ void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Can
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Overlay& o = overlays[k];
       r.count = 1;
-      r.ax[0] = o.a.x(), r.ay[0] = o.a.y(), r.az[0] = o.a.z(), r.bx[0] = o.b.x(), r.by[0] = o.b.y(), r.bz[0] = o.b.z();
+      r.ax[0] = o.a.x(), r.ay[0] = o.a.y(), r.az[0] = o.a.z(), r.bx[0] = o.b.x(), r.by[0] = o.b.y(),
+      r.bz[0] = o.b.z();
       r.rank[0] = r.mean_width[0] = 0.f;
       r.entry[0] = o.colour;
       const auto least = [&](const Vec3& p) {

@@ -1,0 +1,404 @@
+// SPDX-License-Identifier: Apache-2.0
+// Programs that are killed, servers that stop, readers beside writers: what is stored is whole, and what was said to be
+// stored is there.
+#include <algorithm>
+#include <atomic>
+#include <chrono>
+#include <fstream>
+#include <thread>
+
+#include "forest/repository/schema.h"
+
+#include "tests/every_database.h"
+
+namespace forest::repository {
+namespace {
+
+using testing::HasSubstr;
+
+/// Starts `body` in another process, which gives a sign after each step, kills it within `microseconds` of the sign number
+/// `signs`, and returns how many signs it had given.
+std::size_t killed_after(std::size_t signs, double microseconds,
+                         const std::function<void(const std::function<void()>& sign)>& body) {
+  int pipe[2];
+  if (::pipe(pipe) != 0) throw Error("no pipe");
+  const pid_t child = in_child([&] {
+    ::close(pipe[0]);
+    body([&] {
+      if (::write(pipe[1], "+", 1) != 1) ::_exit(1);
+    });
+  });
+  ::close(pipe[1]);
+  std::size_t said = 0;
+  char byte = 0;
+  while (said < signs && ::read(pipe[0], &byte, 1) == 1) ++said;
+  ::usleep(std::uint32_t(microseconds));
+  ::kill(child, SIGKILL);
+  wait_for(child);
+  while (::read(pipe[0], &byte, 1) == 1) ++said;
+  ::close(pipe[0]);
+  return said;
+}
+
+/// Rows of every table that belong to no neuron.
+std::int64_t strays(const std::string& place) {
+  Repository repository = Repository::open(place, Access::read);
+  std::string sum =
+      "select (select count(*) from sections where not exists (select 1 from neurons n where n.id = "
+      "sections.id >> 24))";
+  for (const char* table :
+       {"provenance", "somata", "arbors", "points", "spines", "annotations", "neuron_metrics"})
+    sum += fmt::format(
+        " + (select count(*) from {0} where not exists (select 1 from neurons n where n.id = {0}.neuron))",
+        table);
+  return std::get<std::int64_t>(repository.query(sum).rows.at(0).at(0));
+}
+
+TEST_P(EveryDatabase, AKilledProgramLeavesWholeNeuronsAndAllItSaidItHadStored) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 40; ++i) source.push_back(neuron(i, 50 + i % 7 * 150, 10));
+  Random random(1);
+  std::size_t before = 0, interrupted = 0, partly = 0;
+  for (int round = 0; round < (is_file() ? 100 : 40); ++round) {
+    if (round && round % 8 == 0) renew(), before = 0;
+    const std::size_t said = killed_after(
+        before + random.below(4), random.uniform(0., is_file() ? 4000. : 20'000.), [&](const auto& sign) {
+          Repository repository = Repository::open(place_, Access::write);
+          for (std::size_t i = 0; i < source.size(); ++i) {
+            repository.add(source[i], called(std::to_string(i)));
+            sign();
+          }
+        });
+    interrupted += is_file() && std::filesystem::exists(file_ + "-journal");
+    std::size_t now = 0;
+    const std::string sentence = message([&] { now = whole_neurons(place_, source); });
+    if (sentence != "no error") {
+      EXPECT_THAT(sentence, HasSubstr(is_file() ? "there is no such repository" : "holds no repository"));
+      EXPECT_EQ(said + before, 0u);
+      continue;
+    }
+    EXPECT_EQ(strays(place_), 0);
+    EXPECT_GE(now, said);
+    EXPECT_GE(now, before);
+    partly += now < source.size();
+    before = now;
+  }
+  EXPECT_GT(partly, 0u);
+  if (is_file()) {
+    EXPECT_GT(interrupted, 0u) << "none was killed while it wrote, so this has tested nothing";
+  }
+}
+
+TEST_P(EveryDatabase, AKilledBatchIsStoredWholeOrNotAtAll) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 20; ++i) source.push_back(neuron(i, 200));
+  Random random(5);
+  std::size_t without = 0;
+  for (int round = 0; round < 16; ++round) {
+    renew();
+    Repository::open(place_, Access::write).add(source[0], called("0"));
+    const std::size_t said = killed_after(random.below(21), random.uniform(0., 2000.), [&](const auto& sign) {
+      Repository repository = Repository::open(place_, Access::write);
+      auto transaction = repository.begin();
+      repository.add_model({.name = "bush", .text = "text", .distributions = {{"ratio", "text"}}});
+      for (std::size_t i = 1; i < source.size(); ++i)
+        repository.add(source[i], called(std::to_string(i))), sign();
+      transaction.commit();
+      sign();
+    });
+    const std::size_t now = whole_neurons(place_, source);
+    EXPECT_TRUE(now == 1 || now == source.size()) << now;
+    EXPECT_EQ(Repository::open(place_, Access::read).models().size(), now == 1 ? 0u : 1u);
+    EXPECT_EQ(Repository::open(place_, Access::read).distributions().size(), now == 1 ? 0u : 1u);
+    EXPECT_TRUE(said < source.size() || now == source.size());
+    EXPECT_EQ(strays(place_), 0);
+    without += now == 1 && said > 0;
+  }
+  EXPECT_GT(without, 0u) << "none was killed within its batch";
+}
+
+TEST_P(EveryDatabase, AKilledRemovalTakesAllOfANeuronOrNothing) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 24; ++i) source.push_back(neuron(i, 400, 10));
+  Repository::open(place_, Access::write).populations();
+  Random random(6);
+  std::size_t partly = 0;
+  for (int round = 0; round < (is_file() ? 24 : 12); ++round) {
+    {
+      Repository repository = Repository::open(place_, Access::write);
+      for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+    }
+    std::vector<NeuronId> ids;
+    for (const NeuronRow& row : Repository::open(place_, Access::read).neurons()) ids.push_back(row.id);
+    ASSERT_EQ(ids.size(), source.size());
+    const std::size_t said = killed_after(random.below(12), random.uniform(0., 4000.), [&](const auto& sign) {
+      Repository repository = Repository::open(place_, Access::write);
+      for (const NeuronId id : ids) {
+        if (!repository.remove(id)) ::_exit(1);
+        sign();
+      }
+    });
+    const std::size_t left = whole_neurons(place_, source);
+    EXPECT_LE(left, source.size() - said);
+    EXPECT_GE(left + said + 1, source.size()) << "one at most was removed and not yet said to be";
+    EXPECT_EQ(strays(place_), 0);
+    partly += left > 0 && left < source.size();
+  }
+  EXPECT_GT(partly, 0u);
+}
+
+std::size_t terminals(const Morphology& m) {
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < m.sections().size(); ++i) count += m.is_terminal(SectionId(i));
+  return count;
+}
+
+const std::string grammar_text = "axiom: A\nA -> \\(90) F(1) A\n";
+
+/// What makes the tables those of an older version, in either database.
+std::string as_version(int version) {
+  std::string sql =
+      "drop view model; drop view distribution; drop index distributions_by_name; "
+      "drop table model_distributions; drop table models; "
+      "update grammars set text = 'axiom: A\\x0AA -> \\\\(90) F(1) A\\x0A'; ";
+  if (version == 3) return sql;
+  sql +=
+      "drop view section; drop view junction; alter table sections rename to later; "
+      "create table sections (neuron integer not null, number integer not null, parent integer, arbor "
+      "integer not null, "
+      "branch_order integer not null, length double precision not null, kind integer not null, tag integer "
+      "not null, "
+      "soma_point integer not null, first_point integer not null, point_count integer not null, "
+      "daughters integer not null default 0, area double precision not null default 0, primary key (neuron, "
+      "number)); "
+      "insert into sections select cast(id >> 24 as integer), cast(id & 16777215 as integer), parent, arbor, "
+      "branch_order, "
+      "length, kind, tag, soma_point, "
+      "cast(sum(points) over (partition by id >> 24 order by id) - points as integer), points, daughters, "
+      "area from later; "
+      "drop table later; ";
+  if (version == 2)
+    return sql + "create view section as select 1 as one; create view junction as select 1 as one; ";
+  return sql +
+         "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; drop table "
+         "distributions; "
+         "alter table points drop column packing; alter table sections drop column daughters; "
+         "alter table sections drop column area; ";
+}
+
+TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
+  const auto& server = PostgresqlServer::get();
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 30; ++i) source.push_back(neuron(i, 60));
+  std::vector<NeuronRow> rows;
+  std::string hash;
+  {
+    Repository repository = Repository::open(place_, Access::write);
+    hash = repository.add_grammar("bush", grammar_text);
+    for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+    rows = repository.neurons();
+  }
+  const std::string newest = name_, new_bytes = is_file() ? bytes_of(file_) : "";
+  const std::string script = (folder_ / "older.sql").string();
+  Random random(3);
+  std::size_t unfinished = 0;
+  for (const int version : {1, 2, 3}) {
+    std::string old_bytes, old_name;
+    const std::string sql = as_version(version);
+    if (is_file()) {
+      write_file(file_, new_bytes);
+      write_file(script, fmt::format("begin;\n{}\npragma user_version = {};\ncommit;\n", sql, version));
+      ASSERT_EQ(std::system(fmt::format("sqlite3 -bail '{}' <'{}'", file_, script).c_str()), 0);
+      old_bytes = bytes_of(file_);
+    } else {
+      renew(newest);
+      write_file(script, fmt::format("{}\nupdate brainforest_schema set version = {};\n", sql, version));
+      ASSERT_TRUE(server.run_file(script, name_));
+      old_name = name_;
+    }
+    for (int round = 0; round < 8; ++round) {
+      is_file() ? write_file(file_, old_bytes) : renew(old_name);
+      killed_after(0, random.uniform(0., is_file() ? 30'000. : 150'000.),
+                   [&](const auto&) { Repository::open(place_, Access::read); });
+      if (is_file()) {
+        unfinished += bytes_of(file_) == old_bytes || std::filesystem::exists(file_ + "-journal");
+      } else {
+        unfinished += server.run(
+            fmt::format("select 1 / (case version when {} then 1 else 0 end) from brainforest_schema",
+                        version),
+            name_);
+      }
+      EXPECT_EQ(whole_neurons(place_, source), source.size()) << "opening it again ends what was begun";
+    }
+    Repository repository = Repository::open(place_, Access::read);
+    EXPECT_EQ(repository.neurons_where("total_length > 0").size(), source.size());
+    EXPECT_EQ(repository.grammar(hash), grammar_text);
+    const auto count = [&](const char* question) {
+      return std::get<std::int64_t>(repository.query(question).rows[0][0]);
+    };
+    EXPECT_EQ(count("select count(*) from junction where junction = 'terminal' and neuron = 5"),
+              std::int64_t(terminals(source[4])));
+    EXPECT_EQ(count(is_file() ? "select count(*) from sqlite_master where name like 'old%'"
+                              : "select count(*) from pg_class where relname like 'old%'"),
+              0);
+    EXPECT_EQ(repository.query("select text from model where name = 'bush' and version = 1").rows[0][0],
+              Answer::Value(grammar_text));
+    const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
+    EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
+    EXPECT_EQ(Repository::open(place_, Access::write).add_distribution("ratio", "default", "text"), 1);
+    EXPECT_EQ(Repository::open(place_, Access::write).add(neuron(99), called("another")).already_there,
+              false);
+  }
+  EXPECT_GT(unfinished, 0u) << "none was killed before it was done, so this has tested nothing";
+}
+
+TEST_P(EveryDatabase, TwoProgramsMayBringAnOlderRepositoryUpToDate) {
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 20; ++i) source.push_back(neuron(i, 60));
+  {
+    Repository repository = Repository::open(place_, Access::write);
+    for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
+  }
+  const std::string script = (folder_ / "older.sql").string();
+  write_file(script, is_file()
+                         ? fmt::format("begin;\n{}\npragma user_version = 2;\ncommit;\n", as_version(2))
+                         : fmt::format("{}\nupdate brainforest_schema set version = 2;\n", as_version(2)));
+  if (is_file())
+    ASSERT_EQ(std::system(fmt::format("sqlite3 -bail '{}' <'{}'", file_, script).c_str()), 0);
+  else
+    ASSERT_TRUE(PostgresqlServer::get().run_file(script, name_));
+  std::array<pid_t, 4> children{};
+  for (pid_t& child : children)
+    child = in_child([&] {
+      if (Repository::open(place_, Access::read).neurons().size() != source.size())
+        throw Error("neurons are missing");
+    });
+  for (const pid_t child : children) EXPECT_EQ(wait_for(child), 0);
+  EXPECT_EQ(whole_neurons(place_, source), source.size());
+}
+
+TEST_P(EveryDatabase, WhoReadsWhileThousandsAreStoredSeesWholeNeurons) {
+  constexpr std::size_t count = 3000;
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < count; ++i) source.push_back(neuron(i, 6, 4));
+  Repository::open(place_, Access::write);
+  const pid_t writer = in_child([&] {
+    Repository repository = Repository::open(place_, Access::write);
+    for (std::size_t i = 0; i < count;) {
+      auto transaction = repository.begin();
+      for (const std::size_t end = i + 1 + i % 40; i < end && i < count; ++i)
+        repository.add(source[i], called(std::to_string(i)));
+      transaction.commit();
+      ::usleep(1000);  // as one who has other things to do between two files
+    }
+  });
+  Random random(9);
+  Repository repository = Repository::open(place_, Access::read);
+  std::size_t before = 0, partly = 0;
+  int status = 0;
+  for (bool done = false; !done;) {
+    done = ::waitpid(writer, &status, WNOHANG) == writer;
+    const auto rows = repository.neurons();
+    ASSERT_GE(rows.size(), before);
+    before = rows.size();
+    partly += before > 0 && before < count;
+    std::vector<std::size_t> chosen;
+    if (!rows.empty()) chosen = {rows.size() - 1, random.below(std::uint32_t(rows.size()))};
+    for (const std::size_t i : chosen) {
+      ASSERT_EQ(rows[i].name, std::to_string(i)) << "in the order of storing, none left out";
+      ASSERT_EQ(repository.morphology(rows[i].id), source[i]);
+    }
+    if (random.below(8) == 0) {
+      ASSERT_GE(repository.neurons_where("number_of_sections = 6").size(), before);
+      // One question sees one moment: every table has what belongs to the neurons that are there.
+      const auto counts =
+          repository
+              .query(
+                  "select count(*), 6 * count(*), sum(sections), (select count(*) from sections), "
+                  "(select count(*) from provenance), (select count(*) from metric where metric = "
+                  "'number_of_sections') from neurons")
+              .rows.at(0);
+      const auto count_of = [&](std::size_t i) { return std::get<std::int64_t>(counts[i]); };
+      ASSERT_GE(count_of(0), std::int64_t(before));
+      if (count_of(0) > 0) {
+        ASSERT_EQ(count_of(2), count_of(1));
+      }
+      ASSERT_EQ(count_of(3), count_of(1));
+      ASSERT_EQ(count_of(4), count_of(0));
+      ASSERT_EQ(count_of(5), count_of(0));
+    }
+  }
+  EXPECT_TRUE(WIFEXITED(status) && WEXITSTATUS(status) == 0);
+  EXPECT_EQ(before, count);
+  EXPECT_GT(partly, 0u) << "it was stored too quickly for a reader to see it grow";
+}
+
+TEST(Postgresql, AServerThatStopsIsASentenceAndLosesNothing) {
+  const PostgresqlServer server("halted");
+  if (!server.runs()) {
+    if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
+    GTEST_SKIP() << "there is no PostgreSQL here";
+  }
+  ASSERT_TRUE(server.run("create database cells"));
+  const std::string place = server.address("cells");
+  std::vector<Morphology> source;
+  for (std::size_t i = 0; i < 400; ++i) source.push_back(neuron(i, 100));
+  const auto is_sentence = [&](const std::string& said) {
+    EXPECT_THAT(said, testing::StartsWith(place + ": "));
+    EXPECT_THAT(said, testing::AnyOf(HasSubstr("the server is shutting down"),
+                                     HasSubstr("the connection to the server is lost")));
+    EXPECT_EQ(std::ranges::count(said, '\n'), 0);
+  };
+  std::size_t there = 0;
+  for (const char* how : {"fast", "immediate"}) {
+    // While nothing is asked, within a batch, and at any moment of many.
+    {
+      Repository repository = Repository::open(place, Access::write);
+      repository.add(source[there], called(std::to_string(there))), ++there;
+      ASSERT_TRUE(server.halt(how));
+      for (int again = 0; again < 2; ++again) {
+        is_sentence(message([&] { repository.add(source[there], called(std::to_string(there))); }));
+        is_sentence(message([&] { repository.neurons(); }));
+        is_sentence(message([&] { repository.morphology(NeuronId(1)); }));
+        is_sentence(message([&] { repository.add_distribution("ratio", "default", "text"); }));
+        is_sentence(message([&] { repository.remove(NeuronId(1)); }));
+      }
+      EXPECT_THAT(message([&] { Repository::open(place, Access::read); }),
+                  HasSubstr("the server cannot be reached"));
+    }
+    ASSERT_TRUE(server.resume());
+    EXPECT_EQ(whole_neurons(place, source), there);
+    {
+      Repository repository = Repository::open(place, Access::write);
+      auto transaction = repository.begin();
+      for (std::size_t i = there; i < there + 5; ++i) repository.add(source[i], called(std::to_string(i)));
+      ASSERT_TRUE(server.halt(how));
+      is_sentence(message([&] { transaction.commit(); }));
+    }
+    ASSERT_TRUE(server.resume());
+    EXPECT_EQ(whole_neurons(place, source), there);
+    {
+      Repository repository = Repository::open(place, Access::write);
+      std::thread halting([&] {
+        std::this_thread::sleep_for(std::chrono::milliseconds(30));
+        server.halt(how);
+      });
+      std::size_t stored = there;
+      const std::string said = message([&] {
+        for (; stored < source.size(); ++stored)
+          repository.add(source[stored], called(std::to_string(stored)));
+      });
+      halting.join();
+      is_sentence(said);
+      ASSERT_TRUE(server.resume());
+      const std::size_t now = whole_neurons(place, source);
+      EXPECT_TRUE(now == stored || now == stored + 1)
+          << now << " where " << stored << " were said to be stored";
+      there = now;
+    }
+    EXPECT_EQ(strays(place), 0);
+  }
+}
+
+}  // namespace
+}  // namespace forest::repository
