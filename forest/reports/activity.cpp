@@ -55,7 +55,7 @@ struct FileLayout {
   std::uint64_t compartments, sections, branches;  // how many
 };
 static_assert(sizeof(FileRow) == 24 && sizeof(FileLayout) == 32 && sizeof(Compartment) == 12 &&
-              sizeof(SectionRun) == 8);
+              sizeof(SectionRun) == 12 && sizeof(Spike) == 16);
 
 // In the order of the file, behind the tiles.
 enum Part : std::uint32_t {
@@ -67,11 +67,13 @@ enum Part : std::uint32_t {
   compartment_part,
   section_part,
   branch_part,
+  spike_part,
   text_part,
   part_count
 };
 constexpr std::array<std::uint32_t, part_count> element_sizes{
-    sizeof(Tile), sizeof(Slot), 4, sizeof(FileRow), sizeof(FileLayout), sizeof(Compartment), sizeof(SectionRun), 4, 1};
+    sizeof(Tile),        sizeof(Slot),       4, sizeof(FileRow), sizeof(FileLayout),
+    sizeof(Compartment), sizeof(SectionRun), 4, sizeof(Spike),   1};
 
 struct Entry {
   std::uint32_t part, element_size;
@@ -87,10 +89,19 @@ static_assert(sizeof(Foot) == 32 * part_count + 24);
 using Json = nlohmann::ordered_json;
 
 Json describe(const Facts& f) {
-  return {{"source", f.source},       {"circuit", f.circuit},     {"units", f.units},
-          {"populations", f.populations}, {"instances", f.instances}, {"start", f.start},
-          {"step", f.step},           {"steps", f.steps},         {"low", f.range.low},
-          {"high", f.range.high},     {"clamped", f.clamped},     {"not_numbers", f.not_numbers}};
+  return {{"source", f.source},
+          {"circuit", f.circuit},
+          {"units", f.units},
+          {"populations", f.populations},
+          {"instances", f.instances},
+          {"start", f.start},
+          {"step", f.step},
+          {"steps", f.steps},
+          {"low", f.range.low},
+          {"high", f.range.high},
+          {"clamped", f.clamped},
+          {"not_numbers", f.not_numbers},
+          {"spikes_left_out", f.spikes_left_out}};
 }
 
 Facts understand(const Json& json) {
@@ -101,6 +112,7 @@ Facts understand(const Json& json) {
   f.start = json.at("start"), f.step = json.at("step");
   f.range = {json.at("low"), json.at("high")};
   f.clamped = json.at("clamped"), f.not_numbers = json.at("not_numbers");
+  f.spikes_left_out = json.at("spikes_left_out");
   return f;
 }
 
@@ -110,8 +122,8 @@ std::uint64_t values_of(const FileLayout& layout, std::size_t level) {
 
 /// The columns of tiles of one level: runs of neurons. Those of coarser levels are unions of the finest ones.
 struct Columns {
-  std::vector<std::uint32_t> first;   // neuron; one more than columns
-  std::vector<std::uint64_t> value;   // the first value of each; one more, too
+  std::vector<std::uint32_t> first;  // neuron; one more than columns
+  std::vector<std::uint64_t> value;  // the first value of each; one more, too
   std::size_t size() const { return first.size() - 1; }
 };
 
@@ -204,8 +216,9 @@ void coarsen(const Layout& layout, const Kernel& kernel, const Code* codes,
 
 class Packer {
  public:
-  Packer(const Report& report, const Match& match, const PackOptions& options, NewFile& file)
-      : report_(report), match_(match), options_(options), file_(file) {
+  Packer(const Report& report, const Match& match, std::span<const Spike> spikes, const PackOptions& options,
+         NewFile& file)
+      : report_(report), match_(match), spikes_(spikes), options_(options), file_(file) {
     for (const Layout& layout : match.layouts) {
       Kernel kernel;
       for (std::uint32_t c = 0, s = 0; c < layout.compartments.size(); ++c) {
@@ -215,8 +228,8 @@ class Packer {
         kernel.in_order &= layout.compartments[c].column == c;
       }
       kernels_.push_back(std::move(kernel));
-      file_layouts_.push_back({layout.morphology, layout.soma, layout.compartments.size(), layout.sections.size(),
-                               layout.branches.size()});
+      file_layouts_.push_back({layout.morphology, layout.soma, layout.compartments.size(),
+                               layout.sections.size(), layout.branches.size()});
     }
     cut_columns();
     time_tiles_ = (report.steps + tile_steps - 1) / tile_steps;
@@ -330,7 +343,8 @@ class Packer {
       for (std::size_t s = 0; s < steps; ++s)
         for (const std::vector<Code>& part : waiting_[l]) {
           const std::size_t own = part.size() / steps;
-          codes.insert(codes.end(), part.begin() + std::ptrdiff_t(s * own), part.begin() + std::ptrdiff_t((s + 1) * own));
+          codes.insert(codes.end(), part.begin() + std::ptrdiff_t(s * own),
+                       part.begin() + std::ptrdiff_t((s + 1) * own));
         }
       waiting_[l].clear();
       append(number(l, t, column), pack_tile(std::move(codes), width, steps, number(l, t, column)));
@@ -352,7 +366,8 @@ class Packer {
     }
     std::vector<FileRow> rows;
     for (std::size_t n = 0; n < match_.layout.size(); ++n)
-      rows.push_back({report_.nodes[n].id, report_.nodes[n].population, match_.instance[n], match_.layout[n], 0});
+      rows.push_back(
+          {report_.nodes[n].id, report_.nodes[n].population, match_.instance[n], match_.layout[n], 0});
     std::vector<Compartment> compartments;
     std::vector<SectionRun> sections;
     std::vector<std::uint32_t> branches;
@@ -362,12 +377,16 @@ class Packer {
       branches.insert(branches.end(), layout.branches.begin(), layout.branches.end());
     }
     const std::string text = json.dump(-1, ' ', false, Json::error_handler_t::replace);
-    const std::array<std::span<const std::byte>, part_count> parts{
-        std::as_bytes(std::span(tiles_)),        std::as_bytes(std::span(slots_)),
-        std::as_bytes(std::span(firsts)),        std::as_bytes(std::span(rows)),
-        std::as_bytes(std::span(file_layouts_)), std::as_bytes(std::span(compartments)),
-        std::as_bytes(std::span(sections)),      std::as_bytes(std::span(branches)),
-        std::as_bytes(std::span(text))};
+    const std::array<std::span<const std::byte>, part_count> parts{std::as_bytes(std::span(tiles_)),
+                                                                   std::as_bytes(std::span(slots_)),
+                                                                   std::as_bytes(std::span(firsts)),
+                                                                   std::as_bytes(std::span(rows)),
+                                                                   std::as_bytes(std::span(file_layouts_)),
+                                                                   std::as_bytes(std::span(compartments)),
+                                                                   std::as_bytes(std::span(sections)),
+                                                                   std::as_bytes(std::span(branches)),
+                                                                   std::as_bytes(spikes_),
+                                                                   std::as_bytes(std::span(text))};
     Foot foot{.table = {}, .file_size = 0, .table_hash = 0, .magic = magic};
     constexpr std::array<std::byte, alignment> zeros{};
     for (std::uint32_t p = 0; p < part_count; ++p) {
@@ -391,6 +410,7 @@ class Packer {
 
   const Report& report_;
   const Match& match_;
+  const std::span<const Spike> spikes_;
   const PackOptions& options_;
   NewFile& file_;
   std::vector<Kernel> kernels_;
@@ -404,27 +424,45 @@ class Packer {
   std::uint64_t at_ = 0;
 };
 
+std::optional<std::uint32_t> nearest(const LayoutView& layout, std::uint32_t SectionRun::*of,
+                                     std::uint32_t wanted, float position) {
+  const auto found = std::ranges::find(layout.sections, wanted, of);
+  if (found == layout.sections.end()) return std::nullopt;
+  const auto [begin, end] = layout.compartments_of(std::size_t(found - layout.sections.begin()));
+  const auto run = layout.compartments.subspan(begin, end - begin);
+  const auto best = std::ranges::min_element(
+      run, {}, [&](const Compartment& c) { return std::abs(c.position - position); });
+  return begin + std::uint32_t(best - run.begin());
+}
+
 }  // namespace
 
 std::optional<std::uint32_t> LayoutView::at(std::uint32_t section, float position) const {
-  for (std::size_t s = 0; s < sections.size(); ++s) {
-    if (sections[s].section != section) continue;
-    const std::uint32_t begin = s ? sections[s - 1].end : 0;
-    const auto run = compartments.subspan(begin, sections[s].end - begin);
-    const auto nearest =
-        std::ranges::min_element(run, {}, [&](const Compartment& c) { return std::abs(c.position - position); });
-    return begin + std::uint32_t(nearest - run.begin());
-  }
-  return std::nullopt;
+  return nearest(*this, &SectionRun::section, section, position);
+}
+
+std::optional<std::uint32_t> LayoutView::at_element(std::uint32_t element, float position) const {
+  return nearest(*this, &SectionRun::element, element, position);
+}
+
+std::vector<std::uint32_t> LayoutView::runs(std::size_t count) const {
+  std::vector<std::uint32_t> runs(count, 0xffffffffu);
+  for (std::size_t i = 0; i < sections.size(); ++i)
+    if (sections[i].section < count) runs[sections[i].section] = std::uint32_t(i);
+  return runs;
 }
 
 void pack(const Report& report, const circuit::Circuit& circuit, std::span<const Morphology> morphologies,
-          const Nodes& nodes, const std::filesystem::path& out, const PackOptions& options, Progress& progress) {
+          const Nodes& nodes, std::span<const Spikes> spikes, const std::filesystem::path& out,
+          const PackOptions& options, Progress& progress) {
   if (!(options.range.low < options.range.high) || !std::isfinite(options.range.low) ||
       !std::isfinite(options.range.high))
-    throw Error(fmt::format("a range from {} to {} holds no value; give its lower end first", options.range.low,
-                            options.range.high));
+    throw Error(fmt::format("a range from {} to {} holds no value; give its lower end first",
+                            options.range.low, options.range.high));
+  if (options.tile == 0 || options.tile > (1u << 24))
+    throw Error(fmt::format("tiles of {} values are no good; give 1 to {}", options.tile, 1u << 24));
   const Match matched = match(report, circuit, morphologies, nodes);
+  const PlacedSpikes placed = place(spikes, nodes);
   NewFile file(out);
   Facts facts{.source = report.source,
               .circuit = circuit.name,
@@ -434,8 +472,9 @@ void pack(const Report& report, const circuit::Circuit& circuit, std::span<const
               .start = report.start,
               .step = report.step,
               .steps = report.steps,
-              .range = options.range};
-  Packer(report, matched, options, file).run(std::move(facts), progress);
+              .range = options.range,
+              .spikes_left_out = placed.left_out};
+  Packer(report, matched, placed.spikes, options, file).run(std::move(facts), progress);
   file.commit();
 }
 
@@ -450,7 +489,7 @@ struct Activity::Data {
   std::vector<LayoutView> layouts;
   std::array<Columns, level_count> columns;
   std::array<std::uint64_t, level_count> base{}, width{};
-  std::vector<std::uint32_t> row_of_instance;  // all ones: not reported
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> row_of_instance;  // sorted
   std::size_t time_tiles = 0;
   mutable std::atomic<std::uint64_t> touched{0};
 
@@ -465,7 +504,8 @@ struct Activity::Data {
     return base[level] + t * columns[level].size() + c;
   }
   std::size_t column_of(std::size_t level, std::uint64_t value) const {
-    return std::size_t(std::ranges::upper_bound(columns[level].value, value) - columns[level].value.begin()) - 1;
+    return std::size_t(std::ranges::upper_bound(columns[level].value, value) - columns[level].value.begin()) -
+           1;
   }
   /// A packed row as it lies in the file.
   std::span<const std::byte> row(std::uint64_t number, std::size_t slot) const {
@@ -478,7 +518,8 @@ struct Activity::Data {
   std::span<const std::byte> checked(std::uint64_t number, std::size_t slot, std::size_t count) const {
     const auto packed = row(number, slot);
     touched.fetch_add(packed.size(), std::memory_order_relaxed);
-    if (row_hash(packed, number, slot) != as<Slot>(slot_part)[number * slots + slot].hash || !is_row(packed, count))
+    if (row_hash(packed, number, slot) != as<Slot>(slot_part)[number * slots + slot].hash ||
+        !is_row(packed, count))
       refuse("is damaged: values do not match their checksum");
     return packed;
   }
@@ -506,7 +547,8 @@ Activity Activity::from_bytes(std::vector<std::byte> memory, const std::string& 
   return check(std::move(data), bytes, name);
 }
 
-Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> bytes, const std::string& name) {
+Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> bytes,
+                         const std::string& name) {
   Data& d = *data;
   d.name = name, d.bytes = bytes;
   const auto require = [&](bool good, const std::string& sentence) {
@@ -518,7 +560,8 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   if (head.magic != magic)
     throw InputError(name, 0, "is not an activity file; make one with 'brainforest activity'");
   require(head.version == version && head.zero == 0,
-          fmt::format("has version {} of the activity file and this program reads version {}", head.version, version));
+          fmt::format("has version {} of the activity file and this program reads version {}", head.version,
+                      version));
   Foot foot;
   const std::string cut = "is cut short or has grown";
   require(bytes.size() >= sizeof head + sizeof foot, cut);
@@ -530,11 +573,13 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   std::uint64_t end = tiles_end;  // of what has been looked at, behind the tiles
   for (std::uint32_t p = 0; p < part_count; ++p) {
     const Entry& e = foot.table[p];
-    require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 && e.offset <= foot_at &&
-                e.offset >= sizeof head && e.count <= (foot_at - e.offset) / e.element_size,
+    require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
+                e.offset <= foot_at && e.offset >= sizeof head &&
+                e.count <= (foot_at - e.offset) / e.element_size,
             "has a wrong table of contents");
     require(e.offset >= end && e.offset - end < alignment &&
-                std::ranges::all_of(bytes.subspan(end, e.offset - end), [](std::byte b) { return b == std::byte{0}; }),
+                std::ranges::all_of(bytes.subspan(end, e.offset - end),
+                                    [](std::byte b) { return b == std::byte{0}; }),
             "is damaged between its parts");
     end = e.offset + e.count * e.element_size;
     d.parts[p] = bytes.subspan(e.offset, e.count * e.element_size);
@@ -547,16 +592,16 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   std::vector<std::uint64_t> column_counts;
   try {
     const auto text = d.parts[text_part];
-    const Json json =
-        Json::parse(std::string_view(reinterpret_cast<const char*>(text.data()), text.size()));
+    const Json json = Json::parse(std::string_view(reinterpret_cast<const char*>(text.data()), text.size()));
     d.facts = understand(json);
-    column_counts = json.at("columns");
+    column_counts = json.at("columns").get<std::vector<std::uint64_t>>();
   } catch (const nlohmann::json::exception&) {
     d.refuse("has a damaged description");
   }
   const Facts& f = d.facts;
   require(std::isfinite(f.start) && std::isfinite(f.step) && f.step > 0. && std::isfinite(f.range.low) &&
-              std::isfinite(f.range.high) && f.range.low < f.range.high && f.steps > 0 && f.steps < (1ull << 40),
+              std::isfinite(f.range.high) && f.range.low < f.range.high && f.steps > 0 &&
+              f.steps < (1ull << 40),
           "has a damaged description");
 
   const auto compartments = d.as<Compartment>(compartment_part);
@@ -564,8 +609,8 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   const auto branches = d.as<std::uint32_t>(branch_part);
   std::uint64_t c = 0, s = 0, b = 0;
   for (const FileLayout& layout : d.as<FileLayout>(layout_part)) {
-    require(layout.compartments > 0 && layout.compartments <= compartments.size() - c && layout.sections > 0 &&
-                layout.sections <= sections.size() - s && layout.branches > 0 &&
+    require(layout.compartments > 0 && layout.compartments <= compartments.size() - c &&
+                layout.sections > 0 && layout.sections <= sections.size() - s && layout.branches > 0 &&
                 layout.branches <= branches.size() - b && layout.soma < layout.compartments,
             wrong);
     const LayoutView view{layout.morphology, layout.soma, compartments.subspan(c, layout.compartments),
@@ -582,21 +627,27 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   require(c == compartments.size() && s == sections.size() && b == branches.size(), wrong);
 
   require(f.instances < 0xffffffffull, wrong);
-  std::vector<std::uint32_t> instances;
   for (const FileRow& row : d.as<FileRow>(row_part)) {
-    require(row.layout < d.layouts.size() && row.population < f.populations.size() && row.instance < f.instances &&
-                row.zero == 0,
+    require(row.layout < d.layouts.size() && row.population < f.populations.size() &&
+                row.instance < f.instances && row.zero == 0,
             wrong);
     d.rows.push_back({row.node_id, row.population, row.instance, row.layout, d.width});
     for (std::size_t l = 0; l < level_count; ++l)
       d.width[l] += values_of(d.as<FileLayout>(layout_part)[row.layout], l);
-    instances.push_back(row.instance);
+    d.row_of_instance.emplace_back(row.instance, std::uint32_t(d.rows.size() - 1));
   }
   require(!d.rows.empty(), wrong);
-  std::ranges::sort(instances);
-  require(std::ranges::adjacent_find(instances) == instances.end(), wrong);
-  d.row_of_instance.assign(instances.back() + 1ull, 0xffffffffu);
-  for (std::uint32_t i = 0; i < d.rows.size(); ++i) d.row_of_instance[d.rows[i].instance] = i;
+  std::ranges::sort(d.row_of_instance);
+  require(std::ranges::adjacent_find(d.row_of_instance, {}, [](const auto& p) { return p.first; }) ==
+              d.row_of_instance.end(),
+          wrong);
+  double before = -INFINITY;
+  for (const Spike& spike : d.as<Spike>(spike_part)) {
+    require(
+        spike.time >= before && std::isfinite(spike.time) && spike.instance < f.instances && spike.zero == 0,
+        wrong);
+    before = spike.time;
+  }
 
   std::uint64_t column_total = 0;
   const auto firsts = d.as<std::uint32_t>(column_part);
@@ -605,7 +656,8 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
     require(column_counts[l] > 0 && column_counts[l] <= firsts.size() - column_total, wrong);
     Columns& columns = d.columns[l];
     for (const std::uint32_t first : firsts.subspan(column_total, column_counts[l])) {
-      require(columns.first.empty() ? first == 0 : first > columns.first.back() && first < d.rows.size(), wrong);
+      require(columns.first.empty() ? first == 0 : first > columns.first.back() && first < d.rows.size(),
+              wrong);
       require(l == 0 || std::ranges::binary_search(d.columns[0].first, first), wrong);
       columns.first.push_back(first), columns.value.push_back(d.rows[first].first[l]);
     }
@@ -641,11 +693,12 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
     for (std::size_t column = 0; column < d.columns[0].size(); ++column) {
       next(d.tile(0, t, column), t);
       for (std::size_t l = 1; l < level_count; ++l)
-        if (d.columns[l].first[done[l] + 1] == d.columns[0].first[column + 1]) next(d.tile(l, t, done[l]++), t);
+        if (d.columns[l].first[done[l] + 1] == d.columns[0].first[column + 1])
+          next(d.tile(l, t, done[l]++), t);
     }
   }
-  require(tiles_end - at < alignment &&
-              std::ranges::all_of(bytes.subspan(at, tiles_end - at), [](std::byte x) { return x == std::byte{0}; }),
+  require(tiles_end - at < alignment && std::ranges::all_of(bytes.subspan(at, tiles_end - at),
+                                                            [](std::byte x) { return x == std::byte{0}; }),
           "is damaged between its parts");
   // Rows are far from one another: what the system would read on its own account around each is not needed.
   if (d.file) ::madvise(const_cast<std::byte*>(bytes.data()), tiles_end, MADV_RANDOM);
@@ -657,14 +710,31 @@ std::span<const Row> Activity::rows() const { return data_->rows; }
 std::size_t Activity::layout_count() const { return data_->layouts.size(); }
 LayoutView Activity::layout(std::uint32_t index) const { return data_->layouts[index]; }
 std::uint64_t Activity::width(Level level) const { return data_->width[std::size_t(level)]; }
-std::uint64_t Activity::row_count(std::size_t time_level) const { return rows_in(data_->facts.steps, time_level); }
+std::uint64_t Activity::row_count(std::size_t time_level) const {
+  return rows_in(data_->facts.steps, time_level);
+}
 std::uint64_t Activity::bytes() const { return data_->bytes.size(); }
 std::uint64_t Activity::touched() const { return data_->touched.load(); }
 
 std::optional<std::uint32_t> Activity::row_of_instance(std::uint32_t instance) const {
   const auto& rows = data_->row_of_instance;
-  if (instance >= rows.size() || rows[instance] == 0xffffffffu) return std::nullopt;
-  return rows[instance];
+  const auto found = std::ranges::lower_bound(rows, std::pair(instance, 0u));
+  if (found == rows.end() || found->first != instance) return std::nullopt;
+  return found->second;
+}
+
+std::uint64_t Activity::count(std::uint32_t row, Level level) const {
+  const auto l = std::size_t(level);
+  return (row + 1 < data_->rows.size() ? data_->rows[row + 1].first[l] : data_->width[l]) -
+         data_->rows[row].first[l];
+}
+
+std::span<const Spike> Activity::spikes() const { return data_->as<Spike>(spike_part); }
+
+std::span<const Spike> Activity::spikes(double begin, double end) const {
+  const auto all = spikes();
+  const auto first = std::ranges::lower_bound(all, begin, {}, &Spike::time);
+  return {first, std::ranges::lower_bound(first, all.end(), std::max(begin, end), {}, &Spike::time)};
 }
 
 void Activity::values(Level level, std::size_t time_level, std::uint64_t row, std::uint64_t first,
@@ -687,6 +757,51 @@ void Activity::values(Level level, std::size_t time_level, std::uint64_t row, st
     const std::size_t width = std::size_t(starts[c + 1] - starts[c]);
     unpack(d.checked(d.tile(l, t, c), slot, width), width, std::size_t(from - starts[c]),
            out.subspan(std::size_t(from - first), std::size_t(to - from)));
+  });
+}
+
+void Activity::gather(std::span<const Wanted> wanted, std::size_t time_level, std::uint64_t row,
+                      std::span<Code> out) const {
+  const Data& d = *data_;
+  if (time_level >= time_level_count || row >= row_count(time_level))
+    throw Error(
+        fmt::format("{}: row {} of time level {} is asked for and not in the file", d.name, row, time_level));
+  const std::size_t t = std::size_t(row / level_rows[time_level]);
+  const std::size_t slot = level_slot[time_level] + std::size_t(row % level_rows[time_level]);
+  struct Item {
+    std::uint64_t tile, to;
+    std::uint32_t index;  // in wanted
+  };
+  std::vector<Item> items(wanted.size());
+  std::uint64_t to = 0;
+  for (std::uint32_t i = 0; i < wanted.size(); ++i) {
+    const auto l = std::size_t(wanted[i].level);
+    if (wanted[i].row >= d.rows.size() || l >= level_count)
+      throw Error(
+          fmt::format("{}: neuron {} is asked for and there are {}", d.name, wanted[i].row, d.rows.size()));
+    items[i] = {d.tile(l, t, d.column_of(l, d.rows[wanted[i].row].first[l])), to, i};
+    to += count(wanted[i].row, wanted[i].level);
+  }
+  if (to != out.size())
+    throw Error(fmt::format("{}: {} values are asked for and there is room for {}", d.name, to, out.size()));
+  std::ranges::sort(items, {}, [](const Item& item) { return std::pair(item.tile, item.index); });
+  std::vector<std::size_t> groups;  // where items of another tile begin
+  for (std::size_t i = 0; i < items.size(); ++i)
+    if (i == 0 || items[i].tile != items[i - 1].tile)
+      groups.push_back(i), d.expect(d.row(items[i].tile, slot));
+  groups.push_back(items.size());
+  parallel_for(groups.size() - 1, 8, [&](std::size_t g) {
+    const Wanted& any = wanted[items[groups[g]].index];
+    const auto l = std::size_t(any.level);
+    const auto& starts = d.columns[l].value;
+    const std::size_t c = d.column_of(l, d.rows[any.row].first[l]),
+                      width = std::size_t(starts[c + 1] - starts[c]);
+    const auto packed = d.checked(items[groups[g]].tile, slot, width);
+    for (std::size_t i = groups[g]; i < groups[g + 1]; ++i) {
+      const Wanted& own = wanted[items[i].index];
+      unpack(packed, width, std::size_t(d.rows[own.row].first[l] - starts[c]),
+             out.subspan(std::size_t(items[i].to), std::size_t(count(own.row, own.level))));
+    }
   });
 }
 
@@ -727,7 +842,8 @@ std::vector<Code> Activity::history(Level level, std::uint64_t value) const {
   std::vector<Code> history(d.facts.steps);
   parallel_for(d.time_tiles, 4, [&](std::size_t t) {
     for (std::size_t i = t * tile_steps; i < std::min<std::size_t>((t + 1) * tile_steps, history.size()); ++i)
-      unpack(d.checked(d.tile(l, t, c), i % tile_steps, width), width, within, std::span(history).subspan(i, 1));
+      unpack(d.checked(d.tile(l, t, c), i % tile_steps, width), width, within,
+             std::span(history).subspan(i, 1));
   });
   return history;
 }
@@ -748,6 +864,28 @@ std::vector<Code> Activity::raster(std::size_t time_level) const {
   return raster;
 }
 
+std::vector<Code> Activity::raster_picture(std::uint64_t begin, std::uint64_t end, std::uint32_t width,
+                                           std::uint32_t height) const {
+  if (begin >= end || end > data_->facts.steps || width == 0 || height == 0)
+    throw Error(
+        fmt::format("{}: a picture of steps {} to {} in {}x{} pixels is asked for; there are {} steps",
+                    data_->name, begin, end, width, height, data_->facts.steps));
+  const std::size_t neurons = data_->rows.size();
+  std::vector<Code> picture(std::size_t(width) * height, no_value);
+  parallel_for(width, 4, [&](std::size_t x) {
+    const std::uint64_t first = begin + (end - begin) * x / width;
+    const std::uint64_t last = std::max(first + 1, begin + (end - begin) * (x + 1) / width);
+    std::vector<Code> column(neurons);
+    greatest(Level::soma, first, last, 0, column);
+    for (std::uint32_t y = 0; y < height; ++y) {
+      const std::size_t n = neurons * y / height, stop = std::max(n + 1, neurons * (y + 1) / height);
+      for (std::size_t i = n; i < stop; ++i)
+        raise({&picture[y * std::size_t(width) + x], 1}, {&column[i], 1});
+    }
+  });
+  return picture;
+}
+
 void Activity::verify() const {
   const Data& d = *data_;
   for (std::size_t l = 0; l < level_count; ++l)
@@ -756,7 +894,8 @@ void Activity::verify() const {
       const auto width = std::size_t(d.columns[l].value[c + 1] - d.columns[l].value[c]);
       const std::size_t steps = std::min<std::size_t>(tile_steps, d.facts.steps - t * tile_steps);
       for (std::size_t k = 0; k < time_level_count; ++k)
-        for (std::size_t r = 0; r < rows_in(steps, k); ++r) (void)d.checked(d.tile(l, t, c), level_slot[k] + r, width);
+        for (std::size_t r = 0; r < rows_in(steps, k); ++r)
+          (void)d.checked(d.tile(l, t, c), level_slot[k] + r, width);
     });
 }
 

@@ -43,11 +43,12 @@ struct Facts {
   std::string source, circuit;  // the report and the circuit it was packed from
   std::string units = "mV";
   std::vector<std::string> populations;
-  std::uint64_t instances = 0;  // of the circuit
+  std::uint64_t instances = 0;   // of the circuit
   double start = 0., step = 0.;  // ms
   std::uint64_t steps = 0;
   Range range;
   std::uint64_t clamped = 0, not_numbers = 0;  // values beyond the range; values that are none
+  std::uint64_t spikes_left_out = 0;           // of neurons without a shape
 
   double time(std::uint64_t i) const { return start + double(i) * step; }  // ms
 };
@@ -62,6 +63,21 @@ struct LayoutView {
   /// The compartment whose middle is nearest to a place on a section (soma_run: the soma). None when that section has no
   /// compartment.
   std::optional<std::uint32_t> at(std::uint32_t section, float position) const;
+  /// The same for a section as the report counts it, 0 for the soma.
+  std::optional<std::uint32_t> at_element(std::uint32_t element, float position) const;
+  /// For whoever maps many places: of each of `count` sections of the morphology, its entry in `sections`; all ones for
+  /// one without compartments.
+  std::vector<std::uint32_t> runs(std::size_t count) const;
+  /// Compartments [first, second) of an entry of `sections`.
+  std::pair<std::uint32_t, std::uint32_t> compartments_of(std::size_t run) const {
+    return {run ? sections[run - 1].end : 0, sections[run].end};
+  }
+};
+
+/// What is wanted of one neuron: its place in Activity::rows(), and how closely it is looked at.
+struct Wanted {
+  std::uint32_t row = 0;
+  Level level = Level::compartment;
 };
 
 struct PackOptions {
@@ -72,8 +88,8 @@ struct PackOptions {
 /// Packs a report into a file, whole or not at all. Memory: the mapping and a few tiles, however long the report is. The
 /// same report gives the same bytes at any number of threads. Throws InputError where the report does not fit the circuit.
 void pack(const Report& report, const circuit::Circuit& circuit, std::span<const Morphology> morphologies,
-          const Nodes& nodes, const std::filesystem::path& out, const PackOptions& options = {},
-          Progress& progress = Progress::none());
+          const Nodes& nodes, std::span<const Spikes> spikes, const std::filesystem::path& out,
+          const PackOptions& options = {}, Progress& progress = Progress::none());
 
 /// An open activity file; immutable, cheap to copy, safe in any thread. Its tables are checked when it is opened, the
 /// values whenever they are touched: damage throws InputError, it is never shown.
@@ -86,7 +102,8 @@ class Activity {
   std::span<const Row> rows() const;
   std::size_t layout_count() const;
   LayoutView layout(std::uint32_t index) const;
-  std::uint64_t width(Level level) const;  // values a step
+  std::uint64_t width(Level level) const;                     // values a step
+  std::uint64_t count(std::uint32_t row, Level level) const;  // values of one neuron
   std::uint64_t row_count(std::size_t time_level) const;
   std::uint64_t bytes() const;
   /// The row of a neuron of the circuit, if it was reported.
@@ -99,16 +116,30 @@ class Activity {
   void values(Level level, std::uint64_t step, std::uint64_t first, std::span<Code> out) const {
     values(level, 0, step, first, out);
   }
+  /// What a picture needs: the values of these neurons, one neuron after the other as they are listed, count() each, at one
+  /// row of one time level. Only rows of tiles in which one of them lies are touched. `out` must be as long.
+  void gather(std::span<const Wanted> wanted, std::size_t time_level, std::uint64_t row,
+              std::span<Code> out) const;
   /// The greatest over steps [begin, end), from the coarsest rows that lie within. For scrubbing.
   void greatest(Level level, std::uint64_t begin, std::uint64_t end, std::uint64_t first,
                 std::span<Code> out) const;
 
   /// The virtual clamp: one value at every step.
-  std::vector<Code> history(std::uint64_t compartment) const { return history(Level::compartment, compartment); }
+  std::vector<Code> history(std::uint64_t compartment) const {
+    return history(Level::compartment, compartment);
+  }
   std::vector<Code> history(Level level, std::uint64_t value) const;
+
+  /// All spikes, sorted by time; and those with begin <= time < end, ms.
+  std::span<const Spike> spikes() const;
+  std::span<const Spike> spikes(double begin, double end) const;
 
   /// Soma voltages, one line a neuron of rows(), one column a row of the time level: rows().size() × row_count.
   std::vector<Code> raster(std::size_t time_level = 0) const;
+  /// The same as a picture, time to the right and neurons downwards, of steps [begin, end): width × height codes, rows from
+  /// the top. A pixel that stands for several values has the greatest, so that no spike is lost.
+  std::vector<Code> raster_picture(std::uint64_t begin, std::uint64_t end, std::uint32_t width,
+                                   std::uint32_t height) const;
 
   /// Bytes of the file that were looked at since it was opened, its tables aside.
   std::uint64_t touched() const;
@@ -118,7 +149,8 @@ class Activity {
  private:
   struct Data;
   explicit Activity(std::shared_ptr<const Data> data) : data_(std::move(data)) {}
-  static Activity check(std::shared_ptr<Data> data, std::span<const std::byte> bytes, const std::string& name);
+  static Activity check(std::shared_ptr<Data> data, std::span<const std::byte> bytes,
+                        const std::string& name);
   std::shared_ptr<const Data> data_;
 };
 

@@ -38,8 +38,8 @@ BranchOrder branch_order(const Morphology& m) {
       order.sections.push_back(at.value());
       const auto children = m.children(at);
       if (children.empty()) break;
-      const auto longest = std::ranges::max_element(
-          children, {}, [&](SectionId id) { return reach[id.value()]; });
+      const auto longest =
+          std::ranges::max_element(children, {}, [&](SectionId id) { return reach[id.value()]; });
       for (std::size_t i = children.size(); i-- > 0;)
         if (children[i] != *longest) open.push_back(children[i]);
       at = *longest;
@@ -52,10 +52,23 @@ BranchOrder branch_order(const Morphology& m) {
 /// What is computed once a morphology.
 struct Shape {
   std::vector<SectionId> of_element;
+  std::vector<std::uint32_t> element;  // of each section
   BranchOrder order;
 };
 
-std::uint32_t weight_of(double length) { return std::uint32_t(std::clamp(std::round(length * 10.), 1., 65535.)); }
+std::uint32_t population_of(const Nodes& nodes, const std::string& name, const std::string& source) {
+  const auto found = std::ranges::find(nodes.populations, name);
+  if (found == nodes.populations.end())
+    throw InputError(
+        source, 0,
+        fmt::format("population {} is not in the circuit, which has {}; name the circuit that was simulated",
+                    name, fmt::join(nodes.populations, ", ")));
+  return std::uint32_t(found - nodes.populations.begin());
+}
+
+std::uint32_t weight_of(double length) {
+  return std::uint32_t(std::clamp(std::round(length * 10.), 1., 65535.));
+}
 
 class Matcher {
  public:
@@ -65,7 +78,8 @@ class Matcher {
     if (nodes.of_instance.size() != circuit.instances.size())
       throw Error(fmt::format("{} nodes are named for {} neurons of the circuit", nodes.of_instance.size(),
                               circuit.instances.size()));
-    for (const std::string& name : report.populations) population_.push_back(population(nodes, name));
+    for (const std::string& name : report.populations)
+      population_.push_back(population_of(nodes, name, report.source));
     for (std::size_t i = 0; i < nodes.of_instance.size(); ++i) instance_.emplace(nodes.of_instance[i], i);
     shapes_.resize(morphologies.size());
   }
@@ -80,19 +94,13 @@ class Matcher {
   }
 
  private:
-  [[noreturn]] void refuse(const std::string& sentence) const { throw InputError(report_.source, 0, sentence); }
+  [[noreturn]] void refuse(const std::string& sentence) const {
+    throw InputError(report_.source, 0, sentence);
+  }
 
   std::string name_of(std::size_t n) const {
     return fmt::format("node {} of population {}", report_.nodes[n].id,
                        report_.populations[report_.nodes[n].population]);
-  }
-
-  std::uint32_t population(const Nodes& nodes, const std::string& name) const {
-    const auto found = std::ranges::find(nodes.populations, name);
-    if (found == nodes.populations.end())
-      refuse(fmt::format("population {} is not in the circuit, which has {}; name the circuit that was simulated", name,
-                         fmt::join(nodes.populations, ", ")));
-    return std::uint32_t(found - nodes.populations.begin());
   }
 
   std::uint32_t instance_of(std::size_t n) const {
@@ -102,11 +110,13 @@ class Matcher {
       const auto first = instance_.lower_bound({population_[report_population], 0});
       std::size_t count = 0;
       std::uint64_t last = 0;
-      for (auto at = first; at != instance_.end() && at->first.population == population_[report_population]; ++at)
+      for (auto at = first; at != instance_.end() && at->first.population == population_[report_population];
+           ++at)
         ++count, last = at->first.id;
-      refuse(fmt::format("{} is not in the circuit, where {} neurons of it have a shape{}; name the circuit that was "
-                         "simulated",
-                         name_of(n), count, count ? fmt::format(", the last of them node {}", last) : ""));
+      refuse(fmt::format(
+          "{} is not in the circuit, where {} neurons of it have a shape{}; name the circuit that was "
+          "simulated",
+          name_of(n), count, count ? fmt::format(", the last of them node {}", last) : ""));
     }
     return std::uint32_t(found->second);
   }
@@ -141,7 +151,12 @@ class Matcher {
   const Shape& shape_of(std::uint32_t morphology) {
     Shape& shape = shapes_[morphology];
     const Morphology& m = morphologies_[morphology];
-    if (shape.order.starts.empty()) shape = {sections_of_elements(m), branch_order(m)};
+    if (shape.order.starts.empty()) {
+      shape = {sections_of_elements(m), {}, branch_order(m)};
+      shape.element.resize(shape.of_element.size());
+      for (std::size_t i = 0; i < shape.of_element.size(); ++i)
+        shape.element[shape.of_element[i].value()] = std::uint32_t(i + 1);
+    }
     return shape;
   }
 
@@ -149,16 +164,18 @@ class Matcher {
                std::span<const float> at) {
     const Shape& shape = shape_of(morphology);
     const Morphology& m = morphologies_[morphology];
-    std::vector<std::vector<std::uint32_t>> columns(m.sections().size() + 1);  // of each section; the soma's are last
+    std::vector<std::vector<std::uint32_t>> columns(m.sections().size() +
+                                                    1);  // of each section; the soma's are last
     const std::size_t soma = m.sections().size();
     for (std::size_t c = 0; c < ids.size(); ++c) {
       if (ids[c] > m.sections().size())
-        refuse(fmt::format("{} has a compartment in section {}, but its morphology {} has sections 0 (the soma) to {}; "
-                           "name the circuit that was simulated",
-                           name_of(n), ids[c], circuit_.morphologies[morphology], m.sections().size()));
+        refuse(fmt::format(
+            "{} has a compartment in section {}, but its morphology {} has sections 0 (the soma) to {}; "
+            "name the circuit that was simulated",
+            name_of(n), ids[c], circuit_.morphologies[morphology], m.sections().size()));
       if (!at.empty() && !(at[c] >= 0.f && at[c] <= 1.f))
-        refuse(fmt::format("{} has a compartment at {} of section {}; positions are from 0 to 1", name_of(n), at[c],
-                           ids[c]));
+        refuse(fmt::format("{} has a compartment at {} of section {}; positions are from 0 to 1", name_of(n),
+                           at[c], ids[c]));
       columns[ids[c] ? shape.of_element[ids[c] - 1].value() : soma].push_back(std::uint32_t(c));
     }
     Layout layout{.morphology = morphology, .soma = 0, .compartments = {}, .sections = {}, .branches = {}};
@@ -167,10 +184,10 @@ class Matcher {
       if (own.empty()) return;
       if (!at.empty()) std::ranges::stable_sort(own, {}, [&](std::uint32_t c) { return at[c]; });
       for (std::size_t k = 0; k < own.size(); ++k)
-        layout.compartments.push_back(
-            {own[k], at.empty() ? (float(k) + .5f) / float(own.size()) : at[own[k]],
-             weight_of(length / double(own.size()))});
+        layout.compartments.push_back({own[k], at.empty() ? (float(k) + .5f) / float(own.size()) : at[own[k]],
+                                       weight_of(length / double(own.size()))});
       layout.sections.push_back({section == soma ? soma_run : std::uint32_t(section),
+                                 section == soma ? 0 : shape.element[section],
                                  std::uint32_t(layout.compartments.size())});
     };
     const auto end_branch = [&] {
@@ -241,6 +258,34 @@ Match match(const Report& report, const circuit::Circuit& circuit, std::span<con
             const Nodes& nodes) {
   check(report);
   return Matcher(report, circuit, morphologies, nodes).run();
+}
+
+PlacedSpikes place(std::span<const Spikes> spikes, const Nodes& nodes) {
+  PlacedSpikes placed;
+  for (const Spikes& of : spikes) {
+    const std::uint32_t population = population_of(nodes, of.population, of.source);
+    const auto refuse = [&](const std::string& sentence) { throw InputError(of.source, 0, sentence); };
+    std::unordered_map<std::uint64_t, std::uint32_t> instance;
+    for (std::size_t i = 0; i < nodes.of_instance.size(); ++i)
+      if (nodes.of_instance[i].population == population)
+        instance.emplace(nodes.of_instance[i].id, std::uint32_t(i));
+    for (std::size_t i = 0; i < of.times.size(); ++i) {
+      if (!std::isfinite(of.times[i]))
+        refuse(fmt::format("the time of spike {} of population {} is no number; write the file again", i,
+                           of.population));
+      if (of.nodes[i] >= nodes.ends[population])
+        refuse(fmt::format(
+            "node {} of population {} spikes and is not in the circuit, whose nodes end at {}; name the "
+            "circuit that was simulated",
+            of.nodes[i], of.population, nodes.ends[population]));
+      if (const auto found = instance.find(of.nodes[i]); found != instance.end())
+        placed.spikes.push_back({of.times[i], found->second});
+      else
+        ++placed.left_out;
+    }
+  }
+  std::ranges::sort(placed.spikes, {}, [](const Spike& s) { return std::pair(s.time, s.instance); });
+  return placed;
 }
 
 }  // namespace forest::reports
