@@ -158,6 +158,8 @@ void run(const Options& options, Console& console) {
     reports::pack(report, circuit, shapes, reports::nodes_of(circuit), {}, path, {}, console.progress());
   });
 
+  rusage usage{};
+  ::getrusage(RUSAGE_SELF, &usage);  // from here on the file's own pages would count
   Random random(options.seed, 0, 21);
   const auto any_step = [&] { return random.below(options.steps); };
   std::vector<Code> codes(width);
@@ -203,9 +205,6 @@ void run(const Options& options, Console& console) {
     activity.values(Level::compartment, played++ % options.steps, 0, codes);
   const double raster = milliseconds([&] { activity.raster_picture(0, options.steps, 1200, 800); });
   const double error = worst_error(activity, report, options.seed, 4);
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-
   const double total = double(width) * options.steps;
   console.print({{"made_up", true},
                  {"neurons", options.neurons},
@@ -229,7 +228,7 @@ void run(const Options& options, Console& console) {
                  {"error", error},
                  {"stated_error", activity.facts().range.error()},
                  {"units", activity.facts().units},
-                 {"peak_bytes", std::uint64_t(usage.ru_maxrss) * 1024}});
+                 {"packing_peak_bytes", std::uint64_t(usage.ru_maxrss) * 1024}});
   console.say(fmt::format(
       "Made up: {} neurons, {} values a step, {} steps; {:.1f} MB, {:.2f} bytes a value, packed in {:.1f} s",
       options.neurons, width, options.steps, double(activity.bytes()) / 1e6, double(activity.bytes()) / total,

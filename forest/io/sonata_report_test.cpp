@@ -53,6 +53,7 @@ class Reports : public testing::Test {
 
   fs::path write(const std::vector<Written>& populations) const {
     const fs::path path = root_ / "report.h5";
+    fs::remove(path);  // a report that is still open keeps its own
     hdf5::NewFile file(path);
     for (const Written& w : populations) {
       const std::string base = "/report/" + w.name, map = base + "/mapping/";
@@ -226,7 +227,8 @@ TEST_F(Reports, OfSpikesAreReadAsTheyLie) {
   EXPECT_THAT(complaint([&] { read_sonata_spikes(path); }), HasSubstr("has 3 entries and"));
   {
     hdf5::NewFile file(path);
-    file.write("/spikes/gids", std::span(std::as_const(*Written{}.node_ids)));
+    const std::vector<std::uint64_t> gids{1, 2};
+    file.write("/spikes/gids", std::span(gids));
     file.close();
   }
   EXPECT_THAT(complaint([&] { read_sonata_spikes(path); }), HasSubstr("an early layout"));
