@@ -7,6 +7,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <unistd.h>
 #include <vector>
 
@@ -19,6 +20,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/random.h"
+#include "forest/io/sonata_report.h"
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/transform.h"
 #include "forest/reports/activity.h"
@@ -41,7 +43,7 @@ using Clock = std::chrono::steady_clock;
 struct Options {
   std::uint32_t neurons = 10000, compartments = 1500, steps = 128, seeks = 20, shapes = 10;
   std::uint64_t seed = 1;
-  fs::path folder = fs::temp_directory_path(), keep;
+  fs::path folder = fs::temp_directory_path(), keep, report;
 };
 
 template <class Body>
@@ -149,13 +151,20 @@ void run(const Options& options, Console& console) {
       circuit, shapes,
       {.compartments = options.compartments, .steps = options.steps, .step = .1, .seed = options.seed});
   const std::uint64_t width = report.columns();
+  std::optional<reports::Report> written;  // the same from a file
+  double writing = 0.;
+  if (!options.report.empty()) {
+    writing = milliseconds([&] { io::write_sonata_report(options.report, report, console.progress()); });
+    written = io::read_sonata_report(options.report);
+  }
   std::vector<float> piece(64 * 16384);
   const double making =
       milliseconds([&] { report.read(0, 64, 0, std::min<std::uint64_t>(width, 16384), piece.data()); });
   const double making_rate =
       64. * double(std::min<std::uint64_t>(width, 16384)) / making * 1000.;  // values/s, one core
   const double packing = milliseconds([&] {
-    reports::pack(report, circuit, shapes, reports::nodes_of(circuit), {}, path, {}, console.progress());
+    reports::pack(written ? *written : report, circuit, shapes, reports::nodes_of(circuit), {}, path, {},
+                  console.progress());
   });
 
   rusage usage{};
@@ -212,6 +221,8 @@ void run(const Options& options, Console& console) {
                  {"steps", options.steps},
                  {"bytes", activity.bytes()},
                  {"bytes_per_value", double(activity.bytes()) / total},
+                 {"from", written ? "a SONATA report" : "a formula"},
+                 {"writing_seconds", writing / 1000.},
                  {"packing_seconds", packing / 1000.},
                  {"packed_values_per_second", total / packing * 1000.},
                  {"made_values_per_second", making_rate},
@@ -260,6 +271,9 @@ std::function<void()> bench_activity(CLI::App& command, Console& console) {
   whole("--seeks", options->seeks, "How often each is measured", 1, 100'000);
   command.add_option("--folder", options->folder, "Where the file is made, and removed")
       ->capture_default_str();
+  command.add_option(
+      "--report", options->report,
+      "Also write what is made up as a SONATA report, leave it there, and pack it from there: 60 MB a step");
   command.add_option("--keep", options->keep, "Make this file instead, and leave it");
   add_seed(command, options->seed, "Of the values");
   return [options, &console] { run(*options, console); };

@@ -381,10 +381,39 @@ void NewFile::write(const std::string& path, std::int64_t file_type, std::int64_
         "written");
 }
 
+void NewFile::matrix(const std::string& path, std::size_t rows, std::size_t columns) {
+  const Turn turn;
+  const Properties links(H5Pcreate(H5P_LINK_CREATE)), create(H5Pcreate(H5P_DATASET_CREATE));
+  H5Pset_create_intermediate_group(links, 1);
+  H5Pset_obj_track_times(create, false);
+  H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);  // room on the disk is zero without writing it twice
+  const std::array<hsize_t, 2> shape{rows, columns};
+  const Space space(H5Screate_simple(2, shape.data(), nullptr));
+  check(Dataset(H5Dcreate2(file_, path.c_str(), H5T_IEEE_F32LE, space, links, create, H5P_DEFAULT)).good(),
+        "written");
+}
+
+void NewFile::fill(const std::string& path, std::size_t row, std::size_t rows, std::size_t column,
+                   std::size_t columns, const float* values) {
+  const Turn turn;
+  const Dataset set(H5Dopen2(file_, path.c_str(), H5P_DEFAULT));
+  const Space space(H5Dget_space(set));
+  const std::array<hsize_t, 2> start{row, column}, count{rows, columns};
+  const Space memory(H5Screate_simple(2, count.data(), nullptr));
+  check(H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) >= 0 &&
+            H5Dwrite(set, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, values) >= 0,
+        "written");
+}
+
 // Stored little-endian on every machine.
 void NewFile::write(const std::string& path, std::span<const float> values, std::size_t columns) {
   const Turn turn;
   write(path, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size(), columns);
+}
+
+void NewFile::write(const std::string& path, std::span<const double> values) {
+  const Turn turn;
+  write(path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), values.size());
 }
 
 void NewFile::write(const std::string& path, std::span<const std::int32_t> values, std::size_t columns) {

@@ -81,11 +81,17 @@ class NewFile {
   void group(const std::string& path);
   /// Rows of `columns` values; 0: a single row of all of them.
   void write(const std::string& path, std::span<const float> values, std::size_t columns = 0);
+  void write(const std::string& path, std::span<const double> values);
   void write(const std::string& path, std::span<const std::int32_t> values, std::size_t columns = 0);
   void write(const std::string& path, std::span<const std::uint8_t> values);
   void write(const std::string& path, std::span<const std::uint32_t> values);
   void write(const std::string& path, std::span<const std::uint64_t> values);
   void write(const std::string& path, std::span<const std::string> values);  // UTF-8, of variable length
+  /// An array of 32-bit floats that is filled a piece at a time; what is never filled is zero.
+  void matrix(const std::string& path, std::size_t rows, std::size_t columns);
+  /// Rows [row, row + rows) of it, columns [column, column + columns), row after row.
+  void fill(const std::string& path, std::size_t row, std::size_t rows, std::size_t column,
+            std::size_t columns, const float* values);
   void attribute(const std::string& object, const std::string& name, std::uint32_t value);
   void attribute(const std::string& object, const std::string& name, const std::string& text);  // UTF-8
   void attribute(const std::string& object, const std::string& name, std::span<const std::uint32_t> values);

@@ -2,6 +2,7 @@
 #include "forest/io/sonata_report.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <memory>
@@ -9,7 +10,10 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/parallel.h"
 #include "forest/io/hdf5.h"
+#include "forest/io/sonata_config.h"
 
 namespace forest::io {
 namespace {
@@ -186,6 +190,55 @@ Report read_sonata_report(const fs::path& path, const std::string& population) {
   };
   reports::check(report);
   return report;
+}
+
+void write_sonata_report(const fs::path& path, const Report& report, Progress& progress) {
+  reports::check(report);
+  if (report.populations.size() != 1)
+    throw Error(fmt::format("{}: a report of {} populations is to be written; write one a file",
+                            path.string(), report.populations.size()));
+  NewFile place(path);
+  hdf5::NewFile file(place.path());
+  file.attribute("/", "magic", sonata_magic);
+  file.attribute("/", "version", std::array<std::uint32_t, 2>{0, 1});
+  file.attribute("/", "comment", report.source);
+  const std::string base = "/report/" + report.populations[0], map = base + "/mapping/",
+                    data = base + "/data";
+  std::vector<std::uint64_t> nodes;
+  for (const reports::Node& node : report.nodes) nodes.push_back(node.id);
+  file.write(map + "node_ids", std::span(std::as_const(nodes)));
+  file.write(map + "index_pointers", std::span(report.first_column));
+  file.write(map + "element_ids", std::span(report.element_ids));
+  if (!report.element_positions.empty()) file.write(map + "element_pos", std::span(report.element_positions));
+  const std::array<double, 3> time{report.start, report.start + double(report.steps) * report.step,
+                                   report.step};
+  file.write(map + "time", std::span<const double>(time));
+  file.attribute(map + "time", "units", "ms");
+  file.matrix(data, report.steps, report.columns());
+  file.attribute(data, "units", report.units);
+  constexpr std::size_t rows = 16, columns = 65536;
+  const std::size_t across = (report.columns() + columns - 1) / columns,
+                    down = (report.steps + rows - 1) / rows;
+  progress.begin("writing", across * down);
+  parallel_in_order(
+      across * down,
+      [&](std::size_t i) {
+        const std::size_t row = i / across * rows, column = i % across * columns;
+        std::vector<float> values(std::min(rows, report.steps - row) *
+                                  std::min(columns, report.columns() - column));
+        report.read(row, std::min(rows, report.steps - row), column,
+                    std::min(columns, report.columns() - column), values.data());
+        return values;
+      },
+      [&](std::size_t i, const std::vector<float>& values) {
+        const std::size_t row = i / across * rows, column = i % across * columns;
+        file.fill(data, row, std::min(rows, report.steps - row), column,
+                  std::min(columns, report.columns() - column), values.data());
+        progress.advance();
+      });
+  progress.end();
+  file.close();
+  place.commit();
 }
 
 std::vector<Spikes> read_sonata_spikes(const fs::path& path, const std::string& population) {

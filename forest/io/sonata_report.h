@@ -7,6 +7,7 @@
 #include <string>
 #include <vector>
 
+#include "forest/core/progress.h"
 #include "forest/reports/report.h"
 
 namespace forest::io {
@@ -17,6 +18,11 @@ namespace forest::io {
 /// Throws InputError that names what is wrong: a file that is cut off, a missing or wrong array, a mapping that does not
 /// fit the values, times that do not fit the rows.
 reports::Report read_sonata_report(const std::filesystem::path& file, const std::string& population = "");
+
+/// Writes a report of one population, whole or not at all, a few rows at a time. Its source becomes the attribute "comment"
+/// of the root. Throws Error.
+void write_sonata_report(const std::filesystem::path& file, const reports::Report& report,
+                         Progress& progress = Progress::none());
 
 /// Reads the spikes of all populations, or of one. Throws InputError.
 std::vector<reports::Spikes> read_sonata_spikes(const std::filesystem::path& file,

@@ -15,6 +15,7 @@
 #include "forest/io/hdf5.h"
 #include "forest/io/sonata.h"
 #include "forest/reports/activity.h"
+#include "forest/reports/synthetic.h"
 
 #include "tests/real_data.h"
 
@@ -123,6 +124,37 @@ TEST_F(Reports, OfSeveralPopulationsLieSideBySide) {
   const fs::path slower = write({Written{}, other});
   EXPECT_THAT(complaint([&] { read_sonata_report(slower); }), HasSubstr("name one with --population"));
   EXPECT_EQ(read_sonata_report(slower, "other").step, 1.);
+}
+
+TEST_F(Reports, ThatAreWrittenComeBackEqual) {
+  circuit::Circuit circuit;
+  circuit.morphologies = {"none"};
+  circuit.instances.resize(3000);
+  const reports::Report report =
+      reports::synthetic_report(circuit, std::vector<Morphology>(1), {.steps = 37});
+  reports::Report wide = report;  // wider and longer than what is written at a time
+  wide.first_column.clear(), wide.element_ids.assign(3000 * 30, 0),
+      wide.element_positions.assign(3000 * 30, .25f);
+  for (std::uint64_t n = 0; n <= 3000; ++n) wide.first_column.push_back(30 * n);
+  wide.start = 100.25;
+  wide.read = [](std::size_t row, std::size_t rows, std::size_t column, std::size_t columns, float* out) {
+    for (std::size_t r = row; r < row + rows; ++r)
+      for (std::size_t c = column; c < column + columns; ++c) *out++ = float(r * 100000 + c);
+  };
+  const fs::path path = root_ / "written.h5";
+  write_sonata_report(path, wide);
+  const reports::Report back = read_sonata_report(path);
+  EXPECT_EQ(back.nodes, wide.nodes);
+  EXPECT_EQ(back.first_column, wide.first_column);
+  EXPECT_EQ(back.element_ids, wide.element_ids);
+  EXPECT_EQ(back.element_positions, wide.element_positions);
+  EXPECT_EQ(std::tie(back.start, back.step, back.steps, back.units),
+            std::tie(wide.start, wide.step, wide.steps, wide.units));
+  std::vector<float> one(37 * 90000), other(one.size());
+  wide.read(0, 37, 0, 90000, one.data());
+  back.read(0, 37, 0, 90000, other.data());
+  EXPECT_TRUE(one == other);
+  EXPECT_THROW(write_sonata_report(root_ / "no" / "x.h5", wide), Error);
 }
 
 TEST_F(Reports, AreReadInTheDialectsThatProgramsWrite) {

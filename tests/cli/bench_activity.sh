@@ -8,6 +8,11 @@ mkdir made
 grep -q '^Made up: 5 neurons' out.txt
 "$BRAINFOREST" clamp made/kept.activity --neuron 4 --json >clamped.txt
 grep -q '"steps": 64' clamped.txt
+
+# The made-up report as a file of SONATA: packed from there it gives the same bytes.
+"$BRAINFOREST" bench activity --neurons 5 --compartments 1 --steps 64 --seeks 1 --keep made/read.activity --report made/report.h5 --json >read.json
+cmp <(tail -c +17 made/kept.activity | head -c 20000) <(tail -c +17 made/read.activity | head -c 20000)
+[ -s made/report.h5 ] && grep -q '"from": "a SONATA report"' read.json
 python3 - <<'PY'
 import json
 out = json.load(open("out.json"))
