@@ -250,8 +250,8 @@ void run(const Options& options, Console& console) {
                  cut.row("1 % of neurons whole, others 1 value"), cold_clamp.row("clamp, not in memory"),
                  warm_clamp.row("clamp")});
   console.say(
-      fmt::format("{:.1f} steps/s of all values; raster {:.0f} ms; worst error {:.4f} {} of {:.4f}; peak "
-                  "memory {:.0f} MB; "
+      fmt::format("{:.1f} steps/s of all values; raster {:.0f} ms; worst error {:.4f} {} of {:.4f}; packing "
+                  "took {:.0f} MB of memory; "
                   "{:.1f} % of the file was still in memory when it should not",
                   double(played) / playing, raster, error, activity.facts().units,
                   activity.facts().range.error(), double(usage.ru_maxrss) / 1e3, 100. * still_cached));

@@ -452,6 +452,37 @@ std::vector<std::uint32_t> LayoutView::runs(std::size_t count) const {
   return runs;
 }
 
+std::vector<std::uint32_t> compartments_at(const LayoutView& layout, std::span<const std::uint32_t> parents,
+                                           std::span<const Place> places) {
+  constexpr std::uint32_t none = 0xffffffffu;
+  const auto runs = layout.runs(parents.size());
+  std::vector<std::uint32_t> result;
+  result.reserve(places.size());
+  for (const Place& place : places) {
+    std::uint32_t section = place.section;
+    float position = place.position;
+    // Parents come before their children, so this ends.
+    while (section < parents.size() && runs[section] == none) {
+      section = parents[section] < section ? parents[section] : none;
+      position = 1.f;
+    }
+    if (section >= parents.size()) {
+      result.push_back(place.section == soma_run ? layout.at(soma_run, position).value_or(layout.soma)
+                                                 : layout.soma);
+      continue;
+    }
+    const auto [begin, end] = layout.compartments_of(runs[section]);
+    // Compartments of a section lie in the order of their places.
+    const auto run = layout.compartments.subspan(begin, end - begin);
+    auto best = std::ranges::lower_bound(run, position, {}, &Compartment::position);
+    if (best == run.end() ||
+        (best != run.begin() && position - (best - 1)->position <= best->position - position))
+      --best;
+    result.push_back(begin + std::uint32_t(best - run.begin()));
+  }
+  return result;
+}
+
 void pack(const Report& report, const circuit::Circuit& circuit, std::span<const Morphology> morphologies,
           const Nodes& nodes, std::span<const Spikes> spikes, const std::filesystem::path& out,
           const PackOptions& options, Progress& progress) {
@@ -618,6 +649,10 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
     std::uint32_t before = 0;
     for (const SectionRun& run : view.sections) require(run.end > before, wrong), before = run.end;
     require(before == layout.compartments, wrong);
+    for (const Compartment& compartment : view.compartments)
+      require(compartment.column < layout.compartments && compartment.position >= 0.f &&
+                  compartment.position <= 1.f && compartment.weight > 0,
+              wrong);
     before = 0;
     for (const std::uint32_t branch : view.branches) require(branch > before, wrong), before = branch;
     require(before == layout.sections, wrong);

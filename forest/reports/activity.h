@@ -5,6 +5,7 @@
 // the layout and says why it is so.
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <filesystem>
@@ -68,11 +69,27 @@ struct LayoutView {
   /// For whoever maps many places: of each of `count` sections of the morphology, its entry in `sections`; all ones for
   /// one without compartments.
   std::vector<std::uint32_t> runs(std::size_t count) const;
+  /// The branch of an entry of `sections`: its value in Level::branch, as the entry is its value in Level::section.
+  std::uint32_t branch_of(std::size_t run) const {
+    return std::uint32_t(std::ranges::upper_bound(branches, std::uint32_t(run)) - branches.begin());
+  }
   /// Compartments [first, second) of an entry of `sections`.
   std::pair<std::uint32_t, std::uint32_t> compartments_of(std::size_t run) const {
     return {run ? sections[run - 1].end : 0, sections[run].end};
   }
 };
+
+/// A place on a neuron: where along a section of its morphology, 0 to 1; or the soma (soma_run).
+struct Place {
+  std::uint32_t section = soma_run;
+  float position = .5f;
+};
+
+/// The compartment of each place, for whoever colours segments. Where a section was not reported its nearest reported
+/// ancestor's end answers for it, else the compartment at the soma: a soma report colours the whole neuron.
+/// @param parents  of each section of the morphology; all ones for a root
+std::vector<std::uint32_t> compartments_at(const LayoutView& layout, std::span<const std::uint32_t> parents,
+                                           std::span<const Place> places);
 
 /// What is wanted of one neuron: its place in Activity::rows(), and how closely it is looked at.
 struct Wanted {

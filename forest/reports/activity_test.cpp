@@ -303,6 +303,43 @@ TEST(Activity, KnowsThePartOfACircuitThatWasReported_InTheReportsOrder) {
   EXPECT_FALSE(a.row_of_instance(1000000));
 }
 
+TEST(Activity, TellsTheCompartmentOfEveryPlace) {
+  const Made m = made(3, 10);
+  const Activity a = packed(m);
+  Random random(5);
+  for (const Row& row : a.rows()) {
+    const LayoutView layout = a.layout(row.layout);
+    const Morphology& neuron = m.neurons[layout.morphology];
+    std::vector<std::uint32_t> parents;
+    for (const Section& section : neuron.sections())
+      parents.push_back(section.parent.valid() ? section.parent.value() : soma_run);
+    std::vector<Place> places{{soma_run, .5f}};
+    for (int i = 0; i < 200; ++i)
+      places.push_back({random.below(std::uint32_t(parents.size())), float(random.uniform(-.1, 1.1))});
+    const auto found = compartments_at(layout, parents, places);
+    ASSERT_EQ(found[0], layout.soma);
+    for (std::size_t i = 1; i < places.size(); ++i) {
+      const auto expected = layout.at(places[i].section, places[i].position);
+      ASSERT_FLOAT_EQ(std::abs(layout.compartments[found[i]].position - places[i].position),
+                      std::abs(layout.compartments[*expected].position - places[i].position));
+      const std::uint32_t run = layout.runs(parents.size())[places[i].section];
+      ASSERT_EQ(layout.sections[run].section, places[i].section);
+      const std::uint32_t branch = layout.branch_of(run);
+      ASSERT_LT(run, layout.branches[branch]);
+      ASSERT_TRUE(branch == 0 || run >= layout.branches[branch - 1]);
+    }
+  }
+  // Sections 0 ← 1 ← 2, and 3; only the soma and section 0 were reported.
+  const std::vector<Compartment> compartments{{0, .5f, 1}, {1, .25f, 1}, {2, .75f, 1}};
+  const std::vector<SectionRun> sections{{soma_run, 0, 1}, {0, 1, 3}};
+  const std::vector<std::uint32_t> branches{1, 2}, parents{soma_run, 0, 1, soma_run};
+  const LayoutView layout{0, 0, compartments, sections, branches};
+  EXPECT_THAT(
+      compartments_at(layout, parents,
+                      std::vector<Place>{{0, 0.f}, {0, .6f}, {1, 0.f}, {2, .5f}, {3, .5f}, {99, 0.f}}),
+      ::testing::ElementsAre(1, 2, 2, 2, 0, 0));
+}
+
 TEST(Activity, HasSpikesSortedByTime) {
   Made m = made(5, 10);
   m.nodes.ends = {8};  // nodes 5 to 7 have no shape
