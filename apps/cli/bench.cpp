@@ -12,6 +12,7 @@
 namespace forest::cli {
 
 // One declaration and one row a benchmark.
+std::function<void()> bench_activity(CLI::App&, Console&);
 std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
@@ -19,6 +20,7 @@ std::function<void()> bench_repository(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
+      {"activity", "How fast a simulation's values are packed, sought and clamped", bench_activity},
       {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},

@@ -23,6 +23,9 @@ std::function<void()> plant(CLI::App&, Console&);
 std::function<void()> bench(CLI::App&, Console&);
 std::function<void()> pack(CLI::App&, Console&);
 std::function<void()> render(CLI::App&, Console&);
+std::function<void()> activity(CLI::App&, Console&);
+std::function<void()> clamp(CLI::App&, Console&);
+std::function<void()> raster(CLI::App&, Console&);
 std::function<void()> movie(CLI::App&, Console&);
 std::function<void()> view(CLI::App&, Console&);
 
@@ -68,6 +71,13 @@ std::span<const Verb> verbs() {
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
       {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest",
        pack},
+      {"activity", "Pack a simulation's report for playing, as an activity file",
+       "brainforest activity compartments.h5 --circuit column/ --spikes spikes.h5 --out run.activity",
+       activity},
+      {"clamp", "Show the history of compartments: the virtual clamp",
+       "brainforest clamp run.activity --neuron 3 --section 0 12 --csv traces.csv", clamp},
+      {"raster", "Draw the somata of all neurons over time as a picture",
+       "brainforest raster run.activity --out raster.png", raster},
       {"render", "Draw a forest as a picture, without a display",
        "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
       {"movie", "Film a walk through a forest, without a display",

@@ -50,6 +50,7 @@ class Handle {
   Handle& operator=(const Handle&) = delete;
 
   operator hid_t() const { return id_; }
+  hid_t release() { return std::exchange(id_, -1); }  // not closed here any more
   bool good() const { return id_ >= 0; }
 
  private:
@@ -87,6 +88,15 @@ bool exists(hid_t file, const std::string& object) {
   }
 }
 
+/// Even deflated by the most they can be, so many values need more bytes than the file has: it is damaged.
+void check_claim(const File& owner, const std::string& path, std::size_t count, hid_t type,
+                 std::uintmax_t file_bytes) {
+  constexpr std::uintmax_t most_deflated = 1100;
+  if (count > most_deflated * (file_bytes / std::max<std::size_t>(1, H5Tget_size(type)) + 1))
+    owner.refuse(fmt::format("array {} claims {} values, more than the file can hold; the file is damaged",
+                             path, count));
+}
+
 /// A dataset with its type and length, both checked.
 struct Array {
   Array(const File& owner, hid_t file, const std::string& path, std::uintmax_t file_bytes)
@@ -102,11 +112,7 @@ struct Array {
       owner.refuse(
           fmt::format("array {} has a shape other than a single row of values; write it as one", path));
     count = std::size_t(points);
-    // Even deflated by the most it can be, this many values need more bytes than the file has: it is damaged.
-    constexpr std::uintmax_t most_deflated = 1100;
-    if (count > most_deflated * (file_bytes / std::max<std::size_t>(1, H5Tget_size(type)) + 1))
-      owner.refuse(fmt::format("array {} claims {} values, more than the file can hold; the file is damaged",
-                               path, count));
+    check_claim(owner, path, count, type, file_bytes);
   }
 
   Dataset set;
@@ -184,6 +190,18 @@ std::vector<float> File::reals(const std::string& path) const {
   return values;
 }
 
+std::vector<double> File::doubles(const std::string& path) const {
+  const Turn turn;
+  const Array array(*this, file_, path, bytes_);
+  const Kind kind = kind_of(array.type);
+  if (kind != Kind::reals && kind != Kind::integers)
+    refuse(fmt::format("array {} holds {}; numbers are expected", path, name_of(kind)));
+  std::vector<double> values(array.count);
+  if (array.count && H5Dread(array.set, H5T_NATIVE_DOUBLE, H5S_ALL, H5S_ALL, H5P_DEFAULT, values.data()) < 0)
+    refuse(fmt::format("array {} cannot be read; the file is damaged", path));
+  return values;
+}
+
 std::vector<std::int64_t> File::integers(const std::string& path) const {
   const Turn turn;
   const Array array(*this, file_, path, bytes_);
@@ -247,6 +265,74 @@ std::vector<std::int64_t> File::attribute(const std::string& object, const std::
   return values;
 }
 
+std::string File::text_attribute(const std::string& object, const std::string& name) const {
+  const Turn turn;
+  if (!exists(file_, object) || H5Aexists_by_name(file_, object.c_str(), name.c_str(), H5P_DEFAULT) <= 0)
+    return {};
+  const Attribute open(H5Aopen_by_name(file_, object.c_str(), name.c_str(), H5P_DEFAULT, H5P_DEFAULT));
+  const Type type(H5Aget_type(open)), memory(H5Tcopy(H5T_C_S1));
+  const Space space(H5Aget_space(open));
+  if (kind_of(type) != Kind::texts || H5Sget_simple_extent_npoints(space) != 1) return {};
+  H5Tset_cset(memory, H5Tget_cset(type));
+  std::string text;
+  if (H5Tis_variable_str(type) > 0) {
+    H5Tset_size(memory, H5T_VARIABLE);
+    char* pointer = nullptr;
+    if (H5Aread(open, memory, &pointer) >= 0 && pointer) text = pointer;
+    H5Dvlen_reclaim(memory, space, H5P_DEFAULT, &pointer);
+  } else {
+    text.resize(std::min<std::size_t>(H5Tget_size(type), 65536));  // attributes live in headers of 64 kB
+    H5Tset_size(memory, text.size());
+    H5Tset_strpad(memory, H5T_STR_NULLPAD);
+    if (H5Aread(open, memory, text.data()) < 0) return {};
+    text.resize(std::min(text.size(), text.find('\0')));
+  }
+  return text;
+}
+
+Matrix::Matrix(std::shared_ptr<const File> file, const std::string& path)
+    : file_(std::move(file)), path_(path) {
+  const Turn turn;
+  const File& owner = *file_;
+  // The numbers of a report lie in chunks that several rectangles share.
+  const Properties access(H5Pcreate(H5P_DATASET_ACCESS));
+  constexpr std::size_t slots = 12421, bytes = 64 << 20;
+  H5Pset_chunk_cache(access, slots, bytes, .75);
+  Dataset set(exists(owner.file_, path) ? H5Dopen2(owner.file_, path.c_str(), access) : -1);
+  if (!set.good()) owner.refuse(fmt::format("there is no array {}; the file is not complete", path));
+  const Type type(H5Dget_type(set));
+  if (const Kind kind = kind_of(type); kind != Kind::reals && kind != Kind::integers)
+    owner.refuse(fmt::format("array {} holds {}; numbers are expected", path, name_of(kind)));
+  const Space space(H5Dget_space(set));
+  std::array<hsize_t, 2> shape{};
+  if (H5Sget_simple_extent_ndims(space) != 2 || H5Sget_simple_extent_dims(space, shape.data(), nullptr) != 2)
+    owner.refuse(fmt::format("array {} has a shape other than rows and columns; write it as a matrix", path));
+  rows_ = shape[0], columns_ = shape[1];
+  if (columns_ && rows_ > SIZE_MAX / columns_)
+    owner.refuse(
+        fmt::format("array {} claims {} rows of {} values; the file is damaged", path, rows_, columns_));
+  check_claim(owner, path, rows_ * columns_, type, owner.bytes_);
+  set_ = set.release();
+}
+
+Matrix::~Matrix() {
+  const Turn turn;
+  if (set_ >= 0) H5Dclose(set_);
+}
+
+void Matrix::read(std::size_t row, std::size_t rows, std::size_t column, std::size_t columns,
+                  float* out) const {
+  if (rows == 0 || columns == 0) return;
+  const Turn turn;
+  const Space space(H5Dget_space(set_));
+  const std::array<hsize_t, 2> start{row, column}, count{rows, columns};
+  const Space memory(H5Screate_simple(2, count.data(), nullptr));
+  if (H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) < 0 ||
+      H5Dread(set_, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, out) < 0)
+    file_->refuse(
+        fmt::format("rows {} to {} of array {} cannot be read; the file is damaged", row, row + rows, path_));
+}
+
 NewFile::NewFile(const std::filesystem::path& path) : path_(path.string()) {
   const Turn turn;
   file_ = H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
@@ -295,10 +381,39 @@ void NewFile::write(const std::string& path, std::int64_t file_type, std::int64_
         "written");
 }
 
+void NewFile::matrix(const std::string& path, std::size_t rows, std::size_t columns) {
+  const Turn turn;
+  const Properties links(H5Pcreate(H5P_LINK_CREATE)), create(H5Pcreate(H5P_DATASET_CREATE));
+  H5Pset_create_intermediate_group(links, 1);
+  H5Pset_obj_track_times(create, false);
+  H5Pset_fill_time(create, H5D_FILL_TIME_NEVER);  // room on the disk is zero without writing it twice
+  const std::array<hsize_t, 2> shape{rows, columns};
+  const Space space(H5Screate_simple(2, shape.data(), nullptr));
+  check(Dataset(H5Dcreate2(file_, path.c_str(), H5T_IEEE_F32LE, space, links, create, H5P_DEFAULT)).good(),
+        "written");
+}
+
+void NewFile::fill(const std::string& path, std::size_t row, std::size_t rows, std::size_t column,
+                   std::size_t columns, const float* values) {
+  const Turn turn;
+  const Dataset set(H5Dopen2(file_, path.c_str(), H5P_DEFAULT));
+  const Space space(H5Dget_space(set));
+  const std::array<hsize_t, 2> start{row, column}, count{rows, columns};
+  const Space memory(H5Screate_simple(2, count.data(), nullptr));
+  check(H5Sselect_hyperslab(space, H5S_SELECT_SET, start.data(), nullptr, count.data(), nullptr) >= 0 &&
+            H5Dwrite(set, H5T_NATIVE_FLOAT, memory, space, H5P_DEFAULT, values) >= 0,
+        "written");
+}
+
 // Stored little-endian on every machine.
 void NewFile::write(const std::string& path, std::span<const float> values, std::size_t columns) {
   const Turn turn;
   write(path, H5T_IEEE_F32LE, H5T_NATIVE_FLOAT, values.data(), values.size(), columns);
+}
+
+void NewFile::write(const std::string& path, std::span<const double> values) {
+  const Turn turn;
+  write(path, H5T_IEEE_F64LE, H5T_NATIVE_DOUBLE, values.data(), values.size());
 }
 
 void NewFile::write(const std::string& path, std::span<const std::int32_t> values, std::size_t columns) {

@@ -12,6 +12,7 @@
 #include "forest/circuit/circuit.h"
 #include "forest/core/progress.h"
 #include "forest/io/format.h"
+#include "forest/reports/report.h"
 
 namespace forest::io {
 
@@ -27,6 +28,7 @@ struct SonataCircuit {
   circuit::Circuit circuit;
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
   std::vector<Warning> warnings;         // neurons left out, oddities of morphology files
+  reports::Nodes nodes;                  // of each instance: what reports call it
 };
 
 /// Reads a circuit: one of ours comes back equal. Of others' circuits every population of neurons with a shape is read;

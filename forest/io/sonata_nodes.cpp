@@ -107,6 +107,23 @@ NodePopulation::NodePopulation(const hdf5::File& file, const std::string& name, 
   }
 }
 
+std::vector<std::uint64_t> NodePopulation::ids() const {
+  std::vector<std::uint64_t> ids(size());
+  const bool told = file_.kind(path_ + "/node_id") == hdf5::Kind::integers;
+  const std::vector<std::int64_t> own =
+      told ? file_.integers(path_ + "/node_id") : std::vector<std::int64_t>();
+  if (told && own.size() != size())
+    file_.refuse(
+        fmt::format("{}/node_id has {} entries, but the population has {} nodes; they must be as many", path_,
+                    own.size(), size()));
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    if (told && own[i] < 0)
+      file_.refuse(fmt::format("{}/node_id holds {}, below zero; the file is damaged", path_, own[i]));
+    ids[i] = told ? std::uint64_t(own[i]) : i;
+  }
+  return ids;
+}
+
 std::string NodePopulation::type_cell(std::size_t row, std::string_view column) const {
   const auto place = types_->column(column);
   return place && !absent(types_->rows[row][*place]) ? types_->rows[row][*place] : "";

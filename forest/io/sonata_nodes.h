@@ -33,6 +33,9 @@ class NodePopulation {
 
   std::size_t size() const { return type_ids_.size(); }
 
+  /// The number of each node: its row, unless the file says otherwise.
+  std::vector<std::uint64_t> ids() const;
+
   /// None when no node has the attribute; missing ones of some nodes are `otherwise`.
   std::optional<std::vector<float>> reals(const std::string& attribute, float otherwise) const;
 

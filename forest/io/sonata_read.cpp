@@ -85,7 +85,7 @@ class Assembler {
     } catch (const Error& error) {
       config_.refuse(error.what());
     }
-    return {std::move(circuit_), std::move(morphologies_), std::move(warnings_)};
+    return {std::move(circuit_), std::move(morphologies_), std::move(warnings_), std::move(nodes_)};
   }
 
  private:
@@ -105,6 +105,10 @@ class Assembler {
       for (std::size_t i = 0; i < shape.values.size(); ++i)
         shape_index[i] = morphology(shape.values[i], name, folders);
     const auto types = types_of(nodes, name, shaped);
+    const auto ids = nodes.ids();
+    const auto population = std::uint32_t(nodes_.populations.size());
+    nodes_.populations.push_back(name);
+    nodes_.ends.push_back(ids.empty() ? 0 : std::ranges::max(ids) + 1);
     if (shaped.empty()) return;
 
     const auto positions = positions_of(nodes, name);
@@ -115,6 +119,7 @@ class Assembler {
     };
     for (const std::size_t i : shaped) {
       const std::uint32_t s = shape.index[i], l = layer.index[i];
+      nodes_.of_instance.push_back({population, ids[i]});
       if (recentre && (*recentre)[i] == 0.f) not_centred_.push_back(std::uint32_t(circuit_.instances.size()));
       circuit_.instances.push_back(
           {.position = positions[i],
@@ -332,6 +337,7 @@ class Assembler {
   Circuit circuit_;
   std::vector<Morphology> morphologies_;
   std::vector<Warning> warnings_;
+  reports::Nodes nodes_;
   std::vector<fs::path> files_;  // by morphology
   std::unordered_map<std::string, std::uint32_t> morphology_of_file_;
   std::unordered_set<std::string> names_;   // of morphologies

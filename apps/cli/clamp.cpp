@@ -1,0 +1,180 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest clamp: what compartments did over the whole of a simulation.
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/reports/activity.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path file, csv;
+  std::vector<std::uint64_t> neurons;
+  std::vector<std::uint32_t> sections{0};
+  std::vector<float> positions{.5f};
+  std::string population;
+};
+
+/// A compartment, and what it did.
+struct Trace {
+  std::uint64_t node = 0;
+  std::uint32_t section = 0;
+  float position = 0.f;  // of the middle of the compartment
+  std::uint64_t value = 0;
+  std::vector<float> values;
+  float low = NAN, high = NAN;
+  double mean = NAN;
+  std::size_t highest = 0, numbers = 0;
+};
+
+const reports::Row& row_of(const reports::Activity& activity, const Options& options, std::uint64_t node) {
+  const auto& names = activity.facts().populations;
+  const reports::Row* found = nullptr;
+  for (const reports::Row& row : activity.rows()) {
+    if (row.node_id != node || (!options.population.empty() && names[row.population] != options.population))
+      continue;
+    if (found)
+      throw Error(fmt::format("node {} is in populations {} and {}; choose with --population", node,
+                              names[found->population], names[row.population]));
+    found = &row;
+  }
+  if (!found)
+    throw Error(fmt::format("{}: node {}{} was not reported; there are {} neurons, the first of them node {}",
+                            options.file.string(), node,
+                            options.population.empty() ? "" : " of population " + options.population,
+                            activity.rows().size(), activity.rows().front().node_id));
+  return *found;
+}
+
+Trace find(const reports::Activity& activity, const Options& options, std::uint64_t node,
+           std::uint32_t section, float position) {
+  const reports::Row& row = row_of(activity, options, node);
+  const reports::LayoutView layout = activity.layout(row.layout);
+  const auto compartment = layout.at_element(section, position);
+  if (!compartment) {
+    std::uint32_t most = 0;
+    for (const reports::SectionRun& run : layout.sections) most = std::max(most, run.element);
+    throw Error(fmt::format(
+        "{}: section {} of node {} was not reported; {} of its sections were, the last of them {} "
+        "(0 is the soma)",
+        options.file.string(), section, node, layout.sections.size(), most));
+  }
+  return {.node = node,
+          .section = section,
+          .position = layout.compartments[*compartment].position,
+          .value = row.first[std::size_t(reports::Level::compartment)] + *compartment,
+          .values = {}};
+}
+
+void read(const reports::Activity& activity, Trace& trace) {
+  double sum = 0.;
+  for (const reports::Code code : activity.history(trace.value)) {
+    const float v = activity.facts().range.value(code);
+    if (code != reports::no_value) {
+      if (!(v >= trace.low)) trace.low = v;
+      if (!(v <= trace.high)) trace.high = v, trace.highest = trace.values.size();
+      sum += double(v), ++trace.numbers;
+    }
+    trace.values.push_back(v);
+  }
+  if (trace.numbers) trace.mean = sum / double(trace.numbers);
+}
+
+std::string csv_of(const reports::Facts& facts, const std::vector<Trace>& traces) {
+  std::string text = "time (ms)";
+  for (const Trace& trace : traces)
+    text += fmt::format(",node {} section {} at {:.4g} ({})", trace.node, trace.section, trace.position,
+                        facts.units);
+  for (std::uint64_t i = 0; i < facts.steps; ++i) {
+    text += fmt::format("\n{:.10g}", facts.time(i));
+    for (const Trace& trace : traces)
+      text += std::isnan(trace.values[i]) ? std::string(",") : fmt::format(",{:.3f}", trace.values[i]);
+  }
+  return text + "\n";
+}
+
+void run(const Options& options, Console& console) {
+  const auto activity = reports::Activity::open(options.file);
+  const reports::Facts& facts = activity.facts();
+  const std::size_t count =
+      std::max({options.neurons.size(), options.sections.size(), options.positions.size()});
+  const auto nth = [count](const auto& list, std::size_t i, const char* name) {
+    if (list.size() != 1 && list.size() != count)
+      throw Error(
+          fmt::format("{} has {} values and {} traces are asked for; give one for all, or one for each", name,
+                      list.size(), count));
+    return list[list.size() == 1 ? 0 : i];
+  };
+  std::vector<Trace> traces;
+  for (std::size_t i = 0; i < count; ++i)
+    traces.push_back(find(activity, options, nth(options.neurons, i, "--neuron"),
+                          nth(options.sections, i, "--section"), nth(options.positions, i, "--position")));
+  const auto begin = std::chrono::steady_clock::now();
+  for (Trace& trace : traces) read(activity, trace);
+  const double ms =
+      std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
+  if (!options.csv.empty()) write_file(options.csv, csv_of(facts, traces));
+
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  std::vector<std::vector<std::string>> lines;
+  for (const Trace& t : traces) {
+    const double when = facts.time(t.highest);
+    list.push_back({{"neuron", t.node},
+                    {"section", t.section},
+                    {"position", t.position},
+                    {"lowest", t.low},
+                    {"highest", t.high},
+                    {"highest_at", when},
+                    {"mean", t.mean},
+                    {"not_numbers", facts.steps - t.numbers}});
+    lines.push_back({std::to_string(t.node), std::to_string(t.section), fmt::format("{:.3g}", t.position),
+                     fmt::format("{:.1f}", t.low), fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
+                     fmt::format("{:.1f}", t.mean)});
+  }
+  console.print({{"file", options.file.string()},
+                 {"csv", options.csv.string()},
+                 {"units", facts.units},
+                 {"error", facts.range.error()},
+                 {"steps", facts.steps},
+                 {"milliseconds", ms},
+                 {"traces", list}});
+  const auto in_units = [&](const char* name) { return fmt::format("{} ({})", name, facts.units); };
+  console.table(
+      {"neuron", "section", "position", in_units("lowest"), in_units("highest"), "at (ms)", in_units("mean")},
+      lines);
+}
+
+}  // namespace
+
+std::function<void()> clamp(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command.add_option("activity", options->file, "Activity file")->required();
+  command.add_option("--neuron", options->neurons, "Nodes, as the report numbers them")->required();
+  command
+      .add_option("--section", options->sections,
+                  "Their sections, as the report numbers them: 0 is the soma, then axon, basal, apical")
+      ->capture_default_str();
+  command
+      .add_option("--position", options->positions,
+                  "Where along the sections, 0 to 1; the nearest compartment is shown")
+      ->check(CLI::Range(0., 1.))
+      ->capture_default_str();
+  command.add_option("--population", options->population, "Where several have such a node");
+  command.add_option("--csv", options->csv, "Write every step into this table");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,179 @@
+# SPDX-License-Identifier: Apache-2.0
+# A report written by h5py becomes an activity file; what clamp and raster show is compared with it; what is refused.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+python=/usr/bin/python3
+if ! $python -c 'import h5py' 2>/dev/null; then
+  echo "activity.sh: python3-h5py is not installed; ./dev setup installs it"
+  [ "${BRAINFOREST_REQUIRE_DATA:-0}" = 1 ] && exit 1
+  exit 77
+fi
+
+fails_with() {  # status, words of the sentence, command…
+  local status=$1 words=$2 got=0
+  shift 2
+  "$@" >out.txt 2>err.txt || got=$?
+  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
+  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
+  [ "$(wc -l <err.txt)" = 1 ] || [ "$status" = 2 ] || { echo "more than a sentence from: $*"; cat err.txt; exit 1; }
+}
+program=$BRAINFOREST
+
+# Cells with an axon (2), a basal (3) and a forked apical dendrite (4): sections 1 axon, 2 basal, 3 to 5 apical.
+for i in 1 2; do
+  cat >cell-$i.swc <<SWC
+1 1 0 0 0 5 -1
+2 4 0 5 0 1 1
+3 4 0 6$i 0 1 2
+4 4 30 9$i 0 1 3
+5 4 -30 9$i 0 1 3
+6 3 0 -5 0 1 1
+7 3 0 -4$i 0 1 6
+8 2 5 0 0 1 1
+9 2 8$i 0 0 1 8
+SWC
+done
+"$program" import cell-1.swc cell-2.swc --repo cells.db --population cells >/dev/null
+cat >few.toml <<TOML
+name = "few cells"
+[column]
+radius = 100
+[[type]]
+name = "cells"
+excitatory = true
+[[layer]]
+name = "L1"
+thickness = 300
+count = 7
+mix = { "cells" = 1 }
+TOML
+"$program" plant --recipe few.toml --repo cells.db --seed 2 --out column >/dev/null
+
+cat >report.py <<'PY'
+"""report.py FILE [STEPS [KEY=VALUE…]]: a report of seven neurons of 11 compartments, in the circuit's order turned round."""
+import sys, h5py, numpy
+path, steps = sys.argv[1], int(sys.argv[2]) if len(sys.argv) > 2 else 300
+change = dict(word.split("=") for word in sys.argv[3:])
+elements = [0, 1, 1, 2, 2, 3, 3, 3, 4, 5, 5]
+places = [.5, .25, .75, .25, .75, 1 / 6, .5, 5 / 6, .5, .25, .75]
+nodes = numpy.arange(7, dtype=numpy.uint64)[::-1]
+time = numpy.arange(steps)[:, None]
+column = numpy.arange(7 * 11)[None, :]
+data = (-65 + 10 * numpy.sin(.05 * time + column) + 90 * ((time + 3 * column) % 97 == 0)).astype(numpy.float32)
+if "nan" in change: data[7, 5] = numpy.nan
+if "high" in change: data[8, 6] = float(change["high"])
+with h5py.File(path, "w") as file:
+    group = file.create_group("report/" + change.get("population", "few_cells"))
+    group["data"] = data
+    group["data"].attrs["units"] = change.get("units", "mV")
+    mapping = group.create_group("mapping")
+    mapping["node_ids"] = nodes + int(change.get("first", 0))
+    mapping["index_pointers"] = numpy.arange(8, dtype=numpy.uint64) * 11
+    mapping["element_ids"] = numpy.array(elements * 7, numpy.uint32) + numpy.uint32(change.get("element", 0))
+    mapping["element_pos"] = numpy.array(places * 7)
+    mapping["time"] = [0, steps * .5, .5]
+    mapping["time"].attrs["units"] = "ms"
+    spikes = file.create_group("spikes/few_cells")
+    spikes["timestamps"] = numpy.array([40., 20., 30.])
+    spikes["node_ids"] = numpy.array([1, 2, 6 + int(change.get("spiking", 0))], numpy.uint64)
+PY
+$python report.py run.h5
+"$program" activity run.h5 --circuit column --spikes run.h5 --out run.activity --json >packed.json
+"$program" clamp run.activity --neuron 0 6 3 --section 0 3 5 --position 0.5 1 0.3 --csv traces.csv --json >clamped.json
+"$program" raster run.activity --out raster.png --size 300x70 --from 10 --to 140 --json >raster.json
+$python - <<'PY'
+import csv, h5py, json, struct
+packed, clamped, raster = (json.load(open(name)) for name in ("packed.json", "clamped.json", "raster.json"))
+assert packed["neurons"] == 7 and packed["compartments"] == 77 and packed["steps"] == 300 and packed["spikes"] == 3, packed
+assert packed["error"] <= .3 and packed["clamped"] == packed["not_numbers"] == 0, packed
+data = h5py.File("run.h5")["report/few_cells/data"][:]
+rows = list(csv.reader(open("traces.csv")))
+assert rows[0][0] == "time (ms)" and rows[0][2].startswith("node 6 section 3 at 0.8333 (mV)"), rows[0]
+assert len(rows) == 301 and float(rows[300][0]) == 149.5
+columns = [6 * 11 + 0, 0 * 11 + 7, 3 * 11 + 9]  # the report lists node 6 first
+for trace, column in enumerate(columns):
+    for step in range(300):
+        assert abs(float(rows[step + 1][trace + 1]) - data[step, column]) <= packed["error"] + 2e-3, (trace, step)
+    assert abs(clamped["traces"][trace]["highest"] - data[:, column].max()) < .3
+assert raster["steps"] == 260 and raster["from"] == 10 and raster["to"] == 140, raster
+assert struct.unpack(">II", open("raster.png", "rb").read()[16:24]) == (300, 70)
+PY
+"$program" activity run.h5 --circuit column --spikes run.h5 --out again.activity --threads 1 >/dev/null
+cmp run.activity again.activity
+"$program" clamp run.activity --neuron 2 --csv /dev/stdout --json >out.txt
+grep -q '^149.5,' out.txt
+"$program" clamp run.activity --neuron 2 >out.txt
+grep -q '^ *2 *0' out.txt
+
+# What is no number stays so, what is beyond the range is told.
+$python report.py odd.h5 40 nan=1 high=70
+"$program" activity odd.h5 --circuit column --out odd.activity >out.txt 2>err.txt
+grep -q '1 of 3080 values are no numbers' err.txt && grep -q '1 of 3080 values lie beyond -100 to 50 mV' err.txt
+"$program" clamp odd.activity --neuron 6 --section 3 --position 0 --csv odd.csv >/dev/null
+grep -q '^3.5,$' odd.csv
+"$program" activity odd.h5 --circuit column --out odd.activity --range -100 100 >/dev/null 2>err.txt
+[ "$(grep -c beyond err.txt)" = 0 ]
+"$program" clamp odd.activity --neuron 6 --section 3 --position 0.5 >out.txt
+grep -qE ' (69.[6-9]|70.[0-4]) ' out.txt
+
+# Mismatches are named, and leave what was there.
+cp run.activity kept.activity
+$python report.py other.h5 40 population=other
+fails_with 1 'other.h5: population other is not in the circuit, which has few_cells' "$program" activity other.h5 --circuit column --out run.activity
+$python report.py other.h5 40 first=1
+fails_with 1 'node 7 of population few_cells is not in the circuit, where 7 neurons of it have a shape, the last of them node 6' "$program" activity other.h5 --circuit column --out run.activity
+$python report.py other.h5 40 element=1
+fails_with 1 'has a compartment in section 6, but its morphology cell-' "$program" activity other.h5 --circuit column --out run.activity
+$python report.py other.h5 40 spiking=1
+fails_with 1 'node 7 of population few_cells spikes and is not in the circuit' "$program" activity other.h5 --circuit column --spikes other.h5 --out run.activity
+$python report.py other.h5 40 units=nA
+fails_with 1 'holds values in nA; say from where to where they reach, with --range' "$program" activity other.h5 --circuit column --out run.activity
+fails_with 1 'there are few_cells' "$program" activity run.h5 --circuit column --population cortex --out run.activity
+fails_with 1 'is what is read' "$program" activity run.h5 --circuit column --out run.h5
+for size in 0 7 100 2000 20000; do
+  head -c $size run.h5 >short.h5
+  fails_with 1 'is not an HDF5 file, or was cut off' "$program" activity short.h5 --circuit column --out run.activity
+done
+fails_with 1 'there is no group /report' "$program" activity column/nodes.h5 --circuit column --out run.activity
+cmp run.activity kept.activity
+
+# Activity files that are cut off or damaged are refused, the rest of their values is not shown.
+size=$(stat -c %s run.activity)
+for part in 0 10 40 $((size / 2)) $((size - 1)); do
+  head -c $part run.activity >short.activity
+  fails_with 1 'short.activity' "$program" clamp short.activity --neuron 0
+  fails_with 1 'short.activity' "$program" raster short.activity --out no.png
+done
+"$program" raster run.activity --out right.png >/dev/null
+refused=0
+for part in {0..39}; do
+  $python -c "
+data = bytearray(open('run.activity', 'rb').read())
+data[len(data) * $part // 40 + 8] ^= 4
+open('damaged.activity', 'wb').write(data)"
+  rm -f shown.png
+  if "$program" raster damaged.activity --out shown.png >/dev/null 2>err.txt; then
+    cmp right.png shown.png  # what is damaged is not in the picture
+  else
+    [ ! -e shown.png ] && grep -q 'damaged.activity: .*; pack the report again' err.txt
+    refused=$((refused + 1))
+  fi
+done
+[ $refused -gt 3 ]
+fails_with 1 'is not an activity file' "$program" clamp run.h5 --neuron 0
+[ ! -e no.png ]
+
+fails_with 1 'node 7 was not reported; there are 7 neurons' "$program" clamp run.activity --neuron 7
+fails_with 1 'section 9 of node 0 was not reported; 6 of its sections were, the last of them 5' "$program" clamp run.activity --neuron 0 --section 9
+fails_with 1 '--section has 2 values and 3 traces are asked for' "$program" clamp run.activity --neuron 0 1 2 --section 0 1
+fails_with 1 'holds no step' "$program" raster run.activity --out no.png --from 1000
+fails_with 1 'give the lower end first' "$program" raster run.activity --out no.png --range 5 5
+fails_with 2 '--neuron' "$program" clamp run.activity
+fails_with 2 '--circuit' "$program" activity run.h5 --out x.activity
+[ -z "$(find . -name '*.activity.??????')" ]  # nothing half written is left
+
+# Killed in the middle: the old file is whole. (Its unfinished neighbour stays, as with every program that is killed.)
+$python report.py long.h5 20000
+for wait in .02 .05 .1; do
+  timeout -s KILL $wait "$program" activity long.h5 --circuit column --out run.activity >/dev/null 2>&1 || true
+  "$program" clamp run.activity --neuron 0 >/dev/null
+done
