@@ -16,6 +16,7 @@ std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
+std::function<void()> bench_seam(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
@@ -24,6 +25,7 @@ std::span<const Benchmark> benchmarks() {
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
       {"repository", "How many neurons are stored in a repository in a second, and read back",
        bench_repository},
+      {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer", bench_seam},
   });
   return table;
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "forest/core/error.h"
+#include "forest/geometry/polyline.h"
 
 namespace forest::scene {
 namespace {
@@ -123,6 +124,43 @@ CameraPath walk(const Forest& forest) {
       {start, look(level - inward * (2.2f * radius) + side * (.8f * radius), level, 44.f),
        look(edge, level, 52.f), look(inside, level + inward * radius, 58.f),
        look(deep, level + inward * radius + side * (.5f * radius) + Vec3(0.f, .1f * height, 0.f), 60.f)});
+}
+
+CameraPath dolly(const Forest& forest) {
+  const View start = overview(forest);
+  const Bounds& bounds = forest.soma_bounds();
+  if (bounds.empty()) return CameraPath({start});
+  const Vec3 centre = bounds.centre();
+
+  // The somata nearest to the middle, and the place before each from which it fills half the height.
+  std::vector<std::uint32_t> somata;
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i)
+    if (forest.neurons()[forest.instances()[i].morphology].soma_radius > 0.f) somata.push_back(i);
+  if (somata.empty()) return CameraPath({start});
+  const auto place = [&](std::uint32_t i) {
+    const frame::Instance& instance = forest.instances()[i];
+    return Vec3(instance.x, instance.y, instance.z);
+  };
+  std::ranges::stable_sort(somata, {}, [&](std::uint32_t i) { return (place(i) - centre).squaredNorm(); });
+  somata.resize(std::min<std::size_t>(somata.size(), 24));
+  View end = start;
+  float clearest = -INFINITY;
+  for (const std::uint32_t i : somata) {
+    const Vec3 soma = place(i), towards = (soma - start.camera.eye).normalized();
+    const float radius = forest.neurons()[forest.instances()[i].morphology].soma_radius;
+    const Vec3 before =
+        soma - towards * (2.f * radius / std::tan(.5f * radians(start.camera.field_of_view)));
+    float clearance = INFINITY;
+    for (std::uint32_t other = 0; other < forest.instances().size(); ++other)
+      if (other != i)
+        clearance = std::min(clearance, distance_to_segment(place(other), start.camera.eye, before) -
+                                            forest.neurons()[forest.instances()[other].morphology].soma_radius);
+    if (clearance <= clearest) continue;
+    clearest = clearance;
+    end.camera.eye = before, end.camera.target = soma;
+  }
+  end.camera.near = .5f;
+  return CameraPath({start, end});
 }
 
 }  // namespace forest::scene

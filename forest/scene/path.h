@@ -24,6 +24,10 @@ class CameraPath {
 /// The demo's walk: from outside the column to a clear place inside, between the dendrites, never through a soma.
 CameraPath walk(const Forest& forest);
 
+/// From outside the column straight to one soma near its middle, until it fills half the height: what `bench seam` walks.
+/// Of the somata there, the one whose way is clearest of others.
+CameraPath dolly(const Forest& forest);
+
 /// Distance from a point to the nearest soma's surface, µm; infinite when there is none.
 float soma_clearance(const Forest& forest, const Vec3& point);
 
