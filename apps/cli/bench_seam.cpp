@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench seam: a dolly from outside the column to one soma, drawn as the product draws it and by the reference
-// renderer. Does anything pop, how alike are they, does a branch come apart?
+// renderer. Does anything pop, how alike are they, does a branch come apart? How it is measured: docs/scene/seam.md.
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <optional>
@@ -26,92 +27,126 @@
 namespace forest::cli {
 namespace {
 
+using Json = nlohmann::ordered_json;
+
 struct Options {
-  std::uint32_t neurons = 1000, frames = 0, samples = 16, quick_samples = 1, rate = 25;
+  std::uint32_t neurons = 1000, frames = 20, samples = 16, quick_samples = 1, rate = 25;
   double seconds = 10., budget = 85.;
   std::optional<float> error;
   std::uint64_t seed = 1;
   std::string size = "640x360";
+  bool causes = false;
   std::filesystem::path out;
 };
 
+/// Ways of drawing that are compared with the reference. From each to the next one source of difference is taken away, so
+/// that what remains tells whose fault a difference is.
+enum Way : std::size_t { product, more_samples, every_segment, way_count };
+constexpr std::array<const char*, way_count> way_names{"product", "more_samples", "every_segment"};
+constexpr std::array<const char*, way_count> way_meanings{
+    "the product", "the same detail, as many samples as the reference", "every segment, as many samples"};
+
 /// What one moment of the dolly looks like.
 struct Moment {
-  frame::Image quick, reference;
-  double similarity = 0.;
-  scene::Connections connections;
-  float error = 0.f;  // pixels accepted
+  std::uint32_t picture = 0;
+  std::array<frame::Image, way_count> drawn;  // only the product's, unless causes are asked for
+  frame::Image reference;
+  std::array<double, way_count> similarity{};
 };
 
-/// The change from a picture to the next, quick and in the reference, and where.
-struct Step {
-  std::uint32_t from = 0;
-  double quick = 0., reference = 0.;
-  double ratio() const { return quick / std::max(reference, 1e-9); }
+/// The product's state at one moment.
+struct Quick {
+  frame::Image image;
+  scene::Connections drawn, of_cut;  // of what is drawn, and were nothing of the cut left out
+  float error = 0.f;                 // pixels accepted
 };
 
-class Dolly {
+class Walk {
  public:
-  Dolly(const Options& options, scene::Forest forest)
+  Walk(const Options& options, scene::Forest forest)
       : options_(options),
         size_(parse_size(options.size)),
+        viewport_{float(size_.first), float(size_.second)},
         artist_(std::move(forest)),
-        path_(scene::dolly(artist_.forest())),
+        dolly_(artist_.forest()),
         connectedness_(artist_.forest()),
         budget_(options.budget),
         pictures_(std::max(2u, std::uint32_t(std::lround(options.seconds * options.rate)))) {
+    opengl_.load(artist_.forest().geometry());
     reference_.load(artist_.forest().geometry());
   }
 
   std::uint32_t pictures() const { return pictures_; }
 
-  Moment draw(std::uint32_t picture) {
-    const auto [width, height] = size_;
-    const frame::Viewport viewport{float(width), float(height)};
-    scene::View view = path_.at(float(picture) / float(pictures_ - 1));
-    Moment moment;
-    moment.error = options_.error.value_or(budget_.error());
-    view.detail.error = moment.error;
-    view.samples = options_.quick_samples;
-    Drawn drawn = artist_.draw(view, width, height);
+  /// To be called for every picture in turn: the budget learns from each.
+  Quick draw_quick(std::uint32_t picture) {
+    Quick quick;
+    quick.error = options_.error.value_or(budget_.error());
+    const scene::View view = view_at(picture, quick.error, options_.quick_samples);
+    Drawn drawn = artist_.draw(view, size_.first, size_.second);
     budget_.took(drawn.cull + drawn.draw + drawn.resolve);
     if (drawn.image.covered < .005)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
-    moment.quick = std::move(drawn.image);
-    moment.connections = connectedness_(
-        scene::choose(artist_.forest(), scene::Eye(view.camera, viewport, scene::detail_for(view, width, height)),
-                      viewport),
-        view.camera, viewport, view.samples);
+    quick.image = std::move(drawn.image);
+    quick.drawn = connectedness_(cut(view), view.camera, viewport_, view.samples);
+    scene::View full = view;
+    full.samples = 2;  // nothing is left out for being thin
+    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0);
+    return quick;
+  }
 
-    view.samples = options_.samples;
-    const scene::Cut all = scene::whole(artist_.forest(), view.camera, viewport);
+  Moment compare(std::uint32_t picture, Quick& quick) {
+    const scene::View view = view_at(picture, quick.error, options_.samples);
+    const scene::Cut all = scene::whole(artist_.forest(), view.camera, viewport_);
     const scene::Colouring colouring = scene::colour(artist_.forest(), view.colour_by, view.background);
-    const frame::Timing timing =
-        reference_.draw(scene::compose(artist_.forest(), view, colouring, all, width, height));
-    reference_seconds_ += timing.draw / 1000.;
+    const frame::Frame frame =
+        scene::compose(artist_.forest(), view, colouring, all, size_.first, size_.second);
+    Moment moment{.picture = picture, .drawn = {}, .reference = {}};
+    reference_seconds_ += reference_.draw(frame).draw / 1000.;
     moment.reference = reference_.read();
-    moment.similarity = frame::similarity(moment.quick, moment.reference);
+    moment.drawn[product] = std::move(quick.image);
+    if (options_.causes) {
+      moment.drawn[more_samples] = artist_.draw(view, size_.first, size_.second).image;
+      opengl_.draw(frame);
+      moment.drawn[every_segment] = opengl_.read();
+    }
+    for (std::size_t w = 0; w < ways(); ++w)
+      moment.similarity[w] = frame::similarity(moment.drawn[w], moment.reference);
     return moment;
   }
 
-  double reference_seconds() const { return reference_seconds_; }
+  std::size_t ways() const { return options_.causes ? way_count : 1; }
+  double reference_seconds() const { return reference_seconds_; }  // of all pictures compared
   std::string renderer() const { return artist_.renderer(); }
   const scene::Forest& forest() const { return artist_.forest(); }
 
  private:
+  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples) const {
+    scene::View view = dolly_.at(float(picture) / float(pictures_ - 1));
+    view.detail.error = error;
+    view.samples = samples;
+    return view;
+  }
+  scene::Cut cut(const scene::View& view) const {
+    const scene::Detail detail = scene::detail_for(view, size_.first, size_.second);
+    return scene::choose(artist_.forest(), scene::Eye(view.camera, viewport_, detail), viewport_);
+  }
+
   const Options& options_;
   std::pair<std::uint32_t, std::uint32_t> size_;
+  frame::Viewport viewport_;
   Artist artist_;
+  render::OpenGLRenderer opengl_;
   render::ReferenceRenderer reference_;
-  scene::CameraPath path_;
+  scene::Dolly dolly_;
   scene::Connectedness connectedness_;
   scene::Budget budget_;
   std::uint32_t pictures_;
   double reference_seconds_ = 0.;
 };
 
-/// The pictures that are drawn: all, or `count` in pairs of neighbours, spread evenly.
+/// The pictures that are compared: all, or `count` in pairs of neighbours, spread evenly.
 std::vector<std::uint32_t> chosen_pictures(std::uint32_t all, std::uint32_t count) {
   std::vector<std::uint32_t> chosen;
   if (count == 0 || count >= all) {
@@ -127,92 +162,175 @@ std::vector<std::uint32_t> chosen_pictures(std::uint32_t all, std::uint32_t coun
   return chosen;
 }
 
-void keep(const std::filesystem::path& folder, const std::string& name, const frame::Image& image) {
-  if (!folder.empty()) io::write_png(folder / (name + ".png"), image.width, image.height, image.pixels);
+/// The largest of a row of figures, and the picture where it was.
+struct Extreme {
+  double value = -INFINITY;
+  std::uint32_t picture = 0;
+  bool offer(double v, std::uint32_t at) {
+    if (v <= value) return false;
+    value = v, picture = at;
+    return true;
+  }
+  Json json(double sign = 1.) const { return {{"picture", picture}, {"value", sign * value}}; }
+};
+
+/// What is said of one way of drawing, or of the reference.
+struct Summary {
+  Extreme change, step_ratio, difference;  // difference: 1 - similarity
+  double similarity_sum = 0.;
+};
+
+/// Rows of pictures of one size, in one picture.
+frame::Image sheet(const std::vector<std::vector<const frame::Image*>>& rows) {
+  const frame::Image& first = *rows[0][0];
+  frame::Image image{
+      std::uint32_t(rows[0].size()) * first.width, std::uint32_t(rows.size()) * first.height, {}};
+  image.pixels.reserve(std::size_t(4) * image.width * image.height);
+  for (const auto& row : rows)
+    for (std::size_t y = 0; y < first.height; ++y)
+      for (const frame::Image* one : row) {
+        const auto from = one->pixels.begin() + std::ptrdiff_t(y * 4 * one->width);
+        image.pixels.insert(image.pixels.end(), from, from + std::ptrdiff_t(4 * one->width));
+      }
+  return image;
 }
 
-void run(const Options& options, Console& console) {
-  if (!options.out.empty()) std::filesystem::create_directories(options.out);
-  Dolly dolly(options, grown_column(options.neurons, options.seed, console));
-  const std::vector<std::uint32_t> chosen = chosen_pictures(dolly.pictures(), options.frames);
+/// How much brighter (from middle grey up) or darker the first is.
+frame::Image difference(const frame::Image& a, const frame::Image& b) {
+  const std::vector<float> la = frame::luminance(a), lb = frame::luminance(b);
+  frame::Image image{a.width, a.height, {}};
+  for (std::size_t i = 0; i < la.size(); ++i) {
+    const auto grey = std::uint8_t(std::clamp(128.f + la[i] - lb[i], 0.f, 255.f));
+    image.pixels.insert(image.pixels.end(), {grey, grey, grey, 255});
+  }
+  return image;
+}
 
-  Step largest_quick, largest_reference, worst;  // worst: by the ratio of one step alone
-  std::uint32_t least_alike = 0;
-  double similarity_min = INFINITY, similarity_sum = 0.;
-  std::uint64_t disconnected = 0, most_disconnected = 0;
-  nlohmann::ordered_json every = nlohmann::ordered_json::array();
-  std::optional<Moment> before;
-  console.progress().begin("drawing", chosen.size());
-  for (std::size_t i = 0; i < chosen.size(); ++i) {
-    const std::uint32_t picture = chosen[i];
-    Moment now = dolly.draw(picture);
-    similarity_sum += now.similarity;
-    disconnected += now.connections.disconnected;
-    most_disconnected = std::max(most_disconnected, now.connections.disconnected);
-    nlohmann::ordered_json row{{"picture", picture},
-                               {"similarity", now.similarity},
-                               {"disconnected", now.connections.disconnected},
-                               {"error_pixels", now.error}};
-    if (now.similarity < similarity_min) {
-      similarity_min = now.similarity, least_alike = picture;
-      keep(options.out, "least_alike_quick", now.quick);
-      keep(options.out, "least_alike_reference", now.reference);
+class Keeper {
+ public:
+  Keeper(const Options& options, std::size_t ways) : folder_(options.out), ways_(ways) {
+    if (!folder_.empty()) std::filesystem::create_directories(folder_);
+  }
+  /// The ways, the reference, and how the product differs from it, side by side; a row a moment.
+  void keep(const char* name, const std::vector<const Moment*>& moments) const {
+    if (folder_.empty()) return;
+    std::vector<frame::Image> differences;
+    for (const Moment* m : moments) differences.push_back(difference(m->drawn[product], m->reference));
+    std::vector<std::vector<const frame::Image*>> rows;
+    for (std::size_t i = 0; i < moments.size(); ++i) {
+      rows.emplace_back();
+      for (std::size_t w = 0; w < ways_; ++w) rows.back().push_back(&moments[i]->drawn[w]);
+      rows.back().insert(rows.back().end(), {&moments[i]->reference, &differences[i]});
     }
-    if (before && chosen[i - 1] + 1 == picture) {
-      const Step step{chosen[i - 1], frame::change(before->quick, now.quick),
-                      frame::change(before->reference, now.reference)};
-      row["change"] = step.quick, row["change_reference"] = step.reference;
-      if (step.quick > largest_quick.quick) {
-        largest_quick = step;
-        for (const auto& [name, moment] : {std::pair("before", &*before), std::pair("after", &now)}) {
-          keep(options.out, fmt::format("largest_change_quick_{}", name), moment->quick);
-          keep(options.out, fmt::format("largest_change_reference_{}", name), moment->reference);
-        }
+    const frame::Image all = sheet(rows);
+    io::write_png(folder_ / (std::string(name) + ".png"), all.width, all.height, all.pixels);
+  }
+
+ private:
+  std::filesystem::path folder_;
+  std::size_t ways_;
+};
+
+void run(const Options& options, Console& console) {
+  Walk walk(options, grown_column(options.neurons, options.seed, console));
+  const Keeper keeper(options, walk.ways());
+  const std::vector<std::uint32_t> chosen = chosen_pictures(walk.pictures(), options.frames);
+
+  std::array<Summary, way_count> summary;
+  Summary reference;
+  std::uint64_t disconnected = 0, disconnected_cut = 0, runs = 0;
+  Extreme most_disconnected;
+  Json every = Json::array();
+  std::optional<Moment> before;
+  console.progress().begin("walking", walk.pictures());
+  for (std::uint32_t picture = 0; picture < walk.pictures(); ++picture, console.progress().advance()) {
+    Quick quick = walk.draw_quick(picture);
+    disconnected += quick.drawn.disconnected, disconnected_cut += quick.of_cut.disconnected;
+    runs += quick.drawn.runs;
+    most_disconnected.offer(double(quick.drawn.disconnected), picture);
+    if (!std::ranges::binary_search(chosen, picture)) continue;
+
+    Moment now = walk.compare(picture, quick);
+    Json row{{"picture", picture},
+             {"error_pixels", quick.error},
+             {"disconnected", quick.drawn.disconnected},
+             {"disconnected_cut", quick.of_cut.disconnected}};
+    const bool step = before && before->picture + 1 == picture;
+    const double should = step ? frame::change(before->reference, now.reference) : 0.;
+    if (step) row["change_reference"] = should, reference.change.offer(should, before->picture);
+    for (std::size_t w = 0; w < walk.ways(); ++w) {
+      Summary& s = summary[w];
+      s.similarity_sum += now.similarity[w];
+      Json figures{{"similarity", now.similarity[w]}};
+      if (s.difference.offer(1. - now.similarity[w], picture) && w == product)
+        keeper.keep("least_alike", {&now});
+      if (step) {
+        const double change = frame::change(before->drawn[w], now.drawn[w]);
+        figures["change"] = change;
+        if (s.change.offer(change, before->picture) && w == product)
+          keeper.keep("largest_change", {&*before, &now});
+        if (s.step_ratio.offer(change / std::max(should, .01), before->picture) && w == product)
+          keeper.keep("largest_step_ratio", {&*before, &now});
       }
-      if (step.reference > largest_reference.reference) largest_reference = step;
-      if (step.ratio() > worst.ratio()) worst = step;
+      if (w == product)
+        row.update(figures);
+      else
+        row[way_names[w]] = figures;
     }
     every.push_back(std::move(row));
     before = std::move(now);
-    console.progress().advance();
   }
   console.progress().end();
 
-  const double ratio = largest_quick.quick / std::max(largest_reference.reference, 1e-9);
-  const double mean_similarity = similarity_sum / double(chosen.size());
-  console.print({{"change_ratio", ratio},
-                 {"similarity_min", similarity_min},
-                 {"disconnected", disconnected},
-                 {"similarity_mean", mean_similarity},
-                 {"step_ratio_max", worst.ratio()},
-                 {"least_alike", least_alike},
-                 {"largest_change", {{"picture", largest_quick.from}, {"change", largest_quick.quick}}},
-                 {"largest_change_reference",
-                  {{"picture", largest_reference.from}, {"change", largest_reference.reference}}},
-                 {"neurons", dolly.forest().instances().size()},
-                 {"segments", dolly.forest().segment_total()},
-                 {"size", options.size},
-                 {"pictures", chosen.size()},
-                 {"samples", options.samples},
-                 {"quick_samples", options.quick_samples},
-                 {"reference_seconds", dolly.reference_seconds() / double(chosen.size())},
-                 {"renderer", dolly.renderer()},
-                 {"every", std::move(every)}});
-  console.say(fmt::format("{} neurons, {} segments, {}, {} of {} pictures of {} s, {}",
-                          dolly.forest().instances().size(), dolly.forest().segment_total(), options.size,
-                          chosen.size(), dolly.pictures(), options.seconds, dolly.renderer()));
-  console.table({"", "figure", "aim", "where"},
-                {{"largest change ÷ the reference's", fmt::format("{:.2f}", ratio), "≤ 1.1",
-                  fmt::format("picture {}", largest_quick.from)},
-                 {"the same of one step", fmt::format("{:.2f}", worst.ratio()), "",
-                  fmt::format("picture {}", worst.from)},
-                 {"least similarity", fmt::format("{:.3f}", similarity_min), "≥ 0.95",
-                  fmt::format("picture {}", least_alike)},
-                 {"mean similarity", fmt::format("{:.3f}", mean_similarity), "", ""},
-                 {"disconnected branches", fmt::format("{}", disconnected), "0",
-                  fmt::format("at most {} in a picture", most_disconnected)}});
+  const auto ratio = [&](std::size_t w) { return summary[w].change.value / reference.change.value; };
+  const auto mean = [&](std::size_t w) { return summary[w].similarity_sum / double(chosen.size()); };
+  const auto json_of = [&](std::size_t w) {
+    const Summary& s = summary[w];
+    return Json{{"change_ratio", ratio(w)},          {"similarity_min", 1. - s.difference.value},
+                {"similarity_mean", mean(w)},        {"least_alike", s.difference.picture},
+                {"largest_change", s.change.json()}, {"step_ratio", s.step_ratio.json()}};
+  };
+  Json json{{"change_ratio", ratio(product)},
+            {"similarity_min", 1. - summary[product].difference.value},
+            {"disconnected", disconnected}};
+  json.update(json_of(product));
+  json.update({{"largest_change_reference", reference.change.json()},
+               {"disconnected_cut", disconnected_cut},
+               {"most_disconnected", most_disconnected.json()},
+               {"runs", runs}});
+  for (std::size_t w = 1; w < walk.ways(); ++w) json["causes"][way_names[w]] = json_of(w);
+  json.update({{"neurons", walk.forest().instances().size()},
+               {"segments", walk.forest().segment_total()},
+               {"size", options.size},
+               {"pictures", walk.pictures()},
+               {"compared", chosen.size()},
+               {"samples", options.samples},
+               {"quick_samples", options.quick_samples},
+               {"reference_seconds", walk.reference_seconds() / double(chosen.size())},
+               {"renderer", walk.renderer()},
+               {"every", std::move(every)}});
+  console.print(json);
+
+  console.say(fmt::format("{} neurons, {} segments, {}, {} of {} pictures of {} s compared, {}",
+                          walk.forest().instances().size(), walk.forest().segment_total(), options.size,
+                          chosen.size(), walk.pictures(), options.seconds, walk.renderer()));
+  std::vector<std::vector<std::string>> rows;
+  for (std::size_t w = 0; w < walk.ways(); ++w) {
+    const Summary& s = summary[w];
+    rows.push_back({way_meanings[w], fmt::format("{:.2f}", ratio(w)), fmt::format("{}", s.change.picture),
+                    fmt::format("{:.2f}", s.step_ratio.value), fmt::format("{}", s.step_ratio.picture),
+                    fmt::format("{:.3f}", 1. - s.difference.value), fmt::format("{}", s.difference.picture),
+                    fmt::format("{:.3f}", mean(w))});
+  }
+  rows.push_back({"to reach", "1.10", "", "", "", "0.950", "", ""});
+  console.table({"", "change ÷ reference's", "at", "of one step", "at", "least similarity", "at", "mean"},
+                rows);
+  console.say(fmt::format(
+      "disconnected branches: {} in {} pictures (at most {:.0f}, in picture {}); {} of them by the choice of "
+      "detail",
+      disconnected, walk.pictures(), most_disconnected.value, most_disconnected.picture, disconnected_cut));
   console.say(fmt::format("the reference took {:.2f} s a picture of {} samples",
-                          dolly.reference_seconds() / double(chosen.size()), options.samples));
+                          walk.reference_seconds() / double(chosen.size()), options.samples));
 }
 
 }  // namespace
@@ -223,11 +341,14 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
                          std::uint64_t high) {
     must_be_whole(*command.add_option(name, value, help)->capture_default_str(), low, high);
   };
-  whole("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
-  whole("--frames", options->frames, "Pictures compared, in pairs of neighbours spread over the dolly; 0: all", 0,
+  whole("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000", 10,
+        10'000'000);
+  whole("--frames", options->frames,
+        "Pictures compared with the reference, in pairs of neighbours spread over the dolly; 0: all", 0,
         100'000);
   whole("--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
-  whole("--quick-samples", options->quick_samples, "Pictures averaged by the renderer that is judged", 1, 1024);
+  whole("--quick-samples", options->quick_samples,
+        "Pictures averaged by the product; moving, the studio draws one", 1, 1024);
   whole("--rate", options->rate, "Pictures a second", 1, 1000);
   command.add_option("--seconds", options->seconds, "How long the dolly takes")
       ->check(CLI::Range(.1, 3600.))
@@ -236,11 +357,17 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
       .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
       ->check(CLI::Range(1., 10000.))
       ->capture_default_str();
-  command.add_option("--error", options->error, "Pixels of acceptable error, instead of what the budget says")
+  command
+      .add_option("--error", options->error, "Pixels of acceptable error, instead of what the budget says")
       ->check(CLI::Range(.05, 100.));
-  command.add_option("--out", options->out, "A folder for the worst pictures");
+  command.add_flag(
+      "--causes", options->causes,
+      "Compare, too, what the product would draw with more samples, and without levels of detail");
+  command.add_option("--out", options->out, "A folder for the worst pictures, beside the reference");
   add_size(command, options->size);
   add_seed(command, options->seed, "Of the neurons and their places");
+  command.footer(
+      "Example, in full:\n  brainforest bench seam --neurons 10000 --frames 250 --size 1280x720 --json");
   return [options, &console] { run(*options, console); };
 }
 

@@ -94,7 +94,7 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
     for (const Piece& piece : pieces[index])
       for (const frame::Segment& s :
            forest_.segments().subspan(piece.item->first_segment, piece.item->segment_count))
-        if (draws(s, instance, camera, focal, piece.as_line, subframes)) {
+        if (subframes == 0 || draws(s, instance, camera, focal, piece.as_line, subframes)) {
           begins.push_back(begin_of(s));
           ends.push_back(end_of(s));
         }

@@ -25,8 +25,16 @@ class CameraPath {
 CameraPath walk(const Forest& forest);
 
 /// From outside the column straight to one soma near its middle, until it fills half the height: what `bench seam` walks.
-/// Of the somata there, the one whose way is clearest of others.
-CameraPath dolly(const Forest& forest);
+/// In equal times the distance to it shrinks by equal shares, slow at both ends, so that it grows evenly.
+class Dolly {
+ public:
+  /// Of the somata near the middle, towards the one whose way is clearest of others.
+  explicit Dolly(const Forest& forest);
+  View at(float time) const;  // time from 0 to 1
+
+ private:
+  View start_, end_;
+};
 
 /// Distance from a point to the nearest soma's surface, µm; infinite when there is none.
 float soma_clearance(const Forest& forest, const Vec3& point);

@@ -17,26 +17,37 @@ using frame::Item;
 using frame::Segment;
 
 constexpr int lanes = 16;  // samples of a pixel that are met at once
-using Lanes = Eigen::Array<float, lanes, 1>;
-using Mask = Eigen::Array<bool, lanes, 1>;
+// Plain loops over these become vector instructions; Eigen's select would not.
+struct alignas(64) Lanes : std::array<float, lanes> {
+  static Lanes constant(float value) {
+    Lanes result;
+    result.fill(value);
+    return result;
+  }
+};
+void root(Lanes& v) {
+  using Row = Eigen::Map<Eigen::Array<float, lanes, 1>, Eigen::Aligned64>;
+  Row(v.data()) = Row(v.data()).sqrt();
+}
 
-constexpr int tile = 16;                 // pixels; one thread draws a tile
+constexpr int tile = 8;                  // pixels; one thread draws a tile
 constexpr std::size_t chunk = 1u << 18;  // segments projected at once
 
 // The samples of one pixel: the depth of what is nearest (µm, infinite for nothing), how it is lit, its palette entry.
 struct Pixel {
-  Lanes depth = Lanes::Constant(INFINITY), shade = Lanes::Zero();
+  Lanes depth = Lanes::constant(INFINITY), shade = Lanes::constant(0.f);
   std::array<std::uint8_t, lanes> entry{};
+  float farthest = INFINITY;  // of the depths
 };
 
 // A tapered capsule before the camera (x right, y up, z depth), and all that a ray must know of it.
 struct Capsule {
-  Vec3 a, b, u;            // u: from a to b, unit
-  float ra, rb, length;    // µm
-  float s, c2;             // sine of half the cone's angle, cosine squared
-  float p[2], q[2];        // pixels of a and b
-  float reach;             // what lies further than this from the line p–q, in pixels, does not meet it
-  float nearest;           // depth
+  Vec3 a, b, u;          // u: from a to b, unit
+  float ra, rb, length;  // µm
+  float s, c2;           // sine of half the cone's angle, cosine squared
+  float p[2], q[2];      // pixels of a and b
+  float reach;           // what lies further than this from the line p–q, in pixels, does not meet it
+  float nearest;         // depth
   int left, right, top, bottom;  // pixels, [left, right) × [top, bottom)
   std::uint8_t entry;
 };
@@ -130,57 +141,95 @@ bool project(const Eye& eye, Capsule& c) {
 
 float distance_to_line(const Capsule& c, float x, float y) {
   const float dx = c.q[0] - c.p[0], dy = c.q[1] - c.p[1], square = dx * dx + dy * dy;
-  const float t =
-      square > 0.f ? std::clamp(((x - c.p[0]) * dx + (y - c.p[1]) * dy) / square, 0.f, 1.f) : 0.f;
+  const float t = square > 0.f ? std::clamp(((x - c.p[0]) * dx + (y - c.p[1]) * dy) / square, 0.f, 1.f) : 0.f;
   return std::hypot(x - c.p[0] - t * dx, y - c.p[1] - t * dy);
+}
+
+// Lowers depth to where the rays enter a sphere.
+void meet_sphere(const Vec3& centre, float radius, const Lanes& x, const Lanes& y, Lanes& depth) {
+  Lanes shift, h, under;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float dd = x[i] * x[i] + y[i] * y[i] + 1.f;
+    shift[i] = (x[i] * centre.x() + y[i] * centre.y() + centre.z()) / dd;  // the closest approach
+    const float ox = shift[i] * x[i] - centre.x(), oy = shift[i] * y[i] - centre.y(),
+                oz = shift[i] - centre.z();
+    h[i] = radius * radius - ox * ox - oy * oy - oz * oz;
+    under[i] = (h[i] > 0.f ? h[i] : 0.f) / dd;
+  }
+  root(under);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float t = shift[i] - under[i];
+    const bool hit = (h[i] >= 0.f) & (t > 0.f) & (t < depth[i]);
+    depth[i] = hit ? t : depth[i];
+  }
+}
+
+// The same for the side between the spheres. Returns whether a ray may still meet one of them: both lie within the
+// infinite cone, and what enters by the side enters there first.
+bool meet_side(const Capsule& c, const Lanes& x, const Lanes& y, Lanes& depth) {
+  Lanes shift, ou, du, A, B, under, upper, t, along;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float dd = x[i] * x[i] + y[i] * y[i] + 1.f;
+    shift[i] = (x[i] * c.a.x() + y[i] * c.a.y() + c.a.z()) / dd;  // start there, for precision far away
+    const float ox = shift[i] * x[i] - c.a.x(), oy = shift[i] * y[i] - c.a.y(), oz = shift[i] - c.a.z();
+    ou[i] = ox * c.u.x() + oy * c.u.y() + oz * c.u.z();
+    du[i] = x[i] * c.u.x() + y[i] * c.u.y() + c.u.z();
+    const float k0 = c.ra - c.s * ou[i], k1 = -c.s * du[i];
+    A[i] = c.c2 * (dd - du[i] * du[i]) - k1 * k1;
+    B[i] = -c.c2 * ou[i] * du[i] - k0 * k1;
+    under[i] = B[i] * B[i] - A[i] * (c.c2 * (ox * ox + oy * oy + oz * oz - ou[i] * ou[i]) - k0 * k0);
+    upper[i] = under[i] > 0.f ? under[i] : 0.f;
+  }
+  root(upper);
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float local = (-B[i] - upper[i]) / A[i];
+    along[i] = ou[i] + local * du[i];
+    t[i] = local + shift[i];
+  }
+  const float from = c.s * c.ra, to = c.length + c.s * c.rb;
+  int open = 0;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const bool inside = under[i] >= 0.f;
+    const bool hit =
+        inside & (std::abs(A[i]) > 1e-12f) & (along[i] >= from) & (along[i] <= to) & (t[i] > 0.f);
+    depth[i] = hit ? t[i] : depth[i];
+    open += inside & !hit;
+  }
+  return open > 0;
+}
+
+// Cosine between the light and the normal at a place of the capsule's surface.
+float facing(const Capsule& c, const Vec3& place, const Vec3& light) {
+  const auto on_sphere = [&](const Vec3& centre, float r) {
+    return (place - centre).dot(light) / std::max(r, 1e-9f);
+  };
+  if (c.c2 <= 0.f) return c.ra >= c.rb ? on_sphere(c.a, c.ra) : on_sphere(c.b, c.rb);
+  const Vec3 from_a = place - c.a;
+  const float along = from_a.dot(c.u);
+  if (along < c.s * c.ra) return on_sphere(c.a, c.ra);
+  if (along > c.length + c.s * c.rb) return on_sphere(c.b, c.rb);
+  const Vec3 across = from_a - along * c.u;
+  return std::sqrt(c.c2) * across.dot(light) / std::max(across.norm(), 1e-9f) + c.s * c.u.dot(light);
 }
 
 // Where the rays (x, y, 1) enter the capsule, as geometry/round_cone.h but for sixteen rays, none of unit length: what
 // is solved for is the depth itself.
 void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, Pixel& pixel) {
-  const Vec3& light = eye.light;
-  const Lanes dd = x * x + y * y + 1.f;
-  const auto dot = [&](const Vec3& v) { return Lanes(x * v.x() + y * v.y() + v.z()); };
-  Lanes depth = Lanes::Constant(INFINITY), facing = Lanes::Zero();
-  const Lanes light_ray = dot(light);
-  const auto offer = [&](const Mask& hit, const Lanes& t, const Lanes& lit) {
-    const Mask better = hit && t > 0.f && t < depth;
-    depth = better.select(t, depth);
-    facing = better.select(lit, facing);
-  };
-  const auto offer_sphere = [&](const Vec3& centre, float radius) {
-    const Lanes shift = dot(centre) / dd;
-    const Lanes ox = shift * x - centre.x(), oy = shift * y - centre.y(), oz = shift - centre.z();
-    const Lanes h = radius * radius - ox * ox - oy * oy - oz * oz;
-    const Lanes t = shift - (h.max(0.f) / dd).sqrt();
-    offer(h >= 0.f, t, (t * light_ray - centre.dot(light)) / std::max(radius, 1e-9f));
-  };
-  if (c.c2 > 0.f) {
-    const Lanes shift = dot(c.a) / dd;  // work near the closest approach, for precision far away
-    const Lanes ox = shift * x - c.a.x(), oy = shift * y - c.a.y(), oz = shift - c.a.z();
-    const Lanes du = dot(c.u), ou = ox * c.u.x() + oy * c.u.y() + oz * c.u.z();
-    const Lanes k0 = c.ra - c.s * ou, k1 = -c.s * du;
-    const Lanes A = c.c2 * (dd - du * du) - k1 * k1, B = -c.c2 * ou * du - k0 * k1,
-                C = c.c2 * (ox * ox + oy * oy + oz * oz - ou * ou) - k0 * k0;
-    const Lanes under = B * B - A * C;
-    const Lanes local = (-B - under.max(0.f).sqrt()) / A, along = ou + local * du;
-    // From the middle axis to the place on the side.
-    const Lanes sx = ox + local * x - along * c.u.x(), sy = oy + local * y - along * c.u.y(),
-                sz = oz + local - along * c.u.z();
-    const Lanes rho = (sx * sx + sy * sy + sz * sz).sqrt().max(1e-12f);
-    offer(under >= 0.f && A.abs() > 1e-12f && along >= c.s * c.ra && along <= c.length + c.s * c.rb,
-          local + shift,
-          std::sqrt(c.c2) * (sx * light.x() + sy * light.y() + sz * light.z()) / rho + c.s * c.u.dot(light));
+  Lanes depth = Lanes::constant(INFINITY);
+  if (c.c2 <= 0.f || meet_side(c, x, y, depth)) {
+    meet_sphere(c.a, c.ra, x, y, depth);
+    meet_sphere(c.b, c.rb, x, y, depth);
   }
-  offer_sphere(c.a, c.ra);
-  offer_sphere(c.b, c.rb);
-  depth = depth.max(eye.near);
-  for (int i = 0; i < lanes; ++i) {
-    if (!(depth[i] < pixel.depth[i])) continue;
-    pixel.depth[i] = depth[i];
-    pixel.shade[i] = std::clamp(.5f + .5f * facing[i], 0.f, 1.f);
-    pixel.entry[std::size_t(i)] = c.entry;
+  bool changed = false;
+  for (std::size_t i = 0; i < lanes; ++i) {
+    const float z = std::max(depth[i], eye.near);
+    if (!(z < pixel.depth[i])) continue;
+    pixel.depth[i] = z;
+    pixel.shade[i] = std::clamp(.5f + .5f * facing(c, depth[i] * Vec3(x[i], y[i], 1.f), eye.light), 0.f, 1.f);
+    pixel.entry[i] = c.entry;
+    changed = true;
   }
+  if (changed) pixel.farthest = *std::ranges::max_element(pixel.depth);
 }
 
 // Draws sixteen samples of every pixel. `shift`: where in the pixel they lie.
@@ -192,7 +241,7 @@ class Canvas {
         tall_((eye.height + tile - 1) / tile),
         pixels_(std::size_t(eye.width) * std::size_t(eye.height)),
         farthest_(std::size_t(wide_) * std::size_t(tall_), INFINITY) {
-    for (int i = 0; i < lanes; ++i) shift_x_[i] = shift[std::size_t(i)].x(), shift_y_[i] = shift[std::size_t(i)].y();
+    for (std::size_t i = 0; i < lanes; ++i) shift_x_[i] = shift[i].x(), shift_y_[i] = shift[i].y();
   }
 
   void add(std::vector<Capsule>& capsules) {
@@ -210,18 +259,19 @@ class Canvas {
     for (std::size_t i = 0; i < capsules.size(); ++i)
       tiles_of(capsules[i], [&](std::size_t t) { drawn[next[t]++] = std::uint32_t(i); });
     parallel_for(farthest_.size(), 1, [&](std::size_t t) {
+      if (begin[t] == begin[t + 1]) return;
       const int x = int(t) % wide_ * tile, y = int(t) / wide_ * tile;
       for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) draw(capsules[drawn[i]], x, y);
       float farthest = 0.f;
       for (int row = y; row < std::min(y + tile, eye_.height); ++row)
         for (int column = x; column < std::min(x + tile, eye_.width); ++column)
-          farthest = std::max(farthest, at(column, row).depth.maxCoeff());
+          farthest = std::max(farthest, at(column, row).farthest);
       farthest_[t] = farthest;
     });
   }
 
   /// Adds the colours of the first `count` samples to sums.
-  void resolve(const frame::Frame& f, int count, std::vector<Vec4>& sums) {
+  void resolve(const frame::Frame& f, std::size_t count, std::vector<Vec4>& sums) {
     const frame::Style& style = f.style;
     parallel_for(pixels_.size(), 4096, [&](std::size_t i) {  // depths as octaves, which halos compare
       for (float& d : pixels_[i].depth) d = std::log2(d);
@@ -233,14 +283,14 @@ class Canvas {
       for (int x = 0; x < eye_.width; ++x) {
         const Pixel& pixel = at(x, y);
         Vec4& sum = sums[row * f.width + std::size_t(x)];
-        for (int i = 0; i < count; ++i) {
+        for (std::size_t i = 0; i < count; ++i) {
           if (pixel.depth[i] == INFINITY) {
             sum.head<3>() += behind;
             continue;
           }
           const float z = std::exp2(pixel.depth[i]), shade = pixel.shade[i];
           const float fog = 1.f - std::exp(-std::max(0.f, z - style.fog_start) / style.fog_length);
-          const Vec3 lit = f.palette[pixel.entry[std::size_t(i)]] * (.16f + 1.05f * shade * shade) *
+          const Vec3 lit = f.palette[pixel.entry[i]] * (.16f + 1.05f * shade * shade) *
                            std::exp(-1.1f * style.halo * rim(x, y, i));
           sum.head<3>() += lit + fog * (style.fog_colour - lit);
           sum.w() += 1.f;
@@ -255,15 +305,20 @@ class Canvas {
   void draw(const Capsule& c, int x0, int y0) {
     for (int y = std::max(c.top, y0); y < std::min(c.bottom, y0 + tile); ++y)
       for (int x = std::max(c.left, x0); x < std::min(c.right, x0 + tile); ++x) {
-        if (distance_to_line(c, float(x) + .5f, float(y) + .5f) > c.reach) continue;
-        const Lanes ray_x = (float(x) + .5f - eye_.centre_x - shift_x_) / eye_.focal,
-                    ray_y = (eye_.centre_y + shift_y_ - float(y) - .5f) / eye_.focal;
-        meet(c, ray_x, ray_y, eye_, at(x, y));
+        Pixel& pixel = at(x, y);
+        const float px = float(x) + .5f, py = float(y) + .5f;
+        if (c.nearest >= pixel.farthest || distance_to_line(c, px, py) > c.reach) continue;
+        Lanes ray_x, ray_y;
+        for (std::size_t i = 0; i < lanes; ++i) {
+          ray_x[i] = (px - eye_.centre_x - shift_x_[i]) / eye_.focal;
+          ray_y[i] = (eye_.centre_y + shift_y_[i] - py) / eye_.focal;
+        }
+        meet(c, ray_x, ray_y, eye_, pixel);
       }
   }
 
   // The share of the pixels around in which something nearer stands (after eye-dome lighting, Boucheny 2009).
-  float rim(int x, int y, int lane) {
+  float rim(int x, int y, std::size_t lane) {
     constexpr int ring[8][2] = {{1, 0}, {-1, 0}, {0, 1}, {0, -1}, {2, 2}, {-2, 2}, {2, -2}, {-2, -2}};
     const float here = at(x, y).depth[lane];
     float sum = 0.f;
@@ -302,9 +357,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   std::vector<const Item*> items;
   for (const auto list : {f.dots, f.lines, f.capsules})
     for (const Item& item : list) items.push_back(&item);
-  const auto depth = [&](const Item* i) {
-    return eye.to_camera.row(2).dot(Vec3(i->x, i->y, i->z) - eye.at);
-  };
+  const auto depth = [&](const Item* i) { return eye.to_camera.row(2).dot(Vec3(i->x, i->y, i->z) - eye.at); };
   std::ranges::stable_sort(items, {}, depth);
 
   const auto capsule_of = [&](const Item& item, std::uint32_t index, Capsule& c) {
@@ -354,7 +407,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
       if (project(eye, c)) capsules.push_back(c);
     }
     canvas.add(capsules);
-    canvas.resolve(f, int(std::min<std::uint32_t>(lanes, last - first)), sums_);
+    canvas.resolve(f, std::min<std::uint32_t>(lanes, last - first), sums_);
   }
   samples_ += last - f.first_subframe;
   return {.draw = std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count(),
