@@ -24,12 +24,12 @@ constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 
 
 }  // namespace
 
-scene::Forest grown_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
+std::vector<std::byte> packed_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
   std::vector<circuit::Candidate> candidates;
   std::vector<Morphology> neurons;
   for (const Share& share : shares)
-    for (const Morphology& m : lsystem::grow_population(find_grammar(share.grammar), share.count,
-                                                        seed, console.progress())) {
+    for (const Morphology& m :
+         lsystem::grow_population(find_grammar(share.grammar), share.count, seed, console.progress())) {
       candidates.push_back({fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar,
                             m.soma().sphere().radius, centred(m).bounds().high.y()});
       neurons.push_back(centred(m));
@@ -42,7 +42,11 @@ scene::Forest grown_column(std::uint32_t neurons_planted, std::uint64_t seed, Co
   for (const std::string& name : circuit.morphologies)
     for (std::size_t i = 0; i < candidates.size(); ++i)
       if (candidates[i].name == name) planted.push_back(neurons[i]);
-  return scene::Forest::from_bytes(scene::pack(circuit, planted, console.progress()));
+  return scene::pack(circuit, planted, console.progress());
+}
+
+scene::Forest grown_column(std::uint32_t neurons, std::uint64_t seed, Console& console) {
+  return scene::Forest::from_bytes(packed_column(neurons, seed, console));
 }
 
 }  // namespace forest::cli
