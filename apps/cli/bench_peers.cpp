@@ -3,8 +3,10 @@
 // each in a process of its own; and how far the pictures are like the reference. How it is measured: docs/scene/seam.md.
 #include <algorithm>
 #include <array>
+#include <cerrno>
 #include <chrono>
 #include <cmath>
+#include <cstring>
 #include <ctime>
 #include <fcntl.h>
 #include <map>

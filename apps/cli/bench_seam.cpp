@@ -116,7 +116,7 @@ class Walk {
     return moment;
   }
 
-  std::size_t ways() const { return options_.causes ? way_count : 1; }
+  std::size_t ways() const { return options_.causes ? std::size_t(way_count) : 1; }
   double reference_seconds() const { return reference_seconds_; }  // of all pictures compared
   std::string renderer() const { return artist_.renderer(); }
   const scene::Forest& forest() const { return artist_.forest(); }

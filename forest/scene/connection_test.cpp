@@ -32,7 +32,7 @@ TEST(Connection, NoChoiceOfDetailBreaksABranchOnAWholeDolly) {
   for (int i = 0; i <= 40; ++i)
     for (const float error : {.5f, 1.f, 3.f, 6.f}) {
       const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
-      const Cut cut = choose(forest, Eye(camera, viewport, {.error = error}), viewport);
+      const Cut cut = choose(forest, Eye(camera, viewport, {.error = error, .gaze = {}}), viewport);
       EXPECT_EQ(connectedness(cut, camera, viewport, 0).disconnected, 0u) << i << " " << error;
     }
 }

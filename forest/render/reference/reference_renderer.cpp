@@ -45,6 +45,7 @@ struct Capsule {
   Vec3 a, b, u;          // u: from a to b, unit
   float ra, rb, length;  // µm
   float s, c2;           // sine of half the cone's angle, cosine squared
+  Vec3 moment;           // of the axis about the eye: a × u
   float p[2], q[2];      // pixels of a and b
   float reach;           // what lies further than this from the line p–q, in pixels, does not meet it
   float nearest;         // depth
@@ -136,6 +137,7 @@ bool project(const Eye& eye, Capsule& c) {
   c.u = nested ? Vec3(Vec3::Zero()) : Vec3((c.b - c.a) / c.length);
   c.s = nested ? 0.f : taper / c.length;
   c.c2 = nested ? 0.f : 1.f - c.s * c.s;
+  c.moment = c.a.cross(c.u);
   return true;
 }
 
@@ -174,10 +176,16 @@ bool meet_side(const Capsule& c, const Lanes& x, const Lanes& y, Lanes& depth) {
     const float ox = shift[i] * x[i] - c.a.x(), oy = shift[i] * y[i] - c.a.y(), oz = shift[i] - c.a.z();
     ou[i] = ox * c.u.x() + oy * c.u.y() + oz * c.u.z();
     du[i] = x[i] * c.u.x() + y[i] * c.u.y() + c.u.z();
+    // What is across the axis of the start (p) and of the ray (d).
+    const float px = ox - ou[i] * c.u.x(), py = oy - ou[i] * c.u.y(), pz = oz - ou[i] * c.u.z();
+    const float dx = x[i] - du[i] * c.u.x(), dy = y[i] - du[i] * c.u.y(), dz = 1.f - du[i] * c.u.z();
     const float k0 = c.ra - c.s * ou[i], k1 = -c.s * du[i];
-    A[i] = c.c2 * (dd - du[i] * du[i]) - k1 * k1;
-    B[i] = -c.c2 * ou[i] * du[i] - k0 * k1;
-    under[i] = B[i] * B[i] - A[i] * (c.c2 * (ox * ox + oy * oy + oz * oz - ou[i] * ou[i]) - k0 * k0);
+    A[i] = c.c2 * (dx * dx + dy * dy + dz * dz) - k1 * k1;
+    B[i] = c.c2 * (px * dx + py * dy + pz * dz) - k0 * k1;
+    // B² - A·C, without the difference of large numbers: by the moment of the axis about the ray.
+    const float mx = k0 * dx - k1 * px, my = k0 * dy - k1 * py, mz = k0 * dz - k1 * pz;
+    const float moment = c.moment.x() * x[i] + c.moment.y() * y[i] + c.moment.z();
+    under[i] = c.c2 * (mx * mx + my * my + mz * mz - c.c2 * moment * moment);
     upper[i] = under[i] > 0.f ? under[i] : 0.f;
   }
   root(upper);
