@@ -393,11 +393,11 @@ std::function<void()> bench_peers(CLI::App& command, Console& console) {
   whole("--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
   whole("--quick-samples", options->quick_samples, "Pictures averaged by ours; moving, the studio draws one",
         1, 1024);
-  command
-      .add_option("--budget", options->budget,
-                  "Milliseconds a picture of ours may take before less detail is chosen")
-      ->check(CLI::Range(1., 10000.))
-      ->capture_default_str();
+  must_be_within(*command
+                      .add_option("--budget", options->budget,
+                                  "Milliseconds a picture of ours may take before less detail is chosen")
+                      ->capture_default_str(),
+                 1., 10000.);
   command
       .add_option("--modes", options->modes, "What VTK draws: lines, impostors, tubes; separated by commas")
       ->delimiter(',')

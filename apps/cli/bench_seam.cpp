@@ -350,16 +350,19 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   whole("--quick-samples", options->quick_samples,
         "Pictures averaged by the product; moving, the studio draws one", 1, 1024);
   whole("--rate", options->rate, "Pictures a second", 1, 1000);
-  command.add_option("--seconds", options->seconds, "How long the dolly takes")
-      ->check(CLI::Range(.1, 3600.))
-      ->capture_default_str();
-  command
-      .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
-      ->check(CLI::Range(1., 10000.))
-      ->capture_default_str();
-  command
-      .add_option("--error", options->error, "Pixels of acceptable error, instead of what the budget says")
-      ->check(CLI::Range(.05, 100.));
+  const auto within = [&](CLI::Option* option, double low, double high) {
+    must_be_within(*option, low, high);
+  };
+  within(command.add_option("--seconds", options->seconds, "How long the dolly takes")->capture_default_str(),
+         .1, 3600.);
+  within(command
+             .add_option("--budget", options->budget,
+                         "Milliseconds a picture may take before less detail is chosen")
+             ->capture_default_str(),
+         1., 10000.);
+  within(command.add_option("--error", options->error,
+                            "Pixels of acceptable error, instead of what the budget says"),
+         .05, 100.);
   command.add_flag(
       "--causes", options->causes,
       "Compare, too, what the product would draw with more samples, and without levels of detail");

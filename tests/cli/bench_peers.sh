@@ -5,7 +5,7 @@ trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 fails_with() {  # status, words of the sentence, command…
   local status=$1 words=$2 got=0
   shift 2
-  "$@" >said.txt 2>err.txt || got=$?
+  timeout 60 "$@" >said.txt 2>err.txt || got=$?
   [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
   [ "$(wc -l <err.txt)" = 1 ] || [ "$status" = 2 ] || { echo "more than a sentence from: $*"; cat err.txt; exit 1; }
   grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }

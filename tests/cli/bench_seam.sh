@@ -31,7 +31,7 @@ cmp 1.json 2.json
 fails_with() {  # status, words of the sentence, command…
   local status=$1 words=$2 got=0
   shift 2
-  "$@" >said.txt 2>err.txt || got=$?
+  timeout 60 "$@" >said.txt 2>err.txt || got=$?
   [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
   grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
 }
