@@ -30,8 +30,9 @@ using Moments = Eigen::Array<double, 5, 1>;
 
 void require_same_size(const Image& a, const Image& b) {
   if (a.width != b.width || a.height != b.height || !a.width || !a.height)
-    throw Error(fmt::format("pictures of {} × {} and {} × {} pixels cannot be compared; draw both in one size",
-                            a.width, a.height, b.width, b.height));
+    throw Error(
+        fmt::format("pictures of {} × {} and {} × {} pixels cannot be compared; draw both in one size",
+                    a.width, a.height, b.width, b.height));
 }
 
 }  // namespace
@@ -75,8 +76,9 @@ double similarity(const Image& a, const Image& b) {
   parallel_for(std::size_t(height - 2 * top), 8, [&](std::size_t row) {
     const int y = int(row) + top;
     for (int x = side; x < width - side; ++x) {
-      const Moments m = weighted(
-          y, height, [&](int i) -> const Moments& { return rows[std::size_t(i) * a.width + std::size_t(x)]; });
+      const Moments m = weighted(y, height, [&](int i) -> const Moments& {
+        return rows[std::size_t(i) * a.width + std::size_t(x)];
+      });
       constexpr double c1 = .01 * 255. * .01 * 255., c2 = .03 * 255. * .03 * 255.;
       const double variance_a = m[2] - m[0] * m[0], variance_b = m[3] - m[1] * m[1],
                    covariance = m[4] - m[0] * m[1];
