@@ -363,8 +363,16 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
 
   // From near to far, so that what is hidden is found early.
   std::vector<const Item*> items;
-  for (const auto list : {f.dots, f.lines, f.capsules})
-    for (const Item& item : list) items.push_back(&item);
+  const auto add = [&](const frame::Lists& lists) {
+    for (const auto list : {lists.dots, lists.lines, lists.capsules})
+      for (const Item& item : list) items.push_back(&item);
+  };
+  add(f);
+  if (f.rest) {
+    const frame::Lists rest = f.rest(seen_);  // all of it
+    frame::check(rest, geometry_);
+    add(rest);
+  }
   const auto depth = [&](const Item* i) { return eye.to_camera.row(2).dot(Vec3(i->x, i->y, i->z) - eye.at); };
   std::ranges::stable_sort(items, {}, depth);
 

@@ -18,10 +18,12 @@ class ReferenceRenderer final : public Renderer {
   void load(const frame::Geometry& geometry) override { geometry_ = geometry; }
   frame::Timing draw(const frame::Frame& frame) override;
   frame::Image read() override;
+  const frame::DepthMap& seen() const override { return seen_; }  // empty: nothing is guessed to be hidden
   std::string name() const override { return "reference"; }
 
  private:
   frame::Geometry geometry_;
+  frame::DepthMap seen_;
   std::uint32_t width_ = 0, height_ = 0, samples_ = 0;  // samples_: summed so far
   float exposure_ = 1.f;
   std::vector<Vec4> sums_;  // linear light and coverage, one a pixel

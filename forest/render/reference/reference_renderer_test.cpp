@@ -143,6 +143,23 @@ TEST(ReferenceRenderer, DotsAndLinesAreCapsulesToo) {
   EXPECT_GT(image.covered, .01);
 }
 
+TEST(ReferenceRenderer, WhatTheSceneLeftOutIsDrawnToo) {
+  Fixture f;
+  f.add({-20, 3, 0}, {15, -8, 0}, .5f, .25f);
+  f.add({5, 9, 0}, {5, 9, 0}, 3.f, 3.f);
+  const frame::Image image = f.draw();
+  const auto all = f.items;
+  f.items.resize(1);
+  EXPECT_NE(f.draw().pixels, image.pixels);
+  f.frame.rest = [&](const frame::DepthMap& seen) {
+    EXPECT_TRUE(seen.depths.empty());
+    frame::Lists rest;
+    rest.capsules = std::span(all).last(1);
+    return rest;
+  };
+  EXPECT_EQ(f.draw().pixels, image.pixels);
+}
+
 TEST(ReferenceRenderer, TheSameAtAnyNumberOfThreadsAndInAnyOrder) {
   Fixture f;
   Random random(3);
