@@ -45,6 +45,7 @@ using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t dolly_pictures = 250;  // ten seconds
+constexpr std::uint32_t settling = 15;         // pictures in which the budget finds its error
 
 struct Options {
   std::uint32_t neurons = 1000, frames = 6, samples = 16, quick_samples = 1;
@@ -224,7 +225,7 @@ void write_column(const scene::Forest& forest, const Options& options, const fs:
   write_file(folder / "column.json", json.dump());
 }
 
-/// Draws the whole dolly as the studio would, and prints what the pictures that VTK draws too have taken.
+/// Walks the dolly up to each camera that VTK draws, as the studio would, and prints what these pictures have taken.
 void draw_ours(const Options& options) {
   const auto begin = Clock::now();
   Artist artist(scene::Forest::open(options.draw / "column.forest"));
@@ -234,7 +235,8 @@ void draw_ours(const Options& options) {
   const std::vector<std::uint32_t> measured = measured_pictures(options.frames);
   Json frames = Json::array(), cores = Json::array();
   double first = 0.;
-  for (std::uint32_t picture = 0; picture < dolly_pictures; ++picture) {
+  for (std::uint32_t picture = 0; picture <= measured.back(); ++picture) {
+    if (*std::ranges::lower_bound(measured, picture) > picture + settling) continue;
     const auto start = Clock::now();
     const std::clock_t core = std::clock();
     scene::View view = view_at(dolly, picture, options.quick_samples);
