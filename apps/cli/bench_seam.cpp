@@ -36,6 +36,7 @@ struct Options {
   std::uint64_t seed = 1;
   std::string size = "640x360";
   bool causes = false;
+  Drawer drawer = Drawer::automatic;
   std::filesystem::path out;
 };
 
@@ -67,12 +68,13 @@ class Walk {
       : options_(options),
         size_(parse_size(options.size)),
         viewport_{float(size_.first), float(size_.second)},
-        artist_(std::move(forest)),
+        artist_(std::move(forest), options.drawer),
+        exact_(make_renderer(options.drawer)),
         dolly_(artist_.forest()),
         connectedness_(artist_.forest()),
         budget_(options.budget),
         pictures_(std::max(2u, std::uint32_t(std::lround(options.seconds * options.rate)))) {
-    opengl_.load(artist_.forest().geometry());
+    exact_->load(artist_.forest().geometry());
     reference_.load(artist_.forest().geometry());
   }
 
@@ -108,8 +110,8 @@ class Walk {
     moment.drawn[product] = std::move(quick.image);
     if (options_.causes) {
       moment.drawn[more_samples] = artist_.draw(view, size_.first, size_.second).image;
-      opengl_.draw(frame);
-      moment.drawn[every_segment] = opengl_.read();
+      exact_->draw(frame);
+      moment.drawn[every_segment] = exact_->read();
     }
     for (std::size_t w = 0; w < ways(); ++w)
       moment.similarity[w] = frame::similarity(moment.drawn[w], moment.reference);
@@ -137,7 +139,7 @@ class Walk {
   std::pair<std::uint32_t, std::uint32_t> size_;
   frame::Viewport viewport_;
   Artist artist_;
-  render::OpenGLRenderer opengl_;
+  std::unique_ptr<render::Renderer> exact_;  // draws every segment, where causes are asked for
   render::ReferenceRenderer reference_;
   scene::Dolly dolly_;
   scene::Connectedness connectedness_;
@@ -367,6 +369,7 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
       "--causes", options->causes,
       "Compare, too, what the product would draw with more samples, and without levels of detail");
   command.add_option("--out", options->out, "A folder for the worst pictures, beside the reference");
+  add_renderer(command, options->drawer);
   add_size(command, options->size);
   add_seed(command, options->seed, "Of the neurons and their places");
   command.footer(
