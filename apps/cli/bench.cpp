@@ -16,7 +16,9 @@ std::function<void()> bench_activity(CLI::App&, Console&);
 std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
+std::function<void()> bench_peers(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
+std::function<void()> bench_seam(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
@@ -24,8 +26,12 @@ std::span<const Benchmark> benchmarks() {
       {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
+      {"peers", "How fast, small and true the column is drawn beside VTK's lines, tube impostors and tubes",
+       bench_peers},
       {"repository", "How many neurons are stored in a repository in a second, and read back",
        bench_repository},
+      {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer",
+       bench_seam},
   });
   return table;
 }

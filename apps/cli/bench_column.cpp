@@ -9,17 +9,13 @@
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
 
-#include "forest/circuit/plant.h"
 #include "forest/core/error.h"
-#include "forest/lsystem/grow.h"
-#include "forest/morphology/transform.h"
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
 #include "apps/cli/console.h"
-#include "apps/cli/grammars.h"
+#include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
-#include "apps/cli/planting.h"
 
 namespace forest::cli {
 namespace {
@@ -33,33 +29,6 @@ struct Options {
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
 };
-
-struct Share {
-  const char* grammar;
-  std::size_t count;
-};
-constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
-
-scene::Forest column(const Options& options, Console& console) {
-  std::vector<circuit::Candidate> candidates;
-  std::vector<Morphology> neurons;
-  for (const Share& share : shares)
-    for (const Morphology& m : lsystem::grow_population(find_grammar(share.grammar), share.count,
-                                                        options.seed, console.progress())) {
-      candidates.push_back({fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar,
-                            m.soma().sphere().radius, centred(m).bounds().high.y()});
-      neurons.push_back(centred(m));
-    }
-  circuit::Recipe recipe = find_recipe("column-10000");
-  recipe.radius *= std::sqrt(float(options.neurons) / 10000.f);  // the same density
-  recipe.neurons = options.neurons;
-  const circuit::Circuit circuit = circuit::plant(recipe, candidates, options.seed, console.progress());
-  std::vector<Morphology> planted;
-  for (const std::string& name : circuit.morphologies)
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-      if (candidates[i].name == name) planted.push_back(neurons[i]);
-  return scene::Forest::from_bytes(scene::pack(circuit, planted, console.progress()));
-}
 
 /// Once around the column, at the distance from which all of it is seen, rising and sinking a little.
 scene::View around(const scene::Forest& forest, float turn) {
@@ -104,7 +73,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
 }
 
 void run(const Options& options, Console& console) {
-  const scene::Forest forest = column(options, console);
+  const scene::Forest forest = grown_column(options.neurons, options.seed, console);
   const auto start = Clock::now();
   Artist artist(forest, options.drawer);
   const auto [width, height] = parse_size(options.size);

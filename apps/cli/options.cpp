@@ -26,6 +26,17 @@ void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high) {
   });
 }
 
+void must_be_within(CLI::Option& option, double low, double high) {
+  option.check([low, high](const std::string& text) {
+    double value = 0.;
+    const char* const end = text.data() + text.size();
+    const auto [rest, error] = std::from_chars(text.data(), end, value);
+    return error == std::errc() && rest == end && value >= low && value <= high  // no NaN is
+               ? std::string()
+               : fmt::format("{} is no number from {} to {}", repository::shown(text), low, high);
+  });
+}
+
 void add_common(CLI::App& command, Console& console) {
   command.add_flag("--json", console.json, "Print results as JSON");
   must_be_whole(*command.add_option("--threads", console.threads, "Number of threads; 0 for all cores"), 0,

@@ -30,5 +30,7 @@ void add_force(CLI::App& command, bool& force);
 
 /// An option's value must be a whole number in this range. Said in one short sentence, and never rounded or cut to fit.
 void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high);
+/// The same for any number; what is not a number is refused too.
+void must_be_within(CLI::Option& option, double low, double high);
 
 }  // namespace forest::cli

@@ -15,7 +15,19 @@ void require(bool good, std::string_view sentence) {
   if (!good) throw Error(fmt::format("frame: {}", sentence));
 }
 
+float halton(std::uint32_t index, std::uint32_t base) {
+  float result = 0.f, share = 1.f;
+  for (std::uint32_t i = index + 1; i; i /= base) share /= float(base), result += share * float(i % base);
+  return result;
+}
+
 }  // namespace
+
+Vec3 light_direction() { return Vec3(-.35f, .75f, -.55f).normalized(); }
+
+Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes) {
+  return subframes == 1 ? Vec2(0.f, 0.f) : Vec2(halton(subframe, 2) - .5f, halton(subframe, 3) - .5f);
+}
 
 void check(const Frame& frame, const Geometry& geometry) {
   const Camera& c = frame.camera;

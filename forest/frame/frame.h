@@ -92,6 +92,13 @@ struct Timing {
   double draw = 0., resolve = 0.;  // milliseconds of one picture, all subframes
 };
 
+/// Where light comes from, in camera axes (x right, y up, z along the view); unit length.
+Vec3 light_direction();
+
+/// Where subframe number `subframe` looks through each pixel: x and y from its middle, in pixels, within ±½ (the 2, 3
+/// sequence of Halton); a picture of one subframe looks through the middle. The centre of the picture moves by as much.
+Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes);
+
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);
 void check(const Lists& lists, const Geometry& geometry);

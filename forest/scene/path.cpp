@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "forest/core/error.h"
+#include "forest/geometry/polyline.h"
 
 namespace forest::scene {
 namespace {
@@ -123,6 +124,48 @@ CameraPath walk(const Forest& forest) {
       {start, look(level - inward * (2.2f * radius) + side * (.8f * radius), level, 44.f),
        look(edge, level, 52.f), look(inside, level + inward * radius, 58.f),
        look(deep, level + inward * radius + side * (.5f * radius) + Vec3(0.f, .1f * height, 0.f), 60.f)});
+}
+
+Dolly::Dolly(const Forest& forest) : start_(overview(forest)), end_(start_) {
+  struct Soma {
+    Vec3 place;
+    float radius;
+  };
+  std::vector<Soma> somata;
+  for (const frame::Instance& i : forest.instances())
+    if (const float radius = forest.neurons()[i.morphology].soma_radius; radius > 0.f)
+      somata.push_back({Vec3(i.x, i.y, i.z), radius});
+  const Vec3 centre = forest.soma_bounds().centre(), eye = start_.camera.eye;
+  std::ranges::stable_sort(somata, {}, [&](const Soma& s) { return (s.place - centre).squaredNorm(); });
+  float clearest = -INFINITY;
+  for (std::size_t i = 0; i < std::min<std::size_t>(somata.size(), 24); ++i) {
+    const Soma& goal = somata[i];
+    const float distance = 2.f * goal.radius / std::tan(.5f * radians(start_.camera.field_of_view));
+    const Vec3 before = goal.place - distance * (goal.place - eye).normalized();
+    float clearance = INFINITY;
+    for (std::size_t other = 0; other < somata.size(); ++other)
+      if (other != i)
+        clearance =
+            std::min(clearance, distance_to_segment(somata[other].place, eye, before) - somata[other].radius);
+    if (clearance <= clearest) continue;
+    clearest = clearance;
+    end_.camera.eye = before, end_.camera.target = goal.place;
+  }
+  end_.camera.near = .5f;
+}
+
+View Dolly::at(float time) const {
+  const float s = eased(time);
+  const frame::Camera &from = start_.camera, &to = end_.camera;
+  const float far = (from.eye - to.target).norm(), near = (to.eye - to.target).norm();
+  const float share = std::pow(near / far, s);  // of the distance at the start
+  View view = start_;
+  view.camera.eye = to.target + share * (from.eye - to.target);
+  const Mat3 axes = Quat(from.axes()).slerp(s, Quat(to.axes())).toRotationMatrix();
+  view.camera.target = view.camera.eye - share * far * axes.col(2);
+  view.camera.up = axes.col(1);
+  view.camera.near = from.near * std::pow(to.near / from.near, s);
+  return view;
 }
 
 }  // namespace forest::scene

@@ -24,6 +24,18 @@ class CameraPath {
 /// The demo's walk: from outside the column to a clear place inside, between the dendrites, never through a soma.
 CameraPath walk(const Forest& forest);
 
+/// From outside the column straight to one soma near its middle, until it fills half the height: what `bench seam` walks.
+/// In equal times the distance to it shrinks by equal shares, slow at both ends, so that it grows evenly.
+class Dolly {
+ public:
+  /// Of the somata near the middle, towards the one whose way is clearest of others.
+  explicit Dolly(const Forest& forest);
+  View at(float time) const;  // time from 0 to 1
+
+ private:
+  View start_, end_;
+};
+
 /// Distance from a point to the nearest soma's surface, µm; infinite when there is none.
 float soma_clearance(const Forest& forest, const Vec3& point);
 

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/grown_column.h"
+
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "forest/circuit/plant.h"
+#include "forest/lsystem/grow.h"
+#include "forest/morphology/transform.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/grammars.h"
+#include "apps/cli/planting.h"
+
+namespace forest::cli {
+namespace {
+
+struct Share {
+  const char* grammar;
+  std::size_t count;
+};
+constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
+
+}  // namespace
+
+std::vector<std::byte> packed_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
+  std::vector<circuit::Candidate> candidates;
+  std::vector<Morphology> neurons;
+  for (const Share& share : shares)
+    for (const Morphology& m :
+         lsystem::grow_population(find_grammar(share.grammar), share.count, seed, console.progress())) {
+      candidates.push_back({fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar,
+                            m.soma().sphere().radius, centred(m).bounds().high.y()});
+      neurons.push_back(centred(m));
+    }
+  circuit::Recipe recipe = find_recipe("column-10000");
+  recipe.radius *= std::sqrt(float(neurons_planted) / 10000.f);  // the same density
+  recipe.neurons = neurons_planted;
+  const circuit::Circuit circuit = circuit::plant(recipe, candidates, seed, console.progress());
+  std::vector<Morphology> planted;
+  for (const std::string& name : circuit.morphologies)
+    for (std::size_t i = 0; i < candidates.size(); ++i)
+      if (candidates[i].name == name) planted.push_back(neurons[i]);
+  return scene::pack(circuit, planted, console.progress());
+}
+
+scene::Forest grown_column(std::uint32_t neurons, std::uint64_t seed, Console& console) {
+  return scene::Forest::from_bytes(packed_column(neurons, seed, console));
+}
+
+}  // namespace forest::cli

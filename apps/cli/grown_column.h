@@ -1,0 +1,20 @@
+// SPDX-License-Identifier: Apache-2.0
+// The column that benchmarks draw: a hundred shapes grown from the built-in grammars.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include "forest/scene/forest.h"
+
+namespace forest::cli {
+
+class Console;
+
+/// So many neurons, at the density of the recipe column-10000; the same for the same seed. As a forest file.
+std::vector<std::byte> packed_column(std::uint32_t neurons, std::uint64_t seed, Console& console);
+/// The same, opened.
+scene::Forest grown_column(std::uint32_t neurons, std::uint64_t seed, Console& console);
+
+}  // namespace forest::cli

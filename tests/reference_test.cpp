@@ -1,0 +1,97 @@
+// SPDX-License-Identifier: Apache-2.0
+// The OpenGL renderer against the reference renderer, and the rule by which thin branches are left out against what is
+// really drawn.
+#include <gtest/gtest.h>
+
+#include "forest/core/random.h"
+#include "forest/frame/similarity.h"
+#include "forest/render/opengl/context.h"
+#include "forest/render/opengl/opengl_renderer.h"
+#include "forest/render/reference/reference_renderer.h"
+#include "forest/scene/connection.h"
+#include "forest/scene/path.h"
+#include "forest/scene/view.h"
+#include "forest/scene/whole.h"
+
+#include "tests/sample_forest.h"
+
+namespace forest {
+namespace {
+
+constexpr std::uint32_t width = 320, height = 200;
+const frame::Viewport viewport{float(width), float(height)};
+
+TEST(Reference, OpenGLDrawsTheSamePictureOfEverySegment) {
+  const scene::Forest forest =
+      scene::Forest::from_bytes(scene::pack(testing::sample_circuit(150), testing::sample_neurons()));
+  const render::OffscreenContext context;
+  render::OpenGLRenderer opengl;
+  render::ReferenceRenderer reference;
+  opengl.load(forest.geometry());
+  reference.load(forest.geometry());
+  const scene::Dolly dolly(forest);
+  for (const float time : {0.f, .4f, .6f, .8f, 1.f}) {
+    scene::View view = dolly.at(time);
+    view.samples = 64;
+    const scene::Colouring colouring = scene::colour(forest, view.colour_by, view.background);
+    const scene::Cut all = scene::whole(forest, view.camera, viewport);
+    const frame::Frame frame = scene::compose(forest, view, colouring, all, width, height);
+    opengl.draw(frame);
+    reference.draw(frame);
+    const frame::Image a = opengl.read(), b = reference.read();
+    // Near branches are the same; lines, far away, are a little too bright and too soft (docs/scene/seam.md).
+    EXPECT_GT(frame::similarity(a, b), time > .5f ? .97 : .92) << time;
+    EXPECT_NEAR(a.covered / b.covered, 1., .03) << time;
+    const auto la = frame::luminance(a), lb = frame::luminance(b);
+    double sum = 0., sum_reference = 0.;
+    for (std::size_t i = 0; i < la.size(); ++i) sum += la[i], sum_reference += lb[i];
+    EXPECT_NEAR(sum / sum_reference, 1., time > .5f ? .05 : .1) << time;
+  }
+}
+
+TEST(Reference, WhatIsLeftOutForBeingThinIsWhatConnectionSays) {
+  const render::OffscreenContext context;
+  render::OpenGLRenderer opengl;
+  Random random(11);
+  const std::vector<std::uint8_t> classes{0};
+  int drawn = 0, left_out = 0;
+  for (int i = 0; i < 400; ++i) {
+    const auto place = [&] {
+      return Vec3(float(random.uniform(-30, 30)), float(random.uniform(-20, 20)),
+                  float(random.uniform(-80, 40)));
+    };
+    const auto half = [](double r) {
+      return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(float(r))));
+    };
+    const Vec3 a = place(), b = place();
+    if ((a - b).head<2>().norm() < 5.f) continue;
+    const double radius = std::exp2(random.uniform(-8., 0.)),
+                 mean = i % 4 ? radius * random.uniform(.5, 2.) : 0.;
+    const std::vector<frame::Segment> segments{{a.x(), a.y(), a.z(), half(radius) | half(radius) << 16, b.x(),
+                                                b.y(), b.z(),
+                                                3u | random.below(256) << 8 | half(mean) << 16}};
+    const std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
+    const std::vector<frame::Item> items{{0, 0, 1, 0, 0, 0, 0, 100}};
+    const bool as_line = i % 2;
+    frame::Frame frame;
+    frame.camera = {.eye = {0, 0, 100}};
+    frame.width = width, frame.height = height;
+    frame.subframes = i % 3 ? 1 : 4;
+    frame.palette.fill(Vec3::Ones());
+    frame.colour_class = classes;
+    (as_line ? frame.lines : frame.capsules) = items;
+    opengl.load({segments, instances});
+    opengl.draw(frame);
+    const bool shown = opengl.read().covered > 0.;
+    EXPECT_EQ(scene::draws(segments[0], instances[0], frame.camera, frame.camera.focal(float(height)),
+                           as_line, frame.subframes),
+              shown)
+        << i;
+    (shown ? drawn : left_out) += 1;
+  }
+  EXPECT_GT(drawn, 50);
+  EXPECT_GT(left_out, 50);
+}
+
+}  // namespace
+}  // namespace forest
