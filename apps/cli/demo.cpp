@@ -68,7 +68,7 @@ void grow_into(const std::string& repo, const Options& options, Console& console
     const auto start = Clock::now();
     const auto neurons = lsystem::grow_population(grammar, share.count, options.seed, console.progress());
     figures.growing += seconds_since(start);
-    const std::string hash = repository.add_grammar(grammar.name, grammar.text);
+    const std::string hash = repository.add_grammar(grammar.name, grammar.text, distributions_of(grammar));
     for (std::size_t i = 0; i < neurons.size(); ++i) {
       repository.add(neurons[i], {.name = fmt::format("{}-{}-{:05}", grammar.name, options.seed, i),
                                   .population = share.grammar,

@@ -41,6 +41,19 @@ lsystem::Grammar find_grammar(const std::string& name_or_path) {
   return lsystem::parse_file(name_or_path);
 }
 
+repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
+  constexpr std::size_t most = 100'000'000;
+  repository::TextsByName distributions;
+  std::size_t size = 0;
+  for (const lsystem::Declaration& declaration : grammar.declarations) {
+    if (!declaration.draws) continue;
+    distributions.emplace_back(declaration.name, text_of(declaration, grammar));
+    if ((size += distributions.back().second.size()) > most)
+      throw InputError(grammar.file, 0, "its distributions build on one another too often; make it simpler");
+  }
+  return distributions;
+}
+
 Reference reference_of(const std::string& text) {
   const std::size_t at = text.rfind('@');
   if (at == text.npos || at == 0) return {text};

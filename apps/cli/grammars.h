@@ -16,6 +16,9 @@ std::vector<std::string> built_in_grammars();
 /// A built-in grammar by its name, any other by the path of its file. Throws InputError when there is none.
 lsystem::Grammar find_grammar(const std::string& name_or_path);
 
+/// The distributions that a grammar names, each as a text that stands alone. Throws InputError when they are too large.
+repository::TextsByName distributions_of(const lsystem::Grammar& grammar);
+
 /// What NAME or NAME@version names.
 struct Reference {
   std::string name;

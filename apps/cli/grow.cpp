@@ -61,7 +61,7 @@ class IntoRepository final : public Destination {
       : options_(options),
         name_(grammar.name),
         repository_(repository::Repository::open(options.repo, repository::Access::write)),
-        hash_(repository_.add_grammar(grammar.name, grammar.text)) {}
+        hash_(repository_.add_grammar(grammar.name, grammar.text, distributions_of(grammar))) {}
 
   void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
     if (!transaction_) transaction_.emplace(repository_.begin());

@@ -74,19 +74,9 @@ void say_text(const std::string& text, Console& console) {
 
 // ── Keeping one ──
 
-/// What a text that is a grammar becomes. Throws InputError, with its line, when it is none.
 NewModel model_of(const lsystem::Grammar& grammar, std::string name, std::string population,
                   std::string origin) {
-  constexpr std::size_t most = 100'000'000;
-  NewModel model{std::move(name), grammar.text, std::move(population), std::move(origin), {}};
-  std::size_t size = 0;
-  for (const lsystem::Declaration& declaration : grammar.declarations) {
-    if (!declaration.draws) continue;
-    model.distributions.emplace_back(declaration.name, text_of(declaration, grammar));
-    if ((size += model.distributions.back().second.size()) > most)
-      throw InputError(grammar.file, 0, "its distributions build on one another too often; make it simpler");
-  }
-  return model;
+  return {std::move(name), grammar.text, std::move(population), std::move(origin), distributions_of(grammar)};
 }
 
 struct Kept {

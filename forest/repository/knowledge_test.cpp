@@ -69,6 +69,11 @@ TEST_P(EveryDatabase, WhatNeuronsAreGrownFromIsAModel) {
   EXPECT_EQ(models[1].origin, "neurons were grown from it");
   EXPECT_EQ(models[2].version, 2);
   EXPECT_EQ(models[2].neurons, 0u);
+  EXPECT_TRUE(models[0].distributions.empty());
+  for (int again = 0; again < 2; ++again) repository.add_grammar("alder", text, {{"ratio", "one"}});
+  repository.add_model({.name = "bush", .text = text + "\n", .distributions = {{"ratio", "one"}}});
+  for (const ModelRow& m : repository.models())
+    EXPECT_EQ(m.distributions.size(), m.name == "bush" && m.version == 1 ? 0u : 1u) << "what it had none of";
   const Answer view = repository.query("select text, neurons from model where name = 'bush' and version = 1");
   EXPECT_EQ(view.rows.at(0).at(0), Answer::Value(text)) << "as a person reads it with any client";
   EXPECT_EQ(view.rows[0][1], Answer::Value(std::int64_t(3)));

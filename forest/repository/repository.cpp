@@ -476,9 +476,15 @@ struct Repository::Impl {
   int keep_grammar(const std::string& name, std::string_view text);  // its id
   /// The id and version of a distribution of a population, by its id or 0.
   std::pair<int, int> keep_distribution(const std::string& name, int population, std::string_view text);
-  /// The id and version of a new version, or 0 and the newest when that one (with `anew`) or any has this grammar.
-  std::pair<int, int> keep_model(const std::string& name, int grammar, int population,
-                                 const std::string& origin, bool anew);
+  struct Version {
+    int id, number;
+    bool already_there;
+  };
+  /// A new version, unless the newest (with `anew`) or any has this grammar.
+  Version keep_model(const std::string& name, int grammar, int population, const std::string& origin,
+                     bool anew);
+  /// Links a version to its distributions, if it has none yet.
+  void keep_distributions(int model, const std::string& name, const TextsByName& distributions);
 
   std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
                               int id) const;
@@ -602,24 +608,39 @@ std::pair<int, int> Repository::Impl::keep_distribution(const std::string& name,
   }  // else another program was quicker, and this is the version after its
 }
 
-std::pair<int, int> Repository::Impl::keep_model(const std::string& name, int grammar, int population,
-                                                 const std::string& origin, bool anew) {
+Repository::Impl::Version Repository::Impl::keep_model(const std::string& name, int grammar, int population,
+                                                       const std::string& origin, bool anew) {
   for (;;) {
     const int newest = ask<int>("select max(version) from models where name = :name", name).value_or(0);
-    const std::string there = "select coalesce(population, 0) from models where name = :name and ";
-    const int before = ask<int>(there + "version = :version", name, newest).value_or(0);
+    const std::string of_newest = " from models where name = :name and version = :version";
+    const int before = ask<int>("select population" + of_newest, name, newest).value_or(0);
     const int of = population ? population : before;
-    const std::string same = there + "grammar = :grammar" + (anew ? " and version = :version" : "");
-    const auto known = anew ? ask<int>(same, name, grammar, newest) : ask<int>(same, name, grammar);
-    if (known && (!anew || *known == of)) return {0, newest};
+    if (anew && newest && of == before &&
+        ask<int>("select grammar" + of_newest, name, newest).value_or(0) == grammar)
+      return {*ask<int>("select id" + of_newest, name, newest), newest, true};
+    const std::string any = "select max(id) from models where name = :name and grammar = :grammar";
+    if (const auto id = ask<int>(any, name, grammar); id && !anew)
+      return {*id, *ask<int>("select version from models where id = :id", *id), true};
     const int id = database->next_id("models"), next = newest + 1;
     const std::string program = FOREST_VERSION, words = escaped(origin);
     sql << "insert into models (id, name, version, grammar, population, origin, program) values "
            "(:id, :name, :version, :grammar, nullif(:population, 0), :origin, :program) on conflict do "
            "nothing",
         use(id), use(name), use(next), use(grammar), use(of), use(words), use(program);
-    if (ask<int>("select id from models where id = :id", id)) return {id, next};
+    if (ask<int>("select id from models where id = :id", id)) return {id, next, false};
   }  // else another program was quicker
+}
+
+void Repository::Impl::keep_distributions(int model, const std::string& name,
+                                          const TextsByName& distributions) {
+  if (ask<int>("select count(*) from model_distributions where model = :id", model).value_or(0)) return;
+  const int of = ask<int>("select population from models where id = :id", model).value_or(0);
+  for (const auto& [part, text] : distributions) {
+    const int distribution = keep_distribution(name + "." + part, of, text).first;
+    sql << "insert into model_distributions (model, distribution) values (:id, :distribution) on conflict do "
+           "nothing",
+        use(model), use(distribution);
+  }
 }
 
 std::pair<int, bool> Repository::add_model(const NewModel& model) {
@@ -630,16 +651,9 @@ std::pair<int, bool> Repository::add_model(const NewModel& model) {
   return impl.write([&] {
     const int population = model.population.empty() ? 0 : impl.population(model.population);
     const int grammar = impl.keep_grammar(model.name, model.text);
-    const auto [id, version] = impl.keep_model(model.name, grammar, population, model.origin, true);
-    if (!id) return std::pair(version, true);
-    const int of = impl.ask<int>("select population from models where id = :id", id).value_or(0);
-    for (const auto& [name, text] : model.distributions) {
-      const int distribution = impl.keep_distribution(model.name + "." + name, of, text).first;
-      impl.sql << "insert into model_distributions (model, distribution) values (:id, :distribution) on "
-                  "conflict do nothing",
-          use(id), use(distribution);
-    }
-    return std::pair(version, false);
+    const auto kept = impl.keep_model(model.name, grammar, population, model.origin, true);
+    impl.keep_distributions(kept.id, model.name, model.distributions);
+    return std::pair(kept.number, kept.already_there);
   });
 }
 
@@ -681,11 +695,16 @@ std::optional<ModelRow> Repository::model(std::string_view name, int version) co
   return found;
 }
 
-std::string Repository::add_grammar(std::string_view name, std::string_view text) {
+std::string Repository::add_grammar(std::string_view name, std::string_view text,
+                                    const TextsByName& distributions) {
   check_name("grammar", name);
+  for (const auto& [part, unused] : distributions)
+    check_name("distribution", fmt::format("{}.{}", name, part));
   return impl_->write([&] {
     const std::string model(name);
-    impl_->keep_model(model, impl_->keep_grammar(model, text), 0, "neurons were grown from it", false);
+    const int grammar = impl_->keep_grammar(model, text);
+    const auto kept = impl_->keep_model(model, grammar, 0, "neurons were grown from it", false);
+    impl_->keep_distributions(kept.id, model, distributions);
     return hash_of(text);
   });
 }

@@ -91,6 +91,8 @@ struct DistributionRow {
   bool operator==(const DistributionRow&) const = default;
 };
 
+using TextsByName = std::vector<std::pair<std::string, std::string>>;
+
 /// A text that grows neurons, to be stored as the next version of its name.
 struct NewModel {
   std::string name;             // see names.h
@@ -99,7 +101,7 @@ struct NewModel {
   std::string origin = {};      // how it came to be, in words for people: "from pyramidal.lsys"
   /// Its distributions, each a text that stands alone. They are kept as distributions of its population, by the names
   /// "MODEL.NAME" and with versions of their own: those that did not change stay the same.
-  std::vector<std::pair<std::string, std::string>> distributions = {};
+  TextsByName distributions = {};
 };
 
 /// A version of a model as it was stored.
@@ -172,7 +174,8 @@ class Repository {
 
   /// Keeps the text that neurons are grown from and returns the hash Grown::grammar_hash asks for. When no version of the
   /// model has the text it is the next one.
-  std::string add_grammar(std::string_view name, std::string_view text);
+  std::string add_grammar(std::string_view name, std::string_view text,
+                          const TextsByName& distributions = {});  // as of a model
   std::optional<std::string> grammar(std::string_view hash) const;
 
   /// Keeps the text of a distribution as the next version of its name, unless the newest one has just that text; returns

@@ -102,6 +102,11 @@ TEXT
   fails_with 2 '--name is for one file' $model import good.lsys bush.lsys --name other --repo "$repo"
   [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 6 ]
 
+  # What neurons are grown from is a model as if it had been imported.
+  $BRAINFOREST grow --grammar motoneuron --count 1 --repo "$repo" >out.txt
+  [ "$($model import motoneuron --repo "$repo" --json | json 'd["models"][0]["already_there"]')" = True ]
+  [ "$($model list --repo "$repo" --json | json '[len(m["distributions"]) for m in d if m["name"] == "motoneuron"]')" = '[3]' ]
+
   # A model grows neurons, which name it; growing makes no version of a text that is there.
   $BRAINFOREST grow --model bush@2 --count 3 --seed 1 --repo "$repo" --out grown >out.txt
   $BRAINFOREST grow --grammar second.lsys --count 3 --seed 1 --out same >out.txt
