@@ -11,10 +11,11 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
-#include "forest/core/file.h"
 #include "forest/reports/activity.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -26,6 +27,7 @@ struct Options {
   std::vector<std::uint32_t> sections{0};
   std::vector<float> positions{.5f};
   std::string population;
+  bool force = false;
 };
 
 /// A compartment, and what it did.
@@ -126,7 +128,7 @@ void run(const Options& options, Console& console) {
   for (Trace& trace : traces) read(activity, trace);
   const double ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-  if (!options.csv.empty()) write_file(options.csv, csv_of(facts, traces));
+  if (!options.csv.empty()) write_unless_there(options.csv, csv_of(facts, traces), options.force);
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;
@@ -174,6 +176,7 @@ std::function<void()> clamp(CLI::App& command, Console& console) {
       ->capture_default_str();
   command.add_option("--population", options->population, "Where several have such a node");
   command.add_option("--csv", options->csv, "Write every step into this table");
+  add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }
 

@@ -104,6 +104,9 @@ grep -q '^149.5,' out.txt
 "$program" clamp run.activity --neuron 2 >out.txt
 grep -q '^ *2 *0' out.txt
 
+fails_with 1 'traces.csv' "$program" clamp run.activity --neuron 2 --csv traces.csv  # another table is not replaced unasked
+"$program" clamp run.activity --neuron 2 --csv traces.csv --force >/dev/null
+
 # What is no number stays so, what is beyond the range is told.
 $python report.py odd.h5 40 nan=1 high=70
 "$program" activity odd.h5 --circuit column --out odd.activity >out.txt 2>err.txt
