@@ -83,10 +83,9 @@ TEST(Reference, WhatIsLeftOutForBeingThinIsWhatConnectionSays) {
     opengl.load({segments, instances});
     opengl.draw(frame);
     const bool shown = opengl.read().covered > 0.;
-    EXPECT_EQ(scene::draws(segments[0], instances[0], frame.camera, frame.camera.focal(float(height)),
-                           as_line, frame.subframes),
-              shown)
-        << i;
+    const bool told = scene::draws(segments[0], instances[0], frame.camera, frame.camera.focal(float(height)),
+                                   as_line, frame.subframes);
+    EXPECT_TRUE(told == shown || (told && frame.subframes > 1)) << i;  // several may miss it by chance
     (shown ? drawn : left_out) += 1;
   }
   EXPECT_GT(drawn, 50);

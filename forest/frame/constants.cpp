@@ -7,13 +7,6 @@
 namespace forest::frame {
 namespace {
 
-// The sequence of Halton in one base: where in the pixel the subframe is sampled.
-float halton(unsigned index, unsigned base) {
-  float result = 0.f, share = 1.f;
-  for (unsigned i = index + 1; i; i /= base) share /= float(base), result += share * float(i % base);
-  return result;
-}
-
 std::uint32_t half_pair(float a, float b) {
   const auto half = [](float value) {
     return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
@@ -26,16 +19,16 @@ std::uint32_t half_pair(float a, float b) {
 Constants constants_of(const Frame& f, std::uint32_t subframe) {
   const Mat3 axes = f.camera.axes();
   const Vec3 right = axes.col(0), up = axes.col(1), forward = -axes.col(2), eye = f.camera.eye;
-  const Vec3 light = Vec3(-.35f, .75f, -.55f).normalized();
+  const Vec3 light = light_direction();
+  const Vec2 place = sample_place(subframe, f.subframes);
   const Style& s = f.style;
-  const bool still = f.subframes == 1;
   Constants c{};
   c.eye_x = eye.x(), c.eye_y = eye.y(), c.eye_z = eye.z(), c.focal = f.camera.focal(float(f.height));
   c.right_x = right.x(), c.right_y = right.y(), c.right_z = right.z();
   c.up_x = up.x(), c.up_y = up.y(), c.up_z = up.z();
   c.forward_x = forward.x(), c.forward_y = forward.y(), c.forward_z = forward.z(), c.near = f.camera.near;
-  c.centre_x = .5f * float(f.width) + (still ? 0.f : halton(subframe, 2) - .5f);
-  c.centre_y = .5f * float(f.height) + (still ? 0.f : halton(subframe, 3) - .5f);
+  c.centre_x = .5f * float(f.width) + place.x();
+  c.centre_y = .5f * float(f.height) + place.y();
   c.width = f.width, c.height = f.height;
   c.subframe = subframe, c.subframes = f.subframes;
   c.last_subframe = std::min(f.last_subframe, f.subframes);

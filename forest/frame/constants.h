@@ -6,7 +6,7 @@
 
 namespace forest::frame {
 
-/// Of one subframe: its place in the pixel follows Halton's sequence (bases 2 and 3); a single one looks at pixel centres.
+/// Of one subframe, which looks at sample_place.
 Constants constants_of(const Frame& frame, std::uint32_t subframe);
 
 /// How an overlay is drawn: a segment in the world whose meta word names its palette entry.

@@ -56,6 +56,10 @@ struct Constants {
 #define FOREST_DEPTH_BASE 4.3219281
 #define FOREST_DEPTH_MAX 1048574.0
 #define FOREST_KEY_EMPTY 0xffffffffu
+
+// Lines are drawn across the axis of the screen that they run along less: in a direction between, they measure this many
+// times their width there, on the mean over directions (4/pi ln(1 + sqrt 2)).
+#define FOREST_MEAN_STRETCH 1.1222
 #define FOREST_CLUSTER_SIZE 32u
 #define FOREST_GROUP 256u  // threads of a workgroup that draws
 

@@ -213,10 +213,11 @@ struct Drawn {
 };
 
 // The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
-// drawn when it is a pixel wide or its branch is wider than its rank, and a diagonal one counts as 1.42 times as wide.
+// drawn when it is a pixel wide, a diagonal one 1.42 times as wide, or its branch is wider than its rank.
 float appears_at(const frame::Segment& s, float thickest, float mean) {
   constexpr float diagonal = 2.f * 1.42f;  // widths, of radii
-  return std::min(float(s.meta >> 8 & 255) / 256.f / (diagonal * std::max(mean, 1e-6f)),
+  constexpr float on_the_mean = 2.f * float(FOREST_MEAN_STRETCH);
+  return std::min(float(s.meta >> 8 & 255) / 256.f / (on_the_mean * std::max(mean, 1e-6f)),
                   1.f / (diagonal * std::max(thickest, 1e-6f)));
 }
 
@@ -306,6 +307,10 @@ ClusterTree build_clusters(const Morphology& m) {
   for (std::size_t i = 0; i < sections; ++i)
     means[numbers[i]] += section_area(m, SectionId(i)) / (2. * std::numbers::pi);
   for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
+  // A branch that is thicker than the one it leaves must not be seen without it.
+  for (std::size_t i = 0; i < sections; ++i)
+    if (const SectionId parent = m.section(SectionId(i)).parent; parent.valid())
+      means[numbers[i]] = std::min(means[numbers[i]], means[numbers[parent.value()]]);
   std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
   const double total = std::max(lengths.back(), 1e-9);
   const auto rank_of = [&](std::size_t i) {

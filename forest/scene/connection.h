@@ -8,8 +8,8 @@
 
 namespace forest::scene {
 
-/// Whether any of the frame's subframes draws this segment of this item, were nothing before it: thin branches are left
-/// out by rank, after render/opengl/shaders (draw_line), which a test compares with this.
+/// Whether a picture of so many subframes draws this segment of this item, were nothing before it: a single one leaves thin
+/// branches out by rank, after render/opengl/shaders (draw_line), which a test compares with this.
 bool draws(const frame::Segment& segment, const frame::Instance& instance, const frame::Camera& camera,
            float focal, bool as_line, std::uint32_t subframes);
 

@@ -73,46 +73,57 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.code_a[i] = depth_code(az), r.code_b[i] = depth_code(bz);
     r.width[i] = seen ? fa * ra + fb * rb : -1.f;
     r.mean_width[i] = r.mean_width[i] * (fa + fb);
-    const float length2 = dx * dx + dy * dy + dz * dz, along = dx * lx + dy * ly + dz * lz;
-    r.shade[i] = .35f + .6f * std::sqrt(larger(0.f, 1.f - along * along / larger(length2, 1e-20f)));
+    // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
+    const float ex = -(ax + bx), ey = -(ay + by), ez = -(az + bz);
+    const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
+                per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
+    const float along = (dx * lx + dy * ly + dz * lz) * per_length,
+                end_on = (dx * ex + dy * ey + dz * ez) * per_length * per_distance,
+                towards = (ex * lx + ey * ly + ez * lz) * per_distance;
+    const float b = (towards - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
+    const float a2 = larger(0.f, 1.f - along * along - b * b);
+    r.shade[i] = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
     r.rank[i] = fraction(r.rank[i]);
   }
 }
 
-// A line of whole pixels across its major axis: as draw_line in render/opengl/shaders/common.glsl.
-void draw_line(const Run& r, std::size_t i, Canvas& canvas) {
+// As draw_line in render/opengl/shaders/common.glsl.
+void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
   const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
   const bool steep = high > wide;
   const float major = steep ? high : wide;
   const float stretch = major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f;
   float width = r.width[i] * stretch;
-  if (width < 1.f && r.mean_width[i] > 0.f) width = std::min(r.mean_width[i] * stretch, 1.f);
-  const std::int32_t thickness = std::int32_t(std::min(width, 16384.f) + 1.f - r.rank[i] - 1.f / 512.f);
-  if (thickness < 1) return;
-  const float beside = .5f * width;
+  if (single) {
+    if (width < 1.f && r.mean_width[i] > 0.f)
+      width = std::min(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
+    width = std::floor(width + 1.f - r.rank[i] - 1.f / 512.f);
+    if (width < 1.f) return;
+  }
+  const float half = .5f * width;
   float za = r.code_a[i], zb = r.code_b[i];
-  if (canvas.hidden(std::min(px, qx) - beside, std::min(py, qy) - beside, std::max(px, qx) + beside,
-                    std::max(py, qy) + beside, std::min(za, zb)))
+  if (canvas.hidden(std::min(px, qx) - half, std::min(py, qy) - half, std::max(px, qx) + half,
+                    std::max(py, qy) + half, std::min(za, zb)))
     return;
   if (steep) std::swap(px, py), std::swap(qx, qy);
   if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(za, zb);
-  const float limit = float(steep ? canvas.height() : canvas.width());
-  const std::int32_t limit_across = steep ? canvas.width() : canvas.height();
+  const float limit = float(steep ? canvas.height() : canvas.width()),
+              limit_across = float(steep ? canvas.width() : canvas.height());
   const auto first = std::int32_t(std::max(std::ceil(px - .5f), 0.f)),
              last = std::int32_t(std::min(std::ceil(qx - .5f), limit));
   if (first >= last) return;
   const float inverse = 1.f / (qx - px), slope = (qy - py) * inverse, rise = (zb - za) * inverse;
   const float begin = float(first) + .5f - px;
-  float y = py + begin * slope - .5f * float(thickness - 1), z = za + begin * rise;
+  float y = py + begin * slope - .5f, z = za + begin * rise;
   const std::uint32_t payload = payload_of(r.entry[i], r.shade[i], fraction(r.rank[i] * 7.f));
   for (std::int32_t x = first; x < last; ++x, y += slope, z += rise) {
-    const float floor_y = std::floor(y);
-    if (!(floor_y > -32768.f && floor_y < 32768.f)) continue;
-    const auto at = std::int32_t(floor_y);
-    const std::uint32_t key = key_of(std::min(std::max(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
-    for (std::int32_t across = std::max(at, 0); across < std::min(at + thickness, limit_across); ++across)
+    const auto low = std::int32_t(larger(std::ceil(y - half), 0.f)),
+               end = std::int32_t(smaller(std::ceil(y + half), limit_across));
+    for (std::int32_t across = low; across < end; ++across) {
+      const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
+    }
   }
 }
 
@@ -243,7 +254,7 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   const frame::Constants& c = picture.constants;
   if (r.width[i] < 0.f) return;
   const float width = c.focal * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
-  if (width < .75f) return draw_line(r, i, canvas);
+  if (width < .75f) return draw_line(r, i, c.subframes == 1, canvas);
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
   if (canvas.hidden(std::min(r.px[i], r.qx[i]) - reach, std::min(r.py[i], r.qy[i]) - reach,
@@ -311,7 +322,7 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       switch (kind) {
         case Kind::lines:
           for (std::size_t i = 0; i < r.count; ++i)
-            if (r.width[i] >= 0.f) draw_line(r, i, canvas);
+            if (r.width[i] >= 0.f) draw_line(r, i, c.subframes == 1, canvas);
           break;
         case Kind::capsules:
           for (std::size_t i = 0; i < r.count; ++i) draw_near(picture, r, i, canvas);

@@ -145,8 +145,9 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
 
 float width_in_pixels(Capsule c) { return view.focal * (c.ra / c.a.z + c.rb / c.b.z); }
 
-// A line of whole pixels across its major axis. Every column (or row) between the ends is covered once, ends half open,
-// so joined segments neither overlap nor gap; the area drawn is, on the mean over ranks, the true area.
+// A line across its major axis, every column (or row) between the ends once, ends half open, so that joined segments neither
+// overlap nor gap. With several subframes a pixel is drawn where its centre lies within the line: the mean is its true
+// coverage. A single one draws lines of whole pixels, by rank: the area drawn is, on the mean over ranks, the true area.
 void draw_line(Capsule c) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
   vec2 d = q - p;
@@ -154,10 +155,12 @@ void draw_line(Capsule c) {
   float major = max(abs(d.x), abs(d.y));
   float stretch = major > 0.0 ? length(d) / major : 1.0;
   float width = width_in_pixels(c) * stretch;
-  // A thin branch is drawn or left out as a whole, by its mean width: one that fades is not dashed.
-  if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / c.a.z + 1.0 / c.b.z) * stretch, 1.0);
-  int thickness = int(width + 1.0 - c.rank - 1.0 / 512.0);
-  if (thickness < 1) return;
+  if (view.subframes == 1u) {
+    // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
+    if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / c.a.z + 1.0 / c.b.z) * FOREST_MEAN_STRETCH, 1.0);
+    width = floor(width + 1.0 - c.rank - 1.0 / 512.0);
+    if (width < 1.0) return;
+  }
   if (hidden(min(p, q) - 0.5 * width, max(p, q) + 0.5 * width, min(c.a.z, c.b.z), 6u)) return;
 
   float za = depth_code(c.a.z), zb = depth_code(c.b.z);
@@ -167,24 +170,27 @@ void draw_line(Capsule c) {
   int first = max(int(ceil(p.x - 0.5)), 0), last = min(int(ceil(q.x - 0.5)), limit_x);
   if (first >= last) return;
 
-  vec3 tangent = normalize(c.b - c.a + vec3(1e-9));
-  float along = dot(tangent, light());
-  float shade = 0.35 + 0.6 * sqrt(max(0.0, 1.0 - along * along));
+  // The mean light of the half cylinder one sees, of (0.5 + 0.5 n·l)² as resolve.glsl has it: with the front's share b and
+  // the side's a of the light, the mean of n·l is π b / 4, and of its square (a² + 2 b²) / 3.
+  vec3 tangent = normalize(c.b - c.a + vec3(1e-9)), eye = -normalize(c.a + c.b);
+  float along = dot(tangent, light()), end_on = dot(eye, tangent);
+  float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
+  float a2 = max(0.0, 1.0 - along * along - b * b);
+  float shade = 0.5 * sqrt(max(0.0, 1.0 + 1.5707963 * b + (a2 + 2.0 * b * b) / 3.0));
   uint payload = payload_of(c.entry, shade, fract(c.rank * 7.0));
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
-  float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5 * float(thickness - 1);
+  float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5, half_width = 0.5 * width;
   float z = za + (float(first) + 0.5 - p.x) * rise;
   // One loop over the pixels of all scan lines, tested at its end (see hidden).
-  int x = first, across = int(floor(y)), left = thickness;
+  int x = first, across = int(ceil(y - half_width)), end = int(ceil(y + half_width));
   do {
-    if (across >= 0 && across < limit_y) put(steep ? across : x, steep ? x : across, z, payload);
-    ++across;
-    if (--left == 0) {
+    if (across < end && across >= 0 && across < limit_y) put(steep ? across : x, steep ? x : across, z, payload);
+    if (++across >= end) {
       ++x;
       y += slope;
       z += rise;
-      across = int(floor(y));
-      left = thickness;
+      across = int(ceil(y - half_width));
+      end = int(ceil(y + half_width));
     }
   } while (x < last);
 }
