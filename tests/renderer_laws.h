@@ -3,6 +3,7 @@
 // INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make));
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -168,6 +169,24 @@ TEST_P(RendererLaws, WhatLiesBehindTheEyeIsNotDrawn) {
   EXPECT_EQ(f.draw().covered, 0.);
   f.frame.lines = f.items;
   EXPECT_EQ(f.draw().covered, 0.);
+}
+
+TEST_P(RendererLaws, WhatStandsRightBeforeTheEyeStaysWithinThePicture) {
+  Fixture f(GetParam());
+  f.frame.camera.near = .05f;
+  for (int i = 0; i < 48; ++i) {
+    const float size = std::pow(10.f, float(2 + i % 6)), turn = float(i) * .1309f;
+    const Vec3 far(size * std::cos(turn), size * std::sin(turn), float(i % 5 - 2) * size);
+    f.segments.clear();
+    f.add(Vec3(.01f, -.02f, 99.94f) - far, Vec3(-.01f, .03f, 99.93f) + far, i % 2 ? .3f : 40.f);
+    f.add(Vec3(size, -size, 99.9f), Vec3(size, -size, 99.9f), std::min(.5f * size, 6e4f));
+    const std::vector<frame::Item> run = f.items, sphere{{0, 1, 1, 0, 0, 0, 0, 200}};
+    f.frame.lines = i % 3 ? run : std::span<const frame::Item>();
+    f.frame.capsules = i % 3 ? std::span<const frame::Item>() : run;
+    f.frame.dots = sphere;
+    f.frame.subframes = i % 4 ? 1 : 2;
+    f.draw();
+  }
 }
 
 TEST_P(RendererLaws, RefusesAFrameThatBreaksTheContract) {

@@ -87,6 +87,9 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
   }
 }
 
+// The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
+std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
+
 // As draw_line in render/opengl/shaders/common.glsl.
 void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
@@ -110,16 +113,15 @@ void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
   if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(za, zb);
   const float limit = float(steep ? canvas.height() : canvas.width()),
               limit_across = float(steep ? canvas.width() : canvas.height());
-  const auto first = std::int32_t(std::max(std::ceil(px - .5f), 0.f)),
-             last = std::int32_t(std::min(std::ceil(qx - .5f), limit));
+  const std::int32_t first = clipped(std::ceil(px - .5f), limit), last = clipped(std::ceil(qx - .5f), limit);
   if (first >= last) return;
   const float inverse = 1.f / (qx - px), slope = (qy - py) * inverse, rise = (zb - za) * inverse;
   const float begin = float(first) + .5f - px;
   float y = py + begin * slope - .5f, z = za + begin * rise;
   const std::uint32_t payload = payload_of(r.entry[i], r.shade[i], fraction(r.rank[i] * 7.f));
   for (std::int32_t x = first; x < last; ++x, y += slope, z += rise) {
-    const auto low = std::int32_t(larger(std::ceil(y - half), 0.f)),
-               end = std::int32_t(smaller(std::ceil(y + half), limit_across));
+    const std::int32_t low = clipped(std::ceil(y - half), limit_across),
+                       end = clipped(std::ceil(y + half), limit_across);
     for (std::int32_t across = low; across < end; ++across) {
       const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
@@ -139,11 +141,11 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   if (steep) std::swap(px, py), std::swap(qx, qy);
   if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(wp, wq), std::swap(za, zb);
   const float dx = qx - px, slope = (qy - py) / dx, stretch = std::sqrt(1.f + slope * slope);
-  const std::int32_t limit = steep ? canvas.height() : canvas.width(),
-                     limit_across = steep ? canvas.width() : canvas.height();
+  const float limit = float(steep ? canvas.height() : canvas.width()),
+              limit_across = float(steep ? canvas.width() : canvas.height());
   const float over = .4f * std::min(wp, wq);
-  const auto first = std::int32_t(std::max(std::ceil(px - over - .5f), 0.f)),
-             last = std::int32_t(std::min(std::ceil(qx + over - .5f), float(limit)));
+  const std::int32_t first = clipped(std::ceil(px - over - .5f), limit),
+                     last = clipped(std::ceil(qx + over - .5f), limit);
   const Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
   const Vec3 tangent = (b - a).normalized(), eye = -(a + b).normalized();
   const Vec3 facing = (eye - eye.dot(tangent) * tangent).normalized();
@@ -154,8 +156,8 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
     const float along = (float(x) + .5f - px) / dx, within = std::min(std::max(along, 0.f), 1.f);
     const float centre = py + slope * (along * dx), half = (wp + within * (wq - wp)) * stretch;
     const float z = za + within * (zb - za), inverse = 1.f / half;
-    const auto low = std::int32_t(std::max(std::ceil(centre - half - .5f), 0.f)),
-               high = std::int32_t(std::min(std::ceil(centre + half - .5f), float(limit_across)));
+    const std::int32_t low = clipped(std::ceil(centre - half - .5f), limit_across),
+                       high = clipped(std::ceil(centre + half - .5f), limit_across);
     for (std::int32_t y = low; y < high; ++y) {
       const float t = (float(y) + .5f - centre) * inverse, h = std::sqrt(std::max(0.f, 1.f - t * t));
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
@@ -192,8 +194,8 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
   if (steep) std::swap(px, py), std::swap(qx, qy);
   const float limit = float(steep ? canvas.height() : canvas.width()),
               limit_across = float(steep ? canvas.width() : canvas.height());
-  const auto first = std::int32_t(std::max(std::floor(std::min(px - rp, qx - rq)), 0.f)),
-             last = std::int32_t(std::min(std::ceil(std::max(px + rp, qx + rq)), limit));
+  const std::int32_t first = clipped(std::floor(std::min(px - rp, qx - rq)), limit),
+                     last = clipped(std::ceil(std::max(px + rp, qx + rq)), limit);
   const float reach = std::max(rp, rq);
   const Vec3 axis = b - a;
   const float length = axis.norm(), taper = ra - rb;
@@ -210,8 +212,8 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
     }
     const float y0 = py + t0 * (qy - py), y1 = py + t1 * (qy - py);
     const float w = std::max(rp + t0 * (rq - rp), rp + t1 * (rq - rp));
-    const auto low = std::int32_t(std::max(std::floor(std::min(y0, y1) - w), 0.f)),
-               high = std::int32_t(std::min(std::ceil(std::max(y0, y1) + w), limit_across));
+    const std::int32_t low = clipped(std::floor(std::min(y0, y1) - w), limit_across),
+                       high = clipped(std::ceil(std::max(y0, y1) + w), limit_across);
     for (std::int32_t y = low; y < high; ++y) {
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
       if (canvas.key(at_x, at_y) < nearest) continue;
@@ -279,12 +281,13 @@ void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) 
       canvas.put(std::int32_t(x), std::int32_t(y), key_of(r.code_a[0], payload_of(r.entry[0], .8f, rank)));
     return;
   }
-  const auto top = std::int32_t(std::max(std::ceil(py - radius - .5f), 0.f)),
-             left = std::int32_t(std::max(std::ceil(px - radius - .5f), 0.f)),
-             bottom = std::int32_t(std::min(std::floor(py + radius - .5f), float(canvas.height() - 1))),
-             right = std::int32_t(std::min(std::floor(px + radius - .5f), float(canvas.width() - 1)));
-  for (std::int32_t y = top; y <= bottom; ++y)
-    for (std::int32_t x = left; x <= right; ++x) {
+  const float width = float(canvas.width()), height = float(canvas.height());
+  const std::int32_t top = clipped(std::ceil(py - radius - .5f), height),
+                     bottom = clipped(std::floor(py + radius + .5f), height),
+                     left = clipped(std::ceil(px - radius - .5f), width),
+                     right = clipped(std::floor(px + radius + .5f), width);
+  for (std::int32_t y = top; y < bottom; ++y)
+    for (std::int32_t x = left; x < right; ++x) {
       const float dx = (float(x) + .5f - px) / radius, dy = (float(y) + .5f - py) / radius,
                   h = 1.f - dx * dx - dy * dy;
       if (h <= 0.f) continue;

@@ -145,6 +145,9 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
 
 float width_in_pixels(Capsule c) { return view.focal * (c.ra / c.a.z + c.rb / c.b.z); }
 
+// What stands right before the eye reaches far beyond the picture.
+int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit))); }
+
 // A line across its major axis, every column (or row) between the ends once, ends half open, so that joined segments neither
 // overlap nor gap. With several subframes a pixel is drawn where its centre lies within the line: the mean is its true
 // coverage. A single one draws lines of whole pixels, by rank: the area drawn is, on the mean over ranks, the true area.
@@ -182,15 +185,15 @@ void draw_line(Capsule c) {
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5, half_width = 0.5 * width;
   float z = za + (float(first) + 0.5 - p.x) * rise;
   // One loop over the pixels of all scan lines, tested at its end (see hidden).
-  int x = first, across = int(ceil(y - half_width)), end = int(ceil(y + half_width));
+  int x = first, across = clipped(y - half_width, limit_y), end = clipped(y + half_width, limit_y);
   do {
-    if (across < end && across >= 0 && across < limit_y) put(steep ? across : x, steep ? x : across, z, payload);
+    if (across < end) put(steep ? across : x, steep ? x : across, z, payload);
     if (++across >= end) {
       ++x;
       y += slope;
       z += rise;
-      across = int(ceil(y - half_width));
-      end = int(ceil(y + half_width));
+      across = clipped(y - half_width, limit_y);
+      end = clipped(y + half_width, limit_y);
     }
   } while (x < last);
 }
