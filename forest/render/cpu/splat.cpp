@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/splat.h"
 
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -15,24 +16,41 @@ constexpr float tube_width =
     7.f;  // pixels; below, a capsule is shaded by its distance from the axis on screen
 constexpr std::size_t run = FOREST_CLUSTER_SIZE;
 
+// Items lie in the order of depth, their segments anywhere.
+constexpr std::size_t ahead = 3;
+void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
+  const auto* at = reinterpret_cast<const char*>(&geometry.segments[item.first_segment]);
+  for (std::size_t i = 0; i < std::min<std::size_t>(item.segment_count, 8); i += 2)
+    __builtin_prefetch(at + i * sizeof(frame::Segment));
+  __builtin_prefetch(&geometry.instances[item.instance]);
+}
+
 // The segments of an item in camera coordinates (x right, y up, z depth), cut at the near distance, and in pixels.
 struct Run {
   std::size_t count = 0;
   float ax[run], ay[run], az[run], ra[run], bx[run], by[run], bz[run], rb[run];
-  float px[run], py[run], qx[run], qy[run];      // pixels of both ends
-  float code_a[run], code_b[run];                // of their depths
-  float width[run];                              // pixels; below 0: nothing of it lies before the eye
-  float mean_width[run], rank[run], shade[run];  // of its branch; in [0, 1); of a line
-  std::uint32_t entry[run];                      // of the palette
+  float px[run], py[run], qx[run], qy[run];  // pixels of both ends
+  float code_a[run], code_b[run];            // of their depths
+  // As a line: along the axis of the screen that it runs along more, from `first` to before `last`, where there is one.
+  float left[run], right[run], top[run], bottom[run],
+      nearest[run];       // pixels around it; code of its nearest depth
+  float line_width[run];  // across the axis; 0: nothing to draw
+  float first[run], last[run], y[run], slope[run], z[run], rise[run];  // y and z at the first step
+  std::uint32_t steep[run], payload[run];
+  float width[run];                  // pixels; below 0: nothing of it lies before the eye
+  float mean_width[run], rank[run];  // of its branch; in [0, 1)
+  std::uint32_t entry[run];          // of the palette
 };
 
 void load(const Picture& picture, const frame::Item& item, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
   const std::uint32_t colour = picture.colour_class[item.instance] * 8u;
   const float turn = golden * float(picture.constants.subframe);
-  r.count = item.segment_count;
-  for (std::size_t i = 0; i < r.count; ++i) {
-    const frame::Segment& s = segments[i];
+  r.count = 0;
+  for (std::uint32_t drawn = ~item.without & (0xffffffffu >> (32u - item.segment_count)); drawn;
+       drawn &= drawn - 1) {
+    const frame::Segment& s = segments[std::countr_zero(drawn)];
+    const std::size_t i = r.count++;
     r.ax[i] = s.ax, r.ay[i] = s.ay, r.az[i] = s.az;
     r.bx[i] = s.bx, r.by[i] = s.by, r.bz[i] = s.bz;
     r.ra[i] = from_half(s.radii), r.rb[i] = from_half(s.radii >> 16);
@@ -82,50 +100,67 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
                 towards = (ex * lx + ey * ly + ez * lz) * per_distance;
     const float b = (towards - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
     const float a2 = larger(0.f, 1.f - along * along - b * b);
-    r.shade[i] = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
-    r.rank[i] = fraction(r.rank[i]);
+    const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
+    const float rank = fraction(r.rank[i]);
+    r.rank[i] = rank;
+    r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
+  }
+}
+
+// What draw_line needs, after draw_line in render/opengl/shaders/common.glsl.
+[[gnu::target_clones("default", "arch=haswell")]] void prepare_lines(const frame::Constants& c, Run& r) {
+  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const float width = float(c.width), height = float(c.height);
+  const bool single = c.subframes == 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
+    const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
+    const bool steep = high > wide;
+    const float major = steep ? high : wide;
+    const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
+    const float of_branch = smaller(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
+    const float fair = across < 1.f && r.mean_width[i] > 0.f ? of_branch : across;
+    const float whole = std::floor(fair + 1.f - r.rank[i] - 1.f / 512.f);
+    const float line = single ? whole : across;
+    // From the end of the smaller coordinate to the other.
+    const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
+    const bool turned = ax > bx;
+    const float x0 = turned ? bx : ax, y0 = turned ? by : ay, z0 = turned ? zb : za;
+    const float x1 = turned ? ax : bx, y1 = turned ? ay : by, z1 = turned ? za : zb;
+    const float limit = steep ? height : width;
+    const float first = smaller(larger(std::ceil(x0 - .5f), 0.f), limit),
+                last = smaller(larger(std::ceil(x1 - .5f), 0.f), limit);
+    const float inverse = 1.f / (x1 - x0), slope = (y1 - y0) * inverse, rise = (z1 - z0) * inverse;
+    const float begin = first + .5f - x0, half = .5f * line;
+    r.line_width[i] = r.width[i] >= 0.f && first < last ? line : 0.f;
+    r.left[i] = smaller(px, qx) - half, r.right[i] = larger(px, qx) + half;
+    r.top[i] = smaller(py, qy) - half, r.bottom[i] = larger(py, qy) + half;
+    r.nearest[i] = smaller(za, zb);
+    r.first[i] = first, r.last[i] = last;
+    r.y[i] = y0 + begin * slope - .5f, r.slope[i] = slope;
+    r.z[i] = z0 + begin * rise, r.rise[i] = rise;
+    r.steep[i] = steep;
   }
 }
 
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
 
-// As draw_line in render/opengl/shaders/common.glsl.
-void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
-  float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
-  const bool steep = high > wide;
-  const float major = steep ? high : wide;
-  const float stretch = major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f;
-  float width = r.width[i] * stretch;
-  if (single) {
-    if (width < 1.f && r.mean_width[i] > 0.f)
-      width = std::min(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
-    width = std::floor(width + 1.f - r.rank[i] - 1.f / 512.f);
-    if (width < 1.f) return;
-  }
-  const float half = .5f * width;
-  float za = r.code_a[i], zb = r.code_b[i];
-  if (canvas.hidden(std::min(px, qx) - half, std::min(py, qy) - half, std::max(px, qx) + half,
-                    std::max(py, qy) + half, std::min(za, zb)))
+void draw_line(const Run& r, std::size_t i, Canvas& canvas) {
+  if (!(r.line_width[i] > 0.f) || canvas.hidden(r.left[i], r.top[i], r.right[i], r.bottom[i], r.nearest[i]))
     return;
-  if (steep) std::swap(px, py), std::swap(qx, qy);
-  if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(za, zb);
-  const float limit = float(steep ? canvas.height() : canvas.width()),
-              limit_across = float(steep ? canvas.width() : canvas.height());
-  const std::int32_t first = clipped(std::ceil(px - .5f), limit), last = clipped(std::ceil(qx - .5f), limit);
-  if (first >= last) return;
-  const float inverse = 1.f / (qx - px), slope = (qy - py) * inverse, rise = (zb - za) * inverse;
-  const float begin = float(first) + .5f - px;
-  float y = py + begin * slope - .5f, z = za + begin * rise;
-  const std::uint32_t payload = payload_of(r.entry[i], r.shade[i], fraction(r.rank[i] * 7.f));
-  for (std::int32_t x = first; x < last; ++x, y += slope, z += rise) {
+  const bool steep = r.steep[i];
+  const float half = .5f * r.line_width[i], slope = r.slope[i], rise = r.rise[i];
+  const float limit_across = float(steep ? canvas.width() : canvas.height());
+  const std::int32_t last = std::int32_t(r.last[i]);
+  const std::uint32_t payload = r.payload[i];
+  float y = r.y[i], z = r.z[i];
+  for (std::int32_t x = std::int32_t(r.first[i]); x < last; ++x, y += slope, z += rise) {
     const std::int32_t low = clipped(std::ceil(y - half), limit_across),
                        end = clipped(std::ceil(y + half), limit_across);
-    for (std::int32_t across = low; across < end; ++across) {
-      const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
+    const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
+    for (std::int32_t across = low; across < end; ++across)
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
-    }
   }
 }
 
@@ -256,7 +291,7 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   const frame::Constants& c = picture.constants;
   if (r.width[i] < 0.f) return;
   const float width = c.focal * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
-  if (width < .75f) return draw_line(r, i, c.subframes == 1, canvas);
+  if (width < .75f) return draw_line(r, i, canvas);
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
   if (canvas.hidden(std::min(r.px[i], r.qx[i]) - reach, std::min(r.py[i], r.qy[i]) - reach,
@@ -308,6 +343,7 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Item& item = items[k];
       if (!item.segment_count) continue;
+      if (k + ahead < end) prefetch(picture.geometry, items[k + ahead]);
       const Vec3 centre = picture.to_camera * (Vec3(item.x, item.y, item.z) - picture.eye);
       const float nearest = centre.z() - item.radius;
       if (nearest > c.near) {
@@ -324,10 +360,11 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       project(c, turn, at, picture.light, r);
       switch (kind) {
         case Kind::lines:
-          for (std::size_t i = 0; i < r.count; ++i)
-            if (r.width[i] >= 0.f) draw_line(r, i, c.subframes == 1, canvas);
+          prepare_lines(c, r);
+          for (std::size_t i = 0; i < r.count; ++i) draw_line(r, i, canvas);
           break;
         case Kind::capsules:
+          prepare_lines(c, r);
           for (std::size_t i = 0; i < r.count; ++i) draw_near(picture, r, i, canvas);
           break;
         case Kind::dots:
@@ -355,6 +392,7 @@ void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Can
       };
       r.ra[0] = least(o.a), r.rb[0] = least(o.b);
       project(c, picture.to_camera, at, picture.light, r);
+      prepare_lines(c, r);
       draw_near(picture, r, 0, canvas);
     }
   });
