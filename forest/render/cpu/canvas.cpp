@@ -18,25 +18,31 @@ std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile
 
 void Canvas::clear(std::uint32_t width, std::uint32_t height) {
   width_ = std::int32_t(width), height_ = std::int32_t(height);
-  keys_.resize(std::size_t(width) * height);
-  parallel_ranges(keys_.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
-    std::fill(keys_.begin() + std::ptrdiff_t(begin), keys_.begin() + std::ptrdiff_t(end), FOREST_KEY_EMPTY);
+  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
+  const std::size_t tiles_wide = std::size_t(fine_.width);
+  keys_.resize(tiles_wide * std::size_t(fine_.height) * tile * tile);
+  parallel_for(std::size_t(fine_.height), 16, [&](std::size_t ty) {
+    std::uint32_t* keys = &keys_[ty * tiles_wide * tile * tile];
+    std::fill(keys, keys + tiles_wide * tile * tile, FOREST_KEY_EMPTY);
+    for (std::int32_t y = std::int32_t(ty) * tile; y < std::int32_t(ty + 1) * tile; ++y)
+      for (std::int32_t x = y < height_ ? width_ : 0; x < fine_.width * tile; ++x) keys_[place(x, y)] = 0;
   });
   looked_ = false;
 }
 
+void Canvas::read_row(std::int32_t y, std::uint32_t* keys) const {
+  const std::uint32_t* from = &keys_[place(0, y)];
+  for (std::int32_t x = 0; x < width_; x += tile, from += tile * tile)
+    std::copy(from, from + std::min(tile, width_ - x), keys + x);
+}
+
 void Canvas::look() {
-  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
-  fine_.farthest.resize(std::size_t(fine_.width) * std::size_t(fine_.height));
-  parallel_for(std::size_t(fine_.height), 4, [&](std::size_t ty) {
-    std::vector<std::uint32_t> column(std::size_t(width_), 0u);  // the farthest of the tile's rows
-    for (std::int32_t y = std::int32_t(ty) * tile; y < std::min(std::int32_t(ty + 1) * tile, height_); ++y) {
-      const std::uint32_t* keys = row(y);
-      for (std::size_t x = 0; x < column.size(); ++x) column[x] = std::max(column[x], keys[x]);
-    }
-    for (std::int32_t tx = 0; tx < fine_.width; ++tx)
-      fine_.farthest[ty * std::size_t(fine_.width) + std::size_t(tx)] =
-          *std::max_element(column.begin() + tx * tile, column.begin() + std::min((tx + 1) * tile, width_));
+  fine_.farthest.resize(keys_.size() / (tile * tile));
+  parallel_for(fine_.farthest.size(), 512, [&](std::size_t t) {
+    const std::uint32_t* keys = &keys_[t * tile * tile];
+    std::uint32_t far = 0;
+    for (std::int32_t i = 0; i < tile * tile; ++i) far = std::max(far, keys[i]);
+    fine_.farthest[t] = far;
   });
   coarse_.width = tiles_over(fine_.width), coarse_.height = tiles_over(fine_.height);
   coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);

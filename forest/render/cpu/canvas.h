@@ -33,17 +33,18 @@ class Canvas {
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
-  const std::uint32_t* row(std::int32_t y) const { return &keys_[std::size_t(y) * std::size_t(width_)]; }
+  /// The keys of one row, from the left.
+  void read_row(std::int32_t y, std::uint32_t* keys) const;
 
   /// The nearest key wins, whichever thread comes first.
   void put(std::int32_t x, std::int32_t y, std::uint32_t key) {
-    const std::atomic_ref<std::uint32_t> pixel(keys_[std::size_t(y) * std::size_t(width_) + std::size_t(x)]);
+    const std::atomic_ref<std::uint32_t> pixel(keys_[place(x, y)]);
     std::uint32_t seen = pixel.load(std::memory_order_relaxed);
     while (key < seen && !pixel.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
     }
   }
   std::uint32_t key(std::int32_t x, std::int32_t y) {
-    const std::atomic_ref<std::uint32_t> pixel(keys_[std::size_t(y) * std::size_t(width_) + std::size_t(x)]);
+    const std::atomic_ref<std::uint32_t> pixel(keys_[place(x, y)]);
     return pixel.load(std::memory_order_relaxed);
   }
 
@@ -59,9 +60,15 @@ class Canvas {
     std::int32_t width = 0, height = 0;
     std::vector<std::uint32_t> farthest;
   };
+  // The pixels of a tile are neighbours in memory, in rows: a line in any direction stays within few cache lines and pages.
+  static_assert(FOREST_TILE == 8);
+  std::size_t place(std::int32_t x, std::int32_t y) const {
+    return std::size_t((y >> 3) * fine_.width + (x >> 3)) * 64 + std::size_t((y & 7) << 3 | (x & 7));
+  }
+
   std::int32_t width_ = 0, height_ = 0;
-  std::vector<std::uint32_t> keys_;
-  Level fine_, coarse_;  // tiles, and tiles of tiles
+  std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
+  Level fine_, coarse_;              // tiles, and tiles of tiles
   bool looked_ = false;
 };
 
