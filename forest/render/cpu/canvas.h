@@ -43,9 +43,12 @@ class Canvas {
     while (key < seen && !pixel.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
     }
   }
-  std::uint32_t key(std::int32_t x, std::int32_t y) {
-    const std::atomic_ref<std::uint32_t> pixel(keys_[place(x, y)]);
-    return pixel.load(std::memory_order_relaxed);
+  /// Whether all of the FOREST_TILE pixels from `x`, a multiple of as many, on have a key before this one.
+  bool before(std::int32_t x, std::int32_t y, std::uint32_t key) {
+    std::uint32_t farthest = 0;
+    for (std::uint32_t *pixel = &keys_[place(x, y)], *end = pixel + FOREST_TILE; pixel != end; ++pixel)
+      farthest = std::max(farthest, std::atomic_ref(*pixel).load(std::memory_order_relaxed));
+    return farthest < key;
   }
 
   /// Finds the farthest key of every tile: from now on `hidden` knows what has been drawn.

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/splat.h"
 
+#include <array>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -204,87 +205,123 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   }
 }
 
-struct Hit {
-  float t = std::numeric_limits<float>::infinity();
-  Vec3 normal = Vec3::Zero();
+// A tapered capsule as a ray meets it: the hull of two spheres, or the larger of them alone.
+struct Body {
+  Vec3 a, b, u;  // ends; axis, unit or zero
+  float ra, rb, length, s, c2, cosine;
+  bool nested;  // one sphere lies within the other
+
+  Body(const Run& r, std::size_t i)
+      : a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]), ra(r.ra[i]), rb(r.rb[i]) {
+    const Vec3 axis = b - a;
+    length = axis.norm();
+    const float taper = ra - rb;
+    nested = length <= std::abs(taper) + 1e-6f;
+    u = nested ? Vec3(0, 0, 0) : Vec3(axis / length);
+    s = nested ? 0.f : taper / length;
+    c2 = 1.f - s * s;
+    cosine = std::sqrt(c2);
+  }
 };
 
-void meet_sphere(const Vec3& ray, const Vec3& centre, float radius, Hit& hit) {
-  const float b = ray.dot(centre), h = radius * radius - (centre - b * ray).squaredNorm();
-  if (h < 0.f) return;
-  const float t = b - std::sqrt(h);
-  if (t > 0.f && t < hit.t) hit = {t, (t * ray - centre) / std::max(radius, 1e-9f)};
+// The pixels of a tile that lie in one row.
+constexpr std::int32_t lanes = std::int32_t(FOREST_TILE);
+using Keys = std::array<std::uint32_t, lanes>;
+
+// Every pixel meets the capsule with its own ray: as draw_capsule in render/opengl/shaders/capsule.glsl. Pixels that miss it
+// get the key of none.
+[[gnu::target_clones("default", "arch=haswell")]] void meet(const frame::Constants& c, const Vec3& light,
+                                                            const Body& body, std::uint32_t entry,
+                                                            std::int32_t first_x, std::int32_t y,
+                                                            Keys& keys) {
+  const float ax = body.a.x(), ay = body.a.y(), az = body.a.z(), bx = body.b.x(), by = body.b.y(),
+              bz = body.b.z(), ux = body.u.x(), uy = body.u.y(), uz = body.u.z(), lx = light.x(),
+              ly = light.y(), lz = light.z();
+  const float ra = body.ra, rb = body.rb, s = body.s, c2 = body.c2, cosine = body.cosine;
+  const float begin = s * ra, end = body.length + s * rb;  // of the cone's surface, along the axis
+  const float per_focal = 1.f / c.focal, near = c.near, slope_y = (c.centre_y - float(y) - .5f) * per_focal;
+  const float from_x = .5f - c.centre_x, per_ra = 1.f / larger(ra, 1e-9f), per_rb = 1.f / larger(rb, 1e-9f);
+  const std::int32_t cone = body.nested ? 0 : 1;
+  const std::uint32_t subframe = c.subframe;
+  for (std::int32_t lane = 0; lane < lanes; ++lane) {
+    const std::int32_t x = first_x + lane;
+    const float slope_x = (float(x) + from_x) * per_focal;
+    const float dz = 1.f / std::sqrt(slope_x * slope_x + slope_y * slope_y + 1.f), dx = slope_x * dz,
+                dy = slope_y * dz;
+    const float shift = ax * dx + ay * dy + az * dz;
+    const float ox = shift * dx - ax, oy = shift * dy - ay, oz = shift * dz - az;
+    const float o2 = ox * ox + oy * oy + oz * oz, ou = ox * ux + oy * uy + oz * uz,
+                du = dx * ux + dy * uy + dz * uz;
+    const float k0 = ra - s * ou, k1 = -s * du;
+    const float A = c2 * (1.f - du * du) - k1 * k1, B = -c2 * ou * du - k0 * k1,
+                C = c2 * (o2 - ou * ou) - k0 * k0, root = B * B - A * C;
+    const float local = (-B - std::sqrt(larger(root, 0.f))) / larger(A, 1e-9f), along = ou + local * du;
+    const float t_cone = local + shift;
+    const bool on_cone =
+        (cone != 0) & (root >= 0.f) & (A > 1e-9f) & (along >= begin) & (along <= end) & (t_cone > 0.f);
+    const float wx = ox + local * dx - along * ux, wy = oy + local * dy - along * uy,
+                wz = oz + local * dz - along * uz;
+    const float facing_cone =
+        cosine * (wx * lx + wy * ly + wz * lz) / std::sqrt(larger(wx * wx + wy * wy + wz * wz, 1e-30f)) +
+        s * (ux * lx + uy * ly + uz * lz);
+    // The spheres at its ends.
+    const float shift_b = bx * dx + by * dy + bz * dz;
+    const float qx = shift_b * dx - bx, qy = shift_b * dy - by, qz = shift_b * dz - bz;
+    const float ha = ra * ra - o2, hb = rb * rb - (qx * qx + qy * qy + qz * qz);
+    const float ta = shift - std::sqrt(larger(ha, 0.f)), tb = shift_b - std::sqrt(larger(hb, 0.f));
+    const bool on_a = (ha >= 0.f) & (ta > 0.f), on_b = (hb >= 0.f) & (tb > 0.f);
+    const bool take_b = on_b & (!on_a | (tb < ta));
+    const float t_sphere = take_b ? tb : ta;
+    const float facing_sphere =
+        take_b ? ((tb * dx - bx) * lx + (tb * dy - by) * ly + (tb * dz - bz) * lz) * per_rb
+               : ((ta * dx - ax) * lx + (ta * dy - ay) * ly + (ta * dz - az) * lz) * per_ra;
+    const bool within = (cone == 0) | (root >= 0.f);  // the cone, within which both spheres lie
+    const bool hit = on_cone | (within & (on_a | on_b));
+    const float t = on_cone ? t_cone : t_sphere, facing = on_cone ? facing_cone : facing_sphere;
+    const float code = depth_code(larger(t * dz, near));
+    const std::uint32_t key = key_of(code, payload_of(entry, .5f + .5f * facing, noise_at(x, y, subframe)));
+    keys[std::size_t(lane)] = hit ? key : FOREST_KEY_EMPTY;
+  }
 }
 
-// Every pixel meets the tapered capsule with its own ray: as draw_capsule in render/opengl/shaders/capsule.glsl.
 void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
-  const Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
-  const float ra = r.ra[i], rb = r.rb[i];
-  const std::uint32_t nearest = key_of(depth_code(std::max(std::min(a.z() - ra, b.z() - rb), c.near)), 0);
-  float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const float rp = 1.f + 1.05f * c.focal * ra / std::max(a.z() - .5f * ra, c.near),
-              rq = 1.f + 1.05f * c.focal * rb / std::max(b.z() - .5f * rb, c.near);
-  const bool steep = std::abs(qy - py) > std::abs(qx - px);
-  if (steep) std::swap(px, py), std::swap(qx, qy);
-  const float limit = float(steep ? canvas.height() : canvas.width()),
-              limit_across = float(steep ? canvas.width() : canvas.height());
-  const std::int32_t first = clipped(std::floor(std::min(px - rp, qx - rq)), limit),
-                     last = clipped(std::ceil(std::max(px + rp, qx + rq)), limit);
-  const float reach = std::max(rp, rq);
-  const Vec3 axis = b - a;
-  const float length = axis.norm(), taper = ra - rb;
-  const bool nested = length <= std::abs(taper) + 1e-6f;
-  const Vec3 u = nested ? Vec3(0, 0, 0) : Vec3(axis / length);
-  const float s = nested ? 0.f : taper / length, c2 = 1.f - s * s, cosine = std::sqrt(c2);
-
-  const auto scan = [&](std::int32_t x) {
-    const float at = float(x) + .5f, dx = qx - px;
+  const Body body(r, i);
+  const std::uint32_t nearest =
+      key_of(depth_code(std::max(std::min(body.a.z() - body.ra, body.b.z() - body.rb), c.near)), 0);
+  const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
+  const auto reach_of = [&](const Vec3& p, float radius) {
+    return 1.f + 1.05f * c.focal * radius / std::max(p.z() - .5f * radius, c.near);
+  };
+  const float rp = reach_of(body.a, body.ra), rq = reach_of(body.b, body.rb), reach = std::max(rp, rq);
+  const float width = float(canvas.width()), height = float(canvas.height());
+  const std::int32_t first = clipped(std::floor(std::min(py - rp, qy - rq)), height),
+                     last = clipped(std::ceil(std::max(py + rp, qy + rq)), height);
+  const auto scan = [&](std::int32_t y) {
+    // The part of the axis whose discs can reach this row, and from it the range across.
+    const float at = float(y) + .5f, dy = qy - py;
     float t0 = 0.f, t1 = 1.f;
-    if (std::abs(dx) > 1e-3f) {
-      const float e0 = (at - reach - px) / dx, e1 = (at + reach - px) / dx;
+    if (std::abs(dy) > 1e-3f) {
+      const float e0 = (at - reach - py) / dy, e1 = (at + reach - py) / dy;
       t0 = std::clamp(std::min(e0, e1), 0.f, 1.f), t1 = std::clamp(std::max(e0, e1), 0.f, 1.f);
     }
-    const float y0 = py + t0 * (qy - py), y1 = py + t1 * (qy - py);
+    const float x0 = px + t0 * (qx - px), x1 = px + t1 * (qx - px);
     const float w = std::max(rp + t0 * (rq - rp), rp + t1 * (rq - rp));
-    const std::int32_t low = clipped(std::floor(std::min(y0, y1) - w), limit_across),
-                       high = clipped(std::ceil(std::max(y0, y1) + w), limit_across);
-    for (std::int32_t y = low; y < high; ++y) {
-      const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
-      if (canvas.key(at_x, at_y) < nearest) continue;
-      const Vec3 ray =
-          Vec3((float(at_x) + .5f - c.centre_x) / c.focal, (c.centre_y - float(at_y) - .5f) / c.focal, 1.f)
-              .normalized();
-      Hit hit;
-      if (!nested) {
-        const float shift = a.dot(ray);
-        const Vec3 o = shift * ray - a;
-        const float oy = o.dot(u), dy = ray.dot(u), k0 = ra - s * oy, k1 = -s * dy;
-        const float A = c2 * (1.f - dy * dy) - k1 * k1, B = -c2 * oy * dy - k0 * k1,
-                    C = c2 * (o.squaredNorm() - oy * oy) - k0 * k0, root = B * B - A * C;
-        if (root < 0.f) continue;  // beside the cone, within which both spheres lie
-        if (A > 1e-9f) {
-          const float local = (-B - std::sqrt(root)) / A, along = oy + local * dy;
-          if (along >= s * ra && along <= length + s * rb && local + shift > 0.f)
-            hit = {local + shift, cosine * (o + local * ray - along * u).normalized() + s * u};
-        }
-      }
-      if (std::isinf(hit.t)) {
-        meet_sphere(ray, a, ra, hit);
-        meet_sphere(ray, b, rb, hit);
-        if (std::isinf(hit.t)) continue;
-      }
-      const float z = std::max(hit.t * ray.z(), c.near);
-      canvas.put(at_x, at_y,
-                 key_of(depth_code(z), payload_of(r.entry[i], .5f + .5f * hit.normal.dot(picture.light),
-                                                  noise_at(at_x, at_y, c.subframe))));
+    const std::int32_t low = clipped(std::floor(std::min(x0, x1) - w), width),
+                       high = clipped(std::ceil(std::max(x0, x1) + w), width);
+    Keys keys;
+    for (std::int32_t x = low & -lanes; x < high; x += lanes) {
+      if (canvas.before(x, y, nearest)) continue;
+      meet(c, picture.light, body, r.entry[i], x, y, keys);
+      for (std::int32_t k = std::max(low - x, 0); k < std::min(lanes, high - x); ++k)
+        canvas.put(x + k, y, keys[std::size_t(k)]);
     }
   };
-  constexpr std::int32_t shared = 128;  // scan lines from which on other threads help
+  constexpr std::int32_t shared = 128;  // rows from which on other threads help
   if (last - first >= shared)
     parallel_for(std::size_t(last - first), 16, [&](std::size_t k) { scan(first + std::int32_t(k)); });
   else
-    for (std::int32_t x = first; x < last; ++x) scan(x);
+    for (std::int32_t y = first; y < last; ++y) scan(y);
 }
 
 void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
