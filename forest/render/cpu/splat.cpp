@@ -284,31 +284,95 @@ using Keys = std::array<std::uint32_t, lanes>;
   }
 }
 
+// Two discs of the picture and all between them: where a capsule is seen.
+class Outline {
+ public:
+  /// @param exact  nothing reaches beyond the discs; else, as before the eye, a little does
+  Outline(const Vec2& p, const Vec2& q, float rp, float rq, bool exact)
+      : p_(p), q_(q), rp_(rp), rq_(rq), exact_(exact) {
+    const Vec2 between = q - p;
+    const float distance = between.norm(), sine = distance > 0.f ? (rp - rq) / distance : 2.f;
+    if (std::abs(sine) >= 1.f) return;  // one lies within the other
+    const Vec2 along = between / distance, beside(-along.y(), along.x());
+    const float cosine = std::sqrt(1.f - sine * sine);
+    for (const float side : {-1.f, 1.f}) {
+      const Vec2 normal = sine * along + side * cosine * beside;
+      tangents_[side > 0.f] = {p + rp * normal, q + rq * normal};
+    }
+    apart_ = true;
+  }
+  float top() const { return std::min(p_.y() - rp_, q_.y() - rq_); }
+  float bottom() const { return std::max(p_.y() + rp_, q_.y() + rq_); }
+  /// Which part of the way from p to q has discs that may reach a height; 0 to 1.
+  std::pair<float, float> part(float y) const {
+    const float rise = q_.y() - p_.y(), reach = std::max(rp_, rq_);
+    if (std::abs(rise) <= 1e-3f) return {0.f, 1.f};
+    const float from = (y - reach - p_.y()) / rise, to = (y + reach - p_.y()) / rise;
+    return {std::clamp(std::min(from, to), 0.f, 1.f), std::clamp(std::max(from, to), 0.f, 1.f)};
+  }
+  /// From where to where it reaches at a height; empty (left > right) beside it.
+  std::pair<float, float> across(float y) const {
+    std::pair<float, float> range{INFINITY, -INFINITY};
+    const auto add = [&](float left, float right) {
+      range = {std::min(range.first, left), std::max(range.second, right)};
+    };
+    if (!exact_) {
+      const auto [from, to] = part(y);
+      for (const float t : {from, to}) {
+        const float x = p_.x() + t * (q_.x() - p_.x()), w = std::max(rp_, rq_);
+        add(x - w, x + w);
+      }
+      return range;
+    }
+    for (const auto& [centre, radius] : {std::pair(p_, rp_), std::pair(q_, rq_)})
+      if (const float h = radius * radius - (y - centre.y()) * (y - centre.y()); h >= 0.f)
+        add(centre.x() - std::sqrt(h), centre.x() + std::sqrt(h));
+    if (apart_)
+      for (const auto& [a, b] : tangents_)
+        if ((a.y() - y) * (b.y() - y) <= 0.f && a.y() != b.y()) {
+          const float x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+          add(x, x);
+        }
+    return range;
+  }
+
+ private:
+  Vec2 p_, q_;
+  float rp_, rq_;
+  bool exact_, apart_ = false;
+  std::array<std::pair<Vec2, Vec2>, 2> tangents_;
+};
+
+// The discs are exact where spheres are small beside their distance and not far from the middle of the picture.
+Outline outline_of(const frame::Constants& c, const Run& r, std::size_t i, const Body& body) {
+  const auto small = [](const Vec3& p, float radius) {
+    return radius < .25f * p.z() && p.squaredNorm() < 2.5f * p.z() * p.z();
+  };
+  const bool exact = small(body.a, body.ra) && small(body.b, body.rb);
+  const auto reach = [&](const Vec3& p, float radius) {
+    return 1.f + c.focal * radius *
+                     (exact ? p.norm() / (p.z() * (p.z() - radius))  // as scene/occlusion.cpp
+                            : 1.05f / std::max(p.z() - .5f * radius, c.near));
+  };
+  return {{r.px[i], r.py[i]}, {r.qx[i], r.qy[i]}, reach(body.a, body.ra), reach(body.b, body.rb), exact};
+}
+
 void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   const Body body(r, i);
-  const std::uint32_t nearest =
-      key_of(depth_code(std::max(std::min(body.a.z() - body.ra, body.b.z() - body.rb), c.near)), 0);
-  const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const auto reach_of = [&](const Vec3& p, float radius) {
-    return 1.f + 1.05f * c.focal * radius / std::max(p.z() - .5f * radius, c.near);
-  };
-  const float rp = reach_of(body.a, body.ra), rq = reach_of(body.b, body.rb), reach = std::max(rp, rq);
+  const Outline outline = outline_of(c, r, i, body);
   const float width = float(canvas.width()), height = float(canvas.height());
-  const std::int32_t first = clipped(std::floor(std::min(py - rp, qy - rq)), height),
-                     last = clipped(std::ceil(std::max(py + rp, qy + rq)), height);
+  const std::int32_t first = clipped(std::floor(outline.top()), height),
+                     last = clipped(std::ceil(outline.bottom()), height);
+  const float thickest = std::max(body.ra, body.rb), from = 1.f / body.a.z(), to = 1.f / body.b.z();
   const auto scan = [&](std::int32_t y) {
-    // The part of the axis whose discs can reach this row, and from it the range across.
-    const float at = float(y) + .5f, dy = qy - py;
-    float t0 = 0.f, t1 = 1.f;
-    if (std::abs(dy) > 1e-3f) {
-      const float e0 = (at - reach - py) / dy, e1 = (at + reach - py) / dy;
-      t0 = std::clamp(std::min(e0, e1), 0.f, 1.f), t1 = std::clamp(std::max(e0, e1), 0.f, 1.f);
-    }
-    const float x0 = px + t0 * (qx - px), x1 = px + t1 * (qx - px);
-    const float w = std::max(rp + t0 * (rq - rp), rp + t1 * (rq - rp));
-    const std::int32_t low = clipped(std::floor(std::min(x0, x1) - w), width),
-                       high = clipped(std::ceil(std::max(x0, x1) + w), width);
+    const float at = float(y) + .5f;
+    const auto [left, right] = outline.across(at);
+    if (!(left < right)) return;
+    const auto [begin, end] = outline.part(at);
+    const float depth = 1.f / std::max(from + begin * (to - from), from + end * (to - from));
+    const std::uint32_t nearest = key_of(depth_code(std::max(depth * .9999f - thickest, c.near)), 0);
+    const std::int32_t low = clipped(std::floor(left), width), high = clipped(std::ceil(right), width);
     Keys keys;
     for (std::int32_t x = low & -lanes; x < high; x += lanes) {
       if (canvas.before(x, y, nearest)) continue;
