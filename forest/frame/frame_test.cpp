@@ -50,10 +50,10 @@ TEST(Frustum, NeverCullsWhatProjectsIntoThePicture) {
 TEST(Frame, ContractRefusesWhatIsOutOfRange) {
   const std::vector<Segment> segments(10);
   const std::vector<Instance> instances(2);
-  const std::vector<std::uint8_t> classes(2);
+  const std::vector<State> states(2);
   const Geometry geometry{segments, instances};
   Frame frame;
-  frame.colour_class = classes;
+  frame.states = states;
   EXPECT_NO_THROW(check(frame, geometry));
   const std::vector<Item> good{{1, 0, 10, 0, 0, 0, 0, 1}}, no_instance{{2, 0, 1, 0, 0, 0, 0, 1}},
       no_segments{{0, 5, 6, 0, 0, 0, 0, 1}};

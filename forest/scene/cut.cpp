@@ -33,7 +33,71 @@ struct Look {
   const frame::Frustum& frustum;
   const Occluders* occluders;  // may be null
   bool keep;                   // what they hide
+  const Shown& shown;
+
+  frame::State state(std::uint32_t index) const {
+    return shown.states.empty() ? frame::State{} : shown.states[index];
+  }
 };
+
+// Adds a run to the list that it belongs to, drawn as `kind` or, for `any`, by its width in pixels.
+void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
+  switch (kind) {
+    case frame::Kind::somata:
+      return;
+    case frame::Kind::dots:
+      for (std::uint32_t i = 0; i < run.segment_count; ++i) {
+        cut.dots.push_back(run);
+        cut.dots.back().first_segment += i, cut.dots.back().segment_count = 1;
+      }
+      break;
+    default:
+      (kind == frame::Kind::lines || (kind == frame::Kind::any && thin) ? cut.lines : cut.capsules)
+          .push_back(run);
+  }
+  cut.segments += run.segment_count;
+}
+
+// The states of the sections of a neuron that has parts; null: that of the neuron.
+std::vector<const frame::State*> states_of_sections(const Look& look, std::uint32_t index) {
+  const Forest& forest = look.forest;
+  const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
+  std::vector<const frame::State*> states(neuron.section_count, nullptr);
+  for (const Part& part : std::ranges::equal_range(look.shown.parts, index, {}, &Part::instance)) {
+    if (part.section == soma_section) {
+      std::ranges::fill(states, &part.state);
+      continue;
+    }
+    std::vector<bool> inside(neuron.section_count);
+    for (std::uint32_t s = part.section; s < neuron.section_count; ++s) {  // parents come first
+      const std::uint32_t parent = forest.sections()[neuron.first_section + s].parent;
+      inside[s] = s == part.section || (parent != 0xffffffffu && inside[parent]);
+      if (inside[s]) states[s] = &part.state;
+    }
+  }
+  return states;
+}
+
+// A leaf of a neuron with parts: runs of segments of one state.
+void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const Sphere& sphere, bool thin,
+               std::span<const frame::State* const> states, Cut& cut) {
+  const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
+  const frame::State whole = look.state(index);
+  const auto state_of = [&](std::uint32_t segment) -> const frame::State* {
+    const std::uint32_t section =
+        look.forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
+    return section == soma_section ? nullptr : states[section];
+  };
+  const std::uint32_t end = leaf.first_segment + leaf.segment_count;
+  for (std::uint32_t from = leaf.first_segment, to; from < end; from = to) {
+    const frame::State* state = state_of(from);
+    for (to = from + 1; to < end && state_of(to) == state;) ++to;
+    if (!(state ? *state : whole).is(frame::State::visible)) continue;
+    frame::Item run = item(index, from, to - from, sphere);
+    if (state) run.state = frame::packed(*state);
+    add(cut, run, (state ? *state : whole).kind, thin);
+  }
+}
 
 void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
   const frame::Instance& instance = look.forest.instances()[index];
@@ -42,6 +106,11 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
   const auto clusters = look.forest.clusters();
   const Eye& eye = look.eye;
   const Detail& detail = eye.detail();
+  const frame::State state = look.state(index);
+  const bool parted =
+      state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
+  const auto states = parted ? states_of_sections(look, index) : std::vector<const frame::State*>();
+  if (state.kind == frame::Kind::somata && !parted) return;
   std::uint32_t open[64];
   int depth = 0;
   open[depth++] = from;
@@ -54,17 +123,18 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
       if (look.keep) cut.left_out.push_back({index, at});
       continue;
     }
-    if (!c.is_leaf() && depth + 2 <= 64 && !eye.good_enough(sphere, c.error)) {
+    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
       open[depth++] = c.children[1];
       open[depth++] = c.children[0];
       continue;
     }
-    const float width = 2.f * c.thickness * eye.magnification(sphere);
+    const bool thin = 2.f * c.thickness * eye.magnification(sphere) <= detail.surface_width;
+    if (parted && c.is_leaf()) {
+      add_parts(look, index, c, sphere, thin, states, cut);
+      continue;
+    }
     const std::uint32_t count = detail.thin ? c.visible_at(eye.magnification(sphere)) : c.segment_count;
-    if (!count) continue;
-    (width <= detail.surface_width ? cut.lines : cut.capsules)
-        .push_back(item(index, c.first_segment, count, sphere));
-    cut.segments += count;
+    if (count) add(cut, item(index, c.first_segment, count, sphere), state.kind, thin);
   }
 }
 
@@ -77,12 +147,20 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
     if (look.keep) cut.left_out.push_back({index, soma});
     return;
   }
+  frame::Item ball = item(index, neuron.first_segment, 1, sphere);
+  const frame::State state = look.state(index);
+  if (state.is(frame::State::parted)) {
+    for (const Part& part : std::ranges::equal_range(look.shown.parts, index, {}, &Part::instance))
+      if (part.section == soma_section) ball.state = frame::packed(part.state);
+    if (!(ball.state ? frame::unpacked(ball.state) : state).is(frame::State::visible)) return;
+  }
   const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
-  (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, sphere));
+  (large ? cut.capsules : cut.dots).push_back(ball);
   ++cut.segments;
 }
 
 void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
+  if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
   const std::uint64_t before = cut.segments;
@@ -150,9 +228,10 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 
 }  // namespace
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before) {
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before,
+           const Shown& shown) {
   const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, before, true};
+  const Look look{forest, eye, frustum, before, true, shown};
   Cut cut = in_chunks(forest.instances().size(),
                       [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
@@ -162,9 +241,9 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport
 }
 
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now) {
+             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown) {
   const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, &now, false};
+  const Look look{forest, eye, frustum, &now, false, shown};
   return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
     if (left_out[i].cluster == soma)
       choose_soma(look, left_out[i].instance, part);
