@@ -53,7 +53,7 @@ TEST(Reference, WhatIsLeftOutForBeingThinIsWhatConnectionSays) {
   const render::OffscreenContext context;
   render::OpenGLRenderer opengl;
   Random random(11);
-  const std::vector<std::uint8_t> classes{0};
+  const std::vector<frame::State> states{{}};
   int drawn = 0, left_out = 0;
   for (int i = 0; i < 400; ++i) {
     const auto place = [&] {
@@ -78,7 +78,7 @@ TEST(Reference, WhatIsLeftOutForBeingThinIsWhatConnectionSays) {
     frame.width = width, frame.height = height;
     frame.subframes = i % 3 ? 1 : 4;
     frame.palette.fill(Vec3::Ones());
-    frame.colour_class = classes;
+    frame.states = states;
     (as_line ? frame.lines : frame.capsules) = items;
     opengl.load({segments, instances});
     opengl.draw(frame);

@@ -26,7 +26,7 @@ struct Fixture {
   std::unique_ptr<Renderer> renderer;
   std::vector<frame::Segment> segments;
   std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
-  std::vector<std::uint8_t> classes{0};
+  std::vector<frame::State> states{{}};
   std::vector<frame::Item> items;
   frame::Frame frame;
 
@@ -34,14 +34,14 @@ struct Fixture {
     frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
     frame.width = frame.height = 200;
     frame.palette.fill(Vec3(1, 0, 0));
-    frame.colour_class = classes;
+    frame.states = states;
     frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
     frame.style.halo = 0.f;
   }
   void add(const Vec3& a, const Vec3& b, float radius) {
     const std::uint32_t half = std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(radius)));
     segments.push_back({a.x(), a.y(), a.z(), half | half << 16, b.x(), b.y(), b.z(), 3});
-    items.assign(1, {0, 0, std::uint32_t(segments.size()), 0, 0, 0, 0, 200});
+    items.assign(1, {0, 0, frame::first_segments(segments.size()), 0, 0, 0, 0, 200});
   }
   frame::Image draw() {
     renderer->load({segments, instances});
@@ -187,6 +187,93 @@ TEST_P(RendererLaws, WhatStandsRightBeforeTheEyeStaysWithinThePicture) {
     f.frame.subframes = i % 4 ? 1 : 2;
     f.draw();
   }
+}
+
+// Linear light of a colour byte.
+double light_of(std::uint8_t code) {
+  const double c = code / 255.;
+  return c <= .04045 ? c / 12.92 : std::pow((c + .055) / 1.055, 2.4);
+}
+
+// Mean linear light, red and green, of the pixels within 12 of the middle.
+std::pair<double, double> middle_of(const frame::Image& image) {
+  double red = 0., green = 0.;
+  for (std::size_t y = 88; y < 112; ++y)
+    for (std::size_t x = 88; x < 112; ++x) {
+      red += light_of(image.pixels[4 * (y * 200 + x)]) / 576.;
+      green += light_of(image.pixels[4 * (y * 200 + x) + 1]) / 576.;
+    }
+  return {red, green};
+}
+
+TEST_P(RendererLaws, TransparentThingsBlendAsTheirOpacitiesSayInAnyOrder) {
+  // A red capsule before a green one; which of them comes first in the list, and which neuron it is, must not matter.
+  for (const std::uint32_t subframes : {256u, 15u, 1u})
+    for (const auto& [near, far] :
+         {std::pair(128, 255), std::pair(64, 128), std::pair(200, 100), std::pair(255, 90)})
+      for (const bool swapped : {false, true}) {
+        Fixture f(GetParam());
+        f.instances.push_back(f.instances[0]);
+        f.add({-30, 0, swapped ? -20.f : 20.f}, {30, 0, swapped ? -20.f : 20.f}, 12.f);
+        f.add({0, -30, swapped ? 20.f : -20.f}, {0, 30, swapped ? 20.f : -20.f}, 12.f);
+        f.frame.palette.fill(Vec3(1, 0, 0));
+        for (std::size_t i = 8; i < 16; ++i) f.frame.palette[i] = Vec3(0, 1, 0);
+        f.states = {{}, {}};
+        const std::size_t front = swapped ? 1 : 0;
+        f.states[1 - front].colour_class = 1;
+        f.frame.states = f.states;
+        f.frame.subframes = subframes;
+        const std::vector<frame::Item> both{{0, 0, 1, 0, 0, 0, 0, 80}, {1, 1, 1, 0, 0, 0, 0, 80}};
+        f.frame.capsules = std::span(both).subspan(front, 1);
+        const double red = middle_of(f.draw()).first;
+        f.frame.capsules = std::span(both).subspan(1 - front, 1);
+        const double green = middle_of(f.draw()).second;
+        f.frame.capsules = both;
+        f.states[front].opacity = std::uint8_t(near), f.states[1 - front].opacity = std::uint8_t(far);
+        const auto [seen_red, seen_green] = middle_of(f.draw());
+        EXPECT_NEAR(seen_red / red, near / 255., .05) << subframes << " " << near << " " << far;
+        EXPECT_NEAR(seen_green / green, (1. - near / 255.) * far / 255., .05)
+            << subframes << " " << near << " " << far;
+      }
+}
+
+TEST_P(RendererLaws, OpacityOfAKindAndOfAPartAreObeyed) {
+  Fixture f(GetParam());
+  f.add({-20, 10, 0}, {20, 10, 0}, 6.f);
+  f.add({-20, -10, 0}, {20, -10, 0}, 6.f);
+  f.segments[0].meta = 2, f.segments[1].meta = 4;
+  const std::vector<frame::Item> both{{0, 0, 3, 0, 0, 0, 0, 80}};
+  for (const std::uint32_t subframes : {4u, 32u}) {
+    f.frame.subframes = subframes;
+    f.frame.opacities = frame::opaque();
+    f.frame.capsules = both;
+    const double whole = red_area(f.draw());
+    f.frame.opacities[2] = 0;
+    EXPECT_NEAR(red_area(f.draw()), .5 * whole, .02 * whole);
+    f.frame.opacities = frame::opaque();
+    // A part of the neuron, in a state of its own: the announcement is the neuron's.
+    f.states[0].flags |= frame::State::parted;
+    const frame::State part{.opacity = 64};
+    const std::vector<frame::Item> parts{{0, 0, 1, 0, 0, 0, 0, 80}, {0, 1, 1, packed(part), 0, 0, 0, 80}};
+    f.frame.capsules = parts;
+    EXPECT_NEAR(red_area(f.draw()), (.5 + .5 * 64. / 255.) * whole, .03 * whole);
+    f.states[0].flags = frame::State::visible;
+  }
+}
+
+TEST_P(RendererLaws, ABranchDrawnAsDotsCoversItsArea) {
+  Fixture f(GetParam());
+  for (int i = 0; i < 40; ++i)  // apart from one another
+    f.add({float(i % 8) * 7.f - 25.f, float(i / 8) * 10.f - 20.f, 0},
+          {float(i % 8) * 7.f - 23.f, float(i / 8) * 10.f - 18.f, 0}, i % 2 ? .1f : .5f);
+  std::vector<frame::Item> dots;
+  for (std::uint32_t i = 0; i < 40; ++i) dots.push_back({0, i, 1, 0, 0, 0, 0, 200});
+  f.frame.subframes = 64;
+  f.frame.lines = std::vector<frame::Item>();
+  f.frame.dots = dots;
+  const double scale = f.frame.camera.focal(200.f) / 100.,
+               expected = 20 * std::sqrt(8.) * 1.2 * scale * scale;
+  EXPECT_NEAR(red_area(f.draw()), expected, .2 * expected);
 }
 
 TEST_P(RendererLaws, RefusesAFrameThatBreaksTheContract) {

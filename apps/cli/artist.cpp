@@ -22,8 +22,9 @@ double milliseconds_since(Clock::time_point start) {
 
 }  // namespace
 
-Artist::Artist(scene::Forest forest, Drawer drawer)
+Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
     : forest_(std::move(forest)),
+      targets_(forest_, std::move(sets)),
       chooser_(forest_),
       renderer_(make_renderer(drawer)),
       outline_(scene::outline(forest_)) {
@@ -31,15 +32,16 @@ Artist::Artist(scene::Forest forest, Drawer drawer)
 }
 
 Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline) {
-  if (!colouring_ || view.colour_by != coloured_by_ || view.background != coloured_for_) {
-    colouring_ = scene::colour(forest_, view.colour_by, view.background);
-    coloured_by_ = view.colour_by, coloured_for_ = view.background;
+  if (!colouring_ || view.colour_by != coloured_by_ || view.background != coloured_for_ ||
+      view.targets != shown_as_) {
+    colouring_ = scene::colour(targets_, view);
+    coloured_by_ = view.colour_by, coloured_for_ = view.background, shown_as_ = view.targets;
   }
   Drawn drawn;
   auto start = Clock::now();
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  const scene::Cut& cut = chooser_.choose(eye, viewport);
+  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown());
   drawn.cull = milliseconds_since(start);
   const auto lines =
       with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
@@ -67,6 +69,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.samples = plan.samples;
+    view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
     const Drawn drawn = artist.draw(view, plan.width, plan.height);
     if (drawn.segments && drawn.image.covered == 0.)
       throw Error(

@@ -26,21 +26,25 @@ struct Drawn {
 
 class Artist {
  public:
-  explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic);
+  /// @param sets  names that targets of views may use
+  explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic, circuit::NodeSets sets = {});
 
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   const scene::Forest& forest() const { return forest_; }
+  const scene::Targets& targets() const { return targets_; }
   std::string renderer() const { return renderer_->name(); }
 
  private:
   scene::Forest forest_;
+  scene::Targets targets_;
   scene::Chooser chooser_;
   std::unique_ptr<render::Renderer> renderer_;
   std::vector<frame::Overlay> outline_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
   scene::Background coloured_for_ = scene::Background::dark;
+  std::vector<scene::Appearance> shown_as_;
 };
 
 /// Sums over the pictures of a film.
@@ -55,7 +59,8 @@ struct FilmPlan {
   std::uint32_t width = 1280, height = 720, samples = 4;
   int frames_per_second = 25;
   double seconds = 5.;
-  std::filesystem::path pictures;  // when not empty: a folder for the single pictures as PNG files
+  std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
+  std::vector<scene::Appearance> targets;  // after those of the path's views
 };
 
 /// Films what a path shows. Throws Error when not a single pixel was covered in a picture that should show the forest.

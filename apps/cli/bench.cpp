@@ -19,6 +19,7 @@ std::function<void()> bench_io(CLI::App&, Console&);
 std::function<void()> bench_peers(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
 std::function<void()> bench_seam(CLI::App&, Console&);
+std::function<void()> bench_targets(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
@@ -32,6 +33,7 @@ std::span<const Benchmark> benchmarks() {
        bench_repository},
       {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer",
        bench_seam},
+      {"targets", "How long it takes to show thousands of neurons otherwise", bench_targets},
   });
   return table;
 }

@@ -207,7 +207,7 @@ void write_column(const scene::Forest& forest, const Options& options, const fs:
   for (std::size_t i = 0; i < forest.instances().size(); ++i) {
     const frame::Instance& at = forest.instances()[i];
     json["instances"].push_back(
-        {at.morphology, at.x, at.y, at.z, at.qx, at.qy, at.qz, at.qw, colouring.classes[i]});
+        {at.morphology, at.x, at.y, at.z, at.qx, at.qy, at.qz, at.qw, colouring.states[i].colour_class});
     segments += segments_of[at.morphology];
   }
   if (segments != forest.segment_total())

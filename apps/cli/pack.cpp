@@ -15,6 +15,23 @@
 
 namespace forest::cli {
 
+namespace {
+
+// Nodes that follow one another, as runs.
+circuit::NodeNames names_of(const reports::Nodes& nodes) {
+  circuit::NodeNames names{nodes.populations, {}};
+  for (std::uint32_t i = 0; i < nodes.of_instance.size(); ++i) {
+    const auto& [population, id] = nodes.of_instance[i];
+    if (names.runs.empty() || names.runs.back().population != population ||
+        names.runs.back().first_node + names.runs.back().count != id)
+      names.runs.push_back({population, i, id, 0});
+    ++names.runs.back().count;
+  }
+  return names;
+}
+
+}  // namespace
+
 std::function<void()> pack(CLI::App& command, Console& console) {
   struct Options {
     std::filesystem::path circuit, out;
@@ -32,7 +49,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     else if (!read.warnings.empty())
       console.warn(fmt::format("{} oddities in {}; see them with --verbose", read.warnings.size(),
                                options->circuit.string()));
-    const auto bytes = scene::pack(read.circuit, read.morphologies, console.progress());
+    const auto bytes = scene::pack(read.circuit, read.morphologies, console.progress(), names_of(read.nodes));
     write_file(options->out, bytes);
     const scene::Forest forest = scene::Forest::open(options->out);
     console.print({{"file", options->out.string()},

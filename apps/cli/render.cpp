@@ -12,6 +12,7 @@
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
+#include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
 #include "apps/view_text.h"
 
@@ -28,11 +29,13 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::filesystem::path forest, out;
     std::string view, size = "1920x1080";
     bool outline = false;
+    TargetOptions targets;
     Drawer drawer = Drawer::automatic;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->view, view_help);
+  add_targets(command, options->targets);
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
@@ -40,8 +43,10 @@ std::function<void()> render(CLI::App& command, Console& console) {
   return [options, &console] {
     const auto [width, height] = parse_size(options->size);
     const scene::Forest forest = scene::Forest::open(options->forest);
-    const scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
-    Artist artist(forest, options->drawer);
+    scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
+    add_appearances(options->targets, view.targets);
+    Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
+    warn_of_empty(artist.targets(), view.targets, console);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
     console.print({{"file", options->out.string()},
@@ -64,12 +69,14 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::vector<std::string> views;
     std::string size = "1280x720";
     FilmPlan plan;
+    TargetOptions targets;
     Drawer drawer = Drawer::automatic;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->views,
                      "Key views, two or more, as JSON files or texts; by default a walk into the forest");
+  add_targets(command, options->targets);
   add_size(command, options->size, true);
   command.add_option("--seconds", options->plan.seconds, "Length of the film")
       ->check(CLI::Range(0.04, 3600.))
@@ -92,7 +99,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (views.size() == 1)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
-    Artist artist(forest, options->drawer);
+    add_appearances(options->targets, plan.targets);
+    Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
+    warn_of_empty(artist.targets(), plan.targets, console);
     const FilmFigures figures = film(artist, path, plan, options->out, console.progress());
     console.print({{"file", options->out.string()},
                    {"pictures", figures.pictures},

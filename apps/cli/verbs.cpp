@@ -27,6 +27,7 @@ std::function<void()> activity(CLI::App&, Console&);
 std::function<void()> clamp(CLI::App&, Console&);
 std::function<void()> raster(CLI::App&, Console&);
 std::function<void()> movie(CLI::App&, Console&);
+std::function<void()> targets(CLI::App&, Console&);
 std::function<void()> view(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
@@ -78,6 +79,10 @@ std::span<const Verb> verbs() {
        "brainforest clamp run.activity --neuron 3 --section 0 12 --csv traces.csv", clamp},
       {"raster", "Draw the somata of all neurons over time as a picture",
        "brainforest raster run.activity --out raster.png", raster},
+      {"targets", "List the sets of neurons that a forest has, and define others",
+       "brainforest targets column.forest\n"
+       "  brainforest targets column.forest --define \"deep=(L5 or L6) and not inhibitory\" --out sets.json",
+       targets},
       {"render", "Draw a forest as a picture, without a display",
        "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
       {"movie", "Film a walk through a forest, without a display",

@@ -2,6 +2,7 @@
 #include "forest/frame/frame.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -44,28 +45,36 @@ void check(const Frame& frame, const Geometry& geometry) {
   require(frame.style.fog_length > 0.f, "the length of the fog must be positive");
   for (const Vec3& colour : frame.palette)
     require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");
-  require(frame.colour_class.size() == geometry.instances.size(), "every instance needs a colour class");
-  for (const std::uint8_t colour : frame.colour_class)
-    require(colour < 16, "a colour class must be below 16");
+  require(frame.states.size() == geometry.instances.size(), "every instance needs a state");
+  std::uint8_t colours = 0;
+  for (const State& state : frame.states) colours |= state.colour_class;
+  require(colours < 16, "a colour class must be below 16");
   check(static_cast<const Lists&>(frame), geometry);
   for (const Overlay& o : frame.overlays)
     require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
             "an overlay must be finite and its colour a palette entry");
 }
 
+bool transparent(const Frame& frame) {
+  // Lists that come later, by `rest`, hold no item whose state is not announced by its neuron's being parted.
+  std::uint8_t least = 255, flags = 0;
+  for (const State& state : frame.states) least = std::min(least, state.opacity), flags |= state.flags;
+  return least < 255 || (flags & State::parted) || frame.opacities != opaque();
+}
+
 void check(const Lists& lists, const Geometry& geometry) {
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     for (const Item& item : list) {
       require(item.instance < geometry.instances.size(), "an item names an instance that is not there");
-      require(item.segment_count <= cluster_size, "an item has more segments than a cluster");
-      require(item.first_segment + std::size_t(item.segment_count) <= geometry.segments.size(),
+      require(unpacked(item.state).colour_class < 16, "a colour class must be below 16");
+      require(item.first_segment + std::size_t(std::bit_width(item.drawn)) <= geometry.segments.size(),
               "an item names segments that are not there");
       require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
               "an item's sphere must be finite");
     }
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     require(list.size() < (1u << 26), "a list must have fewer than 67,108,864 items");
-  for (const Item& item : lists.dots) require(item.segment_count == 1, "a dot is one segment");
+  for (const Item& item : lists.dots) require(item.drawn == 1, "a dot is one segment");
   Band before;
   for (const Band& b : lists.bands) {
     require(b.dots >= before.dots && b.lines >= before.lines && b.capsules >= before.capsules,

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <array>
+#include <bit>
 #include <cstdint>
 #include <functional>
 #include <span>
@@ -20,12 +21,43 @@ struct Geometry {
   std::span<const Instance> instances;
 };
 
+/// Primitives that a neuron may be drawn with, however large it is in the picture.
+enum class Kind : std::uint8_t { any, dots, lines, capsules, somata };
+
+/// How a neuron is shown, or a branch of it: 4 bytes, so that changing thousands costs nothing. Renderers read the colour
+/// class and the opacity; the rest has been obeyed by whoever made the lists.
+struct State {
+  static constexpr std::uint8_t visible = 1, simulated = 2,
+                                parted = 4;  // parted: branches of it have states of their own
+
+  std::uint8_t colour_class = 0;  // 0–15
+  Kind kind = Kind::any;
+  std::uint8_t opacity = 255;  // times that of the palette entry; 255: opaque
+  std::uint8_t flags = visible | simulated;
+
+  bool is(std::uint8_t flag) const { return flags & flag; }
+  bool operator==(const State&) const = default;
+};
+static_assert(sizeof(State) == 4);
+
+/// As Item::state.
+inline std::uint32_t packed(const State& s) { return std::bit_cast<std::uint32_t>(s); }
+inline State unpacked(std::uint32_t bits) { return std::bit_cast<State>(bits); }
+
 /// Colours are linear light, 0–1. An instance of colour class c (0–15) shows its sections of kind k as entry 8 c + k.
 using Palette = std::array<Vec3, 128>;
+/// Of every palette entry, 0–255.
+using Opacities = std::array<std::uint8_t, 128>;
 inline Palette black_palette() {
   Palette palette;
   palette.fill(Vec3::Zero());
   return palette;
+}
+
+inline Opacities opaque() {
+  Opacities opacities;
+  opacities.fill(255);
+  return opacities;
 }
 
 struct Style {
@@ -52,7 +84,7 @@ struct Band {
 };
 
 struct Lists {
-  std::span<const Item> dots;      // small spheres: one segment an item
+  std::span<const Item> dots;      // somata, branches as beads: one segment an item
   std::span<const Item> lines;     // thin runs
   std::span<const Item> capsules;  // runs near enough to have a surface
   std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
@@ -74,7 +106,8 @@ struct Frame : Lists {
   std::uint32_t first_subframe = 0, last_subframe = 1024;
   Style style;
   Palette palette = black_palette();
-  std::span<const std::uint8_t> colour_class;  // one an instance, 0–15
+  Opacities opacities = opaque();
+  std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
   /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
   /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
@@ -101,6 +134,8 @@ Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes);
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);
+/// Whether anything in it may be transparent.
+bool transparent(const Frame& frame);
 void check(const Lists& lists, const Geometry& geometry);
 
 }  // namespace forest::frame

@@ -50,13 +50,13 @@ TEST(Frustum, NeverCullsWhatProjectsIntoThePicture) {
 TEST(Frame, ContractRefusesWhatIsOutOfRange) {
   const std::vector<Segment> segments(10);
   const std::vector<Instance> instances(2);
-  const std::vector<std::uint8_t> classes(2);
+  const std::vector<State> states(2);
   const Geometry geometry{segments, instances};
   Frame frame;
-  frame.colour_class = classes;
+  frame.states = states;
   EXPECT_NO_THROW(check(frame, geometry));
-  const std::vector<Item> good{{1, 0, 10, 0, 0, 0, 0, 1}}, no_instance{{2, 0, 1, 0, 0, 0, 0, 1}},
-      no_segments{{0, 5, 6, 0, 0, 0, 0, 1}};
+  const std::vector<Item> good{{1, 0, 0x3ff, 0, 0, 0, 0, 1}}, no_instance{{2, 0, 1, 0, 0, 0, 0, 1}},
+      no_segments{{0, 5, 0x3f, 0, 0, 0, 0, 1}};
   frame.lines = good;
   EXPECT_NO_THROW(check(frame, geometry));
   frame.lines = no_instance;

@@ -4,8 +4,11 @@
 #ifdef __cplusplus
 #pragma once
 #include <cstdint>
+#define FOREST_SHARED constexpr
 namespace forest::frame {
 using uint = std::uint32_t;
+#else
+#define FOREST_SHARED
 #endif
 
 /// A tapered capsule in the coordinates of its neuron (µm). Both ends equal: a sphere.
@@ -29,8 +32,8 @@ struct Instance {
 struct Item {
   uint instance;
   uint first_segment;
-  uint segment_count;     // at most cluster_size
-  uint without;           // bit i: its segment i is not drawn
+  uint drawn;             // bit i: segment first_segment + i is drawn
+  uint state;             // 0: as its instance; else a State of its own, its bytes from the lowest on
   float x, y, z, radius;  // a sphere around all of it, in the world, µm
 };
 
@@ -68,6 +71,49 @@ struct Constants {
 #define FOREST_COARSE 2u      // tiles of tiles
 #define FOREST_FIRST_BAND 4u  // nothing is hidden yet
 
+// Transparency is stochastic (Enderton, Sintorn, Shirley & Luebke 2010, "Stochastic transparency"): what is half
+// transparent shows in half of the subframes, opaque there, so that the depth test is right without any order and the
+// mean is the blend. In which subframes is drawn for every branch of every neuron by itself, so that layers behind one
+// another are independent; with fewer subframes than this also for every pixel, so that a single one is a screen door.
+#define FOREST_DOOR_SUBFRAMES 16u
+
+FOREST_SHARED uint forest_mixed(uint x) {
+  x ^= x >> 16;
+  x *= 0x7feb352du;
+  x ^= x >> 15;
+  x *= 0x846ca68bu;
+  return x ^ (x >> 16);
+}
+
+FOREST_SHARED uint forest_reversed(uint x) {
+  x = ((x & 0x55555555u) << 1) | ((x >> 1) & 0x55555555u);
+  x = ((x & 0x33333333u) << 2) | ((x >> 2) & 0x33333333u);
+  x = ((x & 0x0f0f0f0fu) << 4) | ((x >> 4) & 0x0f0f0f0fu);
+  x = ((x & 0x00ff00ffu) << 8) | ((x >> 8) & 0x00ff00ffu);
+  return (x << 16) | (x >> 16);
+}
+
+// Laine & Karras 2011: a bit of the result depends on that bit and those below it.
+FOREST_SHARED uint forest_scrambled(uint x, uint seed) {
+  x += seed;
+  x ^= x * 0x6c50b47cu;
+  x ^= x * 0xb82f1e52u;
+  x ^= x * 0xc7afe638u;
+  return x ^ (x * 0x8d22f6e6u);
+}
+
+FOREST_SHARED uint forest_branch_key(uint instance, uint meta) {
+  return forest_mixed(forest_mixed(instance) + meta);
+}
+
+// Whether what has this opacity (0–255) shows in this subframe. The thresholds of one key are a shuffled and scrambled van
+// der Corput sequence (Burley 2020, "Practical hash-based Owen scrambling"): of n subframes, n · opacity to within one.
+FOREST_SHARED bool forest_shows(uint opacity, uint key, uint subframe) {
+  uint place = forest_reversed(forest_scrambled(forest_reversed(subframe), key));
+  uint threshold = forest_reversed(forest_scrambled(place, forest_mixed(key ^ 0x9e3779b9u)));
+  return (threshold >> 16) * 255u < opacity << 16;
+}
+
 // Occlusion: the farthest key of every square of 8 × 8 pixels, then of every 8 × 8 of those.
 #define FOREST_TILE 8u
 
@@ -75,5 +121,7 @@ struct Constants {
 static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 &&
               sizeof(Constants) == 160);
 inline constexpr uint cluster_size = FOREST_CLUSTER_SIZE;
+/// Item::drawn of all of so many segments, of cluster_size when they are more.
+constexpr uint first_segments(std::uint64_t count) { return count < 32 ? (1u << count) - 1u : 0xffffffffu; }
 }  // namespace forest::frame
 #endif

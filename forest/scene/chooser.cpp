@@ -3,16 +3,16 @@
 
 namespace forest::scene {
 
-const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport) {
-  eye_ = eye, viewport_ = viewport;
+const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown) {
+  eye_ = eye, viewport_ = viewport, shown_ = shown;
   revealed_segments_ = drawings_ = 0;
-  return cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr);
+  return cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr, shown);
 }
 
 void Chooser::complete(frame::Frame& frame) {
   frame.rest = [this](const frame::DepthMap& seen) {
-    revealed_ =
-        revealed(forest_, *eye_, viewport_, cut_.left_out, Occluders(seen, eye_->camera(), viewport_));
+    revealed_ = revealed(forest_, *eye_, viewport_, cut_.left_out, Occluders(seen, eye_->camera(), viewport_),
+                         shown_);
     revealed_segments_ += revealed_.segments, ++drawings_;
     return revealed_.lists();
   };

@@ -13,8 +13,8 @@ class Chooser {
  public:
   explicit Chooser(Forest forest) : forest_(std::move(forest)) {}
 
-  /// The cut of the next picture; valid until the one after it.
-  const Cut& choose(const Eye& eye, const frame::Viewport& viewport);
+  /// The cut of the next picture; valid until the one after it. What `shown` points to must last until it is drawn.
+  const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);
@@ -28,6 +28,7 @@ class Chooser {
   Forest forest_;
   std::optional<Eye> eye_;
   frame::Viewport viewport_;
+  Shown shown_;
   std::optional<Occluders> before_;
   Cut cut_, revealed_;
   std::uint64_t revealed_segments_ = 0, drawings_ = 0;

@@ -44,7 +44,7 @@ struct Cluster {
       if (magnification <= magnifications[i]) return visible[i] & all();
     return all();
   }
-  std::uint32_t all() const { return segment_count < 32 ? (1u << segment_count) - 1u : 0xffffffffu; }
+  std::uint32_t all() const { return frame::first_segments(segment_count); }
   /// The sphere around the segments [8 i, 8 i + 8) drawn. Packed: its centre from that of the cluster, a signed byte a
   /// coordinate in 127ths of the cluster's radius, and its radius, a byte in 127ths.
   Sphere group(std::uint32_t i) const {

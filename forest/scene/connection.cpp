@@ -2,6 +2,7 @@
 #include "forest/scene/connection.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "forest/core/parallel.h"
@@ -90,9 +91,9 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
     const frame::Instance& instance = forest_.instances()[index];
     std::vector<Vec3> begins, ends;
     for (const Piece& piece : pieces[index])
-      for (std::uint32_t i = 0; i < piece.item->segment_count; ++i) {
-        if (piece.item->without >> i & 1u) continue;
-        const frame::Segment& s = forest_.segments()[piece.item->first_segment + i];
+      for (std::uint32_t drawn = piece.item->drawn; drawn; drawn &= drawn - 1) {
+        const frame::Segment& s =
+            forest_.segments()[piece.item->first_segment + std::uint32_t(std::countr_zero(drawn))];
         if (subframes == 0 || draws(s, instance, camera, focal, piece.as_line, subframes)) {
           begins.push_back(begin_of(s));
           ends.push_back(end_of(s));

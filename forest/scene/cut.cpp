@@ -26,10 +26,13 @@ struct Placed {
   Sphere operator()(const Cluster& c) const { return (*this)(Sphere{{c.x, c.y, c.z}, c.radius}); }
 };
 
-frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t count, std::uint32_t without,
-                 const Sphere& sphere) {
-  return {instance,          first,        count, without, sphere.centre.x(), sphere.centre.y(),
-          sphere.centre.z(), sphere.radius};
+frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t drawn, const Sphere& sphere) {
+  return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
+}
+
+// Whether its branches are so thin that they are drawn as lines.
+bool is_thin(const Cluster& c, float magnification, const Detail& detail) {
+  return 2.f * c.thickness * magnification <= detail.surface_width;
 }
 
 constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
@@ -42,7 +45,73 @@ struct Look {
   const frame::Frustum& frustum;
   const Occluders* occluders;  // may be null
   bool keep;                   // what they hide
+  const Shown& shown;
+
+  frame::State state(std::uint32_t index) const {
+    return shown.states.empty() ? frame::State{} : shown.states[index];
+  }
 };
+
+// Adds a run to the list that it belongs to, drawn as `kind` or, for `any`, by its width in pixels.
+void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
+  if (!run.drawn) return;
+  switch (kind) {
+    case frame::Kind::somata:
+      return;
+    case frame::Kind::dots:
+      for (std::uint32_t drawn = run.drawn; drawn; drawn &= drawn - 1) {
+        cut.dots.push_back(run);
+        cut.dots.back().first_segment += std::uint32_t(std::countr_zero(drawn)), cut.dots.back().drawn = 1;
+      }
+      break;
+    default:
+      (kind == frame::Kind::lines || (kind == frame::Kind::any && thin) ? cut.lines : cut.capsules)
+          .push_back(run);
+  }
+  cut.segments += std::uint32_t(std::popcount(run.drawn));
+}
+
+// The states of the sections of a neuron that has parts; null: that of the neuron.
+std::vector<const frame::State*> states_of_sections(const Look& look, std::uint32_t index) {
+  const Forest& forest = look.forest;
+  const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
+  std::vector<const frame::State*> states(neuron.section_count, nullptr);
+  for (const Part& part : std::ranges::equal_range(look.shown.parts, index, {}, &Part::instance)) {
+    if (part.section == soma_section) {
+      std::ranges::fill(states, &part.state);
+      continue;
+    }
+    std::vector<bool> inside(neuron.section_count);
+    for (std::uint32_t s = part.section; s < neuron.section_count; ++s) {  // parents come first
+      const std::uint32_t parent = forest.sections()[neuron.first_section + s].parent;
+      inside[s] = s == part.section || (parent != 0xffffffffu && inside[parent]);
+      if (inside[s]) states[s] = &part.state;
+    }
+  }
+  return states;
+}
+
+// A leaf of a neuron with parts: runs of segments of one state.
+void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const Sphere& sphere, bool thin,
+               std::span<const frame::State* const> states, Cut& cut) {
+  const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
+  const frame::State whole = look.state(index);
+  const auto state_of = [&](std::uint32_t segment) -> const frame::State* {
+    const std::uint32_t section =
+        look.forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
+    return section == soma_section ? nullptr : states[section];
+  };
+  for (std::uint32_t rest = leaf.all(), drawn; rest; rest &= ~drawn) {
+    const frame::State* state = state_of(leaf.first_segment + std::uint32_t(std::countr_zero(rest)));
+    drawn = 0;
+    for (std::uint32_t i = 0; i < leaf.segment_count; ++i)
+      drawn |= std::uint32_t(state_of(leaf.first_segment + i) == state) << i;
+    if (!(state ? *state : whole).is(frame::State::visible)) continue;
+    frame::Item run = item(index, leaf.first_segment, drawn, sphere);
+    if (state) run.state = frame::packed(*state);
+    add(cut, run, (state ? *state : whole).kind, thin);
+  }
+}
 
 // Of a cluster that is good enough, these groups.
 void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std::uint32_t groups,
@@ -50,28 +119,21 @@ void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std:
   const Cluster& c = look.forest.clusters()[at];
   const float magnification = look.eye.magnification(sphere);
   const Detail& detail = look.eye.detail();
+  const frame::Kind kind = look.state(index).kind;
+  const bool thin = is_thin(c, magnification, detail);
   const std::uint32_t shown = detail.thin ? c.visible_at(magnification) : c.all();
-  auto& list = 2.f * c.thickness * magnification <= detail.surface_width ? cut.lines : cut.capsules;
-  if (groups == every_group && sphere.radius * magnification <= group_limit) {
-    if (!shown) return;
-    list.push_back(item(index, c.first_segment, c.segment_count, ~shown & c.all(), sphere));
-    cut.segments += std::uint32_t(std::popcount(shown));
-    return;
-  }
+  if (groups == every_group && sphere.radius * magnification <= group_limit)
+    return add(cut, item(index, c.first_segment, shown, sphere), kind, thin);
   std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
-    const std::uint32_t bits = shown >> (g * Cluster::group_size) & 255u;
-    if (!bits || !(groups >> g & 1u)) continue;
+    const std::uint32_t first = g * Cluster::group_size, drawn = shown >> first & 255u;
+    if (!drawn || !(groups >> g & 1u)) continue;
     const Sphere around = placed(c.group(g));
     if (!look.frustum.may_see(around)) continue;
-    if (look.occluders && look.occluders->hide(around)) {
+    if (look.occluders && look.occluders->hide(around))
       hidden |= 1u << g;
-      continue;
-    }
-    const std::uint32_t before = g * Cluster::group_size,
-                        count = std::min(c.segment_count - before, Cluster::group_size);
-    list.push_back(item(index, c.first_segment + before, count, ~bits & ((1u << count) - 1u), around));
-    cut.segments += std::uint32_t(std::popcount(bits));
+    else
+      add(cut, item(index, c.first_segment + first, drawn, around), kind, thin);
   }
   if (hidden && look.keep) cut.left_out.push_back({index, at, hidden});
 }
@@ -80,6 +142,11 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
   const Placed placed(look.forest.instances()[index]);
   const auto clusters = look.forest.clusters();
   const Eye& eye = look.eye;
+  const frame::State state = look.state(index);
+  const bool parted =
+      state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
+  const auto states = parted ? states_of_sections(look, index) : std::vector<const frame::State*>();
+  if (state.kind == frame::Kind::somata && !parted) return;
   std::uint32_t open[64];
   int depth = 0;
   open[depth++] = from;
@@ -92,12 +159,15 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
       if (look.keep) cut.left_out.push_back({index, at, 0});
       continue;
     }
-    if (!c.is_leaf() && depth + 2 <= 64 && !eye.good_enough(sphere, c.error)) {
+    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
       open[depth++] = c.children[1];
       open[depth++] = c.children[0];
       continue;
     }
-    choose_groups(look, index, at, every_group, placed, sphere, cut);
+    if (parted)
+      add_parts(look, index, c, sphere, is_thin(c, eye.magnification(sphere), eye.detail()), states, cut);
+    else
+      choose_groups(look, index, at, every_group, placed, sphere, cut);
   }
 }
 
@@ -110,12 +180,20 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
     if (look.keep) cut.left_out.push_back({index, soma, 0});
     return;
   }
+  frame::Item ball = item(index, neuron.first_segment, 1, sphere);
+  const frame::State state = look.state(index);
+  if (state.is(frame::State::parted)) {
+    for (const Part& part : std::ranges::equal_range(look.shown.parts, index, {}, &Part::instance))
+      if (part.section == soma_section) ball.state = frame::packed(part.state);
+    if (!(ball.state ? frame::unpacked(ball.state) : state).is(frame::State::visible)) return;
+  }
   const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
-  (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, 0, sphere));
+  (large ? cut.capsules : cut.dots).push_back(ball);
   ++cut.segments;
 }
 
 void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
+  if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
   const std::uint64_t before = cut.segments;
@@ -183,9 +261,10 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 
 }  // namespace
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before) {
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before,
+           const Shown& shown) {
   const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, before, true};
+  const Look look{forest, eye, frustum, before, true, shown};
   Cut cut = in_chunks(forest.instances().size(),
                       [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
@@ -195,9 +274,9 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport
 }
 
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now) {
+             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown) {
   const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, &now, false};
+  const Look look{forest, eye, frustum, &now, false, shown};
   return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
     const auto [instance, cluster, groups] = left_out[i];
     if (cluster == soma) {

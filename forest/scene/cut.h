@@ -19,6 +19,18 @@ struct LeftOut {
   std::uint32_t groups = 0;                 // bit i: group i of the cluster; 0: all of it, and all below
 };
 
+/// A branch that is shown otherwise than its neuron: a section and all that grows out of it.
+struct Part {
+  std::uint32_t instance = 0, section = 0;  // soma_section: the whole neuron
+  frame::State state;
+};
+
+/// How neurons are shown. Lists that are not there: all are visible, each drawn with the kind that fits its size.
+struct Shown {
+  std::span<const frame::State> states;  // one an instance
+  std::span<const Part> parts;           // by instance; later ones win. Their neurons are flagged as parted
+};
+
 struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
@@ -32,11 +44,11 @@ struct Cut {
 /// Pure: depends on its arguments alone, and is the same at any number of threads.
 /// @param before  what an earlier picture hid, as a guess: it goes to `left_out`. Null: everything in sight is chosen
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-           const Occluders* before = nullptr);
+           const Occluders* before = nullptr, const Shown& shown = {});
 
 /// Of what was left out, that which `now`, of the same view with all else drawn, does not hide. Drawn besides, the
 /// picture is the one without any guess.
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now);
+             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown = {});
 
 }  // namespace forest::scene

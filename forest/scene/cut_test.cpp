@@ -21,8 +21,7 @@ Forest sample() { return Forest::from_bytes(pack(testing::sample_circuit(), test
 
 bool same(const std::vector<frame::Item>& a, const std::vector<frame::Item>& b) {
   return std::ranges::equal(a, b, [](const frame::Item& x, const frame::Item& y) {
-    return x.instance == y.instance && x.first_segment == y.first_segment &&
-           x.segment_count == y.segment_count && x.without == y.without;
+    return x.instance == y.instance && x.first_segment == y.first_segment && x.drawn == y.drawn;
   });
 }
 
@@ -79,8 +78,8 @@ TEST(Cut, DrawsEverySegmentInSightOnce) {
     std::vector<std::set<std::uint32_t>> drawn(forest.instances().size()), shown(drawn.size());
     for (const auto* list : {&cut.lines, &cut.capsules})
       for (const frame::Item& item : *list)
-        for (std::uint32_t i = 0; i < item.segment_count; ++i)
-          if (!(item.without >> i & 1u)) {
+        for (std::uint32_t i = 0; i < frame::cluster_size; ++i)
+          if (item.drawn >> i & 1u) {
             EXPECT_TRUE(drawn[item.instance].insert(item.first_segment + i).second);
           }
     for (std::uint32_t i = 0; i < drawn.size(); ++i) {

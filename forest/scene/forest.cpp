@@ -63,17 +63,20 @@ static_assert(sizeof(Entry) == 32 && sizeof(Header) == 32 + 32 * part_count);
 
 using Json = nlohmann::ordered_json;
 
-std::string describe(const circuit::Circuit& c) {
+std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes) {
   Json json{{"name", c.name}, {"radius", c.radius}, {"morphologies", c.morphologies}};
   for (const auto& layer : c.layers)
     json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
   for (const auto& type : c.types)
     json["types"].push_back(
         {{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
+  if (!nodes.runs.empty()) json["populations"] = nodes.populations;
+  for (const circuit::NodeRun& run : nodes.runs)
+    json["nodes"].push_back({run.population, run.first_node, run.count});
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
-circuit::Circuit understand(std::string_view text) {
+circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
   const Json json = Json::parse(text);
   circuit::Circuit c;
   c.name = json.at("name");
@@ -84,6 +87,12 @@ circuit::Circuit understand(std::string_view text) {
   if (json.contains("types"))
     for (const auto& t : json["types"])
       c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory")});
+  if (json.contains("nodes")) {
+    nodes.populations = json.at("populations");
+    for (const auto& run : json["nodes"])
+      nodes.runs.push_back(
+          {.population = run.at(0), .first_instance = 0, .first_node = run.at(1), .count = run.at(2)});
+  }
   return c;
 }
 
@@ -105,7 +114,7 @@ std::vector<SectionFacts> facts_of(const Morphology& m) {
 }  // namespace
 
 std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morphology> morphologies,
-                            Progress& progress) {
+                            Progress& progress, const circuit::NodeNames& nodes) {
   circuit::check(c);
   if (morphologies.size() != c.morphologies.size())
     throw Error(fmt::format("the circuit names {} morphologies and {} came with it", c.morphologies.size(),
@@ -156,7 +165,7 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
     all_types.push_back(i.type);
     all_layers.push_back(i.layer);
   }
-  const std::string description = describe(c);
+  const std::string description = describe(c, nodes);
   const std::array<std::span<const std::byte>, part_count> parts{
       std::as_bytes(std::span(all_segments)),
       std::as_bytes(std::span(all_instances)),
@@ -191,6 +200,7 @@ struct Forest::Data {
   std::vector<std::byte> memory;
   std::array<std::span<const std::byte>, part_count> parts;
   circuit::Circuit circuit;
+  circuit::NodeNames nodes;
   Bounds soma_bounds;
   std::uint64_t segment_total = 0, bytes = 0;
 
@@ -213,6 +223,7 @@ std::span<const SectionFacts> Forest::sections() const { return data_->as<Sectio
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
+const circuit::NodeNames& Forest::nodes() const { return data_->nodes; }
 const Bounds& Forest::soma_bounds() const { return data_->soma_bounds; }
 std::uint64_t Forest::segment_total() const { return data_->segment_total; }
 std::uint64_t Forest::bytes() const { return data_->bytes; }
@@ -273,7 +284,7 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
   const Forest f(data);
   try {
     const auto text = data->parts[Part::text];
-    data->circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()});
+    data->circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()}, data->nodes);
   } catch (const nlohmann::json::exception&) {
     throw InputError(name, 0, "has a damaged description" + again);
   }
@@ -315,6 +326,15 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     data->soma_bounds.add({instance.x, instance.y, instance.z});
     data->segment_total += f.neurons()[instance.morphology].original_count;
   }
+  circuit::NodeNames& nodes = data->nodes;
+  if (nodes.runs.empty()) nodes = {{data->circuit.name}, {{0, 0, 0, std::uint32_t(f.instances().size())}}};
+  std::uint64_t named = 0;
+  for (circuit::NodeRun& run : nodes.runs) {
+    require(run.population < nodes.populations.size() && run.count <= f.instances().size() - named, wrong);
+    run.first_instance = std::uint32_t(named);
+    named += run.count;
+  }
+  require(named == f.instances().size(), wrong);
   data->bytes = bytes.size();
   return f;
 }

@@ -11,6 +11,7 @@
 #include <vector>
 
 #include "forest/circuit/circuit.h"
+#include "forest/circuit/node_sets.h"
 #include "forest/core/progress.h"
 #include "forest/frame/frame.h"
 #include "forest/morphology/morphology.h"
@@ -42,8 +43,9 @@ struct SectionFacts {
 static_assert(sizeof(Neuron) == 32 && sizeof(SectionFacts) == 32);
 
 /// Packs a circuit. `neurons[i]` is the one named circuit.morphologies[i]. The same input gives the same bytes.
+/// @param nodes  what SONATA calls the instances; without runs: 0, 1, 2, … of a population named as the circuit
 std::vector<std::byte> pack(const circuit::Circuit& circuit, std::span<const Morphology> neurons,
-                            Progress& progress = Progress::none());
+                            Progress& progress = Progress::none(), const circuit::NodeNames& nodes = {});
 
 /// An open forest file; immutable, cheap to copy.
 class Forest {
@@ -64,9 +66,10 @@ class Forest {
 
   /// Names, types, layers and radius; its instances are left empty, they are above.
   const circuit::Circuit& circuit() const;
-  const Bounds& soma_bounds() const;    // of all soma centres
-  std::uint64_t segment_total() const;  // original segments of all instances, as if each were stored
-  std::uint64_t bytes() const;          // of the file
+  const circuit::NodeNames& nodes() const;  // of all instances, in their order
+  const Bounds& soma_bounds() const;        // of all soma centres
+  std::uint64_t segment_total() const;      // original segments of all instances, as if each were stored
+  std::uint64_t bytes() const;              // of the file
   frame::Geometry geometry() const { return {segments(), instances()}; }
 
  private:

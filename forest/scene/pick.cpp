@@ -33,13 +33,16 @@ RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t s
           half_to_float(s.radii & 0xffff), half_to_float(s.radii >> 16)};
 }
 
-std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, float near) {
+std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, float near,
+                         std::span<const frame::State> states) {
   std::optional<Pick> best;
   std::vector<std::uint32_t> open;
   for (std::uint32_t index = 0; index < forest.instances().size(); ++index) {
     const frame::Instance& instance = forest.instances()[index];
     const Neuron& neuron = forest.neurons()[instance.morphology];
     if (!neuron.cluster_count) continue;
+    if (!states.empty() && !states[index].is(frame::State::visible)) continue;
+    const bool soma_alone = !states.empty() && states[index].kind == frame::Kind::somata;
     const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
     const Vec3 at(instance.x, instance.y, instance.z);
     open.assign(1, neuron.first_cluster);
@@ -54,6 +57,9 @@ std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, 
         continue;
       }
       for (std::uint32_t s = c.first_segment; s < c.first_segment + c.segment_count; ++s) {
+        const std::uint32_t section =
+            forest.section_of_segment()[neuron.first_original + s - neuron.first_segment];
+        if (soma_alone && section != soma_section) continue;
         RoundCone cone = in_world(forest, index, s);
         const float depth = (.5f * (cone.a + cone.b) - ray.origin).dot(ray.direction);
         cone.radius_a += tolerance * std::max(0.f, depth);
@@ -63,8 +69,7 @@ std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance, 
         // At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
         if (best && std::tuple(*t, index, s) >= std::tuple(best->distance, best->instance, best->segment))
           continue;
-        best =
-            Pick{index, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
+        best = Pick{index, s, section, *t};
       }
     }
   }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "forest/scene/forest.h"
@@ -17,7 +18,10 @@ struct Pick {
 };
 
 /// @param tolerance  radius of the ray at unit distance (µm a µm): half a pixel's slope makes thin branches pickable
-std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance = 0.f, float near = 0.f);
+/// @param states  one an instance: those that are not visible are not met, of those that show their somata alone the rest
+///                is not. None: all are
+std::optional<Pick> pick(const Forest& forest, const Ray& ray, float tolerance = 0.f, float near = 0.f,
+                         std::span<const frame::State> states = {});
 
 /// A segment of an instance in the world.
 RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t segment);

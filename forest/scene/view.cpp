@@ -3,8 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <charconv>
 #include <cmath>
-#include <map>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -18,43 +18,9 @@ using Json = nlohmann::ordered_json;
 
 constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
 
-constexpr std::array<std::string_view, 4> colour_names{"type", "layer", "kind", "neuron"};
+constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
+constexpr std::array<std::string_view, 5> kind_names{"any", "dots", "lines", "capsules", "somata"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
-
-float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
-Vec3 hex(std::uint32_t rgb) {
-  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f),
-          linear(float(rgb & 255) / 255.f)};
-}
-
-// Okabe & Ito (2008), safe for colour-blind eyes, ordered so that neighbours contrast; then lighter companions.
-constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
-                                                    0x0072B2, 0xD55E00, 0xFFD180, 0xA6DCFF, 0x7FD8B8,
-                                                    0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
-// Ramps from the pia down, one a type: warm, blue, green, violet, grey. Each keeps to one family of hues and grows darker,
-// so that types and layers can both be told, by colour-blind eyes too.
-constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B, 0xC8385A},
-                                                             {0x86C5F4, 0x4A9DE6, 0x2F6FD0},
-                                                             {0x86D9B6, 0x2FBF8F, 0x0E8F6E},
-                                                             {0xF4F1FF, 0xDCCBFA, 0xB9A2EE},
-                                                             {0xE8E8E8, 0xBBBBBB, 0x909090}}};
-// Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
-constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
-                                               0x31688E, 0x5A5AA8, 0x8E4A9E};
-
-// How a section kind changes the colour of its neuron: somata brighter, axons cooler and dimmer.
-Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
-  switch (kind) {
-    case 1:
-      return (base * 1.35f + Vec3::Constant(.10f * lift)).cwiseMin(1.f);
-    case std::uint32_t(SectionKind::axon):
-      return .55f * (.6f * base + .4f * hex(0x6C9BD2));
-    case std::uint32_t(SectionKind::apical):
-      return base;
-    default:
-      return .85f * base;
-  }
-}
 
 Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
   if (!json.is_array() || json.size() != 3)
@@ -70,13 +36,6 @@ Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) 
   return v;
 }
 
-Vec3 ramp_colour(std::uint32_t type, float t) {
-  const auto& ramp = ramps[type % ramps.size()];
-  const float at = 2.f * std::clamp(t, 0.f, 1.f);
-  const std::size_t i = at < 1.f ? 0 : 1;
-  return hex(ramp[i]) + (hex(ramp[i + 1]) - hex(ramp[i])) * (at - float(i));
-}
-
 float number_of(const Json& json, const std::string& name, std::string_view key, float low, float high) {
   if (!json.is_number() || !(json.get<float>() >= low && json.get<float>() <= high))
     throw InputError(name, 0, fmt::format("'{}' must be a number from {} to {}", key, low, high));
@@ -90,6 +49,121 @@ std::uint8_t word_of(const Json& json, const std::string& name, std::string_view
   if (found == words.end())
     throw InputError(name, 0, fmt::format("'{}' must be one of: {}", key, fmt::join(words, ", ")));
   return std::uint8_t(found - words.begin());
+}
+
+bool flag_of(const Json& json, const std::string& name, std::string_view key) {
+  if (!json.is_boolean()) throw InputError(name, 0, fmt::format("'{}' must be true or false", key));
+  return json.get<bool>();
+}
+
+std::uint32_t index_of(const Json& json, const std::string& name, std::string_view key) {
+  if (!json.is_number_unsigned() || json.get<std::uint64_t>() >= 0xffffffffull)
+    throw InputError(name, 0, fmt::format("'{}' must be a whole number from 0 on", key));
+  return json.get<std::uint32_t>();
+}
+
+// "#ff8800", or what colours mean.
+void read_colour(const Json& json, const std::string& name, Appearance& a) {
+  const std::string word = json.is_string() ? json.get<std::string>() : "";
+  if (word.starts_with('#')) {
+    std::uint32_t rgb = 0;
+    const auto [end, error] = std::from_chars(word.data() + 1, word.data() + word.size(), rgb, 16);
+    if (word.size() == 7 && error == std::errc() && end == word.data() + word.size()) {
+      a.colour = rgb;
+      return;
+    }
+  } else if (const auto found = std::ranges::find(colour_names, word); found != colour_names.end()) {
+    a.colour_by = ColourBy(found - colour_names.begin());
+    return;
+  }
+  throw InputError(name, 0,
+                   fmt::format("'colour' of a target must be a colour as \"#ff8800\", or one of: {}",
+                               fmt::join(colour_names, ", ")));
+}
+
+// The kinds whose opacity can be told apart, by their number in Segment::meta.
+std::string_view section_word(std::size_t kind) { return kind == 1 ? "soma" : name_of(SectionKind(kind)); }
+
+void read_opacities(const Json& json, const std::string& name, Appearance& a) {
+  if (json.is_number()) {
+    a.opacity = number_of(json, name, "opacity", 0.f, 1.f);
+    return;
+  }
+  if (!json.is_object())
+    throw InputError(
+        name, 0,
+        "'opacity' must be a number from 0 to 1, or one for each kind as {\"axon\": 0.2, \"soma\": 1}");
+  for (const auto& [word, value] : json.items()) {
+    if (word == "all") {
+      a.opacity = number_of(value, name, word, 0.f, 1.f);
+      continue;
+    }
+    std::size_t kind = 0;
+    while (kind < 8 && section_word(kind) != word) ++kind;
+    if (kind == 8)
+      throw InputError(
+          name, 0, fmt::format("'{}' is no kind of section; give soma, axon, basal, apical or all", word));
+    a.opacity_of[kind] = number_of(value, name, word, 0.f, 1.f);
+  }
+}
+
+Appearance appearance_of(const Json& json, const std::string& name) {
+  if (!json.is_object())
+    throw InputError(name, 0, "'targets' must hold objects as {\"name\": \"L5\", \"opacity\": 0.4}");
+  Appearance a;
+  for (const auto& [key, value] : json.items()) {
+    if (key == "name") {
+      if (!value.is_string() || value.get<std::string>().empty())
+        throw InputError(
+            name, 0, "'name' must be the name of a target, or an expression as \"L5 and not inhibitory\"");
+      a.name = value.get<std::string>();
+    } else if (key == "neuron") {
+      if (!a.branch) a.branch = Branch{};
+      a.branch->neuron = index_of(value, name, key);
+    } else if (key == "section") {
+      if (!a.branch) a.branch = Branch{};
+      a.branch->section = index_of(value, name, key);
+    } else if (key == "visible") {
+      a.visible = flag_of(value, name, key);
+    } else if (key == "simulated") {
+      a.simulated = flag_of(value, name, key);
+    } else if (key == "colour") {
+      read_colour(value, name, a);
+    } else if (key == "kind") {
+      a.kind = frame::Kind(word_of(value, name, key, kind_names));
+    } else if (key == "opacity") {
+      read_opacities(value, name, a);
+    } else {
+      throw InputError(name, 0, fmt::format("'{}' is no key of a target; see docs/scene/targets.md", key));
+    }
+  }
+  if (a.name.empty() == !a.branch || (a.branch && !json.contains("neuron")))
+    throw InputError(
+        name, 0,
+        "each of the targets must have a 'name', or a 'neuron' with or without a 'section', and not both");
+  return a;
+}
+
+Json json_of(const Appearance& a) {
+  Json json;
+  if (a.branch) {
+    json["neuron"] = a.branch->neuron;
+    if (a.branch->section != soma_section) json["section"] = a.branch->section;
+  } else {
+    json["name"] = a.name;
+  }
+  const auto number = [](float value) { return std::round(double(value) * 1e4) / 1e4; };
+  if (a.visible) json["visible"] = *a.visible;
+  if (a.colour) json["colour"] = fmt::format("#{:06x}", *a.colour);
+  if (a.colour_by) json["colour"] = colour_names[std::size_t(*a.colour_by)];
+  if (a.kind) json["kind"] = kind_names[std::size_t(*a.kind)];
+  Json parts;
+  if (a.opacity) parts["all"] = number(*a.opacity);
+  for (std::size_t kind = 0; kind < 8; ++kind)
+    if (a.opacity_of[kind]) parts[section_word(kind)] = number(*a.opacity_of[kind]);
+  if (!parts.is_null()) json["opacity"] = parts.size() == 1 && a.opacity ? parts["all"] : parts;
+  if (a.simulated) json["simulated"] = *a.simulated;
+  return json;
 }
 
 }  // namespace
@@ -132,7 +206,10 @@ View parse_view(std::string_view text, const std::string& name) {
       v.colour_by = ColourBy(word_of(value, name, key, colour_names));
     else if (key == "background")
       v.background = Background(word_of(value, name, key, background_names));
-    else if (key == "gaze") {
+    else if (key == "targets") {
+      if (!value.is_array()) throw InputError(name, 0, "'targets' must be a list; see docs/scene/targets.md");
+      for (const Json& one : value) v.targets.push_back(appearance_of(one, name));
+    } else if (key == "gaze") {
       if (!value.is_array() || value.size() != 2 || !value[0].is_number() || !value[1].is_number())
         throw InputError(
             name, 0, "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
@@ -161,6 +238,7 @@ std::string to_json(const View& v) {
             {"fog", v.fog},
             {"halo", v.halo}};
   if (v.detail.gaze) json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+  for (const Appearance& a : v.targets) json["targets"].push_back(json_of(a));
   return json.dump();
 }
 
@@ -197,77 +275,6 @@ View portrait(const Forest& forest) {
   return view;
 }
 
-Colouring colour(const Forest& forest, ColourBy by, Background background) {
-  Colouring result{.palette = frame::black_palette(),
-                   .classes = std::vector<std::uint8_t>(forest.instances().size()),
-                   .legend = {}};
-  const bool light = background == Background::light;
-  std::array<Vec3, 16> base;
-  base.fill(hex(0xBBBBBB));
-  const auto& circuit = forest.circuit();
-  const auto fill = [&](std::size_t count, const auto& rgb, const auto& name_of_class) {
-    for (std::size_t i = 0; i < std::min<std::size_t>(count, base.size()); ++i) {
-      base[i] = hex(rgb(i)) * (light ? .7f : 1.f);
-      result.legend.push_back({name_of_class(i), base[i]});
-    }
-  };
-  switch (by) {
-    case ColourBy::type: {
-      // The hue tells the type, its step the layer. Pairs of them are numbered as they are met; past sixteen they share.
-      std::map<std::pair<std::uint32_t, std::uint32_t>, std::uint8_t> pairs;
-      for (std::size_t i = 0; i < result.classes.size(); ++i)
-        pairs.try_emplace({forest.types()[i], forest.layers()[i]}, std::uint8_t(0));
-      std::map<std::uint32_t, std::uint32_t> layers_of_type;
-      for (const auto& [pair, number] : pairs) ++layers_of_type[pair.first];
-      std::uint32_t next = 0, step = 0, type_before = 0;
-      for (auto& [pair, number] : pairs) {
-        const auto [type, layer] = pair;
-        step = next > 0 && type == type_before ? step + 1 : 0;
-        type_before = type;
-        number = std::uint8_t(std::min(next++, 15u));
-        const std::uint32_t steps = layers_of_type[type];
-        base[number] =
-            ramp_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light ? .6f : 1.f);
-        result.legend.push_back(
-            {circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""), base[number]});
-      }
-      for (std::size_t i = 0; i < result.classes.size(); ++i)
-        result.classes[i] = pairs[{forest.types()[i], forest.layers()[i]}];
-      break;
-    }
-    case ColourBy::layer:
-      fill(
-          circuit.layers.size(), [&](std::size_t i) { return layered[i % layered.size()]; },
-          [&](std::size_t i) { return circuit.layers[i].name; });
-      for (std::size_t i = 0; i < result.classes.size(); ++i)
-        result.classes[i] = std::uint8_t(forest.layers()[i] % 16);
-      break;
-    case ColourBy::neuron:
-      for (std::size_t i = 0; i < 14; ++i) base[i] = hex(categorical[i]) * (light ? .7f : 1.f);
-      for (std::size_t i = 0; i < result.classes.size(); ++i)
-        result.classes[i] = std::uint8_t(i * 2654435761u >> 16 & 0xffff) % 14;
-      break;
-    case ColourBy::kind:
-      break;
-  }
-  for (std::uint32_t c = 0; c < 16; ++c)
-    for (std::uint32_t kind = 0; kind < 8; ++kind)
-      result.palette[8 * c + kind] = of_kind(base[c], kind, light ? 0.f : 1.f);
-  if (by == ColourBy::kind) {
-    // The colours neuroanatomists know: soma black or white, axon blue, basal red, apical magenta.
-    const std::array<std::uint32_t, 8> kinds{0x999999, 0xF0E442, 0x0072B2, 0xD55E00,
-                                             0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
-    for (std::uint32_t i = 0; i < 128; ++i) result.palette[i] = hex(kinds[i % 8]) * (light ? .7f : 1.f);
-    const std::array<std::uint32_t, 4> shown{1, 2, 3, 4};
-    for (const auto kind : shown)
-      result.legend.push_back(
-          {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), result.palette[kind]});
-  }
-  result.palette[highlight_entry] = light ? hex(0xC00040) : Vec3(1.f, 1.f, 1.f);
-  result.palette[outline_entry] = light ? hex(0x8090A0) : hex(0x5A6B80);
-  return result;
-}
-
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
   detail.thin = view.samples == 1;
@@ -281,15 +288,17 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.camera = view.camera;
   f.width = width, f.height = height, f.subframes = view.samples;
   f.palette = colouring.palette;
-  f.colour_class = colouring.classes;
+  f.opacities = colouring.opacities, f.states = colouring.states;
   static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;
   frame::Style& s = f.style;
   s.halo = view.halo;
   if (view.background == Background::light) {
-    s.background_top = hex(0xF7F9FC), s.background_bottom = hex(0xE6EBF2), s.fog_colour = hex(0xEDF1F7);
+    s.background_top = light_of(0xF7F9FC), s.background_bottom = light_of(0xE6EBF2),
+    s.fog_colour = light_of(0xEDF1F7);
   } else {
-    s.background_top = hex(0x0E1420), s.background_bottom = hex(0x05070C), s.fog_colour = hex(0x0A0F1A);
+    s.background_top = light_of(0x0E1420), s.background_bottom = light_of(0x05070C),
+    s.fog_colour = light_of(0x0A0F1A);
   }
   // Fog begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
   const Bounds& bounds = forest.soma_bounds();

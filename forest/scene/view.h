@@ -8,25 +8,25 @@
 #include <vector>
 
 #include "forest/frame/frame.h"
+#include "forest/scene/colouring.h"
 #include "forest/scene/cut.h"
 
 namespace forest::scene {
-
-enum class ColourBy : std::uint8_t { type, layer, kind, neuron };
-enum class Background : std::uint8_t { dark, light };
 
 struct View {
   frame::Camera camera;
   Detail detail;  // gaze in shares of the width and height here, so that a view fits every picture size
   ColourBy colour_by = ColourBy::type;
   Background background = Background::dark;
-  std::uint32_t samples = 16;  // subframes of a still picture
-  float fog = 1.f;             // strength of the depth cue; 0 for none
-  float halo = 1.f;            // strength of the rim around nearer branches; 0 for none
+  std::uint32_t samples = 16;       // subframes of a still picture
+  float fog = 1.f;                  // strength of the depth cue; 0 for none
+  float halo = 1.f;                 // strength of the rim around nearer branches; 0 for none
+  std::vector<Appearance> targets;  // how they are shown; later ones win
 };
 
 /// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"gaze":[.5,.5],"error":1,"colour_by":"type",
-///  "background":"dark","samples":16,"fog":1,"halo":1}; only eye and target are needed.
+///  "background":"dark","samples":16,"fog":1,"halo":1,"targets":[{"name":"L5","opacity":.4}]}; only eye and target are
+/// needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);
@@ -36,23 +36,6 @@ View overview(const Forest& forest);
 
 /// A picture to hang on a wall: near enough to follow single dendrites, far enough to see the layers.
 View portrait(const Forest& forest);
-
-struct LegendEntry {
-  std::string name;
-  Vec3 colour;  // linear light
-};
-
-/// Colours of all instances for a way of colouring.
-struct Colouring {
-  frame::Palette palette;
-  std::vector<std::uint8_t> classes;  // one an instance
-  std::vector<LegendEntry> legend;
-};
-Colouring colour(const Forest& forest, ColourBy by, Background background);
-
-/// Palette entry for highlights: bright, used by overlays.
-inline constexpr std::uint32_t highlight_entry = 127;
-inline constexpr std::uint32_t outline_entry = 126;
 
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,

@@ -15,8 +15,8 @@ Cut whole(const Forest& forest, const frame::Camera& camera, const frame::Viewpo
     for (const Cluster& c : forest.clusters().subspan(neuron.first_cluster, neuron.cluster_count)) {
       const Sphere sphere{place + turn * Vec3(c.x, c.y, c.z), c.radius};
       if (!c.is_leaf() || !frustum.may_see(sphere)) continue;
-      cut.capsules.push_back({index, c.first_segment, c.segment_count, 0, sphere.centre.x(),
-                              sphere.centre.y(), sphere.centre.z(), sphere.radius});
+      cut.capsules.push_back({index, c.first_segment, c.all(), 0, sphere.centre.x(), sphere.centre.y(),
+                              sphere.centre.z(), sphere.radius});
       cut.segments += c.segment_count;
     }
     cut.neurons += cut.segments > before;

@@ -49,7 +49,8 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   State& s = *state_;
   frame::check(f, s.picture.geometry);
   s.seen = {};
-  s.picture.colour_class = f.colour_class;
+  s.picture.states = f.states, s.picture.opacities = f.opacities;
+  s.picture.transparent = frame::transparent(f);
   frame::Timing timing;
   for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes);
        ++subframe) {

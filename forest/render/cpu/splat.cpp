@@ -21,8 +21,7 @@ constexpr std::size_t run = FOREST_CLUSTER_SIZE;
 constexpr std::size_t ahead = 3;
 void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
   const auto* at = reinterpret_cast<const char*>(&geometry.segments[item.first_segment]);
-  for (std::size_t i = 0; i < std::min<std::size_t>(item.segment_count, 8); i += 2)
-    __builtin_prefetch(at + i * sizeof(frame::Segment));
+  for (std::size_t i = 0; i < 8; i += 2) __builtin_prefetch(at + i * sizeof(frame::Segment));
   __builtin_prefetch(&geometry.instances[item.instance]);
 }
 
@@ -41,15 +40,59 @@ struct Run {
   float width[run];                  // pixels; below 0: nothing of it lies before the eye
   float mean_width[run], rank[run];  // of its branch; in [0, 1)
   std::uint32_t entry[run];          // of the palette
+  std::uint32_t meta[run];           // as frame::Segment's
+  std::uint32_t opacity[run],
+      key[run];  // 0: left out; below 255: a screen door with this key (frame/layout.h)
 };
+
+// A canvas seen through a screen door: only the pixels at which something of that opacity shows.
+struct Door {
+  Canvas& canvas;
+  std::uint32_t opacity, key_of_branch, subframe;
+
+  bool open(std::int32_t x, std::int32_t y) const {
+    const std::uint32_t pixel = std::uint32_t(y) * std::uint32_t(canvas.width()) + std::uint32_t(x);
+    return frame::forest_shows(opacity, key_of_branch ^ frame::forest_mixed(pixel), subframe);
+  }
+  std::int32_t width() const { return canvas.width(); }
+  std::int32_t height() const { return canvas.height(); }
+  bool hidden(float left, float top, float right, float bottom, float nearest_code) const {
+    return canvas.hidden(left, top, right, bottom, nearest_code);
+  }
+  bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const { return canvas.before(x, y, key); }
+  void put(std::int32_t x, std::int32_t y, std::uint32_t key) {
+    if (open(x, y)) canvas.put(x, y, key);
+  }
+};
+
+// Calls draw with the canvas of a segment.
+void through(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas, auto&& draw) {
+  if (r.opacity[i] == 255) return draw(canvas);
+  if (r.opacity[i] == 0) return;
+  Door door{canvas, r.opacity[i], r.key[i], picture.constants.subframe};
+  draw(door);
+}
+
+// Of a run that is loaded, what is transparent, and what of that does not show in this subframe.
+void leave_out(const Picture& picture, const frame::Item& item, const frame::State& state, Run& r) {
+  const frame::Constants& c = picture.constants;
+  for (std::size_t i = 0; i < r.count; ++i) {
+    const std::uint32_t opacity = (state.opacity * picture.opacities[r.entry[i]] + 127u) / 255u;
+    if (opacity == 255) continue;
+    r.key[i] = frame::forest_branch_key(item.instance, r.meta[i]);
+    r.opacity[i] = c.subframes < FOREST_DOOR_SUBFRAMES                  ? opacity
+                   : frame::forest_shows(opacity, r.key[i], c.subframe) ? 255u
+                                                                        : 0u;
+  }
+}
 
 void load(const Picture& picture, const frame::Item& item, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
-  const std::uint32_t colour = picture.colour_class[item.instance] * 8u;
+  const frame::State state = picture.state_of(item);
+  const std::uint32_t colour = state.colour_class * 8u;
   const float turn = golden * float(picture.constants.subframe);
   r.count = 0;
-  for (std::uint32_t drawn = ~item.without & (0xffffffffu >> (32u - item.segment_count)); drawn;
-       drawn &= drawn - 1) {
+  for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
     const frame::Segment& s = segments[std::countr_zero(drawn)];
     const std::size_t i = r.count++;
     r.ax[i] = s.ax, r.ay[i] = s.ay, r.az[i] = s.az;
@@ -58,8 +101,33 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.mean_width[i] = from_half(s.meta >> 16);
     r.rank[i] = float(s.meta >> 8 & 255) * (1.f / 256.f) + turn;
     r.entry[i] = colour + (s.meta & 7);
+    r.meta[i] = s.meta;
+    r.opacity[i] = 255;
   }
+  if (picture.transparent) leave_out(picture, item, state, r);
 }
+
+// A segment of a branch as a string of beads: spheres that cover as much of the picture together, a bead for two
+// diameters of its length, none shorter than two pixels. A soma is one already.
+struct Beads {
+  Vec3 a, b;
+  std::uint32_t count;
+  float radius;
+
+  Beads(const Run& r, float pixels_a_unit)
+      : a(r.ax[0], r.ay[0], r.az[0]), b(r.bx[0], r.by[0], r.bz[0]), count(1), radius(r.ra[0]) {
+    const float length = (b - a).norm(), width = r.ra[0] + r.rb[0];
+    if (!(length > 0.f)) return;
+    const float most = std::min({.5f * length / std::max(width, 1e-6f), .5f * length * pixels_a_unit, 16.f});
+    count = std::uint32_t(std::max(most, 1.f));
+    radius = std::sqrt(length * width / (3.14159f * float(count)));
+  }
+  void put(std::uint32_t k, Run& r) const {
+    const Vec3 at = a + (float(k) + .5f) / float(count) * (b - a);
+    r.ra[0] = r.rb[0] = radius;
+    r.ax[0] = r.bx[0] = at.x(), r.ay[0] = r.by[0] = at.y(), r.az[0] = r.bz[0] = at.z();
+  }
+};
 
 // From the coordinates of their neuron to pixels: camera = turn · p + at.
 [[gnu::target_clones("default", "arch=haswell")]] void project(const frame::Constants& c, const Mat3& turn,
@@ -147,7 +215,8 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
 
-void draw_line(const Run& r, std::size_t i, Canvas& canvas) {
+// As draw_line in render/opengl/shaders/common.glsl.
+void draw_line(const Run& r, std::size_t i, auto& canvas) {
   if (!(r.line_width[i] > 0.f) || canvas.hidden(r.left[i], r.top[i], r.right[i], r.bottom[i], r.nearest[i]))
     return;
   const bool steep = r.steep[i];
@@ -166,7 +235,7 @@ void draw_line(const Run& r, std::size_t i, Canvas& canvas) {
 }
 
 // A thin capsule by its distance from the axis on screen: as draw_tube in render/opengl/shaders/capsule.glsl.
-void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
+void draw_tube(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
   const frame::Constants& c = picture.constants;
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
   float wp = c.focal * r.ra[i] / r.az[i], wq = c.focal * r.rb[i] / r.bz[i], za = r.code_a[i],
@@ -357,7 +426,7 @@ Outline outline_of(const frame::Constants& c, const Run& r, std::size_t i, const
   return {{r.px[i], r.py[i]}, {r.qx[i], r.qy[i]}, reach(body.a, body.ra), reach(body.b, body.rb), exact};
 }
 
-void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
+void draw_capsule(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
   const frame::Constants& c = picture.constants;
   const Body body(r, i);
   const Outline outline = outline_of(c, r, i, body);
@@ -388,7 +457,7 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
     for (std::int32_t y = first; y < last; ++y) scan(y);
 }
 
-void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
+void draw_near(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
   const frame::Constants& c = picture.constants;
   if (r.width[i] < 0.f) return;
   const float width = c.focal * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
@@ -406,7 +475,7 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
 }
 
 // Small spheres: as render/opengl/shaders/dots.glsl.
-void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) {
+void draw_dot(const Picture& picture, const Run& r, float rank, auto& canvas) {
   if (r.width[0] < 0.f) return;
   const frame::Constants& c = picture.constants;
   const float px = r.px[0], py = r.py[0], z = r.az[0], radius = c.focal * r.ra[0] / z;
@@ -435,6 +504,21 @@ void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) 
     }
 }
 
+// The one segment of a dot.
+void draw_beads(const Picture& picture, const frame::Item& item, const Mat3& turn, const Vec3& at,
+                float depth, Run& r, Canvas& canvas) {
+  const frame::Constants& c = picture.constants;
+  const Beads beads(r, c.focal / std::max(depth, c.near));
+  const float of_branch = (r.entry[0] & 7) == 1 ? 0.f : float(item.first_segment & 0xffff) * .5698403f;
+  for (std::uint32_t k = 0; k < beads.count; ++k) {
+    beads.put(k, r);
+    project(c, turn, at, picture.light, r);
+    const float rank = fraction(float(item.instance) * .7548777f + of_branch + float(k) * .3819660f +
+                                golden * float(c.subframe));
+    through(picture, r, 0, canvas, [&](auto& seen) { draw_dot(picture, r, rank, seen); });
+  }
+}
+
 }  // namespace
 
 void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
@@ -443,7 +527,7 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
     Run r{};
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Item& item = items[k];
-      if (!item.segment_count) continue;
+      if (!item.drawn) continue;
       if (k + ahead < end) prefetch(picture.geometry, items[k + ahead]);
       const Vec3 centre = picture.to_camera * (Vec3(item.x, item.y, item.z) - picture.eye);
       const float nearest = centre.z() - item.radius;
@@ -458,19 +542,25 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
           picture.to_camera * Quat(instance.qw, instance.qx, instance.qy, instance.qz).toRotationMatrix();
       const Vec3 at = picture.to_camera * (Vec3(instance.x, instance.y, instance.z) - picture.eye);
       load(picture, item, r);
+      if (kind == Kind::dots) {
+        draw_beads(picture, item, turn, at, centre.z(), r, canvas);
+        continue;
+      }
       project(c, turn, at, picture.light, r);
       switch (kind) {
         case Kind::lines:
           prepare_lines(c, r);
-          for (std::size_t i = 0; i < r.count; ++i) draw_line(r, i, canvas);
+          for (std::size_t i = 0; i < r.count; ++i)
+            if (r.line_width[i] > 0.f)
+              through(picture, r, i, canvas, [&](auto& seen) { draw_line(r, i, seen); });
           break;
         case Kind::capsules:
           prepare_lines(c, r);
-          for (std::size_t i = 0; i < r.count; ++i) draw_near(picture, r, i, canvas);
+          for (std::size_t i = 0; i < r.count; ++i)
+            through(picture, r, i, canvas, [&](auto& seen) { draw_near(picture, r, i, seen); });
           break;
         case Kind::dots:
-          draw_dot(picture, r, fraction(float(item.instance) * .7548777f + golden * float(c.subframe)),
-                   canvas);
+          break;
       }
     }
   });

@@ -11,10 +11,16 @@ namespace forest::render::cpu {
 /// One picture's constants in the form that drawing needs.
 struct Picture {
   frame::Geometry geometry;
-  std::span<const std::uint8_t> colour_class;
+  std::span<const frame::State> states;
+  frame::Opacities opacities;
+  bool transparent = false;  // something may be
   frame::Constants constants;
   Mat3 to_camera;  // rows: right, up, forward
   Vec3 eye, light;
+
+  frame::State state_of(const frame::Item& item) const {
+    return item.state ? frame::unpacked(item.state) : states[item.instance];
+  }
 };
 
 enum class Kind { dots, lines, capsules };

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <cstring>
@@ -61,10 +62,11 @@ class Buffer {
 
 class Program {
  public:
-  Program(const char* title, const char* body, const char* before = "") {
+  Program(const char* title, const char* body, const char* before = "", const char* definitions = "") {
     const GLuint shader = glCreateShader(GL_COMPUTE_SHADER);
-    const char* texts[] = {"#version 450 core\n", shaders::layout, shaders::common, before, body};
-    glShaderSource(shader, 5, texts, nullptr);
+    const char* texts[] = {"#version 450 core\n", definitions, shaders::layout,
+                           shaders::common,       before,      body};
+    glShaderSource(shader, 6, texts, nullptr);
     glCompileShader(shader);
     name_ = glCreateProgram();
     glAttachShader(name_, shader);
@@ -89,6 +91,16 @@ class Program {
   GLuint name_ = 0;
 };
 
+// What draws lists.
+struct Drawing {
+  explicit Drawing(const char* definitions)
+      : dots("dots", shaders::dots, "", definitions),
+        lines("lines", shaders::lines, "", definitions),
+        capsules("capsules", shaders::capsules, shaders::capsule, definitions),
+        close_ups("close_ups", shaders::close_ups, shaders::capsule, definitions) {}
+  Program dots, lines, capsules, close_ups;
+};
+
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -97,7 +109,7 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 struct OpenGLRenderer::Device {
   struct List {
-    const Program* program;
+    Program Drawing::*program;
     std::uint32_t flags;
     Buffer items;
     std::uint32_t count = 0;
@@ -107,15 +119,15 @@ struct OpenGLRenderer::Device {
   using ListSet = std::array<List, list_count>;
   static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
 
-  Program dots{"dots", shaders::dots}, lines{"lines", shaders::lines},
-      capsules{"capsules", shaders::capsules, shaders::capsule},
-      close_ups{"close_ups", shaders::close_ups, shaders::capsule}, cull{"cull", shaders::cull},
-      tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
+  Drawing opaque{""};
+  std::unique_ptr<Drawing> transparent;  // made when something is
+  const Drawing* drawing = &opaque;
+  Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
+  Buffer segments, instances, states, palette, overlay_segments, uniforms, keys, sums, image, queue,
       large_queue, tiles;
-  ListSet lists{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}},
-      rest{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}};
-  List overlays{&capsules, FOREST_OVERLAY, {}};
+  ListSet lists{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}},
+      rest{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}};
+  List overlays{&Drawing::capsules, FOREST_OVERLAY, {}};
   frame::DepthMap seen;
   std::vector<std::uint32_t> farthest;
   frame::Geometry geometry;
@@ -128,7 +140,7 @@ struct OpenGLRenderer::Device {
     list.items.upload(items);
     list.count = std::uint32_t(items.size());
     list.segments = 0;
-    for (const Item& item : items) list.segments += item.segment_count;
+    for (const Item& item : items) list.segments += std::size_t(std::popcount(item.drawn));
   }
 
   void upload(ListSet& to, const frame::Lists& from) {
@@ -147,16 +159,24 @@ struct OpenGLRenderer::Device {
     std::vector<Item> mark_items;
     for (const frame::Overlay& o : f.overlays) marks.push_back(frame::segment_of(o));
     for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
-      mark_items.push_back({0, std::uint32_t(i),
-                            std::uint32_t(std::min<std::size_t>(frame::cluster_size, marks.size() - i)), 0, 0,
-                            0, 0, INFINITY});  // never culled as a whole
+      mark_items.push_back({0, std::uint32_t(i), frame::first_segments(marks.size() - i), 0, 0, 0, 0,
+                            INFINITY});  // never culled as a whole
     overlay_segments.upload(std::span<const Segment>(marks));
     set(overlays, mark_items);
     upload(lists, f);
 
-    colour_classes.upload(f.colour_class);
+    states.upload(f.states);
+    if (frame::transparent(f)) {
+      if (!transparent) transparent = std::make_unique<Drawing>("#define FOREST_DOOR\n");
+      drawing = transparent.get();
+    } else {
+      drawing = &opaque;
+    }
     std::array<float, 4 * std::tuple_size_v<frame::Palette>> colours{};
-    for (std::size_t i = 0; i < f.palette.size(); ++i) Vec3::Map(&colours[4 * i]) = f.palette[i];
+    for (std::size_t i = 0; i < f.palette.size(); ++i) {
+      Vec3::Map(&colours[4 * i]) = f.palette[i];
+      colours[4 * i + 3] = f.opacities[i];
+    }
     palette.upload(std::span<const float>(colours));
   }
 
@@ -170,7 +190,7 @@ struct OpenGLRenderer::Device {
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
     instances.bind_texels(1, GL_RGBA32UI);
     keys.bind_texels(3, GL_R32UI);
-    colour_classes.bind_texels(4, GL_R8UI);
+    states.bind_texels(4, GL_RGBA8UI);
     palette.bind_texels(5, GL_RGBA32F);
     large_queue.bind_texels(7, GL_R32UI);
     tiles.bind_texels(8, GL_R32UI);
@@ -200,8 +220,8 @@ struct OpenGLRenderer::Device {
     (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind_texels(0, GL_RGBA32UI);
     cull.use();
     glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
-    run_queue(*list.program, queue);
-    if (list.program == &capsules) run_queue(close_ups, large_queue);
+    run_queue(drawing->*list.program, queue);
+    if (list.program == &Drawing::capsules) run_queue(drawing->close_ups, large_queue);
   }
 
   void run_queue(const Program& program, const Buffer& groups) {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <chrono>
 #include <cmath>
 #include <numeric>
@@ -51,6 +52,7 @@ struct Capsule {
   float nearest;         // depth
   int left, right, top, bottom;  // pixels, [left, right) × [top, bottom)
   std::uint8_t entry;
+  std::uint32_t opacity, key;  // 0–255, of a screen door; see frame/layout.h
 };
 
 float half_to_float(std::uint32_t bits) {
@@ -222,7 +224,9 @@ float facing(const Capsule& c, const Vec3& place, const Vec3& light) {
 
 // Where the rays (x, y, 1) enter the capsule, as geometry/round_cone.h but for sixteen rays, none of unit length: what
 // is solved for is the depth itself.
-void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, Pixel& pixel) {
+// Only the samples whose bits are set in `shown` change.
+void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, std::uint32_t shown,
+          Pixel& pixel) {
   Lanes depth = Lanes::constant(INFINITY);
   if (c.c2 <= 0.f || meet_side(c, x, y, depth)) {
     meet_sphere(c.a, c.ra, x, y, depth);
@@ -231,7 +235,7 @@ void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, Pixe
   bool changed = false;
   for (std::size_t i = 0; i < lanes; ++i) {
     const float z = std::max(depth[i], eye.near);
-    if (!(z < pixel.depth[i])) continue;
+    if (!(z < pixel.depth[i]) || !(shown >> i & 1)) continue;
     pixel.depth[i] = z;
     pixel.shade[i] = std::clamp(.5f + .5f * facing(c, depth[i] * Vec3(x[i], y[i], 1.f), eye.light), 0.f, 1.f);
     pixel.entry[i] = c.entry;
@@ -243,8 +247,13 @@ void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, Pixe
 // Draws sixteen samples of every pixel. `shift`: where in the pixel they lie.
 class Canvas {
  public:
-  Canvas(const Eye& eye, const std::array<Vec2, lanes>& shift)
+  /// @param first, last  the samples are subframes, from the first on; those beyond the last repeat it
+  Canvas(const Eye& eye, const std::array<Vec2, lanes>& shift, std::uint32_t first, std::uint32_t last,
+         std::uint32_t subframes)
       : eye_(eye),
+        first_(first),
+        last_(last),
+        by_pixel_(subframes < FOREST_DOOR_SUBFRAMES),
         wide_((eye.width + tile - 1) / tile),
         tall_((eye.height + tile - 1) / tile),
         pixels_(std::size_t(eye.width) * std::size_t(eye.height)),
@@ -321,8 +330,19 @@ class Canvas {
           ray_x[i] = (px - eye_.centre_x - shift_x_[i]) / eye_.focal;
           ray_y[i] = (eye_.centre_y + shift_y_[i] - py) / eye_.focal;
         }
-        meet(c, ray_x, ray_y, eye_, pixel);
+        const auto place = std::uint32_t(y * eye_.width + x);
+        meet(c, ray_x, ray_y, eye_, shown(c, by_pixel_ ? frame::forest_mixed(place) : 0u), pixel);
       }
+  }
+
+  // The samples in which a capsule shows.
+  std::uint32_t shown(const Capsule& c, std::uint32_t pixel) const {
+    if (c.opacity == 255) return ~0u;
+    std::uint32_t bits = 0;
+    for (std::uint32_t i = 0; i < lanes; ++i)
+      bits |= std::uint32_t(frame::forest_shows(c.opacity, c.key ^ pixel, std::min(first_ + i, last_ - 1)))
+              << i;
+    return bits;
   }
 
   // The share of the pixels around in which something nearer stands (after eye-dome lighting, Boucheny 2009).
@@ -338,6 +358,8 @@ class Canvas {
   }
 
   const Eye& eye_;
+  std::uint32_t first_, last_;
+  bool by_pixel_;
   int wide_, tall_;  // in tiles
   Lanes shift_x_, shift_y_;
   std::vector<Pixel> pixels_;
@@ -384,8 +406,11 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     c.a = eye.seen(at + turn * Vec3(s.ax, s.ay, s.az));
     c.b = eye.seen(at + turn * Vec3(s.bx, s.by, s.bz));
     c.ra = half_to_float(s.radii & 0xffff), c.rb = half_to_float(s.radii >> 16);
-    c.entry = std::uint8_t(f.colour_class[item.instance] * 8u + (s.meta & 7u));
-    return project(eye, c);
+    const frame::State state = item.state ? frame::unpacked(item.state) : f.states[item.instance];
+    c.entry = std::uint8_t(state.colour_class * 8u + (s.meta & 7u));
+    c.opacity = (state.opacity * f.opacities[c.entry] + 127u) / 255u;
+    c.key = frame::forest_branch_key(item.instance, s.meta);
+    return c.opacity > 0 && project(eye, c);
   };
 
   const std::uint32_t last = std::min(f.last_subframe, f.subframes);
@@ -393,19 +418,21 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     std::array<Vec2, lanes> shift;
     for (std::uint32_t i = 0; i < lanes; ++i)
       shift[i] = frame::sample_place(std::min(first + i, last - 1), f.subframes);
-    Canvas canvas(eye, shift);
+    Canvas canvas(eye, shift, first, last, f.subframes);
     std::vector<Capsule> capsules;
     for (std::size_t from = 0; from < items.size();) {
       std::size_t to = from, segments = 0;
       std::vector<std::size_t> place;
-      for (; to < items.size() && segments < chunk; segments += items[to++]->segment_count)
+      for (; to < items.size() && segments < chunk;
+           segments += std::size_t(std::popcount(items[to++]->drawn)))
         place.push_back(segments);
       capsules.resize(segments);
       std::vector<char> in_sight(segments);
       parallel_for(to - from, 64, [&](std::size_t i) {
         const Item& item = *items[from + i];
-        for (std::uint32_t k = 0; k < item.segment_count; ++k)
-          if (!(item.without >> k & 1u)) in_sight[place[i] + k] = capsule_of(item, k, capsules[place[i] + k]);
+        std::size_t at = place[i];
+        for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1, ++at)
+          in_sight[at] = capsule_of(item, std::uint32_t(std::countr_zero(drawn)), capsules[at]);
       });
       std::size_t kept = 0;
       for (std::size_t i = 0; i < segments; ++i)
@@ -420,6 +447,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
       c.a = eye.seen(o.a), c.b = eye.seen(o.b);
       c.ra = std::max(o.radius, c.a.z() / eye.focal), c.rb = std::max(o.radius, c.b.z() / eye.focal);
       c.entry = std::uint8_t(o.colour);
+      c.opacity = 255;
       if (project(eye, c)) capsules.push_back(c);
     }
     canvas.add(capsules);

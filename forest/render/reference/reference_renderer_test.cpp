@@ -18,7 +18,7 @@ struct Fixture {
   ReferenceRenderer renderer;
   std::vector<frame::Segment> segments;
   std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
-  std::vector<std::uint8_t> classes{0};
+  std::vector<frame::State> states{{}};
   std::vector<frame::Item> items;
   frame::Frame frame;
 
@@ -26,7 +26,7 @@ struct Fixture {
     frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
     frame.width = frame.height = 200;
     frame.palette.fill(Vec3(1, 0, 0));
-    frame.colour_class = classes;
+    frame.states = states;
     frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
     frame.style.halo = 0.f;
   }
@@ -70,6 +70,39 @@ TEST(ReferenceRenderer, TaperedCapsuleCoversTheAreaBetweenItsTangents) {
   const double expected =
       std::sqrt(length * length - 16.) * 8. + 36. * (M_PI / 2 + angle) + 4. * (M_PI / 2 - angle);
   EXPECT_NEAR(f.area() / (scale * scale * expected), 1., .005);
+}
+
+TEST(ReferenceRenderer, TransparentThingsBlendAsTheirOpacitiesSayInAnyOrder) {
+  for (const std::uint32_t subframes : {256u, 12u})
+    for (const bool swapped : {false, true}) {
+      Fixture f;
+      f.instances.push_back(f.instances[0]);
+      f.add({-30, 0, swapped ? -20.f : 20.f}, {30, 0, swapped ? -20.f : 20.f}, 12.f, 12.f);
+      f.add({0, -30, swapped ? 20.f : -20.f}, {0, 30, swapped ? 20.f : -20.f}, 12.f, 12.f);
+      f.items[1].instance = 1;
+      f.states = {{}, {.colour_class = 1}};
+      f.frame.states = f.states;
+      for (std::size_t i = 8; i < 16; ++i) f.frame.palette[i] = Vec3(0, 1, 0);
+      f.frame.subframes = subframes;
+      // Mean linear light, red and green, around the middle.
+      const auto middle = [&] {
+        const frame::Image image = f.draw();
+        std::array<double, 2> sum{};
+        for (std::size_t y = 90; y < 110; ++y)
+          for (std::size_t x = 90; x < 110; ++x)
+            for (std::size_t c = 0; c < 2; ++c)
+              sum[c] += std::pow((image.pixels[4 * (y * 200 + x) + c] / 255. + .055) / 1.055, 2.4) / 400.;
+        return sum;
+      };
+      const std::size_t front = swapped ? 1 : 0, back = 1 - front;
+      const double near = middle()[front];
+      f.states[front].opacity = 0;
+      const double far = middle()[back];
+      f.states[front].opacity = 77, f.states[back].opacity = 160;
+      const auto seen = middle();
+      EXPECT_NEAR(seen[front] / near, 77. / 255., .03) << subframes;
+      EXPECT_NEAR(seen[back] / far, (1. - 77. / 255.) * 160. / 255., .03) << subframes;
+    }
 }
 
 TEST(ReferenceRenderer, EveryPixelIsThatOfTheNearestOfRaysMetOneByOne) {

@@ -52,6 +52,9 @@ void draw_capsule(Capsule c, int lane, int lanes) {
       int px = steep ? y : x, py = steep ? x : y;
       uint pixel = uint(py) * view.width + uint(px), seen = texelFetch(keys_seen, int(pixel)).x;
       if (seen < nearest) continue;
+#ifdef FOREST_DOOR
+      if (!open_at(pixel)) continue;
+#endif
       vec3 ray = normalize(vec3((float(px) + 0.5 - view.centre_x) / view.focal,
                                 (view.centre_y - float(py) - 0.5) / view.focal, 1.0));
       Hit hit = Hit(1e30, vec3(0.0));

@@ -6,8 +6,8 @@ layout(binding = 0) uniform usamplerBuffer segments;        // two a Segment
 layout(binding = 1) uniform usamplerBuffer instances;       // two an Instance
 layout(binding = 2) uniform usamplerBuffer items;           // two an Item
 layout(binding = 3) uniform usamplerBuffer keys_seen;       // a pixel: perhaps an older and so a farther key
-layout(binding = 4) uniform usamplerBuffer colour_classes;  // an instance
-layout(binding = 5) uniform samplerBuffer palette;          // linear
+layout(binding = 4) uniform usamplerBuffer states;          // an instance: colour class, kind, opacity, flags
+layout(binding = 5) uniform samplerBuffer palette;          // linear, and 0–255 for its opacity
 layout(binding = 6) uniform usamplerBuffer queue_seen;
 layout(binding = 7) uniform usamplerBuffer large_seen;
 layout(binding = 8) uniform usamplerBuffer tiles_seen;
@@ -48,8 +48,20 @@ float depth_code(float z) { return clamp((log2(z) + FOREST_DEPTH_BASE) * FOREST_
 
 uint key_of(float code, uint payload) { return (uint(code) << 12) | payload; }
 
+#ifdef FOREST_DOOR  // a program for pictures with something transparent: what this thread draws is
+uint door_opacity = 255u, door_key = 0u;
+
+// Whether a screen door with that key is open at a pixel.
+bool open_at(uint pixel) {
+  return door_opacity == 255u || forest_shows(door_opacity, door_key ^ forest_mixed(pixel), view.subframe);
+}
+#endif
+
 void put(int x, int y, float code, uint payload) {
   uint at = uint(y) * view.width + uint(x), key = key_of(code, payload);
+#ifdef FOREST_DOOR
+  if (!open_at(at)) return;
+#endif
   if (key < texelFetch(keys_seen, int(at)).x) atomicMin(keys[at], key);  // the plain look first: most of a dense forest is hidden
 }
 
@@ -80,8 +92,8 @@ uint group_index() { return gl_WorkGroupID.y * 32768u + gl_WorkGroupID.x; }
 uint thread_index() { return group_index() * FOREST_GROUP + gl_LocalInvocationID.x; }
 
 bool fetch(uint item_index, uint index, out Capsule c) {
-  uvec4 item = texelFetch(items, int(2u * item_index));  // instance, first segment, count
-  if (index >= item.z) return false;
+  uvec4 item = texelFetch(items, int(2u * item_index));  // instance, first segment, which, state
+  if ((item.z >> index & 1u) == 0u) return false;
   uvec4 at_a = texelFetch(segments, int(2u * (item.y + index))), at_b = texelFetch(segments, int(2u * (item.y + index) + 1u));
   vec2 radii = unpackHalf2x16(at_a.w);
   uint meta = at_b.w;
@@ -103,7 +115,16 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.a = to_camera(at + turned(q, c.a));
     c.b = to_camera(at + turned(q, c.b));
     c.mean = unpackHalf2x16(meta >> 16).x;
-    c.entry = texelFetch(colour_classes, int(item.x)).x * 8u + (meta & 7u);
+    uvec4 state = item.w == 0u ? texelFetch(states, int(item.x)) : (uvec4(item.w) >> uvec4(0u, 8u, 16u, 24u)) & 255u;
+    c.entry = state.x * 8u + (meta & 7u);
+#ifdef FOREST_DOOR
+    door_opacity = (state.z * uint(texelFetch(palette, int(c.entry)).w) + 127u) / 255u;
+    door_key = forest_branch_key(item.x, meta);
+    if (view.subframes >= FOREST_DOOR_SUBFRAMES && door_opacity < 255u) {  // as a whole, or not at all
+      if (!forest_shows(door_opacity, door_key, view.subframe)) return false;
+      door_opacity = 255u;
+    }
+#endif
     c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
   return clip_near(c);

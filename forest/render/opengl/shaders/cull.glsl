@@ -15,8 +15,7 @@ void main() {
   uint at = gl_GlobalInvocationID.x;
   uint item = view.first_item + at;
   if (at >= view.item_count || hidden(uintBitsToFloat(texelFetch(items, int(2u * item + 1u))))) return;
-  uvec2 run = texelFetch(items, int(2u * item)).zw;
-  uint drawn = run.x == 0u ? 0u : ~run.y & (0xffffffffu >> (32u - run.x)), count = uint(bitCount(drawn));
+  uint drawn = texelFetch(items, int(2u * item)).z, count = uint(bitCount(drawn));
   uint place = atomicAdd(queued, count);
   for (uint i = 0u; i < count; ++i, drawn &= drawn - 1u) queue[place + i] = item * 64u + uint(findLSB(drawn));
   uint groups = (place + count + FOREST_GROUP - 1u) / FOREST_GROUP;

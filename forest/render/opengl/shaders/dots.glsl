@@ -1,13 +1,10 @@
-// Small spheres (distant somata): one thread a sphere.
+// Small spheres: distant somata, and the beads of branches drawn as dots; one thread a segment.
 
 layout(local_size_x = FOREST_GROUP) in;
 
-void main() {
-  Capsule c;
-  if (!fetch_queued(c)) return;
+void draw_dot(Capsule c, float rank) {
   vec2 p = to_pixel(c.a);
   float r = view.focal * c.ra / c.a.z;
-  float rank = fract(float(texelFetch(queue_seen, int(4u + thread_index())).x / 64u) * 0.7548777 + golden * float(view.subframe));
   if (r < 0.6) {  // less than a pixel: drawn for its share of subframes
     if (3.14159 * r * r <= rank) return;
     ivec2 pixel = ivec2(floor(p));
@@ -26,4 +23,23 @@ void main() {
       put(x, y, depth_code(max(c.a.z + c.ra * normal.z, view.near)),
           payload_of(c.entry, 0.5 + 0.5 * dot(normal, light()), noise_at(x, y)));
     }
+}
+
+void main() {
+  Capsule c;
+  if (!fetch_queued(c)) return;
+  float rank = float(texelFetch(queue_seen, int(4u + thread_index())).x / 64u) * 0.7548777 + golden * float(view.subframe);
+  float len = distance(c.a, c.b), width = c.ra + c.rb;
+  vec3 from = c.a, way = c.b - c.a;
+  uint count = 1u;
+  if (len > 0.0) {  // of a branch: a string of beads, as in render/cpu/splat.cpp
+    float most = min(min(0.5 * len / max(width, 1e-6), 0.5 * len * view.focal / (0.5 * (c.a.z + c.b.z))), 16.0);
+    count = uint(max(most, 1.0));
+    c.ra = sqrt(len * width / (3.14159 * float(count)));
+  }
+  uint k = 0u;
+  do {
+    c.a = from + (float(k) + 0.5) / float(count) * way;
+    draw_dot(c, fract(rank + float(k) * 0.3819660));
+  } while (++k < count);
 }

@@ -1,0 +1,322 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/circuit/node_sets.h"
+
+#include <algorithm>
+#include <array>
+#include <cctype>
+#include <charconv>
+#include <map>
+#include <numeric>
+#include <regex>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "forest/core/error.h"
+
+namespace forest::circuit {
+namespace {
+
+constexpr std::size_t deepest = 64;            // sets within sets, parentheses within parentheses
+constexpr std::size_t longest_pattern = 1000;  // characters
+constexpr std::size_t longest_expression = 100'000;
+
+Members united(const Members& a, const Members& b) {
+  Members result;
+  result.reserve(a.size() + b.size());
+  std::ranges::set_union(a, b, std::back_inserter(result));
+  return result;
+}
+
+Members common(const Members& a, const Members& b) {
+  Members result;
+  std::ranges::set_intersection(a, b, std::back_inserter(result));
+  return result;
+}
+
+Members all(std::size_t count) {
+  Members result(count);
+  std::iota(result.begin(), result.end(), 0u);
+  return result;
+}
+
+std::optional<double> number_in(const std::string& word) {
+  double value = 0.;
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  return error == std::errc() && end == word.data() + word.size() ? std::optional(value) : std::nullopt;
+}
+
+// Text for a sentence: one line, not endless.
+std::string quoted(std::string_view text) {
+  std::string shown = "'";
+  for (const char c : text.substr(0, 60)) shown += std::iscntrl(static_cast<unsigned char>(c)) ? '?' : c;
+  return shown + (text.size() > 60 ? "…'" : "'");
+}
+
+class Resolver {
+ public:
+  Resolver(const NodeSets& sets, const NodeTable& table) : sets_(sets), table_(table) {}
+
+  const Members& of(std::string_view name) {
+    if (const auto known = done_.find(name); known != done_.end()) return known->second;
+    const NodeSet* set = sets_.find(name);
+    if (!set)
+      refuse(path_.empty()
+                 ? fmt::format("there is no node set {}", quoted(name))
+                 : fmt::format("the node set {} names {}, which is not there; add it or take the name out",
+                               quoted(path_.back()), quoted(name)));
+    if (const auto before = std::ranges::find(path_, name); before != path_.end()) {
+      std::string circle;
+      for (auto at = before; at != path_.end(); ++at) circle += quoted(*at) + " → ";
+      refuse(fmt::format("node sets name one another in a circle, {}{}; take one of the names out", circle,
+                         quoted(name)));
+    }
+    if (path_.size() >= deepest)
+      refuse(fmt::format("more than {} node sets stand within one another, down to {}; name fewer", deepest,
+                         quoted(name)));
+    path_.push_back(name);
+    Members result;
+    if (set->compound)
+      for (const std::string& other : set->of) result = united(result, of(other));
+    else
+      result = of_clauses(*set);
+    path_.pop_back();
+    return done_.emplace(set->name, std::move(result)).first->second;
+  }
+
+ private:
+  [[noreturn]] void refuse(const std::string& sentence) const { throw InputError(sets_.source, 0, sentence); }
+
+  Members of_clauses(const NodeSet& set) const {
+    std::vector<bool> inside(table_.count, true);
+    for (const Clause& clause : set.clauses) {
+      const auto attribute = table_.attribute(clause.attribute);
+      if (!attribute)
+        refuse(fmt::format("the node set {} asks for {}, which is not known of these neurons; known are {}",
+                           quoted(set.name), quoted(clause.attribute), table_.known));
+      const std::vector<bool> holds = tested(set, clause, *attribute);
+      for (std::size_t i = 0; i < table_.count; ++i)
+        inside[i] = inside[i] && holds[attribute->words.empty() ? i : attribute->index[i]];
+    }
+    Members result;
+    for (std::uint32_t i = 0; i < table_.count; ++i)
+      if (inside[i]) result.push_back(i);
+    return result;
+  }
+
+  // Of each word, or of each node's number.
+  std::vector<bool> tested(const NodeSet& set, const Clause& clause, const Attribute& attribute) const {
+    const bool words = !attribute.words.empty();
+    std::vector<bool> holds(words ? attribute.words.size() : attribute.numbers.size());
+    if (clause.test == Clause::Test::any_of) {
+      std::vector<double> numbers = clause.numbers;
+      for (const std::string& word : clause.words)
+        if (const auto number = number_in(word); number && !words) numbers.push_back(*number);
+      std::ranges::sort(numbers);
+      for (std::size_t i = 0; i < holds.size(); ++i)
+        if (words) {
+          const auto number = number_in(attribute.words[i]);
+          holds[i] = std::ranges::find(clause.words, attribute.words[i]) != clause.words.end() ||
+                     (number && std::ranges::binary_search(numbers, *number));
+        } else {
+          holds[i] = std::ranges::binary_search(numbers, attribute.numbers[i]);
+        }
+      return holds;
+    }
+    if (words != (clause.test == Clause::Test::regex))
+      refuse(fmt::format(
+          "the node set {} asks of {} {}", quoted(set.name), quoted(clause.attribute),
+          words ? "to be a number, but it is a word; give words or \"$regex\""
+                : "to meet a pattern, but it is a number; compare it with \"$gt\", \"$gte\", \"$lt\" or "
+                  "\"$lte\""));
+    if (words) {
+      try {
+        if (clause.words.at(0).size() > longest_pattern)
+          throw std::regex_error(std::regex_constants::error_space);
+        // Without backtracking: no pattern takes longer than pattern × word.
+        const std::regex pattern(clause.words.at(0),
+                                 std::regex::ECMAScript | std::regex_constants::__polynomial);
+        for (std::size_t i = 0; i < holds.size(); ++i)
+          holds[i] = std::regex_search(attribute.words[i].substr(0, longest_pattern), pattern);
+      } catch (const std::regex_error&) {
+        refuse(fmt::format("the node set {} has a pattern that cannot be used, {}; correct it",
+                           quoted(set.name), quoted(clause.words.at(0))));
+      }
+      return holds;
+    }
+    const double limit = clause.numbers.at(0);
+    for (std::size_t i = 0; i < holds.size(); ++i) {
+      const double value = attribute.numbers[i];
+      holds[i] = clause.test == Clause::Test::greater    ? value > limit
+                 : clause.test == Clause::Test::less     ? value < limit
+                 : clause.test == Clause::Test::at_least ? value >= limit
+                                                         : value <= limit;
+    }
+    return holds;
+  }
+
+  const NodeSets& sets_;
+  const NodeTable& table_;
+  std::map<std::string, Members, std::less<>> done_;
+  std::vector<std::string_view> path_;
+};
+
+// Reads an expression: or-terms of and-terms of factors.
+class Reader {
+ public:
+  Reader(std::string_view text, const std::function<Members(const std::string&)>& find, std::size_t count)
+      : text_(text), find_(find), count_(count) {
+    if (text.size() > longest_expression)
+      throw Error(
+          fmt::format("an expression of {} characters is too long; define parts of it by name", text.size()));
+    next();
+  }
+
+  Members whole() {
+    Members result = either();
+    if (what_ != End) fail("'and' or 'or' is missing before");
+    return result;
+  }
+  bool only_unions() const { return only_unions_; }
+
+ private:
+  enum What { End, Name, And, Or, Not, Open, Close };
+
+  [[noreturn]] void fail(const char* sentence) const {
+    throw Error(fmt::format("{} is no set of neurons: {} {}", quoted(text_), sentence,
+                            what_ == End ? "its end" : quoted(word_)));
+  }
+
+  Members either() {
+    if (++depth_ > deepest)
+      throw Error(fmt::format("{} has too many parentheses within one another", quoted(text_)));
+    Members result = both();
+    while (what_ == Or) next(), result = united(result, both());
+    --depth_;
+    return result;
+  }
+  Members both() {
+    Members result = one();
+    while (what_ == And) next(), only_unions_ = false, result = common(result, one());
+    return result;
+  }
+  Members one() {
+    bool turned = false;
+    while (what_ == Not) next(), only_unions_ = false, turned = !turned;
+    Members result;
+    if (what_ == Open) {
+      next();
+      result = either();
+      if (what_ != Close) fail("')' is missing before");
+      next();
+    } else if (what_ == Name) {
+      result = find_(word_);
+      next();
+    } else {
+      fail("a name is missing before");
+    }
+    if (!turned) return result;
+    Members rest;
+    std::ranges::set_difference(all(count_), result, std::back_inserter(rest));
+    return rest;
+  }
+
+  static bool space(char c) { return std::isspace(static_cast<unsigned char>(c)); }
+  static std::optional<What> keyword(std::string_view word) {
+    static constexpr std::array<std::pair<std::string_view, What>, 3> words{
+        {{"and", And}, {"or", Or}, {"not", Not}}};
+    for (const auto& [known, what] : words)
+      if (std::ranges::equal(word, known, {},
+                             [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); }))
+        return what;
+    return std::nullopt;
+  }
+  std::string_view plain_word(std::size_t at) const {
+    std::size_t end = at;
+    while (end < text_.size() && !space(text_[end]) && text_[end] != '(' && text_[end] != ')') ++end;
+    return text_.substr(at, end - at);
+  }
+  void skip_space() {
+    while (at_ < text_.size() && space(text_[at_])) ++at_;
+  }
+
+  void next() {
+    skip_space();
+    word_.clear();
+    if (at_ == text_.size()) {
+      what_ = End;
+      return;
+    }
+    const char c = text_[at_];
+    if (c == '(' || c == ')') {
+      what_ = c == '(' ? Open : Close;
+      word_ = c;
+      ++at_;
+      return;
+    }
+    if (c == '\'' || c == '"') {
+      const std::size_t end = text_.find(c, at_ + 1);
+      if (end == std::string_view::npos)
+        throw Error(fmt::format("{} has a quote that does not end; close it", quoted(text_)));
+      what_ = Name;
+      word_ = text_.substr(at_ + 1, end - at_ - 1);
+      at_ = end + 1;
+      return;
+    }
+    // Words that follow one another are one name.
+    what_ = Name;
+    for (std::string_view word; !(word = plain_word(at_)).empty(); skip_space()) {
+      if (const auto key = keyword(word)) {
+        if (!word_.empty()) break;
+        what_ = *key, word_ = word, at_ += word.size();
+        return;
+      }
+      word_ += (word_.empty() ? "" : " ") + std::string(word);
+      at_ += word.size();
+    }
+  }
+
+  std::string_view text_;
+  const std::function<Members(const std::string&)>& find_;
+  std::size_t count_, at_ = 0, depth_ = 0;
+  bool only_unions_ = true;  // so far
+  What what_ = End;
+  std::string word_;
+};
+
+}  // namespace
+
+const NodeSet* NodeSets::find(std::string_view name) const {
+  const auto found = std::ranges::find(sets, name, &NodeSet::name);
+  return found == sets.end() ? nullptr : &*found;
+}
+
+void NodeSets::put(NodeSet set) {
+  const auto found = std::ranges::find(sets, set.name, &NodeSet::name);
+  if (found == sets.end())
+    sets.push_back(std::move(set));
+  else
+    *found = std::move(set);
+}
+
+Members members(const NodeSets& sets, std::string_view name, const NodeTable& table) {
+  return Resolver(sets, table).of(name);
+}
+
+Members evaluate(std::string_view expression, const std::function<Members(const std::string&)>& find,
+                 std::size_t count) {
+  return Reader(expression, find, count).whole();
+}
+
+std::optional<std::vector<std::string>> union_of(std::string_view expression) {
+  std::vector<std::string> names;
+  const std::function<Members(const std::string&)> note = [&](const std::string& name) {
+    names.push_back(name);
+    return Members{};
+  };
+  Reader reader(expression, note, 0);
+  reader.whole();
+  return reader.only_unions() ? std::optional(names) : std::nullopt;
+}
+
+}  // namespace forest::circuit

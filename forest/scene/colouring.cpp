@@ -1,0 +1,410 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/colouring.h"
+
+#include <algorithm>
+#include <cmath>
+#include <functional>
+#include <map>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/scene/view.h"
+
+namespace forest::scene {
+namespace {
+
+constexpr std::size_t class_count = 16;
+constexpr std::size_t most_hues = 60'000, most_rows = 250;
+constexpr std::size_t depth_steps = 10;
+constexpr std::uint32_t grey = 0xBBBBBB;
+
+float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
+
+// Okabe & Ito (2008), safe for colour-blind eyes, ordered so that neighbours contrast; then lighter companions.
+constexpr std::array<std::uint32_t, 14> categorical{0xE69F00, 0x56B4E9, 0x009E73, 0xF0E442, 0xCC79A7,
+                                                    0x0072B2, 0xD55E00, 0xFFD180, 0xA6DCFF, 0x7FD8B8,
+                                                    0xE8B4D2, 0x7FB3DF, 0xF7A072, 0xBBBBBB};
+// Ramps from the pia down, one a type: warm, blue, green, violet, grey. Each keeps to one family of hues and grows darker,
+// so that types and layers can both be told, by colour-blind eyes too.
+constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B, 0xC8385A},
+                                                             {0x86C5F4, 0x4A9DE6, 0x2F6FD0},
+                                                             {0x86D9B6, 0x2FBF8F, 0x0E8F6E},
+                                                             {0xF4F1FF, 0xDCCBFA, 0xB9A2EE},
+                                                             {0xE8E8E8, 0xBBBBBB, 0x909090}}};
+// Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
+constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
+                                               0x31688E, 0x5A5AA8, 0x8E4A9E};
+
+// The colours neuroanatomists know: soma black or white, axon blue, basal red, apical magenta.
+constexpr std::array<std::uint32_t, 8> anatomical{0x999999, 0xF0E442, 0x0072B2, 0xD55E00,
+                                                  0xCC79A7, 0x009E73, 0x56B4E9, 0x7FD8B8};
+
+// How a section kind changes the colour of its neuron: somata brighter, axons cooler and dimmer.
+Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
+  switch (kind) {
+    case 1:
+      return (base * 1.35f + Vec3::Constant(.10f * lift)).cwiseMin(1.f);
+    case std::uint32_t(SectionKind::axon):
+      return .55f * (.6f * base + .4f * light_of(0x6C9BD2));
+    case std::uint32_t(SectionKind::apical):
+      return base;
+    default:
+      return .85f * base;
+  }
+}
+
+Vec3 ramp_colour(std::uint32_t type, float t) {
+  const auto& ramp = ramps[type % ramps.size()];
+  const float at = 2.f * std::clamp(t, 0.f, 1.f);
+  const std::size_t i = at < 1.f ? 0 : 1;
+  return light_of(ramp[i]) + (light_of(ramp[i + 1]) - light_of(ramp[i])) * (at - float(i));
+}
+
+// What a colour class shows, before it is known which class.
+struct Hue {
+  std::array<Vec3, 8> kinds;
+  std::vector<LegendEntry> legend;
+};
+using OpacityRow = std::array<std::uint8_t, 8>;
+
+std::uint8_t byte_of(float share) { return std::uint8_t(std::lround(255.f * std::clamp(share, 0.f, 1.f))); }
+
+// Works out how each neuron is shown, in hues of which there may be any number, then gives them classes.
+class Painter {
+ public:
+  Painter(const Targets& targets, const View& view)
+      : targets_(targets),
+        view_(view),
+        forest_(targets.forest()),
+        light_(view.background == Background::light),
+        looks_(forest_.instances().size()) {}
+
+  Colouring paint() {
+    const auto& base = scheme(view_.colour_by);
+    for (std::uint32_t i = 0; i < looks_.size(); ++i) looks_[i].hue = base(i);
+    for (const Appearance& a : view_.targets) apply(a);
+    return in_classes();
+  }
+
+ private:
+  // Before classes: 8 bytes a neuron.
+  struct Look {
+    std::uint16_t hue = 0;
+    std::uint8_t row = 0;  // of opacities by kind
+    frame::Kind kind = frame::Kind::any;
+    std::uint8_t opacity = 255;
+    std::uint8_t flags = frame::State::visible | frame::State::simulated;
+  };
+  struct PartLook {
+    std::uint32_t instance, section;
+    Look look;
+  };
+  using HueOf = std::function<std::uint16_t(std::uint32_t)>;
+
+  std::uint16_t add_hue(const Vec3& base, const std::string& name) {
+    if (hues_.size() >= most_hues) return std::uint16_t(most_hues - 1);
+    Hue hue{{}, {}};
+    for (std::uint32_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = of_kind(base, kind, light_ ? 0.f : 1.f);
+    if (!name.empty()) hue.legend.push_back({name, base});
+    hues_.push_back(std::move(hue));
+    return std::uint16_t(hues_.size() - 1);
+  }
+  Vec3 on_background(std::uint32_t rgb) const { return light_of(rgb) * (light_ ? .7f : 1.f); }
+
+  const HueOf& scheme(ColourBy by) {
+    auto& known = schemes_[std::size_t(by)];
+    if (!known) known = make_scheme(by);
+    return known;
+  }
+
+  HueOf make_scheme(ColourBy by) {
+    const auto& circuit = forest_.circuit();
+    const auto first = std::uint16_t(hues_.size());
+    switch (by) {
+      case ColourBy::type:
+        return by_type();
+      case ColourBy::layer:
+        for (std::size_t i = 0; i < circuit.layers.size(); ++i)
+          add_hue(on_background(layered[i % layered.size()]), circuit.layers[i].name);
+        return [this, first](std::uint32_t i) { return hue_at(first + forest_.layers()[i]); };
+      case ColourBy::neuron:
+        for (const std::uint32_t rgb : categorical) add_hue(on_background(rgb), "");
+        return [first](std::uint32_t i) {
+          return std::uint16_t(first + (i * 2654435761u >> 16 & 0xff) % categorical.size());
+        };
+      case ColourBy::kind: {
+        add_hue(Vec3::Zero(), "");
+        Hue& hue = hues_.back();
+        for (std::size_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = on_background(anatomical[kind]);
+        for (const std::size_t kind : {1u, 2u, 3u, 4u})
+          hue.legend.push_back(
+              {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
+        return [first](std::uint32_t) { return first; };
+      }
+      case ColourBy::depth:
+        return by_depth();
+      case ColourBy::target: {
+        add_hue(on_background(grey), view_.targets.empty() ? "no target" : "");
+        std::vector<std::uint16_t> of(looks_.size(), first);
+        for (std::size_t t = 0; t < view_.targets.size(); ++t) {
+          const Appearance& a = view_.targets[t];
+          if (a.branch) continue;
+          const std::uint16_t hue =
+              a.colour ? flat(a) : add_hue(on_background(categorical[t % categorical.size()]), a.name);
+          for (const std::uint32_t i : targets_.find(a.name)) of[i] = hue;
+        }
+        return [of = std::move(of)](std::uint32_t i) { return of[i]; };
+      }
+    }
+    return [first](std::uint32_t) { return first; };
+  }
+
+  std::uint16_t hue_at(std::size_t i) const { return std::uint16_t(std::min(i, most_hues - 1)); }
+
+  // The hue tells the type, its step the layer. Pairs of them are numbered as they are met.
+  HueOf by_type() {
+    const auto& circuit = forest_.circuit();
+    const std::size_t layers = circuit.layers.size(), pairs = circuit.types.size() * layers;
+    if (pairs > (1u << 20)) {  // by the type alone
+      const auto first = std::uint16_t(hues_.size());
+      for (std::size_t t = 0; t < circuit.types.size(); ++t)
+        add_hue(ramp_colour(std::uint32_t(t), .5f), circuit.types[t].name);
+      return [this, first](std::uint32_t i) { return hue_at(first + forest_.types()[i]); };
+    }
+    std::vector<std::uint16_t> hue_of(pairs);
+    std::vector<bool> met(pairs);
+    for (std::uint32_t i = 0; i < looks_.size(); ++i)
+      met[forest_.types()[i] * layers + forest_.layers()[i]] = true;
+    for (std::size_t type = 0; type < circuit.types.size(); ++type) {
+      const auto begin = met.begin() + std::ptrdiff_t(type * layers);
+      const auto steps = std::count(begin, begin + std::ptrdiff_t(layers), true);
+      std::ptrdiff_t step = 0;
+      for (std::size_t layer = 0; layer < layers; ++layer)
+        if (met[type * layers + layer]) {
+          hue_of[type * layers + layer] =
+              add_hue(ramp_colour(std::uint32_t(type), steps > 1 ? float(step) / float(steps - 1) : .5f) *
+                          (light_ ? .6f : 1.f),
+                      circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
+          ++step;
+        }
+    }
+    return [this, layers, hue_of = std::move(hue_of)](std::uint32_t i) {
+      return hue_of[forest_.types()[i] * layers + forest_.layers()[i]];
+    };
+  }
+
+  // Of the soma below the pia: the top of the highest layer.
+  HueOf by_depth() {
+    const auto first = std::uint16_t(hues_.size());
+    float pia = -INFINITY, bottom = INFINITY;
+    for (const auto& layer : forest_.circuit().layers)
+      pia = std::max(pia, layer.top), bottom = std::min(bottom, layer.bottom);
+    const Bounds& somata = forest_.soma_bounds();
+    if (!somata.empty()) pia = std::max(pia, somata.high.y()), bottom = std::min(bottom, somata.low.y());
+    const float step = std::max((pia - bottom) / float(depth_steps), 1e-3f);
+    for (std::size_t i = 0; i < depth_steps; ++i) {
+      const float at = float(i) / float(depth_steps - 1) * float(layered.size() - 1);
+      const std::size_t k = std::min(std::size_t(at), layered.size() - 2);
+      const Vec3 a = on_background(layered[k]), b = on_background(layered[k + 1]);
+      add_hue(a + (b - a) * (at - float(k)),
+              fmt::format("{:.0f}–{:.0f} µm deep", step * float(i), step * float(i + 1)));
+    }
+    return [this, first, pia, step](std::uint32_t i) {
+      const float depth = (pia - forest_.instances()[i].y) / step;
+      return std::uint16_t(first + std::size_t(std::clamp(depth, 0.f, float(depth_steps) - .5f)));
+    };
+  }
+
+  // The hue of an appearance with a colour of its own.
+  std::uint16_t flat(const Appearance& a) {
+    const std::string name = a.branch ? fmt::format("neuron {}, a branch", a.branch->neuron) : a.name;
+    const auto [known, first] = flat_.try_emplace({*a.colour, name}, std::uint16_t(0));
+    if (first) known->second = add_hue(light_of(*a.colour), name);
+    return known->second;
+  }
+
+  void apply(const Appearance& a) {
+    if (a.branch) return apply_to_branch(a);
+    const circuit::Members& members = targets_.find(a.name);
+    const Change change = change_of(a);
+    for (const std::uint32_t i : members) change(looks_[i], i);
+    if (!parts_.empty())
+      for (PartLook& part : parts_)
+        if (std::ranges::binary_search(members, part.instance)) change(part.look, part.instance);
+  }
+
+  void apply_to_branch(const Appearance& a) {
+    const Branch& b = *a.branch;
+    const std::string where = fmt::format("neuron {}", b.neuron);
+    if (b.neuron >= looks_.size())
+      throw Error(
+          fmt::format("there is no {} in this forest of {}; give one from 0 on", where, looks_.size()));
+    const Neuron& neuron = forest_.neurons()[forest_.instances()[b.neuron].morphology];
+    if (b.section != soma_section && b.section >= neuron.section_count)
+      throw Error(fmt::format("{} has {} sections and no section {}; give one from 0 on", where,
+                              neuron.section_count, b.section));
+    const Change change = change_of(a);
+    if (b.section == soma_section) {
+      change(looks_[b.neuron], b.neuron);
+      for (PartLook& part : parts_)
+        if (part.instance == b.neuron) change(part.look, b.neuron);
+      return;
+    }
+    looks_[b.neuron].flags |= frame::State::parted;
+    PartLook part{b.neuron, b.section, looks_[b.neuron]};
+    for (const PartLook& before : parts_)  // a branch of one that is shown otherwise already begins as that
+      if (before.instance == b.neuron && within(neuron, b.section, before.section)) part.look = before.look;
+    for (PartLook& below : parts_)
+      if (below.instance == b.neuron && within(neuron, below.section, b.section))
+        change(below.look, b.neuron);
+    change(part.look, b.neuron);
+    // Before its own branches, which stay as they were said to be.
+    const auto at = std::ranges::find_if(parts_, [&](const PartLook& other) {
+      return other.instance == b.neuron && within(neuron, other.section, b.section);
+    });
+    parts_.insert(at, part);
+  }
+
+  // Whether a section is `branch` or grows out of it.
+  bool within(const Neuron& neuron, std::uint32_t section, std::uint32_t branch) const {
+    while (section != 0xffffffffu && section > branch)
+      section = forest_.sections()[neuron.first_section + section].parent;
+    return section == branch;
+  }
+
+  // An appearance made ready for thousands of neurons.
+  struct Change {
+    const Appearance& a;
+    std::uint8_t opacity;
+    const HueOf* hue_of;  // null: none, or a flat one
+    std::optional<std::uint16_t> hue;
+    std::vector<std::uint8_t> row;  // by the row before
+
+    void operator()(Look& look, std::uint32_t i) const {
+      const auto set = [&](std::uint8_t flag, const std::optional<bool>& on) {
+        if (on) look.flags = std::uint8_t(*on ? look.flags | flag : look.flags & ~flag);
+      };
+      set(frame::State::visible, a.visible);
+      set(frame::State::simulated, a.simulated);
+      if (hue_of) look.hue = (*hue_of)(i);
+      if (hue) look.hue = *hue;
+      if (a.kind) look.kind = *a.kind;
+      if (a.opacity) look.opacity = opacity;
+      look.row = row[look.row];
+    }
+  };
+  Change change_of(const Appearance& a) {
+    Change change{a, byte_of(a.opacity.value_or(1.f)), nullptr, std::nullopt, {}};
+    if (a.colour) change.hue = flat(a);
+    if (a.colour_by) change.hue_of = &scheme(*a.colour_by);
+    for (std::size_t before = 0, count = rows_.size(); before < count; ++before) {
+      OpacityRow row = rows_[before];
+      for (std::size_t kind = 0; kind < 8; ++kind)
+        if (a.opacity_of[kind]) row[kind] = byte_of(*a.opacity_of[kind]);
+      auto known = std::ranges::find(rows_, row);
+      if (known == rows_.end() && rows_.size() >= most_rows)
+        throw Error("a view tells opacities by kind of branch in too many ways; leave some of them out");
+      if (known == rows_.end()) rows_.push_back(row), known = rows_.end() - 1;
+      change.row.push_back(std::uint8_t(known - rows_.begin()));
+    }
+    return change;
+  }
+
+  Colouring in_classes() {
+    // How often each hue with each row of opacities is seen.
+    const std::size_t rows = rows_.size();
+    std::vector<std::uint32_t> seen(std::max<std::size_t>(hues_.size(), 1) * rows);
+    const auto count = [&](const Look& look) {
+      if (look.flags & (frame::State::visible | frame::State::parted)) ++seen[look.hue * rows + look.row];
+    };
+    for (const Look& look : looks_) count(look);
+    for (const PartLook& part : parts_) count(part.look);
+    std::vector<std::size_t> used;
+    for (std::size_t i = 0; i < seen.size(); ++i)
+      if (seen[i]) used.push_back(i);
+    std::vector<std::size_t> kept = used;
+    if (kept.size() > class_count) {
+      std::ranges::stable_sort(kept, std::greater(), [&](std::size_t i) { return seen[i]; });
+      kept.resize(class_count);
+      std::ranges::sort(kept);
+    }
+    std::vector<std::uint8_t> class_of(seen.size());
+    for (const std::size_t i : used) class_of[i] = std::uint8_t(nearest(i, kept, rows));
+
+    Colouring result{.palette = frame::black_palette(),
+                     .opacities = frame::opaque(),
+                     .states = {},
+                     .parts = {},
+                     .legend = {}};
+    std::vector<bool> told(hues_.size());
+    for (std::size_t c = 0; c < kept.size(); ++c) {
+      const Hue& hue = hues_[kept[c] / rows];
+      for (std::size_t kind = 0; kind < 8; ++kind) {
+        result.palette[8 * c + kind] = hue.kinds[kind];
+        result.opacities[8 * c + kind] = rows_[kept[c] % rows][kind];
+      }
+      if (!told[kept[c] / rows])
+        result.legend.insert(result.legend.end(), hue.legend.begin(), hue.legend.end());
+      told[kept[c] / rows] = true;
+    }
+    const auto state_of = [&](const Look& look) {
+      return frame::State{class_of[look.hue * rows + look.row], look.kind, look.opacity, look.flags};
+    };
+    result.states.reserve(looks_.size());
+    for (const Look& look : looks_) result.states.push_back(state_of(look));
+    for (const PartLook& part : parts_) {
+      frame::State state = state_of(part.look);
+      state.flags &= std::uint8_t(~frame::State::parted);
+      result.parts.push_back({part.instance, part.section, state});
+    }
+    std::ranges::stable_sort(result.parts, {}, &Part::instance);
+    result.opacities[highlight_entry] = result.opacities[outline_entry] = 255;
+    result.palette[highlight_entry] = light_ ? light_of(0xC00040) : Vec3(1.f, 1.f, 1.f);
+    result.palette[outline_entry] = light_ ? light_of(0x8090A0) : light_of(0x5A6B80);
+    return result;
+  }
+
+  // Of those kept, the one that looks most alike: what one sees through must stay so, the colour may differ.
+  std::size_t nearest(std::size_t i, const std::vector<std::size_t>& kept, std::size_t rows) const {
+    const auto far = [&](std::size_t other) {
+      float sum = 0.f;
+      for (std::size_t kind = 0; kind < 8; ++kind) {
+        sum += (hues_[i / rows].kinds[kind] - hues_[other / rows].kinds[kind]).squaredNorm();
+        const float by = float(rows_[i % rows][kind]) - float(rows_[other % rows][kind]);
+        sum += by * by / 255.f;
+      }
+      return sum;
+    };
+    return std::size_t(std::ranges::min_element(kept, {}, far) - kept.begin());
+  }
+
+  const Targets& targets_;
+  const View& view_;
+  const Forest& forest_;
+  bool light_;
+  std::vector<Look> looks_;
+  std::vector<PartLook> parts_;
+  std::vector<Hue> hues_;
+  std::vector<OpacityRow> rows_{{255, 255, 255, 255, 255, 255, 255, 255}};
+  std::array<HueOf, 6> schemes_;
+  std::map<std::pair<std::uint32_t, std::string>, std::uint16_t> flat_;
+};
+
+}  // namespace
+
+Vec3 light_of(std::uint32_t rgb) {
+  return {linear(float(rgb >> 16 & 255) / 255.f), linear(float(rgb >> 8 & 255) / 255.f),
+          linear(float(rgb & 255) / 255.f)};
+}
+
+Colouring colour(const Targets& targets, const View& view) { return Painter(targets, view).paint(); }
+
+Colouring colour(const Forest& forest, ColourBy by, Background background) {
+  View view;
+  view.colour_by = by, view.background = background;
+  return colour(Targets(forest), view);
+}
+
+}  // namespace forest::scene

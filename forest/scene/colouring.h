@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+// How every neuron of a forest is shown: its colour, whether it is there at all, with what it is drawn, how much one sees
+// through it. One small state a neuron, worked out anew whenever a view changes; nothing else is.
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "forest/frame/frame.h"
+#include "forest/scene/cut.h"
+#include "forest/scene/targets.h"
+
+namespace forest::scene {
+
+struct View;
+
+enum class ColourBy : std::uint8_t { type, layer, kind, neuron, target, depth };
+enum class Background : std::uint8_t { dark, light };
+
+/// A branch of one neuron: the section and all that grows out of it; soma_section means the whole neuron.
+struct Branch {
+  std::uint32_t neuron = 0, section = 0xffffffffu;
+  bool operator==(const Branch&) const = default;
+};
+
+/// How a target or a branch is shown. What is not said stays as it was; of a view's appearances later ones win.
+struct Appearance {
+  std::string name;  // of the target, or an expression; "" when it is a branch
+  std::optional<Branch> branch;
+  std::optional<bool> visible;
+  std::optional<std::uint32_t> colour;  // 0xrrggbb, sRGB
+  std::optional<ColourBy> colour_by;    // instead of one colour
+  std::optional<frame::Kind> kind;
+  std::optional<float> opacity;                      // 0–1
+  std::array<std::optional<float>, 8> opacity_of{};  // by section kind (1: the soma), times that
+  std::optional<bool> simulated;                     // stored and told; nothing simulates yet
+
+  bool operator==(const Appearance&) const = default;
+};
+
+struct LegendEntry {
+  std::string name;
+  Vec3 colour;  // linear light
+};
+
+/// Colours and states of all instances.
+struct Colouring {
+  frame::Palette palette;
+  frame::Opacities opacities = frame::opaque();
+  std::vector<frame::State> states;  // one an instance
+  std::vector<Part> parts;           // by instance
+  std::vector<LegendEntry> legend;
+
+  Shown shown() const { return {states, parts}; }
+};
+
+/// There are sixteen colour classes: where a view needs more, the rarest colours become the most similar of the others.
+/// Throws Error for a target that is not there, a branch of a neuron that is not there.
+Colouring colour(const Targets& targets, const View& view);
+/// Without targets.
+Colouring colour(const Forest& forest, ColourBy by, Background background);
+
+/// Palette entry for highlights: bright, used by overlays.
+inline constexpr std::uint32_t highlight_entry = 127;
+inline constexpr std::uint32_t outline_entry = 126;
+
+/// Linear light of 0xrrggbb.
+Vec3 light_of(std::uint32_t rgb);
+
+}  // namespace forest::scene

@@ -1,0 +1,87 @@
+#!/usr/bin/env bash
+# Targets: listed, defined, written as SONATA's node sets, shown and hidden in pictures.
+set -euo pipefail
+program=$BRAINFOREST
+fail() { echo "targets.sh: $*" >&2; exit 1; }
+refuses() {  # a command that must fail with status 1 and one sentence that holds the words
+  local words=$1 said status=0
+  shift
+  said=$("$@" 2>&1 >/dev/null) || status=$?
+  [[ $status == 1 ]] || fail "status $status instead of 1: $*"
+  [[ $said == *"$words"* && $(wc -l <<<"$said") == 1 ]] || fail "said '$said' instead of one sentence with '$words'"
+}
+told() { /usr/bin/python3 -c "import json, sys; d = json.load(open('$1')); sys.exit(not ($2))" || fail "$1: not so: $2"; }
+
+for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 3 --seed 1 --repo r.db >/dev/null; done
+"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
+"$program" pack circuit -o a.forest >/dev/null
+
+"$program" targets a.forest --json >list.json
+told list.json '{t["name"]: t["neurons"] for t in d["targets"]}["all"] == d["neurons"] == 1000'
+told list.json 'sum(t["neurons"] for t in d["targets"] if t["origin"] == "layer") == 1000'
+told list.json 'sum(t["neurons"] for t in d["targets"] if t["origin"] == "type") == 1000'
+told list.json 'sum(t["neurons"] for t in d["targets"] if t["origin"] == "sign") == 1000'
+told list.json '[t["name"] for t in d["targets"] if t["origin"] == "population"] == ["column-1000"]'
+
+# Combined, edited, written, read again by us and by h5py's owner of the truth: the circuit's own file.
+"$program" targets a.forest --define 'deep=(L5 or L6) and not inhibitory' --define 'top={"y":{"$gt":1300}}' \
+  --define 'either=deep or top' --out sets.json >/dev/null
+told sets.json 'd["either"] == ["deep", "top"] and d["top"] == {"y": {"$gt": 1300.0}} and d["deep"]["population"] == "column-1000"'
+/usr/bin/python3 - <<'PY' || fail "the nodes of a set are not those of the circuit's file"
+import csv, json, h5py
+nodes = h5py.File("circuit/nodes.h5")["nodes/column-1000"]
+group = nodes["0"]
+layers = [group["@library/layer"].asstr()[i] for i in group["layer"]]
+types = {row["node_type_id"]: row for row in csv.DictReader(open("circuit/node_types.csv"), delimiter=" ")}
+sign = [types[str(t)]["ei"] for t in nodes["node_type_id"]]
+deep = [int(i) for i in nodes["node_id"] if layers[i] in ("L5", "L6") and sign[i] == "e"]
+assert json.load(open("sets.json"))["deep"]["node_id"] == deep and deep, "deep"
+PY
+"$program" targets a.forest --node-sets sets.json --members 'either and not deep' --json >members.json
+/usr/bin/python3 - <<'PY' || fail "wrong members"
+import json, h5py
+y = h5py.File("circuit/nodes.h5")["nodes/column-1000/0/y"][:]
+deep = set(json.load(open("sets.json"))["deep"]["node_id"])
+assert json.load(open("members.json"))["members"] == {"column-1000": [i for i in range(1000) if y[i] > 1300 and i not in deep]}
+PY
+"$program" targets a.forest --node-sets sets.json --remove either --out fewer.json >/dev/null
+told fewer.json 'sorted(d) == ["deep", "top"]'
+refuses "fewer.json" "$program" targets a.forest --node-sets sets.json --out fewer.json
+"$program" targets a.forest --node-sets sets.json --out fewer.json --force >/dev/null
+cmp sets.json fewer.json || fail "node sets are not written as they were read"
+
+# In pictures.
+view='"eye":[700,1500,900],"target":[0,1300,0],"samples":2'
+draw() { "$program" render a.forest --size 200x150 -o "$1.png" --json "${@:2}" >"$1.json"; }
+draw all --view "{$view}"
+draw only --view "{$view}" --only L2 --node-sets sets.json --hide "top and inhibitory"
+draw shown --view "{$view,\"targets\":[{\"name\":\"all\",\"visible\":false},{\"name\":\"L2\",\"visible\":true},{\"name\":\"top and inhibitory\",\"visible\":false}]}" --node-sets sets.json
+cmp only.png shown.png || fail "--only and --hide are not what the view says"
+told only.json '0 < d["neurons"] <= 218 and d["segments"] > 0'
+told all.json 'd["neurons"] > 218'
+draw clear --view "{$view,\"targets\":[{\"name\":\"all\",\"opacity\":0.3,\"kind\":\"lines\",\"colour\":\"#ff8800\"}]}"
+told clear.json 'd["view"]["targets"] == [{"name": "all", "colour": "#ff8800", "kind": "lines", "opacity": 0.3}]'
+/usr/bin/python3 -c 'import json; assert json.load(open("clear.json"))["covered"] < .9 * json.load(open("all.json"))["covered"]' ||
+  fail "what is transparent covers as much as what is not"
+"$program" movie a.forest --seconds 0.1 --size 160x90 --samples 1 --only L4 -o walk.mp4 >/dev/null
+# An empty target is said, not shown as a black picture without a word.
+said=$("$program" render a.forest --size 64x64 -o none.png --only L1 2>&1 >/dev/null)
+[[ $said == *"no neuron belongs to the target 'L1'"* ]] || fail "an empty target: '$said'"
+"$program" bench targets --neurons 200 --repeats 2 --size 160x90 --json >bench.json
+told bench.json 'd["worst_milliseconds"] > 0 and len(d["changes"]) >= 8 and all(c["picture_changed"] > 0 for c in d["changes"])'
+
+refuses "no target 'L7'" "$program" render a.forest --only L7 -o x.png
+refuses "is no set of neurons" "$program" render a.forest --only "L2 and" -o x.png
+refuses "'opacty' is no key" "$program" render a.forest --view "{$view,\"targets\":[{\"name\":\"all\",\"opacty\":1}]}" -o x.png
+refuses "no neuron 1000" "$program" render a.forest --view "{$view,\"targets\":[{\"neuron\":1000,\"visible\":false}]}" -o x.png
+echo '{"a": ["b"], "b": ["a"], "c": {"etype": "x"}}' >bad.json
+refuses "'a' → 'b' → 'a'" "$program" render a.forest --node-sets bad.json --only a -o x.png
+refuses "asks for 'etype'" "$program" render a.forest --node-sets bad.json --only c -o x.png
+refuses "'etype'" "$program" targets a.forest --node-sets bad.json --members c
+[[ $("$program" targets a.forest --node-sets bad.json 2>/dev/null | grep -c '?$') == 3 ]] || fail "sets that cannot be used are not listed as such"
+printf '{"a": {"layer": 5},\n "b" {}}' >slip.json
+refuses "slip.json:2: is no JSON" "$program" targets a.forest --node-sets slip.json
+refuses "defines nothing" "$program" targets a.forest --define L2
+refuses "no node set 'x'" "$program" targets a.forest --remove x
+[[ ! -e x.png ]] || fail "a refused command left a file behind"
+echo "targets.sh: all is well"
