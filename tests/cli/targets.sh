@@ -51,7 +51,7 @@ refuses "fewer.json" "$program" targets a.forest --node-sets sets.json --out few
 cmp sets.json fewer.json || fail "node sets are not written as they were read"
 
 # In pictures.
-view='"eye":[700,1500,900],"target":[0,1300,0],"samples":2'
+view='"eye":[1700,1500,1900],"target":[0,1300,0],"samples":2'
 draw() { "$program" render a.forest --size 200x150 -o "$1.png" --json "${@:2}" >"$1.json"; }
 draw all --view "{$view}"
 draw only --view "{$view}" --only L2 --node-sets sets.json --hide "top and inhibitory"
