@@ -66,7 +66,9 @@ void run(const Options& options, Console& console) {
   console.progress().begin("changing", std::size(changes));
   for (const Change& change : changes) {
     scene::View other = view;
-    other.targets = scene::parse_view(fmt::format(R"({{"eye":[0,0,1],"target":[0,0,0],"targets":{}}})", change.targets)).targets;
+    other.targets =
+        scene::parse_view(fmt::format(R"({{"eye":[0,0,1],"target":[0,0,0],"targets":{}}})", change.targets))
+            .targets;
     // The first time the names are looked up; a person who turns a knob asks for the same ones again.
     auto start = Clock::now();
     const scene::Targets targets(forest, sets);
@@ -88,7 +90,8 @@ void run(const Options& options, Console& console) {
                     {"picture_changed", changed},
                     {"draw_milliseconds", drawn.cull + drawn.draw + drawn.resolve}});
     table.push_back({change.name, fmt::format("{:.2f}", first), fmt::format("{:.2f}", again),
-                     fmt::format("{:.1f}", changed), fmt::format("{:.1f}", drawn.cull + drawn.draw + drawn.resolve)});
+                     fmt::format("{:.1f}", changed),
+                     fmt::format("{:.1f}", drawn.cull + drawn.draw + drawn.resolve)});
     console.progress().advance();
   }
   console.progress().end();
@@ -98,17 +101,19 @@ void run(const Options& options, Console& console) {
                  {"size", options.size},
                  {"renderer", artist.renderer()}});
   console.say(fmt::format("{} neurons, {}, {}", forest.instances().size(), options.size, artist.renderer()));
-  console.table({"change of all neurons", "first ms", "again ms", "picture changed", "next picture ms"}, table);
+  console.table({"change of all neurons", "first ms", "again ms", "picture changed", "next picture ms"},
+                table);
 }
 
 }  // namespace
 
 std::function<void()> bench_targets(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  must_be_whole(*command.add_option("--neurons", options->neurons, "Neurons planted")->capture_default_str(), 10,
-                10'000'000);
-  must_be_whole(*command.add_option("--repeats", options->repeats, "Times each change is made")->capture_default_str(), 1,
-                100'000);
+  must_be_whole(*command.add_option("--neurons", options->neurons, "Neurons planted")->capture_default_str(),
+                10, 10'000'000);
+  must_be_whole(
+      *command.add_option("--repeats", options->repeats, "Times each change is made")->capture_default_str(),
+      1, 100'000);
   add_size(command, options->size);
   add_renderer(command, options->drawer);
   add_seed(command, options->seed, "Of the neurons and their places");

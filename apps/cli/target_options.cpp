@@ -13,13 +13,15 @@ namespace forest::cli {
 
 void add_node_sets(CLI::App& command, std::vector<std::filesystem::path>& files) {
   command
-      .add_option("--node-sets", files, "SONATA node sets, JSON files: names that targets may use besides the forest's own")
+      .add_option("--node-sets", files,
+                  "SONATA node sets, JSON files: names that targets may use besides the forest's own")
       ->type_name("FILE");
 }
 
 void add_targets(CLI::App& command, TargetOptions& options) {
   add_node_sets(command, options.node_sets);
-  command.add_option("--only", options.only, "Show these targets alone, for example \"L5 and not inhibitory\"")
+  command
+      .add_option("--only", options.only, "Show these targets alone, for example \"L5 and not inhibitory\"")
       ->type_name("TARGET");
   command.add_option("--hide", options.hide, "Leave these targets out")->type_name("TARGET");
 }
@@ -30,7 +32,8 @@ circuit::NodeSets read_node_sets(const std::vector<std::filesystem::path>& files
     circuit::NodeSets sets = io::read_node_sets(file);
     for (circuit::NodeSet& set : sets.sets) {
       if (all.find(set.name))
-        console.warn(fmt::format("{} replaces the node set '{}' of the files before it", file.string(), set.name));
+        console.warn(
+            fmt::format("{} replaces the node set '{}' of the files before it", file.string(), set.name));
       all.put(std::move(set));
     }
     all.source = files.size() == 1 ? sets.source : "the node sets";
@@ -49,7 +52,8 @@ void add_appearances(const TargetOptions& options, std::vector<scene::Appearance
   for (const std::string& name : options.hide) show(name, false);
 }
 
-void warn_of_empty(const scene::Targets& targets, const std::vector<scene::Appearance>& shown, Console& console) {
+void warn_of_empty(const scene::Targets& targets, const std::vector<scene::Appearance>& shown,
+                   Console& console) {
   for (const scene::Appearance& a : shown)
     if (!a.branch && targets.find(a.name).empty())
       console.warn(fmt::format("no neuron belongs to the target '{}'", a.name));

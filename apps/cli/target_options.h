@@ -37,6 +37,7 @@ circuit::NodeSets read_node_sets(const std::vector<std::filesystem::path>& files
 void add_appearances(const TargetOptions& options, std::vector<scene::Appearance>& shown);
 
 /// Says which of the targets have no neuron: a picture should not be empty without a word.
-void warn_of_empty(const scene::Targets& targets, const std::vector<scene::Appearance>& shown, Console& console);
+void warn_of_empty(const scene::Targets& targets, const std::vector<scene::Appearance>& shown,
+                   Console& console);
 
 }  // namespace forest::cli

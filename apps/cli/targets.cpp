@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest targets: which sets of neurons a forest has, and node sets read, combined and edited.
+#include "forest/scene/targets.h"
+
 #include <map>
 #include <memory>
 
@@ -9,7 +11,6 @@
 
 #include "forest/core/error.h"
 #include "forest/io/node_sets.h"
-#include "forest/scene/targets.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -31,18 +32,21 @@ struct Options {
 };
 
 // Of each population, the numbers that its members have there.
-std::map<std::string, std::vector<double>> nodes_of(const scene::Forest& forest, const circuit::Members& members) {
+std::map<std::string, std::vector<double>> nodes_of(const scene::Forest& forest,
+                                                    const circuit::Members& members) {
   std::map<std::string, std::vector<double>> nodes;
   auto run = forest.nodes().runs.begin();
   for (const std::uint32_t i : members) {
     while (i - run->first_instance >= run->count) ++run;
-    nodes[forest.nodes().populations[run->population]].push_back(double(run->first_node + i - run->first_instance));
+    nodes[forest.nodes().populations[run->population]].push_back(
+        double(run->first_node + i - run->first_instance));
   }
   return nodes;
 }
 
 // SONATA knows unions and lists of nodes: whatever else was said becomes the nodes that it means in this forest.
-std::vector<circuit::NodeSet> sets_of(const std::string& name, const std::string& expression, const scene::Targets& targets) {
+std::vector<circuit::NodeSet> sets_of(const std::string& name, const std::string& expression,
+                                      const scene::Targets& targets) {
   using circuit::Clause;
   if (expression.starts_with('{') || expression.starts_with('[')) {
     circuit::NodeSet set = io::parse_node_set(expression, "--define");
@@ -51,7 +55,8 @@ std::vector<circuit::NodeSet> sets_of(const std::string& name, const std::string
   }
   const circuit::Members& members = targets.find(expression);
   if (const auto names = circuit::union_of(expression);
-      names && std::ranges::all_of(*names, [&](const auto& n) { return n != name && targets.sets().find(n); }))
+      names &&
+      std::ranges::all_of(*names, [&](const auto& n) { return n != name && targets.sets().find(n); }))
     return {{.name = name, .clauses = {}, .of = *names, .compound = true}};
   const auto nodes = nodes_of(targets.forest(), members);
   std::vector<circuit::NodeSet> sets;
@@ -71,7 +76,8 @@ std::vector<circuit::NodeSet> sets_of(const std::string& name, const std::string
 void define(const std::string& said, scene::Targets& targets, Console& console) {
   const std::size_t equals = said.find('=');
   if (equals == 0 || equals == std::string::npos)
-    throw Error(fmt::format("'{}' defines nothing; give NAME=EXPRESSION, for example \"deep=L5 or L6\"", said));
+    throw Error(
+        fmt::format("'{}' defines nothing; give NAME=EXPRESSION, for example \"deep=L5 or L6\"", said));
   const std::string name = said.substr(0, equals), expression = said.substr(equals + 1);
   circuit::NodeSets sets = targets.sets();
   for (circuit::NodeSet& set : sets_of(name, expression, targets)) sets.put(std::move(set));
@@ -92,7 +98,9 @@ void run(const Options& options, Console& console) {
   for (const std::string& name : options.remove) remove(name, targets);
   for (const std::string& said : options.define) define(said, targets, console);
 
-  Json json{{"forest", options.forest.string()}, {"neurons", forest.instances().size()}, {"targets", Json::array()}};
+  Json json{{"forest", options.forest.string()},
+            {"neurons", forest.instances().size()},
+            {"targets", Json::array()}};
   if (!options.members.empty()) {
     Json members = Json::object();
     std::vector<std::vector<std::string>> rows;
@@ -127,11 +135,15 @@ std::function<void()> targets(CLI::App& command, Console& console) {
   command.add_option("forest", options->forest, "Forest file")->required();
   add_node_sets(command, options->node_sets);
   command
-      .add_option("--define", options->define,
-                  "NAME=EXPRESSION: names joined by and, or, not and parentheses, or a rule of SONATA as JSON")
+      .add_option(
+          "--define", options->define,
+          "NAME=EXPRESSION: names joined by and, or, not and parentheses, or a rule of SONATA as JSON")
       ->type_name("NAME=EXPRESSION");
-  command.add_option("--remove", options->remove, "Take a node set out, before any is defined")->type_name("NAME");
-  command.add_option("--members", options->members, "Tell the nodes of this target instead of the list of targets")
+  command.add_option("--remove", options->remove, "Take a node set out, before any is defined")
+      ->type_name("NAME");
+  command
+      .add_option("--members", options->members,
+                  "Tell the nodes of this target instead of the list of targets")
       ->type_name("TARGET");
   command.add_option("-o,--out", options->out, "Write the node sets, those defined too, as a JSON file");
   add_force(command, options->force);

@@ -61,13 +61,15 @@ class Resolver {
     if (const auto known = done_.find(name); known != done_.end()) return known->second;
     const NodeSet* set = sets_.find(name);
     if (!set)
-      refuse(path_.empty() ? fmt::format("there is no node set {}", quoted(name))
-                           : fmt::format("the node set {} names {}, which is not there; add it or take the name out",
-                                         quoted(path_.back()), quoted(name)));
+      refuse(path_.empty()
+                 ? fmt::format("there is no node set {}", quoted(name))
+                 : fmt::format("the node set {} names {}, which is not there; add it or take the name out",
+                               quoted(path_.back()), quoted(name)));
     if (const auto before = std::ranges::find(path_, name); before != path_.end()) {
       std::string circle;
       for (auto at = before; at != path_.end(); ++at) circle += quoted(*at) + " → ";
-      refuse(fmt::format("node sets name one another in a circle, {}{}; take one of the names out", circle, quoted(name)));
+      refuse(fmt::format("node sets name one another in a circle, {}{}; take one of the names out", circle,
+                         quoted(name)));
     }
     if (path_.size() >= deepest)
       refuse(fmt::format("more than {} node sets stand within one another, down to {}; name fewer", deepest,
@@ -122,20 +124,23 @@ class Resolver {
       return holds;
     }
     if (words != (clause.test == Clause::Test::regex))
-      refuse(fmt::format("the node set {} asks of {} {}", quoted(set.name), quoted(clause.attribute),
-                         words ? "to be a number, but it is a word; give words or \"$regex\""
-                               : "to meet a pattern, but it is a number; compare it with \"$gt\", \"$gte\", \"$lt\" or "
-                                 "\"$lte\""));
+      refuse(fmt::format(
+          "the node set {} asks of {} {}", quoted(set.name), quoted(clause.attribute),
+          words ? "to be a number, but it is a word; give words or \"$regex\""
+                : "to meet a pattern, but it is a number; compare it with \"$gt\", \"$gte\", \"$lt\" or "
+                  "\"$lte\""));
     if (words) {
       try {
-        if (clause.words.at(0).size() > longest_pattern) throw std::regex_error(std::regex_constants::error_space);
+        if (clause.words.at(0).size() > longest_pattern)
+          throw std::regex_error(std::regex_constants::error_space);
         // Without backtracking: no pattern takes longer than pattern × word.
-        const std::regex pattern(clause.words.at(0), std::regex::ECMAScript | std::regex_constants::__polynomial);
+        const std::regex pattern(clause.words.at(0),
+                                 std::regex::ECMAScript | std::regex_constants::__polynomial);
         for (std::size_t i = 0; i < holds.size(); ++i)
           holds[i] = std::regex_search(attribute.words[i].substr(0, longest_pattern), pattern);
       } catch (const std::regex_error&) {
-        refuse(fmt::format("the node set {} has a pattern that cannot be used, {}; correct it", quoted(set.name),
-                           quoted(clause.words.at(0))));
+        refuse(fmt::format("the node set {} has a pattern that cannot be used, {}; correct it",
+                           quoted(set.name), quoted(clause.words.at(0))));
       }
       return holds;
     }
@@ -162,7 +167,8 @@ class Reader {
   Reader(std::string_view text, const std::function<Members(const std::string&)>& find, std::size_t count)
       : text_(text), find_(find), count_(count) {
     if (text.size() > longest_expression)
-      throw Error(fmt::format("an expression of {} characters is too long; define parts of it by name", text.size()));
+      throw Error(
+          fmt::format("an expression of {} characters is too long; define parts of it by name", text.size()));
     next();
   }
 
@@ -182,7 +188,8 @@ class Reader {
   }
 
   Members either() {
-    if (++depth_ > deepest) throw Error(fmt::format("{} has too many parentheses within one another", quoted(text_)));
+    if (++depth_ > deepest)
+      throw Error(fmt::format("{} has too many parentheses within one another", quoted(text_)));
     Members result = both();
     while (what_ == Or) next(), result = united(result, both());
     --depth_;
@@ -216,9 +223,11 @@ class Reader {
 
   static bool space(char c) { return std::isspace(static_cast<unsigned char>(c)); }
   static std::optional<What> keyword(std::string_view word) {
-    static constexpr std::array<std::pair<std::string_view, What>, 3> words{{{"and", And}, {"or", Or}, {"not", Not}}};
+    static constexpr std::array<std::pair<std::string_view, What>, 3> words{
+        {{"and", And}, {"or", Or}, {"not", Not}}};
     for (const auto& [known, what] : words)
-      if (std::ranges::equal(word, known, {}, [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); }))
+      if (std::ranges::equal(word, known, {},
+                             [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); }))
         return what;
     return std::nullopt;
   }

@@ -21,8 +21,9 @@ struct Clause {
 
   std::string attribute;  // "layer", "population", "node_id", …
   Test test = Test::any_of;
-  std::vector<std::string> words;  // any_of: one of these or of the numbers; regex: one pattern, met anywhere in the word
-  std::vector<double> numbers;     // any_of; the comparisons have one
+  std::vector<std::string>
+      words;  // any_of: one of these or of the numbers; regex: one pattern, met anywhere in the word
+  std::vector<double> numbers;  // any_of; the comparisons have one
 
   bool operator==(const Clause&) const = default;
 };
@@ -55,9 +56,9 @@ struct Attribute {
 
 /// What node sets are resolved against.
 struct NodeTable {
-  std::size_t count = 0;                                                 // nodes
+  std::size_t count = 0;                                                // nodes
   std::function<std::optional<Attribute>(std::string_view)> attribute;  // none: not known
-  std::string known;                                                     // their names, for errors
+  std::string known;                                                    // their names, for errors
 };
 
 /// The nodes of a set. A word and a number are equal when they read the same: the layer "2" is 2.
@@ -85,7 +86,8 @@ struct NodeNames {
 /// @param find   what a name means; may throw
 /// @param count  of all instances, for "not"
 /// Throws Error with one sentence.
-Members evaluate(std::string_view expression, const std::function<Members(const std::string&)>& find, std::size_t count);
+Members evaluate(std::string_view expression, const std::function<Members(const std::string&)>& find,
+                 std::size_t count);
 
 /// An expression that is a union of plain names: those names; none for any other.
 std::optional<std::vector<std::string>> union_of(std::string_view expression);

@@ -36,7 +36,8 @@ Members of(std::vector<Clause> clauses) {
 TEST(NodeSets, EveryClauseMustHoldAndOneOfItsValues) {
   EXPECT_THAT(of({}), ElementsAre(0, 1, 2, 3, 4, 5));
   EXPECT_THAT(of({{"mtype", Ask::any_of, {"L2_a"}, {}}}), ElementsAre(0, 2, 4));
-  EXPECT_THAT(of({{"layer", Ask::any_of, {"2", "4"}, {}}, {"mtype", Ask::any_of, {"L2_b"}, {}}}), ElementsAre(1, 5));
+  EXPECT_THAT(of({{"layer", Ask::any_of, {"2", "4"}, {}}, {"mtype", Ask::any_of, {"L2_b"}, {}}}),
+              ElementsAre(1, 5));
   EXPECT_THAT(of({{"layer", Ask::any_of, {}, {2, 3}}}), ElementsAre(0, 1, 2, 3));
   EXPECT_THAT(of({{"node_id", Ask::any_of, {}, {2, 0, 0, 99}}}), ElementsAre(0, 2));
   EXPECT_THAT(of({{"node_id", Ask::any_of, {}, {}}}), IsEmpty());
@@ -76,7 +77,8 @@ TEST(NodeSets, CompoundsAreUnionsAndCirclesAreNamed) {
   EXPECT_THAT(refused(sets, "missing"), HasSubstr("sets.json: there is no node set 'missing'"));
   sets.put({.name = "z", .clauses = {}, .of = {"gone"}, .compound = true});
   EXPECT_THAT(refused(sets, "x"), HasSubstr("'z' names 'gone'"));
-  EXPECT_THAT(members(sets, "both", six()), ElementsAre(0, 1, 2, 4));  // what is wrong elsewhere does not matter
+  EXPECT_THAT(members(sets, "both", six()),
+              ElementsAre(0, 1, 2, 4));  // what is wrong elsewhere does not matter
 }
 
 TEST(NodeSets, HostileOnesEndWithASentence) {
@@ -88,7 +90,9 @@ TEST(NodeSets, HostileOnesEndWithASentence) {
   sets.sets.clear();
   sets.put({.name = "0", .clauses = {}, .of = {}});
   for (int i = 1; i < 60; ++i)  // 2^60 ways down
-    sets.put({.name = std::to_string(i), .clauses = {}, .of = {std::to_string(i - 1), std::to_string(i - 1)},
+    sets.put({.name = std::to_string(i),
+              .clauses = {},
+              .of = {std::to_string(i - 1), std::to_string(i - 1)},
               .compound = true});
   EXPECT_EQ(members(sets, "59", six()).size(), 6u);
   for (const char* pattern : {"(a", "[", "*", "\\1(a)"}) {
@@ -136,8 +140,8 @@ TEST(Expression, SaysWhatItMeans) {
 }
 
 TEST(Expression, WhatIsNoneIsOneSentence) {
-  for (const char* wrong : {"", "  ", "and", "L5 and", "L5 or or L5", "(L5", "L5)", "not", "L5 (inhibitory)", "'L5", "()",
-                            "L5 and no such name"})
+  for (const char* wrong : {"", "  ", "and", "L5 and", "L5 or or L5", "(L5", "L5)", "not", "L5 (inhibitory)",
+                            "'L5", "()", "L5 and no such name"})
     EXPECT_THROW(say(wrong), Error) << wrong;
   EXPECT_THROW(say(std::string(5000, '(') + "L5"), Error);
   std::string nots;

@@ -21,8 +21,11 @@ using circuit::NodeSet;
 using circuit::NodeSets;
 using Test = Clause::Test;
 
-constexpr std::array<std::pair<std::string_view, Test>, 5> operators{
-    {{"$regex", Test::regex}, {"$gt", Test::greater}, {"$lt", Test::less}, {"$gte", Test::at_least}, {"$lte", Test::at_most}}};
+constexpr std::array<std::pair<std::string_view, Test>, 5> operators{{{"$regex", Test::regex},
+                                                                      {"$gt", Test::greater},
+                                                                      {"$lt", Test::less},
+                                                                      {"$gte", Test::at_least},
+                                                                      {"$lte", Test::at_most}}};
 
 constexpr int deepest = 8;  // brackets within brackets: node sets have three
 
@@ -46,10 +49,11 @@ void add_value(const Place& place, const std::string& attribute, const Json& val
   } else if (value.is_boolean() && attribute != "node_id" && attribute != "population") {
     clause.words.push_back(value.get<bool>() ? "true" : "false");
   } else {
-    place.refuse(attribute, attribute == "node_id"      ? "must be a whole number or a list of them"
-                            : attribute == "population" ? "must be a name or a list of names"
-                                                        : "must be a word, a number, a list of them or a comparison as "
-                                                          "{\"$gt\": 3}");
+    place.refuse(attribute, attribute == "node_id" ? "must be a whole number or a list of them"
+                            : attribute == "population"
+                                ? "must be a name or a list of names"
+                                : "must be a word, a number, a list of them or a comparison as "
+                                  "{\"$gt\": 3}");
   }
 }
 
@@ -63,11 +67,13 @@ void add_clauses(const Place& place, const std::string& attribute, const Json& v
     set.clauses.push_back(std::move(clause));
     return;
   }
-  if (value.empty()) place.refuse(attribute, "asks for nothing; give a value or a comparison as {\"$gt\": 3}");
+  if (value.empty())
+    place.refuse(attribute, "asks for nothing; give a value or a comparison as {\"$gt\": 3}");
   for (const auto& [word, limit] : value.items()) {
     const auto known = std::ranges::find(operators, word, [](const auto& o) { return std::string(o.first); });
     if (known == operators.end())
-      place.refuse(attribute, fmt::format("is compared by '{}'; known are $regex, $gt, $gte, $lt and $lte", word));
+      place.refuse(attribute,
+                   fmt::format("is compared by '{}'; known are $regex, $gt, $gte, $lt and $lte", word));
     const bool pattern = known->second == Test::regex;
     if (pattern ? !limit.is_string() : !limit.is_number())
       place.refuse(attribute, fmt::format("must have a {} behind {}", pattern ? "text" : "number", word));
@@ -87,14 +93,15 @@ NodeSet set_of(const std::string& source, const std::string& name, const Json& r
     set.compound = true;
     for (const Json& other : rule) {
       if (!other.is_string())
-        throw InputError(source, 0, fmt::format("the node set '{}' must list names of other sets only", name));
+        throw InputError(source, 0,
+                         fmt::format("the node set '{}' must list names of other sets only", name));
       set.of.push_back(other.get<std::string>());
     }
   } else if (rule.is_object()) {
     for (const auto& [attribute, value] : rule.items()) add_clauses(place, attribute, value, set);
   } else {
-    throw InputError(source, 0,
-                     fmt::format("the node set '{}' must be an object of attributes or a list of names", name));
+    throw InputError(
+        source, 0, fmt::format("the node set '{}' must be an object of attributes or a list of names", name));
   }
   return set;
 }
@@ -135,11 +142,14 @@ Json json_of(const NodeSet& set) {
       value = Json::array();
       for (const std::string& word : clause.words) value.push_back(word);
       for (const double number : clause.numbers)
-        value.push_back(number == std::floor(number) && std::abs(number) < 9e15 ? Json(std::int64_t(number)) : Json(number));
+        value.push_back(number == std::floor(number) && std::abs(number) < 9e15 ? Json(std::int64_t(number))
+                                                                                : Json(number));
       if (value.size() == 1) value = Json(value[0]);
     } else {
-      const auto word = std::ranges::find(operators, clause.test, [](const auto& o) { return o.second; })->first;
-      value[std::string(word)] = clause.test == Test::regex ? Json(clause.words.at(0)) : Json(clause.numbers.at(0));
+      const auto word =
+          std::ranges::find(operators, clause.test, [](const auto& o) { return o.second; })->first;
+      value[std::string(word)] =
+          clause.test == Test::regex ? Json(clause.words.at(0)) : Json(clause.numbers.at(0));
     }
   }
   return rule;
@@ -150,7 +160,8 @@ Json json_of(const NodeSet& set) {
 NodeSets parse_node_sets(std::string_view text, const std::string& name) {
   const Json json = parsed(text, name);
   if (!json.is_object())
-    throw InputError(name, 0, "must be one JSON object with a node set behind each name; see docs/scene/targets.md");
+    throw InputError(name, 0,
+                     "must be one JSON object with a node set behind each name; see docs/scene/targets.md");
   NodeSets sets{.source = name, .sets = {}};
   sets.sets.reserve(json.size());
   for (const auto& [key, rule] : json.items()) {
@@ -165,7 +176,9 @@ NodeSets read_node_sets(const std::filesystem::path& file) {
   return parse_node_sets(mapped.text(), file.string());
 }
 
-NodeSet parse_node_set(std::string_view json, const std::string& name) { return set_of(name, name, parsed(json, name)); }
+NodeSet parse_node_set(std::string_view json, const std::string& name) {
+  return set_of(name, name, parsed(json, name));
+}
 
 std::string to_json(const NodeSets& sets) {
   std::string text = "{";

@@ -49,7 +49,8 @@ std::string refused(const std::string& json) {
 }
 
 TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {
-  EXPECT_THAT(refused("{\n\"a\": {\"layer\": 5},\n oops}"), HasSubstr("sets.json:3: is no JSON from here on"));
+  EXPECT_THAT(refused("{\n\"a\": {\"layer\": 5},\n oops}"),
+              HasSubstr("sets.json:3: is no JSON from here on"));
   const std::pair<const char*, const char*> wrong[] = {
       {"", "is no JSON"},
       {"[]", "one JSON object"},
@@ -72,7 +73,8 @@ TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {
   };
   for (const auto& [json, words] : wrong) EXPECT_THAT(refused(json), HasSubstr(words)) << json;
   EXPECT_THAT(refused("{\"a\": " + std::string(100'000, '[')), HasSubstr("no JSON"));
-  EXPECT_THAT(refused("{\"a\": " + std::string(1000, '[') + std::string(1000, ']') + "}"), HasSubstr("brackets"));
+  EXPECT_THAT(refused("{\"a\": " + std::string(1000, '[') + std::string(1000, ']') + "}"),
+              HasSubstr("brackets"));
 }
 
 TEST(NodeSetsFile, CutOffAnywhereItIsRefused) {
@@ -85,9 +87,10 @@ TEST(NodeSetsFile, ThoseOfOtherProgramsAreRead) {
   const auto folder = real_data("sonata");
   if (!folder) GTEST_SKIP() << "real data is not here";
   std::size_t sets = 0;
-  for (const char* file : {"libsonata_tests/node_sets.json", "snap_tests/node_sets.json", "snap_tests/node_sets_file.json",
-                           "obi_tiny_circuits/tiny_circuits/nbS1-O1-E2Sst-maxNsyn-HEX0-L5/node_sets.json",
-                           "allen_sonata_examples/300_cells/node_sets.json"}) {
+  for (const char* file :
+       {"libsonata_tests/node_sets.json", "snap_tests/node_sets.json", "snap_tests/node_sets_file.json",
+        "obi_tiny_circuits/tiny_circuits/nbS1-O1-E2Sst-maxNsyn-HEX0-L5/node_sets.json",
+        "allen_sonata_examples/300_cells/node_sets.json"}) {
     const NodeSets read = read_node_sets(*folder / file);
     EXPECT_EQ(parse_node_sets(to_json(read), "again").sets, read.sets) << file;
     sets += read.sets.size();

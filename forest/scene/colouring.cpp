@@ -139,7 +139,8 @@ class Painter {
         Hue& hue = hues_.back();
         for (std::size_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = on_background(anatomical[kind]);
         for (const std::size_t kind : {1u, 2u, 3u, 4u})
-          hue.legend.push_back({kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
+          hue.legend.push_back(
+              {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
         return [first](std::uint32_t) { return first; };
       }
       case ColourBy::depth:
@@ -150,7 +151,8 @@ class Painter {
         for (std::size_t t = 0; t < view_.targets.size(); ++t) {
           const Appearance& a = view_.targets[t];
           if (a.branch) continue;
-          const std::uint16_t hue = a.colour ? flat(a) : add_hue(on_background(categorical[t % categorical.size()]), a.name);
+          const std::uint16_t hue =
+              a.colour ? flat(a) : add_hue(on_background(categorical[t % categorical.size()]), a.name);
           for (const std::uint32_t i : targets_.find(a.name)) of[i] = hue;
         }
         return [of = std::move(of)](std::uint32_t i) { return of[i]; };
@@ -167,21 +169,24 @@ class Painter {
     const std::size_t layers = circuit.layers.size(), pairs = circuit.types.size() * layers;
     if (pairs > (1u << 20)) {  // by the type alone
       const auto first = std::uint16_t(hues_.size());
-      for (std::size_t t = 0; t < circuit.types.size(); ++t) add_hue(ramp_colour(std::uint32_t(t), .5f), circuit.types[t].name);
+      for (std::size_t t = 0; t < circuit.types.size(); ++t)
+        add_hue(ramp_colour(std::uint32_t(t), .5f), circuit.types[t].name);
       return [this, first](std::uint32_t i) { return hue_at(first + forest_.types()[i]); };
     }
     std::vector<std::uint16_t> hue_of(pairs);
     std::vector<bool> met(pairs);
-    for (std::uint32_t i = 0; i < looks_.size(); ++i) met[forest_.types()[i] * layers + forest_.layers()[i]] = true;
+    for (std::uint32_t i = 0; i < looks_.size(); ++i)
+      met[forest_.types()[i] * layers + forest_.layers()[i]] = true;
     for (std::size_t type = 0; type < circuit.types.size(); ++type) {
       const auto begin = met.begin() + std::ptrdiff_t(type * layers);
       const auto steps = std::count(begin, begin + std::ptrdiff_t(layers), true);
       std::ptrdiff_t step = 0;
       for (std::size_t layer = 0; layer < layers; ++layer)
         if (met[type * layers + layer]) {
-          hue_of[type * layers + layer] = add_hue(
-              ramp_colour(std::uint32_t(type), steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .6f : 1.f),
-              circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
+          hue_of[type * layers + layer] =
+              add_hue(ramp_colour(std::uint32_t(type), steps > 1 ? float(step) / float(steps - 1) : .5f) *
+                          (light_ ? .6f : 1.f),
+                      circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
           ++step;
         }
     }
@@ -234,11 +239,12 @@ class Painter {
     const Branch& b = *a.branch;
     const std::string where = fmt::format("neuron {}", b.neuron);
     if (b.neuron >= looks_.size())
-      throw Error(fmt::format("there is no {} in this forest of {}; give one from 0 on", where, looks_.size()));
+      throw Error(
+          fmt::format("there is no {} in this forest of {}; give one from 0 on", where, looks_.size()));
     const Neuron& neuron = forest_.neurons()[forest_.instances()[b.neuron].morphology];
     if (b.section != soma_section && b.section >= neuron.section_count)
-      throw Error(fmt::format("{} has {} sections and no section {}; give one from 0 on", where, neuron.section_count,
-                              b.section));
+      throw Error(fmt::format("{} has {} sections and no section {}; give one from 0 on", where,
+                              neuron.section_count, b.section));
     const Change change = change_of(a);
     if (b.section == soma_section) {
       change(looks_[b.neuron], b.neuron);
@@ -251,7 +257,8 @@ class Painter {
     for (const PartLook& before : parts_)  // a branch of one that is shown otherwise already begins as that
       if (before.instance == b.neuron && within(neuron, b.section, before.section)) part.look = before.look;
     for (PartLook& below : parts_)
-      if (below.instance == b.neuron && within(neuron, below.section, b.section)) change(below.look, b.neuron);
+      if (below.instance == b.neuron && within(neuron, below.section, b.section))
+        change(below.look, b.neuron);
     change(part.look, b.neuron);
     // Before its own branches, which stay as they were said to be.
     const auto at = std::ranges::find_if(parts_, [&](const PartLook& other) {
@@ -262,7 +269,8 @@ class Painter {
 
   // Whether a section is `branch` or grows out of it.
   bool within(const Neuron& neuron, std::uint32_t section, std::uint32_t branch) const {
-    while (section != 0xffffffffu && section > branch) section = forest_.sections()[neuron.first_section + section].parent;
+    while (section != 0xffffffffu && section > branch)
+      section = forest_.sections()[neuron.first_section + section].parent;
     return section == branch;
   }
 
@@ -270,7 +278,7 @@ class Painter {
   struct Change {
     const Appearance& a;
     std::uint8_t opacity;
-    const HueOf* hue_of;           // null: none, or a flat one
+    const HueOf* hue_of;  // null: none, or a flat one
     std::optional<std::uint16_t> hue;
     std::vector<std::uint8_t> row;  // by the row before
 
@@ -325,7 +333,11 @@ class Painter {
     std::vector<std::uint8_t> class_of(seen.size());
     for (const std::size_t i : used) class_of[i] = std::uint8_t(nearest(i, kept, rows));
 
-    Colouring result{.palette = frame::black_palette(), .opacities = frame::opaque(), .states = {}, .parts = {}, .legend = {}};
+    Colouring result{.palette = frame::black_palette(),
+                     .opacities = frame::opaque(),
+                     .states = {},
+                     .parts = {},
+                     .legend = {}};
     std::vector<bool> told(hues_.size());
     for (std::size_t c = 0; c < kept.size(); ++c) {
       const Hue& hue = hues_[kept[c] / rows];
@@ -333,7 +345,8 @@ class Painter {
         result.palette[8 * c + kind] = hue.kinds[kind];
         result.opacities[8 * c + kind] = rows_[kept[c] % rows][kind];
       }
-      if (!told[kept[c] / rows]) result.legend.insert(result.legend.end(), hue.legend.begin(), hue.legend.end());
+      if (!told[kept[c] / rows])
+        result.legend.insert(result.legend.end(), hue.legend.begin(), hue.legend.end());
       told[kept[c] / rows] = true;
     }
     const auto state_of = [&](const Look& look) {

@@ -28,15 +28,15 @@ struct Branch {
 
 /// How a target or a branch is shown. What is not said stays as it was; of a view's appearances later ones win.
 struct Appearance {
-  std::string name;              // of the target, or an expression; "" when it is a branch
+  std::string name;  // of the target, or an expression; "" when it is a branch
   std::optional<Branch> branch;
   std::optional<bool> visible;
   std::optional<std::uint32_t> colour;  // 0xrrggbb, sRGB
   std::optional<ColourBy> colour_by;    // instead of one colour
   std::optional<frame::Kind> kind;
-  std::optional<float> opacity;                       // 0–1
-  std::array<std::optional<float>, 8> opacity_of{};   // by section kind (1: the soma), times that
-  std::optional<bool> simulated;                      // stored and told; nothing simulates yet
+  std::optional<float> opacity;                      // 0–1
+  std::array<std::optional<float>, 8> opacity_of{};  // by section kind (1: the soma), times that
+  std::optional<bool> simulated;                     // stored and told; nothing simulates yet
 
   bool operator==(const Appearance&) const = default;
 };

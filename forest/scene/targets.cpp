@@ -44,7 +44,8 @@ constexpr std::array<Row, 14> attributes{{
     {"population",
      [](const Forest& f) {
        Attribute a{f.nodes().populations, {}, {}};
-       for (const circuit::NodeRun& run : f.nodes().runs) a.index.insert(a.index.end(), run.count, run.population);
+       for (const circuit::NodeRun& run : f.nodes().runs)
+         a.index.insert(a.index.end(), run.count, run.population);
        return a;
      }},
     {"node_id",
@@ -71,7 +72,8 @@ constexpr std::array<Row, 14> attributes{{
      }},
     {"synapse_class",
      [](const Forest& f) {
-       return of_type(f, [](const circuit::CellType& t) { return std::string(t.excitatory ? "EXC" : "INH"); });
+       return of_type(f,
+                      [](const circuit::CellType& t) { return std::string(t.excitatory ? "EXC" : "INH"); });
      }},
     {"ei",
      [](const Forest& f) {
@@ -129,7 +131,8 @@ circuit::NodeTable node_table(const Forest& forest) {
           known};
 }
 
-Targets::Targets(Forest forest, circuit::NodeSets sets) : forest_(std::move(forest)), sets_(std::move(sets)) {}
+Targets::Targets(Forest forest, circuit::NodeSets sets)
+    : forest_(std::move(forest)), sets_(std::move(sets)) {}
 
 void Targets::use(circuit::NodeSets sets) {
   sets_ = std::move(sets);
@@ -174,7 +177,8 @@ Members Targets::named(const std::string& name) const {
     meant = std::move(members);
   }
   if (!meant)
-    throw Error(fmt::format("there is no target '{}' in this forest; 'brainforest targets' lists them", name));
+    throw Error(
+        fmt::format("there is no target '{}' in this forest; 'brainforest targets' lists them", name));
   return *meant;
 }
 

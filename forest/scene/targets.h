@@ -15,9 +15,9 @@ namespace forest::scene {
 /// What a list of targets tells of one.
 struct TargetFacts {
   std::string name;
-  std::string origin;    // "node set", "type", "layer", "population", "sign" or "all"
+  std::string origin;     // "node set", "type", "layer", "population", "sign" or "all"
   std::size_t count = 0;  // neurons
-  std::string problem;   // why it cannot be used; "" when it can
+  std::string problem;    // why it cannot be used; "" when it can
 };
 
 /// What is known of the neurons of a forest by the names that node sets use: population, node_id, layer, mtype (also

@@ -60,14 +60,18 @@ TEST(Targets, AForestHasThemByItself) {
     EXPECT_EQ(targets.find(t.name).size(), t.count) << t.name;
     names.insert(t.origin + ":" + t.name);
   }
-  EXPECT_EQ(names, (std::set<std::string>{"type:first", "type:second", "layer:upper", "layer:lower", "population:a",
-                                          "population:b", "sign:excitatory", "sign:inhibitory", "all:all"}));
+  EXPECT_EQ(names,
+            (std::set<std::string>{"type:first", "type:second", "layer:upper", "layer:lower", "population:a",
+                                   "population:b", "sign:excitatory", "sign:inhibitory", "all:all"}));
 }
 
 TEST(Targets, NodeSetsAskForAttributes) {
   const Forest f = sample();
   circuit::NodeSets sets{.source = "sets.json", .sets = {}};
-  sets.put({.name = "some", .clauses = {{"population", Clause::Test::any_of, {"b"}, {}}, {"node_id", Clause::Test::any_of, {}, {12, 15, 3}}}, .of = {}});
+  sets.put({.name = "some",
+            .clauses = {{"population", Clause::Test::any_of, {"b"}, {}},
+                        {"node_id", Clause::Test::any_of, {}, {12, 15, 3}}},
+            .of = {}});
   sets.put({.name = "high", .clauses = {{"y", Clause::Test::greater, {}, {300}}}, .of = {}});
   sets.put({.name = "first", .clauses = {{"mtype", Clause::Test::any_of, {"second"}, {}}}, .of = {}});
   sets.put({.name = "both", .clauses = {}, .of = {"some", "high"}, .compound = true});
@@ -76,8 +80,10 @@ TEST(Targets, NodeSetsAskForAttributes) {
   EXPECT_EQ(targets.find("some"), (Members{2, 5}));
   EXPECT_EQ(targets.find("high"), where(f, [&](auto i) { return f.instances()[i].y > 300.f; }));
   EXPECT_EQ(targets.find("first"), targets.find("type:second"));  // a node set comes first
-  EXPECT_EQ(targets.find("both and not high").size(), 2 - (f.instances()[2].y > 300.f) - (f.instances()[5].y > 300.f));
-  EXPECT_THAT(refused([&] { targets.find("odd"); }), HasSubstr("sets.json: the node set 'odd' asks for 'etype'"));
+  EXPECT_EQ(targets.find("both and not high").size(),
+            2 - (f.instances()[2].y > 300.f) - (f.instances()[5].y > 300.f));
+  EXPECT_THAT(refused([&] { targets.find("odd"); }),
+              HasSubstr("sets.json: the node set 'odd' asks for 'etype'"));
   EXPECT_THAT(targets.list()[4].problem, HasSubstr("etype"));  // told, and the others can be used
 }
 
@@ -151,8 +157,10 @@ TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
   const Forest f = sample();
   const Targets targets(f);
   for (const char* word : {"type", "layer", "kind", "neuron", "target", "depth"}) {
-    View view = with(std::string(R"([{"name":"first","opacity":0.5},{"name":"second","colour":")") + word + "\"}]");
-    view.colour_by = parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":")") + word + "\"}").colour_by;
+    View view =
+        with(std::string(R"([{"name":"first","opacity":0.5},{"name":"second","colour":")") + word + "\"}]");
+    view.colour_by =
+        parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":")") + word + "\"}").colour_by;
     const Colouring c = colour(targets, view);
     const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, nullptr, c.shown());
     EXPECT_NO_THROW(frame::check(compose(f, view, c, cut, 320, 200), f.geometry())) << word;
@@ -166,8 +174,15 @@ TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
   View view = with("[]");
   view.colour_by = ColourBy::layer;
   for (std::uint32_t i = 0; i < 30; ++i)
-    view.targets.push_back({.name = "", .branch = Branch{i}, .visible = {}, .colour = i < 15 ? i << 4 : 0xff0000 + i,
-                            .colour_by = {}, .kind = {}, .opacity = {}, .opacity_of = {}, .simulated = {}});
+    view.targets.push_back({.name = "",
+                            .branch = Branch{i},
+                            .visible = {},
+                            .colour = i < 15 ? i << 4 : 0xff0000 + i,
+                            .colour_by = {},
+                            .kind = {},
+                            .opacity = {},
+                            .opacity_of = {},
+                            .simulated = {}});
   const Colouring c = colour(targets, view);
   for (std::uint32_t i = 0; i < 30; ++i) {
     const Vec3 shown = c.palette[8 * c.states[i].colour_class + 4];
@@ -216,9 +231,11 @@ TEST(Appearance, AKindIsDrawnWithItsOwnPrimitives) {
     const Colouring c = colour(targets, view);
     return choose(f, eye, {320, 200}, nullptr, c.shown());
   };
-  const Cut lines = cut_of("lines"), capsules = cut_of("capsules"), dots = cut_of("dots"), somata = cut_of("somata");
+  const Cut lines = cut_of("lines"), capsules = cut_of("capsules"), dots = cut_of("dots"),
+            somata = cut_of("somata");
   const auto somata_in = [&](const std::vector<frame::Item>& list) {
-    return std::ranges::count_if(list, [&](const frame::Item& i) { return (f.segments()[i.first_segment].meta & 7) == 1; });
+    return std::ranges::count_if(
+        list, [&](const frame::Item& i) { return (f.segments()[i.first_segment].meta & 7) == 1; });
   };
   EXPECT_EQ(somata_in(lines.capsules), std::ptrdiff_t(lines.capsules.size()));
   EXPECT_TRUE(capsules.lines.empty());
@@ -259,15 +276,23 @@ TEST(Appearance, ABranchIsShownByItself) {
   const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, nullptr, c.shown());
   EXPECT_EQ(again.neurons, 40u);
   EXPECT_EQ(c.parts[0].state.opacity, 255);
-  EXPECT_THAT(refused([&] { view.targets[1].branch = Branch{40}; colour(targets, view); }), HasSubstr("no neuron 40"));
-  EXPECT_THAT(refused([&] { view.targets[1].branch = Branch{4, 5000}; colour(targets, view); }),
+  EXPECT_THAT(refused([&] {
+                view.targets[1].branch = Branch{40};
+                colour(targets, view);
+              }),
+              HasSubstr("no neuron 40"));
+  EXPECT_THAT(refused([&] {
+                view.targets[1].branch = Branch{4, 5000};
+                colour(targets, view);
+              }),
               HasSubstr("no section 5000"));
 }
 
 TEST(Appearance, OpacityOfAKindOfBranchGoesToThePalette) {
   const Forest f = sample();
   const Targets targets(f);
-  const View view = with(R"([{"name":"first","opacity":{"apical":0.2,"soma":1}},{"name":"upper","opacity":{"basal":0}}])");
+  const View view =
+      with(R"([{"name":"first","opacity":{"apical":0.2,"soma":1}},{"name":"upper","opacity":{"basal":0}}])");
   const Colouring c = colour(targets, view);
   for (std::uint32_t i = 0; i < 40; ++i) {
     const std::size_t at = 8 * c.states[i].colour_class;
