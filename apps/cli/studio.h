@@ -3,12 +3,14 @@
 
 #include <filesystem>
 #include <string>
+#include <vector>
 
 namespace forest::cli {
 
 bool has_display();
 
 /// Becomes the studio: returns only by throwing Error.
-[[noreturn]] void open_studio(const std::filesystem::path& forest, const std::string& view = "");
+[[noreturn]] void open_studio(const std::filesystem::path& forest, const std::string& view = "",
+                              const std::vector<std::filesystem::path>& node_sets = {});
 
 }  // namespace forest::cli

@@ -14,13 +14,15 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/studio.h"
+#include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
 
 bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
 
-void open_studio(const std::filesystem::path& forest, const std::string& view) {
+void open_studio(const std::filesystem::path& forest, const std::string& view,
+                 const std::vector<std::filesystem::path>& node_sets) {
   if (!has_display())
     throw Error(
         "there is no display to open the studio on; make a picture with 'brainforest render' instead");
@@ -29,6 +31,7 @@ void open_studio(const std::filesystem::path& forest, const std::string& view) {
       std::filesystem::read_symlink("/proc/self/exe", ignored).parent_path() / "brainforest-studio";
   std::vector<std::string> words{studio.string(), forest.string()};
   if (!view.empty()) words.insert(words.end(), {"--view", view});
+  for (const auto& file : node_sets) words.insert(words.end(), {"--node-sets", file.string()});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -42,13 +45,15 @@ std::function<void()> view(CLI::App& command, Console&) {
   struct Options {
     std::filesystem::path forest;
     std::string view;
+    std::vector<std::filesystem::path> node_sets;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
+  add_node_sets(command, options->node_sets);
   return [options] {
     MappedFile exists(options->forest);  // says so here rather than in a window
-    open_studio(options->forest, options->view);
+    open_studio(options->forest, options->view, options->node_sets);
   };
 }
 

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "forest/core/error.h"
+#include "forest/io/node_sets.h"
 
 #include "apps/studio/report.h"
 #include "apps/studio/theme.h"
@@ -23,6 +24,7 @@ namespace {
 struct Options {
   std::filesystem::path forest, screenshot;
   std::string view, size;
+  std::vector<std::filesystem::path> node_sets;
   bool report = false;
 };
 
@@ -67,7 +69,13 @@ int run(const Options& options, int& argc, char** argv) {
   application.setApplicationName("Studio");
   apply_theme(application);
 
-  Window window(forest, view, QString::fromStdString(options.forest.filename().string()));
+  circuit::NodeSets sets;
+  for (const auto& file : options.node_sets) {
+    circuit::NodeSets more = io::read_node_sets(file);
+    for (circuit::NodeSet& set : more.sets) sets.put(std::move(set));
+    sets.source = options.node_sets.size() == 1 ? more.source : "the node sets";
+  }
+  Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets));
   if (size.isValid()) window.resize(size);
   if (options.report) report(window);
   int status = 0;
@@ -108,6 +116,8 @@ int main(int argc, char** argv) {
   CLI::App app{"A window on a forest: orbit, fly, and ask any branch what it is.", "brainforest-studio"};
   app.add_option("FOREST", options.forest, "A forest file, made by 'brainforest pack'")->required();
   app.add_option("--view", options.view, "Begin with this view: a JSON file, or the text that Ctrl+C copies");
+  app.add_option("--node-sets", options.node_sets,
+                 "SONATA node sets, JSON files: names that targets may use besides the forest's own");
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");

@@ -9,7 +9,7 @@ namespace {
 using S = Settings;
 
 constexpr const char* group_names[] = {"Eye", "Flight", "Gaze", "Detail", "Colour", "Depth", "Shown"};
-constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron"};
+constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron", "Target", "Depth"};
 constexpr const char* background_words[] = {"Dark", "Light"};
 
 constexpr double far = 1e6;  // µm

@@ -17,10 +17,12 @@ class Style final : public QProxyStyle {
 
   void drawPrimitive(PrimitiveElement element, const QStyleOption* option, QPainter* painter,
                      const QWidget* widget) const override {
-    if (element != PE_IndicatorCheckBox) return QProxyStyle::drawPrimitive(element, option, painter, widget);
+    if (element != PE_IndicatorCheckBox && element != PE_IndicatorItemViewItemCheck)
+      return QProxyStyle::drawPrimitive(element, option, painter, widget);
     const QPalette& palette = option->palette;
     const QRectF box = QRectF(option->rect).adjusted(.5, .5, -.5, -.5);
-    const bool on = option->state & State_On, bright = option->state & (State_MouseOver | State_HasFocus);
+    const bool on = option->state & State_On, some = option->state & State_NoChange,
+               bright = option->state & (State_MouseOver | State_HasFocus);
     painter->save();
     painter->setRenderHint(QPainter::Antialiasing);
     painter->setPen(bright || on ? palette.color(QPalette::Highlight) : QColor(0x45, 0x52, 0x64));
@@ -33,6 +35,11 @@ class Style final : public QProxyStyle {
         return box.topLeft() + QPointF(x * box.width(), y * box.height());
       };
       painter->drawPolyline(QPolygonF{at(.24, .52), at(.43, .71), at(.77, .31)});
+    }
+    if (some) {
+      painter->setPen(QPen(palette.color(QPalette::Highlight), 1.8, Qt::SolidLine, Qt::RoundCap));
+      painter->drawLine(box.topLeft() + QPointF(.3 * box.width(), .5 * box.height()),
+                        box.topLeft() + QPointF(.7 * box.width(), .5 * box.height()));
     }
     painter->restore();
   }
@@ -75,15 +82,16 @@ void apply_theme(QApplication& application) {
     QScrollArea, QScrollArea > QWidget > QWidget { background: #12161d; border: none; }
     QLabel#group { color: #6c788a; font-size: 8pt; font-weight: 600; padding-top: 4px; }
     QLabel#hint { color: #6c788a; padding: 16px; }
-    QDoubleSpinBox, QComboBox { background: #0d1016; border: 1px solid #252d39; border-radius: 3px;
+    QDoubleSpinBox, QSpinBox, QLineEdit, QComboBox { background: #0d1016; border: 1px solid #252d39; border-radius: 3px;
                                 padding: 2px 5px; min-height: 17px; selection-background-color: #56b4e9; }
-    QDoubleSpinBox:focus, QComboBox:focus { border-color: #56b4e9; }
+    QDoubleSpinBox:focus, QSpinBox:focus, QLineEdit:focus, QComboBox:focus { border-color: #56b4e9; }
     QDoubleSpinBox:disabled { color: #4d5867; }
     QCheckBox { spacing: 8px; }
     QCheckBox:focus { color: #56b4e9; }
-    QTableWidget { background: #12161d; alternate-background-color: #161b23; selection-background-color: #26303d;
+    QTableWidget, QTreeWidget { background: #12161d; alternate-background-color: #161b23; selection-background-color: #26303d;
                    selection-color: #e8eef6; }
     QTableWidget::item { padding: 0 6px; }
+    QTreeWidget::item { padding: 2px 4px; }
     QScrollBar:vertical { background: transparent; width: 9px; margin: 0; }
     QScrollBar::handle:vertical { background: #2a3341; border-radius: 4px; min-height: 24px; }
     QScrollBar::add-line, QScrollBar::sub-line { height: 0; width: 0; }

@@ -54,12 +54,13 @@ Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
 
 }  // namespace
 
-Viewport::Viewport(scene::Forest forest, const scene::View& view, QWidget* parent)
+Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets, QWidget* parent)
     : QOpenGLWidget(parent),
       forest_(std::move(forest)),
+      targets_(forest_, std::move(sets)),
       chooser_(forest_),
       settings_{.view = view},
-      colouring_(scene::colour(forest_, view.colour_by, view.background)),
+      colouring_(scene::colour(targets_, view)),
       outline_(scene::outline(forest_)) {
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
@@ -83,11 +84,13 @@ Viewport::~Viewport() {
 
 void Viewport::change(const Settings& settings) {
   const scene::View& old = settings_.view;
-  if (settings.view.colour_by != old.colour_by || settings.view.background != old.background)
-    colouring_ = scene::colour(forest_, settings.view.colour_by, settings.view.background);
+  const bool recolour = settings.view.colour_by != old.colour_by ||
+                        settings.view.background != old.background || settings.view.targets != old.targets;
+  if (recolour) colouring_ = scene::colour(targets_, settings.view);
   settings_ = settings;
   touch();
   Q_EMIT changed();
+  if (recolour) Q_EMIT recoloured();
 }
 
 void Viewport::set_camera(const frame::Camera& camera) {
@@ -130,8 +133,8 @@ std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
   const frame::Camera& camera = settings_.view.camera;
   const Ray ray = ray_through(camera, in_points(), vec(place) + Vec2(.5f, .5f));
   const float pixel = 1.f / camera.focal(float(height()) * float(devicePixelRatioF()));
-  const auto exact = scene::pick(forest_, ray, .5f * pixel, camera.near);
-  return exact ? exact : scene::pick(forest_, ray, reach * pixel, camera.near);
+  const auto exact = scene::pick(forest_, ray, .5f * pixel, camera.near, colouring_.states);
+  return exact ? exact : scene::pick(forest_, ray, reach * pixel, camera.near, colouring_.states);
 }
 
 frame::Image Viewport::picture() {
@@ -193,12 +196,11 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
   if (first == 0)
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
-                    {float(w), float(h)});
+                    {float(w), float(h)}, colouring_.shown());
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
-  scene::Colouring colouring = colouring_;
-  mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
-  frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
+  frame::Frame frame = scene::compose(forest_, view, colouring_, chooser_.cut(), w, h, overlays);
+  mark_selection(frame.palette, view.background, selection_ && settings_.dim);
   chooser_.complete(frame);
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);

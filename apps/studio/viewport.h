@@ -25,11 +25,15 @@ class Viewport final : public QOpenGLWidget {
   Q_OBJECT
 
  public:
-  Viewport(scene::Forest forest, const scene::View& view, QWidget* parent = nullptr);
+  /// @param sets  names that targets may use
+  Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets, QWidget* parent = nullptr);
   ~Viewport() override;
 
   const scene::Forest& forest() const { return forest_; }
+  const scene::Targets& targets() const { return targets_; }
+  const scene::Colouring& colouring() const { return colouring_; }
   const Settings& settings() const { return settings_; }
+  /// Throws Error, and changes nothing, for a target that is not there.
   void change(const Settings& settings);
   /// Glides there, slow in and slow out.
   void glide_to(const frame::Camera& camera);
@@ -57,8 +61,9 @@ class Viewport final : public QOpenGLWidget {
   QString renderer_name() const { return renderer_name_; }
 
  Q_SIGNALS:
-  void changed();   // the settings, by hand or otherwise
-  void selected();  // something else, or nothing
+  void changed();     // the settings, by hand or otherwise
+  void recoloured();  // how neurons are shown
+  void selected();    // something else, or nothing
   void drawn();
   void settled();  // the picture is finished
   void failed(const QString& sentence);
@@ -99,6 +104,7 @@ class Viewport final : public QOpenGLWidget {
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;
+  scene::Targets targets_;
   scene::Chooser chooser_;
   Settings settings_;
   scene::Colouring colouring_;

@@ -23,6 +23,7 @@
 #include "forest/io/png.h"
 
 #include "apps/studio/selection_panel.h"
+#include "apps/studio/targets_panel.h"
 #include "apps/studio/view_panel.h"
 #include "apps/view_text.h"
 
@@ -42,8 +43,8 @@ constexpr const char* gestures[][2] = {
 
 }  // namespace
 
-Window::Window(scene::Forest forest, const scene::View& view, const QString& title)
-    : viewport_(new Viewport(std::move(forest), view, this)) {
+Window::Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets)
+    : viewport_(new Viewport(std::move(forest), view, std::move(sets), this)) {
   setWindowTitle(tr("%1 – Brain Forest").arg(title));
   setCentralWidget(viewport_);
   setDockNestingEnabled(true);
@@ -69,7 +70,10 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   connect(viewport_, &Viewport::selected, this, [this] {
     const auto& selection = viewport_->selection();
     selection_panel_->show_facts(selection ? facts(viewport_->forest(), *selection) : std::vector<Fact>{});
+    show_targets();
   });
+  connect(viewport_, &Viewport::recoloured, this, &Window::show_targets);
+  show_targets();
   connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
 
   resize(1280, 800);
@@ -88,7 +92,16 @@ void Window::add_docks() {
   scroll->setWidgetResizable(true);
   scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   scroll->setMinimumWidth(300);
-  const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_}, {"View", scroll}};
+  targets_panel_ =
+      new TargetsPanel({[this](const scene::Appearance& who, const scene::Appearance& what, bool own_colour) {
+                          Settings settings = viewport_->settings();
+                          change_target(settings.view, who, what, own_colour);
+                          viewport_->change(settings);
+                        },
+                        [this](const QString& expression) { return add_target(expression); }},
+                       this);
+  const std::pair<const char*, QWidget*> docks[] = {
+      {"Selection", selection_panel_}, {"Targets", targets_panel_}, {"View", scroll}};
   QList<QDockWidget*> added;
   for (const auto& [name, widget] : docks) {
     auto* dock = new QDockWidget(tr(name), this);
@@ -97,7 +110,7 @@ void Window::add_docks() {
     addDockWidget(Qt::RightDockWidgetArea, dock);
     added.push_back(dock);
   }
-  resizeDocks(added, {420, 300}, Qt::Vertical);
+  resizeDocks(added, {260, 300, 160}, Qt::Vertical);
 }
 
 template <class Row, class Value>
@@ -196,6 +209,28 @@ void Window::show_figures() {
                            locale.toString(qulonglong(viewport_->forest().instances().size()))));
   quality_->setText(tr("%1 samples, error %2 pixels").arg(f.samples).arg(double(f.error), 0, 'f', 1));
   renderer_->setText(viewport_->renderer_name());
+}
+
+void Window::show_targets() {
+  std::optional<scene::Branch> selected;
+  if (const auto& s = viewport_->selection()) selected = scene::Branch{s->pick.instance, s->pick.section};
+  targets_panel_->show_rows(
+      target_rows(viewport_->targets(), viewport_->settings().view, viewport_->colouring(), selected));
+}
+
+QString Window::add_target(const QString& expression) {
+  try {
+    scene::Appearance who, what;
+    who.name = expression.toStdString();
+    what.visible = true;
+    if (viewport_->targets().find(who.name).empty()) return tr("No neuron belongs to that.");
+    Settings settings = viewport_->settings();
+    change_target(settings.view, who, what);
+    viewport_->change(settings);
+    return {};
+  } catch (const std::exception& error) {
+    return QString::fromUtf8(error.what());
+  }
 }
 
 void Window::copy_view() {

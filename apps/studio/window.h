@@ -15,11 +15,12 @@ namespace forest::studio {
 void write_image(const std::filesystem::path& path, const QImage& seen);
 
 class SelectionPanel;
+class TargetsPanel;
 class ViewPanel;
 
 class Window final : public QMainWindow {
  public:
-  Window(scene::Forest forest, const scene::View& view, const QString& title);
+  Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets = {});
 
   Viewport& viewport() { return *viewport_; }
 
@@ -30,6 +31,8 @@ class Window final : public QMainWindow {
   void add_docks();
   void add_menus();
   void show_figures();
+  void show_targets();
+  QString add_target(const QString& expression);
   void copy_view();
   void paste_view();
   void save_picture(bool as_seen);
@@ -40,6 +43,7 @@ class Window final : public QMainWindow {
   Viewport* viewport_;
   ViewPanel* view_panel_;
   SelectionPanel* selection_panel_;
+  TargetsPanel* targets_panel_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
   QTimer panel_rest_;  // the panel follows a moving view a few times a second
 };

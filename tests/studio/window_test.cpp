@@ -397,6 +397,66 @@ TEST_F(Window, ControlsHaveKeys) {
   EXPECT_GT(light.pixels[0], 200);
 }
 
+TEST_F(Window, TargetsAreShownAndHiddenByKeys) {
+  const io::Picture before = saved("targets_before.png");
+  // The list begins with the types: the first is hidden by Space on its row, and comes back.
+  key("alt+t");
+  key("space");
+  settle();
+  ASSERT_EQ(view_.targets.size(), 1u);
+  EXPECT_EQ(view_.targets[0].name, "first");
+  EXPECT_EQ(view_.targets[0].visible, false);
+  EXPECT_GT(difference(before, saved("targets_hidden.png")), .02);
+  key("alt+t");
+  key("space");
+  settle();
+  EXPECT_EQ(view_.targets[0].visible, true);
+  EXPECT_LT(difference(before, saved("targets_again.png")), .001);
+  // Its opacity, its kind, its colour.
+  key("alt+q");
+  xdotool("key ctrl+a type 20");
+  key("Return");
+  settle();
+  EXPECT_EQ(view_.targets.back().opacity, .2f);
+  const io::Picture clear = saved("targets_clear.png");
+  EXPECT_GT(difference(before, clear), .02);
+  key("alt+k");
+  key("End");
+  settle();
+  EXPECT_EQ(view_.targets.back().kind, frame::Kind::somata);
+  key("alt+c");
+  key("Down");
+  settle();
+  EXPECT_EQ(view_.targets.back().colour, 0xE69F00u);
+  EXPECT_GT(difference(clear, saved("targets_somata.png")), .02);
+}
+
+TEST_F(Window, AnExpressionBecomesATarget) {
+  key("alt+n");
+  xdotool("type --delay 5 'first and not upper'");
+  key("Return");
+  settle();
+  ASSERT_EQ(view_.targets.size(), 1u);
+  EXPECT_EQ(view_.targets[0].name, "first and not upper");
+  EXPECT_EQ(view_.targets[0].visible, true);
+  key("alt+n");
+  xdotool("type --delay 5 'nobody of this name'");
+  key("Return");
+  settle();
+  EXPECT_EQ(view_.targets.size(), 1u);  // the panel says why
+}
+
+TEST_F(Window, WhatIsHiddenCannotBePicked) {
+  key("alt+t");
+  key("End");  // all
+  key("space");
+  settle();
+  EXPECT_EQ(view_.targets[0].name, "all");
+  Random random(14);
+  const Target target = clear_target(random, view_, viewport(), true);
+  EXPECT_TRUE(click(target.pixel).is_null());
+}
+
 TEST_F(Window, GazeFollowsTheMouse) {
   key("m");
   settle();

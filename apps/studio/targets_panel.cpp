@@ -1,0 +1,206 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/targets_panel.h"
+
+#include <QCheckBox>
+#include <QColorDialog>
+#include <QComboBox>
+#include <QFormLayout>
+#include <QHeaderView>
+#include <QLabel>
+#include <QLineEdit>
+#include <QPainter>
+#include <QShortcut>
+#include <QSignalBlocker>
+#include <QSpinBox>
+#include <QTreeWidget>
+#include <QVBoxLayout>
+#include <cmath>
+
+#include "apps/studio/annotation.h"
+
+namespace forest::studio {
+namespace {
+
+QIcon swatch(const QColor& colour) {
+  QPixmap picture(24, 24);
+  picture.fill(Qt::transparent);
+  QPainter painter(&picture);
+  painter.setRenderHint(QPainter::Antialiasing);
+  painter.setPen(Qt::NoPen);
+  painter.setBrush(colour);
+  painter.drawEllipse(4, 4, 16, 16);
+  return QIcon(picture);
+}
+
+Qt::CheckState check_of(TargetRow::Seen seen) {
+  return seen == TargetRow::Seen::all    ? Qt::Checked
+         : seen == TargetRow::Seen::some ? Qt::PartiallyChecked
+                                         : Qt::Unchecked;
+}
+
+// A control with its name, hint and key.
+template <class Control>
+Control* named(Control* control, const char* name, const char* hint, const char* key) {
+  control->setAccessibleName(name);
+  control->setAccessibleDescription(hint);
+  control->setToolTip(QString("%1 (%2)").arg(hint, QKeySequence(key).toString(QKeySequence::NativeText)));
+  QObject::connect(new QShortcut(QKeySequence(key), control), &QShortcut::activated, control,
+                   [control] { control->setFocus(Qt::ShortcutFocusReason); });
+  return control;
+}
+
+}  // namespace
+
+TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), changes_(std::move(changes)) {
+  setAccessibleName(tr("Targets"));
+  auto* column = new QVBoxLayout(this);
+  column->setContentsMargins(6, 6, 6, 8);
+  column->setSpacing(4);
+
+  list_ = named(new QTreeWidget(this), "Targets", "Sets of neurons: the box shows or hides one, Space does so too", "Alt+T");
+  list_->setColumnCount(2);
+  list_->setHeaderHidden(true);
+  list_->setRootIsDecorated(false);
+  list_->setIndentation(0);
+  list_->setFrameShape(QFrame::NoFrame);
+  list_->setUniformRowHeights(true);
+  list_->setAlternatingRowColors(true);
+  list_->header()->setStretchLastSection(false);
+  list_->header()->setSectionResizeMode(0, QHeaderView::Stretch);
+  list_->header()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
+  column->addWidget(list_, 1);
+  connect(list_, &QTreeWidget::itemChanged, this, [this](QTreeWidgetItem* item, int) {
+    if (quiet_) return;
+    list_->setCurrentItem(item);
+    scene::Appearance what;
+    what.visible = item->checkState(0) == Qt::Checked;
+    say(what);
+  });
+  connect(list_, &QTreeWidget::currentItemChanged, this, [this] {
+    if (!quiet_) show_chosen();
+  });
+
+  expression_ = named(new QLineEdit(this), "Another target", "Names joined by and, or, not: L5 and not inhibitory", "Alt+N");
+  expression_->setPlaceholderText(tr("Another: L5 and not inhibitory"));
+  expression_->setClearButtonEnabled(true);
+  column->addWidget(expression_);
+  problem_ = new QLabel(this);
+  problem_->setObjectName("hint");
+  problem_->setWordWrap(true);
+  problem_->hide();
+  column->addWidget(problem_);
+  connect(expression_, &QLineEdit::returnPressed, this, [this] {
+    const QString problem = changes_.add(expression_->text().trimmed());
+    problem_->setText(problem);
+    problem_->setVisible(!problem.isEmpty());
+    if (problem.isEmpty()) expression_->clear(), expression_->clearFocus();
+  });
+
+  auto* form = new QFormLayout;
+  form->setContentsMargins(4, 4, 4, 0);
+  form->setSpacing(4);
+  colour_ = named(new QComboBox(this), "Colour of the target", "One colour, or what colours mean", "Alt+C");
+  for (const TargetColour& colour : target_colours())
+    colour_->addItem(colour.rgb ? swatch(QColor::fromRgb(*colour.rgb)) : QIcon(), colour.name);
+  colour_->addItem(tr("Another…"));
+  connect(colour_, &QComboBox::activated, this, [this](int index) {
+    scene::Appearance what;
+    if (std::size_t(index) < target_colours().size()) {
+      what.colour = target_colours()[std::size_t(index)].rgb;
+      what.colour_by = target_colours()[std::size_t(index)].by;
+      return say(what, what.colour || what.colour_by);
+    }
+    const QColor chosen_colour = QColorDialog::getColor(Qt::white, this, tr("Colour of the target"),
+                                                        QColorDialog::DontUseNativeDialog);
+    if (!chosen_colour.isValid()) return;
+    what.colour = chosen_colour.rgb() & 0xffffffu;
+    say(what);
+  });
+  form->addRow(tr("Colour"), colour_);
+
+  kind_ = named(new QComboBox(this), "Kind of the target", "What its neurons are drawn with", "Alt+K");
+  for (const char* word : kind_words()) kind_->addItem(word);
+  connect(kind_, &QComboBox::activated, this, [this](int index) {
+    scene::Appearance what;
+    what.kind = frame::Kind(index);
+    say(what);
+  });
+  form->addRow(tr("Drawn"), kind_);
+
+  opacity_ = named(new QSpinBox(this), "Opacity of the target (%)", "100 hides what lies behind, 0 shows nothing of it",
+                   "Alt+Q");
+  opacity_->setRange(0, 100);
+  opacity_->setSingleStep(10);
+  opacity_->setSuffix(" %");
+  opacity_->setKeyboardTracking(false);
+  connect(opacity_, &QSpinBox::valueChanged, this, [this](int percent) {
+    scene::Appearance what;
+    what.opacity = float(percent) / 100.f;
+    say(what);
+  });
+  form->addRow(tr("Opacity"), opacity_);
+
+  simulated_ = new QCheckBox(tr("Simulated"), this);
+  simulated_->setToolTip(tr("Kept for simulators; changes nothing of the picture"));
+  connect(simulated_, &QCheckBox::clicked, this, [this](bool on) {
+    scene::Appearance what;
+    what.simulated = on;
+    say(what);
+  });
+  form->addRow(QString(), simulated_);
+  column->addLayout(form);
+  show_chosen();
+}
+
+const TargetRow* TargetsPanel::chosen() const {
+  const int row = list_->indexOfTopLevelItem(list_->currentItem());
+  return row >= 0 && std::size_t(row) < rows_.size() ? &rows_[std::size_t(row)] : nullptr;
+}
+
+void TargetsPanel::say(const scene::Appearance& what, bool own_colour) {
+  if (const TargetRow* row = chosen(); row && row->problem.empty()) changes_.change(scene::Appearance(row->who), what, own_colour);
+}
+
+void TargetsPanel::show_rows(std::vector<TargetRow> rows) {
+  const std::optional<scene::Appearance> before = chosen() ? std::optional(chosen()->who) : std::nullopt;
+  quiet_ = true;
+  rows_ = std::move(rows);
+  while (list_->topLevelItemCount() > int(rows_.size())) delete list_->takeTopLevelItem(list_->topLevelItemCount() - 1);
+  while (list_->topLevelItemCount() < int(rows_.size())) list_->addTopLevelItem(new QTreeWidgetItem);
+  for (std::size_t i = 0; i < rows_.size(); ++i) {
+    const TargetRow& row = rows_[i];
+    QTreeWidgetItem* item = list_->topLevelItem(int(i));
+    item->setText(0, QString::fromStdString(row.title));
+    item->setToolTip(0, QString::fromStdString(row.problem.empty() ? row.title + ": " + row.origin : row.problem));
+    item->setText(1, row.problem.empty() ? QLocale().toString(qulonglong(row.count)) : "?");
+    item->setTextAlignment(1, Qt::AlignRight | Qt::AlignVCenter);
+    item->setForeground(1, QColor(140, 153, 172));
+    item->setIcon(0, row.count && row.seen != TargetRow::Seen::none ? swatch(to_screen(row.colour)) : QIcon());
+    item->setFlags(row.problem.empty() && row.count ? Qt::ItemIsEnabled | Qt::ItemIsSelectable | Qt::ItemIsUserCheckable
+                                                    : Qt::ItemIsSelectable);
+    item->setCheckState(0, check_of(row.seen));
+    if (before && row.who == *before) list_->setCurrentItem(item);
+  }
+  quiet_ = false;
+  show_chosen();
+}
+
+void TargetsPanel::show_chosen() {
+  const TargetRow* row = chosen();
+  const bool usable = row && row->problem.empty() && row->count;
+  for (QWidget* control : {static_cast<QWidget*>(colour_), static_cast<QWidget*>(kind_),
+                           static_cast<QWidget*>(opacity_), static_cast<QWidget*>(simulated_)})
+    control->setEnabled(usable);
+  if (!usable) return;
+  const QSignalBlocker quiet_opacity(opacity_);
+  kind_->setCurrentIndex(int(row->kind));
+  opacity_->setValue(int(std::lround(100.f * row->opacity)));
+  simulated_->setChecked(row->simulated);
+  const QColor seen = to_screen(row->colour);
+  int word = 0;
+  for (std::size_t i = 0; i < target_colours().size(); ++i)
+    if (const auto& rgb = target_colours()[i].rgb; rgb && QColor::fromRgb(*rgb).rgb() == seen.rgb()) word = int(i);
+  colour_->setCurrentIndex(word);
+}
+
+}  // namespace forest::studio
