@@ -16,6 +16,13 @@ function(forest_test target)
   target_compile_definitions(${target} PRIVATE FOREST_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
   target_compile_options(${target} PRIVATE ${FOREST_WARNINGS} -O1) # building them at -O3 takes longer than running them
   target_link_libraries(${target} PRIVATE GTest::gtest_main GTest::gmock rapidcheck)
+  get_target_property(sources ${target} SOURCES)
+  list(LENGTH sources count)
+  if(count GREATER 5) # fewer are sooner without
+    target_precompile_headers(${target} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core>)
+    # For ccache; and GCC 12 warns falsely of std::vector when its headers come precompiled.
+    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess -Wno-stringop-overflow>)
+  endif()
 endfunction()
 
 function(forest_module)
