@@ -18,7 +18,8 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
                                  },
                                  "layer, y"};
   try {
-    (void)circuit::evaluate(text, [](const std::string&) { return circuit::Members{1}; }, 3);
+    (void)circuit::evaluate(
+        text, [](const std::string&) { return circuit::Members{1}; }, 3);
   } catch (const Error&) {
   }
   try {

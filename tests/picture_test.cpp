@@ -122,5 +122,43 @@ TEST(Chooser, ItsMemoryChangesNoPixel) {
   EXPECT_GT(revealed, 0u);
 }
 
+// Nor when neurons come, go and become transparent: what stood before others may be gone in the next picture.
+TEST(Chooser, ItsMemoryChangesNoPixelWhateverIsShown) {
+  const scene::Forest forest =
+      scene::Forest::from_bytes(scene::pack(testing::sample_circuit(300), testing::sample_neurons()));
+  const scene::Targets targets(forest);
+  const frame::Viewport viewport{float(width), float(height)};
+  render::CpuRenderer renderer;
+  renderer.load(forest.geometry());
+  scene::Chooser chooser(forest);
+  std::size_t left_out = 0;
+  for (const char* shown :
+       {R"([])", R"([{"name":"first","visible":false}])", R"([{"name":"all","opacity":0.3}])",
+        R"([{"name":"first","opacity":{"basal":0.1}},{"name":"lower","kind":"dots"}])",
+        R"([{"name":"second","visible":false},{"neuron":3,"section":2,"opacity":0.5,"colour":"#00ff00"}])",
+        R"([{"name":"all","kind":"somata"}])", R"([])"})
+    for (const std::uint32_t samples : {1u, 3u, 17u}) {
+      SCOPED_TRACE(shown);
+      scene::View view = scene::walk(forest).at(.5f);
+      view.targets =
+          scene::parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"targets":)") + shown + "}")
+              .targets;
+      view.samples = samples;
+      const scene::Colouring colouring = scene::colour(targets, view);
+      const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
+      const scene::Cut cut = scene::choose(forest, eye, viewport, nullptr, colouring.shown());
+      renderer.draw(scene::compose(forest, view, colouring, cut, width, height));
+      const frame::Image plain = renderer.read();
+      const scene::Cut& guessed = chooser.choose(eye, viewport, colouring.shown());
+      frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
+      chooser.complete(frame);
+      renderer.draw(frame);
+      chooser.remember(renderer.seen());
+      EXPECT_EQ(renderer.read().pixels, plain.pixels);
+      left_out += guessed.left_out.size();
+    }
+  EXPECT_GT(left_out, 50u);
+}
+
 }  // namespace
 }  // namespace forest

@@ -98,14 +98,16 @@ TargetRow row_of(const scene::Branch& branch, const scene::Colouring& colouring)
 }  // namespace
 
 std::vector<TargetRow> target_rows(const scene::Targets& targets, const scene::View& view,
-                                   const scene::Colouring& colouring, const std::optional<scene::Branch>& selected) {
+                                   const scene::Colouring& colouring,
+                                   const std::optional<scene::Branch>& selected) {
   std::vector<TargetRow> rows;
   if (selected) rows.push_back(row_of(*selected, colouring));
   const std::size_t first = rows.size();
   const std::vector<scene::TargetFacts> known = targets.list();
   for (const Appearance& a : view.targets)
     if (!a.branch && std::ranges::find(known, a.name, &scene::TargetFacts::name) == known.end() &&
-        std::ranges::find(rows.begin() + std::ptrdiff_t(first), rows.end(), a.name, &TargetRow::title) == rows.end())
+        std::ranges::find(rows.begin() + std::ptrdiff_t(first), rows.end(), a.name, &TargetRow::title) ==
+            rows.end())
       rows.push_back(row_of(targets, colouring, a.name, "expression"));
   for (const scene::TargetFacts& facts : known) {
     // A name that means two things is asked for by what it is.

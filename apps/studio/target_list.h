@@ -29,7 +29,8 @@ struct TargetRow {
 
 /// The selected branch first, then expressions of the view that are no names, then all that Targets lists.
 std::vector<TargetRow> target_rows(const scene::Targets& targets, const scene::View& view,
-                                   const scene::Colouring& colouring, const std::optional<scene::Branch>& selected);
+                                   const scene::Colouring& colouring,
+                                   const std::optional<scene::Branch>& selected);
 
 /// What `what` says holds from now on for `who`, whatever the view said before of it or of others: what is said last wins.
 /// @param own_colour  false: what was said of its colour is forgotten

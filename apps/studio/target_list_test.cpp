@@ -12,8 +12,8 @@ using scene::Appearance;
 using Seen = TargetRow::Seen;
 
 struct Fixture {
-  scene::Forest forest =
-      scene::Forest::from_bytes(scene::pack(forest::testing::sample_circuit(40), forest::testing::sample_neurons()));
+  scene::Forest forest = scene::Forest::from_bytes(
+      scene::pack(forest::testing::sample_circuit(40), forest::testing::sample_neurons()));
   scene::Targets targets{forest};
   scene::View view = scene::overview(forest);
 

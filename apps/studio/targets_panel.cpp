@@ -57,7 +57,8 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   column->setContentsMargins(6, 6, 6, 8);
   column->setSpacing(4);
 
-  list_ = named(new QTreeWidget(this), "Targets", "Sets of neurons: the box shows or hides one, Space does so too", "Alt+T");
+  list_ = named(new QTreeWidget(this), "Targets",
+                "Sets of neurons: the box shows or hides one, Space does so too", "Alt+T");
   list_->setColumnCount(2);
   list_->setHeaderHidden(true);
   list_->setRootIsDecorated(false);
@@ -80,7 +81,8 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
     if (!quiet_) show_chosen();
   });
 
-  expression_ = named(new QLineEdit(this), "Another target", "Names joined by and, or, not: L5 and not inhibitory", "Alt+N");
+  expression_ = named(new QLineEdit(this), "Another target",
+                      "Names joined by and, or, not: L5 and not inhibitory", "Alt+N");
   expression_->setPlaceholderText(tr("Another: L5 and not inhibitory"));
   expression_->setClearButtonEnabled(true);
   column->addWidget(expression_);
@@ -127,8 +129,8 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   });
   form->addRow(tr("Drawn"), kind_);
 
-  opacity_ = named(new QSpinBox(this), "Opacity of the target (%)", "100 hides what lies behind, 0 shows nothing of it",
-                   "Alt+Q");
+  opacity_ = named(new QSpinBox(this), "Opacity of the target (%)",
+                   "100 hides what lies behind, 0 shows nothing of it", "Alt+Q");
   opacity_->setRange(0, 100);
   opacity_->setSingleStep(10);
   opacity_->setSuffix(" %");
@@ -158,26 +160,31 @@ const TargetRow* TargetsPanel::chosen() const {
 }
 
 void TargetsPanel::say(const scene::Appearance& what, bool own_colour) {
-  if (const TargetRow* row = chosen(); row && row->problem.empty()) changes_.change(scene::Appearance(row->who), what, own_colour);
+  if (const TargetRow* row = chosen(); row && row->problem.empty())
+    changes_.change(scene::Appearance(row->who), what, own_colour);
 }
 
 void TargetsPanel::show_rows(std::vector<TargetRow> rows) {
   const std::optional<scene::Appearance> before = chosen() ? std::optional(chosen()->who) : std::nullopt;
   quiet_ = true;
   rows_ = std::move(rows);
-  while (list_->topLevelItemCount() > int(rows_.size())) delete list_->takeTopLevelItem(list_->topLevelItemCount() - 1);
+  while (list_->topLevelItemCount() > int(rows_.size()))
+    delete list_->takeTopLevelItem(list_->topLevelItemCount() - 1);
   while (list_->topLevelItemCount() < int(rows_.size())) list_->addTopLevelItem(new QTreeWidgetItem);
   for (std::size_t i = 0; i < rows_.size(); ++i) {
     const TargetRow& row = rows_[i];
     QTreeWidgetItem* item = list_->topLevelItem(int(i));
     item->setText(0, QString::fromStdString(row.title));
-    item->setToolTip(0, QString::fromStdString(row.problem.empty() ? row.title + ": " + row.origin : row.problem));
+    item->setToolTip(
+        0, QString::fromStdString(row.problem.empty() ? row.title + ": " + row.origin : row.problem));
     item->setText(1, row.problem.empty() ? QLocale().toString(qulonglong(row.count)) : "?");
     item->setTextAlignment(1, Qt::AlignRight | Qt::AlignVCenter);
     item->setForeground(1, QColor(140, 153, 172));
-    item->setIcon(0, row.count && row.seen != TargetRow::Seen::none ? swatch(to_screen(row.colour)) : QIcon());
-    item->setFlags(row.problem.empty() && row.count ? Qt::ItemIsEnabled | Qt::ItemIsSelectable | Qt::ItemIsUserCheckable
-                                                    : Qt::ItemIsSelectable);
+    item->setIcon(0,
+                  row.count && row.seen != TargetRow::Seen::none ? swatch(to_screen(row.colour)) : QIcon());
+    item->setFlags(row.problem.empty() && row.count
+                       ? Qt::ItemIsEnabled | Qt::ItemIsSelectable | Qt::ItemIsUserCheckable
+                       : Qt::ItemIsSelectable);
     item->setCheckState(0, check_of(row.seen));
     if (before && row.who == *before) list_->setCurrentItem(item);
   }
@@ -199,7 +206,8 @@ void TargetsPanel::show_chosen() {
   const QColor seen = to_screen(row->colour);
   int word = 0;
   for (std::size_t i = 0; i < target_colours().size(); ++i)
-    if (const auto& rgb = target_colours()[i].rgb; rgb && QColor::fromRgb(*rgb).rgb() == seen.rgb()) word = int(i);
+    if (const auto& rgb = target_colours()[i].rgb; rgb && QColor::fromRgb(*rgb).rgb() == seen.rgb())
+      word = int(i);
   colour_->setCurrentIndex(word);
 }
 
