@@ -10,9 +10,11 @@
 #include "forest/core/progress.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
+#include "forest/scene/scanpath.h"
 #include "forest/scene/view.h"
 
 #include "apps/cli/drawer.h"
+#include "apps/foveated.h"
 
 namespace forest::cli {
 
@@ -28,6 +30,7 @@ class Artist {
  public:
   explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic);
 
+  /// A view with a gaze is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   const scene::Forest& forest() const { return forest_; }
@@ -37,6 +40,7 @@ class Artist {
   scene::Forest forest_;
   scene::Chooser chooser_;
   std::unique_ptr<render::Renderer> renderer_;
+  Foveated foveated_;
   std::vector<frame::Overlay> outline_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
@@ -55,7 +59,8 @@ struct FilmPlan {
   std::uint32_t width = 1280, height = 720, samples = 4;
   int frames_per_second = 25;
   double seconds = 5.;
-  std::filesystem::path pictures;  // when not empty: a folder for the single pictures as PNG files
+  std::optional<scene::Scanpath> gaze;  // replayed from its begin; none: that of the views
+  std::filesystem::path pictures;       // when not empty: a folder for the single pictures as PNG files
 };
 
 /// Films what a path shows. Throws Error when not a single pixel was covered in a picture that should show the forest.

@@ -22,6 +22,7 @@
 
 #include "forest/io/png.h"
 
+#include "apps/studio/section_panel.h"
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/view_panel.h"
 #include "apps/view_text.h"
@@ -64,6 +65,7 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   connect(&panel_rest_, &QTimer::timeout, this,
           [this] { view_panel_->show_settings(viewport_->settings()); });
   connect(viewport_, &Viewport::changed, this, [this] {
+    section_panel_->show_settings(viewport_->settings());
     if (!panel_rest_.isActive()) panel_rest_.start();
   });
   connect(viewport_, &Viewport::selected, this, [this] {
@@ -88,14 +90,25 @@ void Window::add_docks() {
   scroll->setWidgetResizable(true);
   scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
   scroll->setMinimumWidth(300);
-  const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_}, {"View", scroll}};
+  section_panel_ = new SectionPanel(
+      viewport_->forest(), viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
+  const std::pair<const char*, QWidget*> docks[] = {
+      {"Selection", selection_panel_}, {"View", scroll}, {"Section", section_panel_}};
   QList<QDockWidget*> added;
   for (const auto& [name, widget] : docks) {
     auto* dock = new QDockWidget(tr(name), this);
     dock->setObjectName(name);
     dock->setWidget(widget);
-    addDockWidget(Qt::RightDockWidgetArea, dock);
-    added.push_back(dock);
+    const bool section = widget == section_panel_;  // a picture of its own, for those who ask for it
+    addDockWidget(section ? Qt::LeftDockWidgetArea : Qt::RightDockWidgetArea, dock);
+    if (section)
+      connect(viewport_, &Viewport::changed, dock, [this, dock, shown = false]() mutable {
+        if (const bool wanted = viewport_->settings().plane; wanted != shown)
+          dock->setVisible(shown = wanted);
+      });
+    else
+      added.push_back(dock);
+    dock->setVisible(!section);
   }
   resizeDocks(added, {420, 300}, Qt::Vertical);
 }

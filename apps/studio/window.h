@@ -14,6 +14,7 @@ namespace forest::studio {
 /// As PNG, whole or not at all; throws Error.
 void write_image(const std::filesystem::path& path, const QImage& seen);
 
+class SectionPanel;
 class SelectionPanel;
 class ViewPanel;
 
@@ -40,6 +41,7 @@ class Window final : public QMainWindow {
   Viewport* viewport_;
   ViewPanel* view_panel_;
   SelectionPanel* selection_panel_;
+  SectionPanel* section_panel_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
   QTimer panel_rest_;  // the panel follows a moving view a few times a second
 };

@@ -5,12 +5,14 @@
 #include <array>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "forest/frame/camera.h"
 #include "forest/frame/layout.h"
+#include "forest/geometry/plane.h"
 
 namespace forest::frame {
 
@@ -65,10 +67,19 @@ struct DepthMap {
   std::vector<float> depths;
 };
 
+/// A clear rectangle in the world, through which what lies behind is seen tinted.
+struct Glass {
+  Plane plane;
+  Vec2 low = Vec2::Zero(), high = Vec2::Zero();  // along the plane's right and up, µm
+  Vec3 colour = Vec3::Constant(.5f);             // linear light
+  float opacity = .2f;                           // share of the colour in what lies behind, 0–1
+};
+
 struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,
   // and the image is the mean of all so far. The frames of the parts before must have shown the same.
   std::uint32_t first_subframe = 0, last_subframe = 1024;
@@ -76,6 +87,7 @@ struct Frame : Lists {
   Palette palette = black_palette();
   std::span<const std::uint8_t> colour_class;  // one an instance, 0–15
   std::span<const Overlay> overlays;
+  std::optional<Glass> glass;
   /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
   /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
   std::function<Lists(const DepthMap&)> rest;

@@ -150,9 +150,8 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 
 }  // namespace
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before) {
-  const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, before, true};
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before) {
+  const Look look{forest, eye, eye.frustum(), before, true};
   Cut cut = in_chunks(forest.instances().size(),
                       [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
@@ -161,10 +160,9 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport
   return cut;
 }
 
-Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now) {
-  const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, &now, false};
+Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
+             const Occluders& now) {
+  const Look look{forest, eye, eye.frustum(), &now, false};
   return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
     if (left_out[i].cluster == soma)
       choose_soma(look, left_out[i].instance, part);

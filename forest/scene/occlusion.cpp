@@ -17,6 +17,7 @@ constexpr float tile = float(FOREST_TILE);
 Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport)
     : axes_(camera.axes()),
       eye_(camera.eye),
+      orthographic_(camera.orthographic()),
       near_(camera.near),
       focal_(camera.focal(viewport.height)),
       centre_x_(.5f * viewport.width),
@@ -44,8 +45,9 @@ bool Occluders::hide(const Sphere& sphere) const {
   const float depth = -p.z(), nearest = depth - sphere.radius;
   if (!(nearest > near_)) return false;
   // A point at distance r from the centre is seen at most f · r · |p| / (depth · nearest) beside it.
-  const float reach = focal_ * sphere.radius * p.norm() / (depth * nearest) + margin;
-  const float x = centre_x_ + focal_ * p.x() / depth, y = centre_y_ - focal_ * p.y() / depth;
+  const float scale = orthographic_ ? focal_ : focal_ / depth;
+  const float reach = focal_ * sphere.radius * (orthographic_ ? 1.f : p.norm() / (depth * nearest)) + margin;
+  const float x = centre_x_ + scale * p.x(), y = centre_y_ - scale * p.y();
   const Level& finest = levels_.front();
   const float wide = float(finest.width) * tile, high = float(finest.height) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;

@@ -29,6 +29,7 @@ class Occluders {
   std::vector<Level> levels_;
   Mat3 axes_;
   Vec3 eye_;
+  bool orthographic_;
   float near_, focal_, centre_x_, centre_y_;
 };
 

@@ -20,6 +20,7 @@ constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
 
 constexpr std::array<std::string_view, 4> colour_names{"type", "layer", "kind", "neuron"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
+constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
 float linear(float srgb) { return srgb <= .04045f ? srgb / 12.92f : std::pow((srgb + .055f) / 1.055f, 2.4f); }
 Vec3 hex(std::uint32_t rgb) {
@@ -122,6 +123,12 @@ View parse_view(std::string_view text, const std::string& name) {
       v.detail.error = number_of(value, name, key, .05f, 100.f);
     else if (key == "acuity_slope")
       v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
+    else if (key == "fovea")
+      v.detail.fovea = number_of(value, name, key, 0.f, 90.f);
+    else if (key == "screen")
+      v.detail.screen = number_of(value, name, key, 0.f, 170.f);
+    else if (key == "projection")
+      v.camera.projection = frame::Projection(word_of(value, name, key, projection_names));
     else if (key == "samples")
       v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
     else if (key == "fog")
@@ -152,6 +159,7 @@ std::string to_json(const View& v) {
             {"target", list(v.camera.target)},
             {"up", list(v.camera.up)},
             {"field_of_view", v.camera.field_of_view},
+            {"projection", projection_names[std::size_t(v.camera.projection)]},
             {"near", v.camera.near},
             {"error", v.detail.error},
             {"acuity_slope", v.detail.acuity_slope},
@@ -160,7 +168,11 @@ std::string to_json(const View& v) {
             {"samples", v.samples},
             {"fog", v.fog},
             {"halo", v.halo}};
-  if (v.detail.gaze) json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+  if (v.detail.gaze) {
+    json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+    json["fovea"] = v.detail.fovea;
+    if (v.detail.screen > 0.f) json["screen"] = v.detail.screen;
+  }
   return json.dump();
 }
 

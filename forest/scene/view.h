@@ -25,8 +25,8 @@ struct View {
   float halo = 1.f;            // strength of the rim around nearer branches; 0 for none
 };
 
-/// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"gaze":[.5,.5],"error":1,"colour_by":"type",
-///  "background":"dark","samples":16,"fog":1,"halo":1}; only eye and target are needed.
+/// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
+///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1}; only eye and target are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);

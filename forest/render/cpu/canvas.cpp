@@ -16,11 +16,13 @@ std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile
 
 }  // namespace
 
-void Canvas::clear(std::uint32_t width, std::uint32_t height) {
+void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area) {
+  area_ = area;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
   keys_.resize(std::size_t(width) * height);
-  parallel_ranges(keys_.size(), 1 << 16, [&](std::size_t begin, std::size_t end) {
-    std::fill(keys_.begin() + std::ptrdiff_t(begin), keys_.begin() + std::ptrdiff_t(end), FOREST_KEY_EMPTY);
+  const std::size_t wide = area.right - area.left;
+  parallel_for(area.bottom - area.top, (1 << 16) / wide + 1, [&](std::size_t row) {
+    std::fill_n(keys_.begin() + std::ptrdiff_t((area.top + row) * width + area.left), wide, FOREST_KEY_EMPTY);
   });
   looked_ = false;
 }
@@ -28,11 +30,13 @@ void Canvas::clear(std::uint32_t width, std::uint32_t height) {
 void Canvas::look() {
   fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
   fine_.farthest.resize(std::size_t(fine_.width) * std::size_t(fine_.height));
+  const auto top = std::int32_t(area_.top), bottom = std::int32_t(area_.bottom);
   parallel_for(std::size_t(fine_.height), 4, [&](std::size_t ty) {
     std::vector<std::uint32_t> column(std::size_t(width_), 0u);  // the farthest of the tile's rows
-    for (std::int32_t y = std::int32_t(ty) * tile; y < std::min(std::int32_t(ty + 1) * tile, height_); ++y) {
+    for (std::int32_t y = std::max(std::int32_t(ty) * tile, top);
+         y < std::min(std::int32_t(ty + 1) * tile, bottom); ++y) {
       const std::uint32_t* keys = row(y);
-      for (std::size_t x = 0; x < column.size(); ++x) column[x] = std::max(column[x], keys[x]);
+      for (std::size_t x = area_.left; x < area_.right; ++x) column[x] = std::max(column[x], keys[x]);
     }
     for (std::int32_t tx = 0; tx < fine_.width; ++tx)
       fine_.farthest[ty * std::size_t(fine_.width) + std::size_t(tx)] =

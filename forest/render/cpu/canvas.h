@@ -28,8 +28,8 @@ namespace forest::render::cpu {
 
 class Canvas {
  public:
-  /// All pixels empty.
-  void clear(std::uint32_t width, std::uint32_t height);
+  /// All pixels of the area empty; those beside it may hold anything and count as hidden.
+  void clear(std::uint32_t width, std::uint32_t height, const frame::Area& area);
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
@@ -60,6 +60,7 @@ class Canvas {
     std::vector<std::uint32_t> farthest;
   };
   std::int32_t width_ = 0, height_ = 0;
+  frame::Area area_;
   std::vector<std::uint32_t> keys_;
   Level fine_, coarse_;  // tiles, and tiles of tiles
   bool looked_ = false;

@@ -50,6 +50,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   frame::check(f, s.picture.geometry);
   s.seen = {};
   s.picture.colour_class = f.colour_class;
+  const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
   frame::Timing timing;
   for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes);
        ++subframe) {
@@ -59,7 +60,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
-    s.canvas.clear(f.width, f.height);
+    s.canvas.clear(f.width, f.height, area);
     s.draw(f);
     if (f.rest) {
       s.canvas.look();
@@ -71,7 +72,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
     cpu::splat(s.picture, f.overlays, s.canvas);
     timing.draw += milliseconds_since(start);
     start = Clock::now();
-    cpu::resolve(s.canvas, c, f.palette, s.sums, s.image);
+    cpu::resolve(s.canvas, c, f.palette, area, s.sums, s.image);
     timing.resolve += milliseconds_since(start);
   }
   return timing;
@@ -83,7 +84,7 @@ frame::Image CpuRenderer::read() {
   return image;
 }
 
-const frame::Image& CpuRenderer::image() const { return state_->image; }
+const frame::Image* CpuRenderer::image() const { return &state_->image; }
 
 const frame::DepthMap& CpuRenderer::seen() const { return state_->seen; }
 

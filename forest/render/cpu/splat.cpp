@@ -48,7 +48,8 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
   const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
               m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
   const float tx = at.x(), ty = at.y(), tz = at.z(), lx = light.x(), ly = light.y(), lz = light.z();
-  const float near = c.near, focal = c.focal, centre_x = c.centre_x, centre_y = c.centre_y;
+  const float near = c.near, focal = c.focal, converge = c.converge, parallel = c.parallel,
+              centre_x = c.centre_x, centre_y = c.centre_y;
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
   for (std::size_t i = 0; i < count; ++i) {
     float ax = m00 * r.ax[i] + m01 * r.ay[i] + m02 * r.az[i] + tx;
@@ -65,7 +66,7 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     ax += from * dx, ay += from * dy, az = larger(az + from * dz, near);
     bx += to * dx, by += to * dy, bz = larger(bz + to * dz, near);
     const float ra = r.ra[i] + from * dr, rb = r.rb[i] + to * dr;
-    const float fa = focal / az, fb = focal / bz;
+    const float fa = focal / (converge * az + parallel), fb = focal / (converge * bz + parallel);
     r.ax[i] = ax, r.ay[i] = ay, r.az[i] = az, r.ra[i] = ra;
     r.bx[i] = bx, r.by[i] = by, r.bz[i] = bz, r.rb[i] = rb;
     r.px[i] = centre_x + fa * ax, r.py[i] = centre_y - fa * ay;
@@ -74,7 +75,7 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.width[i] = seen ? fa * ra + fb * rb : -1.f;
     r.mean_width[i] = r.mean_width[i] * (fa + fb);
     // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
-    const float ex = -(ax + bx), ey = -(ay + by), ez = -(az + bz);
+    const float ex = -converge * (ax + bx), ey = -converge * (ay + by), ez = -(az + bz);
     const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
                 per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
     const float along = (dx * lx + dy * ly + dz * lz) * per_length,
@@ -86,6 +87,9 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.rank[i] = fraction(r.rank[i]);
   }
 }
+
+// What a length at this depth is divided by to be seen.
+float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }
 
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
@@ -133,8 +137,8 @@ void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
 void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  float wp = c.focal * r.ra[i] / r.az[i], wq = c.focal * r.rb[i] / r.bz[i], za = r.code_a[i],
-        zb = r.code_b[i];
+  float wp = c.focal * r.ra[i] / lens(c, r.az[i]), wq = c.focal * r.rb[i] / lens(c, r.bz[i]),
+        za = r.code_a[i], zb = r.code_b[i];
   constexpr float octave = 1.442695f * float(FOREST_DEPTH_STEPS);
   const float bulge = octave * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
   const bool steep = std::abs(qy - py) > std::abs(qx - px);
@@ -147,7 +151,8 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   const std::int32_t first = clipped(std::ceil(px - over - .5f), limit),
                      last = clipped(std::ceil(qx + over - .5f), limit);
   const Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
-  const Vec3 tangent = (b - a).normalized(), eye = -(a + b).normalized();
+  const Vec3 tangent = (b - a).normalized(),
+             eye = -(a + b).cwiseProduct(Vec3(c.converge, c.converge, 1.f)).normalized();
   const Vec3 facing = (eye - eye.dot(tangent) * tangent).normalized();
   Vec3 side = tangent.cross(facing);
   if ((steep ? side.x() : -side.y()) < 0.f) side = -side;
@@ -188,8 +193,8 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
   const float ra = r.ra[i], rb = r.rb[i];
   const std::uint32_t nearest = key_of(depth_code(std::max(std::min(a.z() - ra, b.z() - rb), c.near)), 0);
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const float rp = 1.f + 1.05f * c.focal * ra / std::max(a.z() - .5f * ra, c.near),
-              rq = 1.f + 1.05f * c.focal * rb / std::max(b.z() - .5f * rb, c.near);
+  const float rp = 1.f + 1.05f * c.focal * ra / std::max(lens(c, a.z() - .5f * ra), lens(c, c.near)),
+              rq = 1.f + 1.05f * c.focal * rb / std::max(lens(c, b.z() - .5f * rb), lens(c, c.near));
   const bool steep = std::abs(qy - py) > std::abs(qx - px);
   if (steep) std::swap(px, py), std::swap(qx, qy);
   const float limit = float(steep ? canvas.height() : canvas.width()),
@@ -217,13 +222,14 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
     for (std::int32_t y = low; y < high; ++y) {
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
       if (canvas.key(at_x, at_y) < nearest) continue;
-      const Vec3 ray =
-          Vec3((float(at_x) + .5f - c.centre_x) / c.focal, (c.centre_y - float(at_y) - .5f) / c.focal, 1.f)
-              .normalized();
+      const float beside = (float(at_x) + .5f - c.centre_x) / c.focal,
+                  above = (c.centre_y - float(at_y) - .5f) / c.focal;
+      const Vec3 ray = Vec3(c.converge * beside, c.converge * above, 1.f).normalized();
+      const Vec3 begin(c.parallel * beside, c.parallel * above, 0.f), to_a = a - begin;
       Hit hit;
       if (!nested) {
-        const float shift = a.dot(ray);
-        const Vec3 o = shift * ray - a;
+        const float shift = to_a.dot(ray);
+        const Vec3 o = shift * ray - to_a;
         const float oy = o.dot(u), dy = ray.dot(u), k0 = ra - s * oy, k1 = -s * dy;
         const float A = c2 * (1.f - dy * dy) - k1 * k1, B = -c2 * oy * dy - k0 * k1,
                     C = c2 * (o.squaredNorm() - oy * oy) - k0 * k0, root = B * B - A * C;
@@ -235,8 +241,8 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
         }
       }
       if (std::isinf(hit.t)) {
-        meet_sphere(ray, a, ra, hit);
-        meet_sphere(ray, b, rb, hit);
+        meet_sphere(ray, to_a, ra, hit);
+        meet_sphere(ray, b - begin, rb, hit);
         if (std::isinf(hit.t)) continue;
       }
       const float z = std::max(hit.t * ray.z(), c.near);
@@ -255,7 +261,7 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
 void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   if (r.width[i] < 0.f) return;
-  const float width = c.focal * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
+  const float width = c.focal * std::max(r.ra[i] / lens(c, r.az[i]), r.rb[i] / lens(c, r.bz[i]));
   if (width < .75f) return draw_line(r, i, c.subframes == 1, canvas);
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
@@ -273,7 +279,7 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
 void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) {
   if (r.width[0] < 0.f) return;
   const frame::Constants& c = picture.constants;
-  const float px = r.px[0], py = r.py[0], z = r.az[0], radius = c.focal * r.ra[0] / z;
+  const float px = r.px[0], py = r.py[0], z = r.az[0], radius = c.focal * r.ra[0] / lens(c, z);
   if (radius < .6f) {  // less than a pixel: drawn for its share of subframes
     const float x = std::floor(px), y = std::floor(py);
     if (3.14159f * radius * radius > rank && x >= 0.f && y >= 0.f && x < float(canvas.width()) &&
@@ -311,9 +317,10 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       const Vec3 centre = picture.to_camera * (Vec3(item.x, item.y, item.z) - picture.eye);
       const float nearest = centre.z() - item.radius;
       if (nearest > c.near) {
-        const float reach = c.focal * item.radius * centre.norm() / (centre.z() * nearest) + 2.f;
-        const float x = c.centre_x + c.focal * centre.x() / centre.z(),
-                    y = c.centre_y - c.focal * centre.y() / centre.z();
+        const float scale = c.focal / lens(c, centre.z());
+        const float reach =
+            c.focal * item.radius * (c.parallel + c.converge * centre.norm() / (centre.z() * nearest)) + 2.f;
+        const float x = c.centre_x + scale * centre.x(), y = c.centre_y - scale * centre.y();
         if (canvas.hidden(x - reach, y - reach, x + reach, y + reach, depth_code(nearest))) continue;
       }
       const frame::Instance& instance = picture.geometry.instances[item.instance];
@@ -351,7 +358,7 @@ void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Can
       r.rank[0] = r.mean_width[0] = 0.f;
       r.entry[0] = o.colour;
       const auto least = [&](const Vec3& p) {
-        return std::max(o.radius, (picture.to_camera.row(2).dot(p) + at.z()) / c.focal);
+        return std::max(o.radius, lens(c, picture.to_camera.row(2).dot(p) + at.z()) / c.focal);
       };
       r.ra[0] = least(o.a), r.rb[0] = least(o.b);
       project(c, picture.to_camera, at, picture.light, r);

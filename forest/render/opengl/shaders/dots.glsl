@@ -6,7 +6,7 @@ void main() {
   Capsule c;
   if (!fetch_queued(c)) return;
   vec2 p = to_pixel(c.a);
-  float r = view.focal * c.ra / c.a.z;
+  float r = view.focal * c.ra / lens(c.a.z);
   float rank = fract(float(texelFetch(queue_seen, int(4u + thread_index())).x / 64u) * 0.7548777 + golden * float(view.subframe));
   if (r < 0.6) {  // less than a pixel: drawn for its share of subframes
     if (3.14159 * r * r <= rank) return;
