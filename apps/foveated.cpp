@@ -24,7 +24,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     layers_.push_back(std::make_unique<Drawn>(Drawn{scene::Chooser(forest_), make_(), {}}));
     layers_.back()->renderer->load(forest_.geometry());
   }
-  figures_ = {.layers = plan.size()};
+  figures_ = {};
   std::vector<const frame::Image*> pictures;
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
@@ -38,13 +38,16 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     figures_.cull += milliseconds_since(start);
     frame::Frame frame = scene::compose(forest_, view, colouring, drawn.chooser.cut(), layer.width,
                                         layer.height, overlays);
-    frame.area = layer.area, frame.glass = glass;
+    frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
+    frame.glass = glass;
     frame.first_subframe = first, frame.last_subframe = last;
     drawn.chooser.complete(frame);
     const frame::Timing timing = drawn.renderer->draw(frame);
     drawn.chooser.remember(drawn.renderer->seen());
     figures_.draw += timing.draw, figures_.resolve += timing.resolve;
+    figures_.drawn += timing.drawn;
     figures_.segments += drawn.chooser.segments();
+    figures_.layer_segments.push_back(drawn.chooser.segments());
     figures_.neurons = std::max(figures_.neurons, drawn.chooser.cut().neurons);
     start = Clock::now();
     if (const frame::Image* image = drawn.renderer->image()) {

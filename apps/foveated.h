@@ -21,9 +21,10 @@ class Foveated {
 
   struct Figures {
     double cull = 0., draw = 0., resolve = 0., unite = 0.;  // milliseconds
-    std::uint64_t segments = 0;                             // drawn, of all layers
+    std::uint64_t segments = 0;                             // chosen, of all layers
+    std::uint64_t drawn = 0;                                // of them, as frame::Timing has it
     std::uint32_t neurons = 0;                              // in sight, of the layer that sees most
-    std::size_t layers = 0;
+    std::vector<std::uint64_t> layer_segments;              // the same of each, finest first
   };
   /// Its subframes [first, last) of view.samples, as frame::Frame has them.
   const frame::Image& draw(const scene::View& view, std::uint32_t width, std::uint32_t height,

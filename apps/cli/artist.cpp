@@ -45,7 +45,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.resolve = f.resolve, drawn.read = f.unite;
-    drawn.segments = f.segments, drawn.neurons = f.neurons;
+    drawn.segments = f.segments, drawn.reached = f.drawn, drawn.neurons = f.neurons;
     return drawn;
   }
   const frame::Viewport viewport{float(width), float(height)};
@@ -58,7 +58,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
   drawn.neurons = cut.neurons;
-  drawn.draw = timing.draw, drawn.resolve = timing.resolve;
+  drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;
   start = Clock::now();
   drawn.image = renderer_->read();
   drawn.read = milliseconds_since(start);

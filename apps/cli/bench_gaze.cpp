@@ -50,12 +50,17 @@ scene::Scanpath looking_about(double milliseconds, std::uint64_t seed) {
 struct Part {
   std::string name;
   double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., unite = 0., covered = 0.;
-  std::uint64_t segments = 0, whole_segments = 0;  // of the pictures compared, with and without a gaze
-  std::uint64_t fovea_pixels = 0, fovea_differ = 0;
+  std::uint64_t segments = 0, whole_segments = 0;  // chosen for the pictures compared, with and without a gaze
+  std::uint64_t drawn = 0, whole_drawn = 0;        // of them, neither hidden nor beside what is wanted
+  std::uint64_t fovea_pixels = 0, fovea_differ = 0, compared = 0;
   std::vector<double> took;  // ms
+  std::vector<std::uint64_t> layers;  // segments of each, of the last picture compared
 
   double per_second() const { return frames / seconds; }
-  double ratio() const { return double(whole_segments) / double(std::max<std::uint64_t>(1, segments)); }
+  double ratio() const { return double(whole_drawn) / double(std::max<std::uint64_t>(1, drawn)); }
+  double ratio_chosen() const {
+    return double(whole_segments) / double(std::max<std::uint64_t>(1, segments));
+  }
   double slowest() const { return *std::ranges::max_element(took); }
 };
 
@@ -117,7 +122,10 @@ class Bench {
 
  private:
   void compare(const scene::View& view, const frame::Image& image, Part& part, const Drawn& whole) {
+    ++part.compared;
     part.segments += foveated_.figures().segments;
+    part.drawn += foveated_.figures().drawn, part.whole_drawn += whole.reached;
+    part.layers = foveated_.figures().layer_segments;
     part.whole_segments += whole.segments;
     const frame::Viewport viewport{float(size_.first), float(size_.second)};
     const scene::Gaze gaze(view.camera, viewport, scene::detail_for(view, size_.first, size_.second));
@@ -177,18 +185,23 @@ void run(const Options& options, Console& console) {
     json["parts"].push_back(
         {{"part", p.name},
          {"ratio", p.ratio()},
+         {"ratio_chosen", p.ratio_chosen()},
+         {"drawn", p.drawn / p.compared},
+         {"drawn_without", p.whole_drawn / p.compared},
          {"frames_per_second", p.per_second()},
          {"slowest_ms", p.slowest()},
-         {"segments", p.segments / options.compared},
-         {"segments_without", p.whole_segments / options.compared},
+         {"segments", p.segments / p.compared},
+         {"layers", p.layers},
+         {"segments_without", p.whole_segments / p.compared},
          {"fovea_pixels", p.fovea_pixels},
          {"fovea_differ", p.fovea_differ},
          {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}, {"unite", p.unite}}},
          {"covered", p.covered}});
     rows.push_back({p.name, fmt::format("{:.1f}", p.per_second()), fmt::format("{:.1f}", p.cull),
                     fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.resolve),
-                    fmt::format("{:.1f}", p.unite), fmt::format("{}", p.segments / options.compared),
-                    fmt::format("{}", p.whole_segments / options.compared), fmt::format("{:.1f}", p.ratio()),
+                    fmt::format("{:.1f}", p.unite), fmt::format("{}", p.drawn / p.compared),
+                    fmt::format("{}", p.whole_drawn / p.compared), fmt::format("{:.1f}", p.ratio()),
+                    fmt::format("{:.1f}", p.ratio_chosen()),
                     fmt::format("{} of {}", p.fovea_differ, p.fovea_pixels)});
   }
   json["ratio_min"] = least_ratio, json["frames_per_second_min"] = least_rate, json["fovea_differ"] = differ;
@@ -196,7 +209,7 @@ void run(const Options& options, Console& console) {
   console.say(fmt::format("{} neurons, {} segments, {}, {}", bench.forest().instances().size(),
                           bench.forest().segment_total(), options.size, bench.renderer()));
   console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "resolve ms", "unite ms", "segments",
-                 "without gaze", "ratio", "pixels of the fovea that differ"},
+                 "without gaze", "ratio", "of those chosen", "pixels of the fovea that differ"},
                 rows);
 }
 

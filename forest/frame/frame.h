@@ -80,6 +80,9 @@ struct Frame : Lists {
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
+  std::optional<Area> hole;  // of them these are not wanted either
+  // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.
+  float gaps = 0.f;
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,
   // and the image is the mean of all so far. The frames of the parts before must have shown the same.
   std::uint32_t first_subframe = 0, last_subframe = 1024;
@@ -102,6 +105,7 @@ struct Image {
 
 struct Timing {
   double draw = 0., resolve = 0.;  // milliseconds of one picture, all subframes
+  std::uint64_t drawn = 0;         // segments of the last subframe that were neither hidden nor beside what is wanted; 0: unknown
 };
 
 /// Where light comes from, in camera axes (x right, y up, z along the view); unit length.

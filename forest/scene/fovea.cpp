@@ -15,6 +15,10 @@ constexpr float least_fade = .5f;    // degrees
 constexpr float margin = 6.f;        // pixels of a layer around what is shown of it: rims look two pixels far
 constexpr std::size_t rows_at_once = 8;
 
+// A cluster of which less than this share of a square of pixels would show is left out of the coarser layers: its neighbours,
+// farther or nearer, stand for it.
+constexpr float seldom = .2f;
+
 // A pixel of the picture as a layer counts it.
 float in_layer(float pixel, float size, float layer_size, float scale) {
   return (pixel - .5f * size) / scale + .5f * layer_size;
@@ -38,6 +42,28 @@ frame::Area within(const Gaze& gaze, float eccentricity, float width, float heig
           clamped(std::ceil(high.x()), width), clamped(std::ceil(high.y()), height)};
 }
 
+// The largest square of a layer's pixels, upright about the gaze, that lies within so many degrees, less a margin; empty when
+// there is none in the picture.
+frame::Area hole_of(const Gaze& gaze, float eccentricity, const Layer& layer, float width, float height) {
+  const auto inside = [&](float half) {
+    float most = 0.f;
+    for (const Vec2& corner : {Vec2(-1, -1), Vec2(1, -1), Vec2(-1, 1), Vec2(1, 1)})
+      most = std::max(most, gaze.eccentricity(gaze.pixel() + half * corner));
+    return most <= eccentricity;
+  };
+  float half = 0.f;
+  for (float step = std::max(width, height); step > .5f; step *= .5f)
+    if (inside(half + step)) half += step;
+  half -= margin * layer.scale;
+  const auto bound = [&](float at, float size, std::uint32_t layer_size) {
+    return std::uint32_t(std::clamp(in_layer(at, size, float(layer_size), layer.scale), 0.f, float(layer_size)));
+  };
+  if (half <= 0.f) return {};
+  const Vec2 low = gaze.pixel() - Vec2(half, half), high = gaze.pixel() + Vec2(half, half);
+  return {bound(low.x(), width, layer.width), bound(low.y(), height, layer.height),
+          bound(high.x(), width, layer.width), bound(high.y(), height, layer.height)};
+}
+
 // How columns (or rows) of the picture lie between those of a layer.
 struct Between {
   std::vector<std::uint32_t> first;  // of two neighbours
@@ -56,13 +82,23 @@ struct Between {
 };
 
 using Colour = Eigen::Array4f;
-using Bytes = Eigen::Array<std::uint8_t, 4, 1>;
+
+// a + share × (b - a), byte by byte; and back to bytes. Flat loops become vector instructions.
+[[gnu::target_clones("default", "arch=haswell")]] void mix(const std::uint8_t* a, const std::uint8_t* b, float share,
+                                                           std::size_t count, float* out) {
+  for (std::size_t i = 0; i < count; ++i) out[i] = float(a[i]) + share * (float(b[i]) - float(a[i]));
+}
+[[gnu::target_clones("default", "arch=haswell")]] void to_bytes(const float* from, std::size_t count,
+                                                                std::uint8_t* out) {
+  for (std::size_t i = 0; i < count; ++i) out[i] = std::uint8_t(std::int32_t(from[i] + .5f));
+}
 
 }  // namespace
 
 std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_t height) {
   const frame::Area all{0, 0, width, height};
-  std::vector<Layer> layers{{width, height, 1.f, all, INFINITY, INFINITY}};
+  std::vector<Layer> layers{
+      {.width = width, .height = height, .area = all, .until = INFINITY, .gone = INFINITY}};
   if (!view.detail.gaze) return layers;
   const float w = float(width), h = float(height);
   const Detail& detail = view.detail;
@@ -85,6 +121,10 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
   }
   for (Layer& layer : layers) {
     layer.area = {0, 0, layer.width, layer.height};
+    if (&layer != layers.data()) {
+      layer.gaps = seldom;
+      layer.hole = hole_of(gaze, (&layer - 1)->until, layer, w, h);
+    }
     if (std::isinf(layer.gone)) continue;
     const frame::Area part = within(gaze, layer.gone, w, h);
     const auto low = [&](std::uint32_t at, float size, std::uint32_t layer_size) {
@@ -152,30 +192,29 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
         mixed.resize(s.picture.width);
         const std::size_t upper = s.rows.first[y], lower = std::min<std::size_t>(upper + 1, s.picture.height - 1);
         const float down = s.rows.share[y];
-        for (std::uint32_t x = first; x < last; ++x) {
-          const auto at = [&](std::size_t r) {
-            return Bytes::Map(&s.picture.pixels[4 * (r * s.picture.width + x)]).cast<float>().eval();
-          };
-          const Colour a = at(upper);
-          mixed[x] = a + down * (at(lower) - a);
-        }
+        const std::uint8_t* source = s.picture.pixels.data();
+        const std::size_t pitch = 4 * std::size_t(s.picture.width);
+        mix(source + upper * pitch + 4 * first, source + lower * pitch + 4 * first, down, 4 * (last - first),
+            mixed[first].data());
         const Vec3 middle = gaze.way_to({.5f * float(s.left + s.right), float(y) + .5f});
-        for (std::uint32_t x = s.left; x < s.right; ++x) {
+        const auto colour_at = [&](std::uint32_t x) -> Colour {
           const std::uint32_t i = s.columns.first[x];
           const Colour a = mixed[i], b = mixed[std::min(i + 1, last - 1)];
-          const Colour colour = a + s.columns.share[x] * (b - a);
-          if (s.none < -1.f) {
-            row[x] = colour;
-            continue;
-          }
-          const Vec3 way(middle.x() + float(x) + .5f - .5f * float(s.left + s.right), middle.y(), middle.z());
+          return a + s.columns.share[x] * (b - a);
+        };
+        if (s.none < -1.f) {
+          for (std::uint32_t x = s.left; x < s.right; ++x) row[x] = colour_at(x);
+          continue;
+        }
+        const float from = float(s.left + s.right) * .5f - .5f;
+        for (std::uint32_t x = s.left; x < s.right; ++x) {
+          const Vec3 way(middle.x() + float(x) - from, middle.y(), middle.z());
           const float cosine = way.dot(ahead) / way.norm();
           const float share = std::clamp((cosine - s.none) / (s.full - s.none), 0.f, 1.f);
-          row[x] += share * (colour - row[x]);
+          if (share > 0.f) row[x] += share * (colour_at(x) - row[x]);
         }
       }
-      std::uint8_t* out = &whole.pixels[4 * y * width];
-      for (std::uint32_t x = 0; x < width; ++x) Bytes::Map(out + 4 * x) = (row[x] + .5f).cast<std::uint8_t>();
+      to_bytes(row[0].data(), 4 * std::size_t(width), &whole.pixels[4 * y * width]);
     }
   });
 }

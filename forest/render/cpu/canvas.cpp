@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/canvas.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "forest/core/parallel.h"
@@ -16,8 +18,9 @@ std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile
 
 }  // namespace
 
-void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area) {
-  area_ = area;
+void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area, const frame::Area& hole,
+                   float gaps) {
+  area_ = area, hole_ = hole, gaps_ = gaps;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
   keys_.resize(std::size_t(width) * height);
   const std::size_t wide = area.right - area.left;
@@ -27,9 +30,35 @@ void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area&
   looked_ = false;
 }
 
+// The farthest key of a tile's wanted pixels but for the share of gaps; 0 when there are none.
+std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
+  const auto within = [&](std::int32_t low, std::uint32_t from, std::uint32_t to) {
+    return std::pair(std::max(low, std::int32_t(from)), std::min(low + tile, std::int32_t(to)));
+  };
+  const auto [left, right] = within(tx * tile, area_.left, area_.right);
+  const auto [top, bottom] = within(ty * tile, area_.top, area_.bottom);
+  if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
+      top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
+    return 0;
+  std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile)> keys;
+  std::size_t count = 0;
+  for (std::int32_t y = top; y < bottom; ++y)
+    for (std::int32_t x = left; x < right; ++x) keys[count++] = row(y)[x];
+  if (!count) return 0;
+  const auto nth = keys.begin() + std::ptrdiff_t(float(count - 1) * (1.f - gaps_));
+  std::nth_element(keys.begin(), nth, keys.begin() + std::ptrdiff_t(count));
+  return *nth;
+}
+
 void Canvas::look() {
   fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
   fine_.farthest.resize(std::size_t(fine_.width) * std::size_t(fine_.height));
+  if (gaps_ > 0.f || hole_.right > hole_.left) {
+    parallel_for(fine_.farthest.size(), 64, [&](std::size_t i) {
+      fine_.farthest[i] = far_in_tile(std::int32_t(i) % fine_.width, std::int32_t(i) / fine_.width);
+    });
+    return look_at_coarse();
+  }
   const auto top = std::int32_t(area_.top), bottom = std::int32_t(area_.bottom);
   parallel_for(std::size_t(fine_.height), 4, [&](std::size_t ty) {
     std::vector<std::uint32_t> column(std::size_t(width_), 0u);  // the farthest of the tile's rows
@@ -42,6 +71,10 @@ void Canvas::look() {
       fine_.farthest[ty * std::size_t(fine_.width) + std::size_t(tx)] =
           *std::max_element(column.begin() + tx * tile, column.begin() + std::min((tx + 1) * tile, width_));
   });
+  look_at_coarse();
+}
+
+void Canvas::look_at_coarse() {
   coarse_.width = tiles_over(fine_.width), coarse_.height = tiles_over(fine_.height);
   coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
   for (std::int32_t y = 0; y < fine_.height; ++y)

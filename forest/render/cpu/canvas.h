@@ -28,8 +28,10 @@ namespace forest::render::cpu {
 
 class Canvas {
  public:
-  /// All pixels of the area empty; those beside it may hold anything and count as hidden.
-  void clear(std::uint32_t width, std::uint32_t height, const frame::Area& area);
+  /// All pixels of the area empty; those beside it may hold anything, and with those of the hole count as hidden.
+  /// @param gaps  share of a tile's pixels that may be farther than what `hidden` goes by
+  void clear(std::uint32_t width, std::uint32_t height, const frame::Area& area, const frame::Area& hole = {},
+             float gaps = 0.f);
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
@@ -60,10 +62,14 @@ class Canvas {
     std::vector<std::uint32_t> farthest;
   };
   std::int32_t width_ = 0, height_ = 0;
-  frame::Area area_;
+  frame::Area area_, hole_;
+  float gaps_ = 0.f;
   std::vector<std::uint32_t> keys_;
   Level fine_, coarse_;  // tiles, and tiles of tiles
   bool looked_ = false;
+
+  void look_at_coarse();
+  std::uint32_t far_in_tile(std::int32_t tx, std::int32_t ty) const;
 };
 
 }  // namespace forest::render::cpu

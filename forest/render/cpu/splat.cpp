@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/splat.h"
 
+#include <atomic>
 #include <cmath>
 #include <limits>
 
@@ -94,8 +95,8 @@ float lens(const frame::Constants& c, float z) { return c.converge * z + c.paral
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
 
-// As draw_line in render/opengl/shaders/common.glsl.
-void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
+// As draw_line in render/opengl/shaders/common.glsl. Whether there was anything to draw.
+bool draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
   const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
   const bool steep = high > wide;
@@ -106,19 +107,19 @@ void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
     if (width < 1.f && r.mean_width[i] > 0.f)
       width = std::min(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
     width = std::floor(width + 1.f - r.rank[i] - 1.f / 512.f);
-    if (width < 1.f) return;
+    if (width < 1.f) return false;
   }
   const float half = .5f * width;
   float za = r.code_a[i], zb = r.code_b[i];
   if (canvas.hidden(std::min(px, qx) - half, std::min(py, qy) - half, std::max(px, qx) + half,
                     std::max(py, qy) + half, std::min(za, zb)))
-    return;
+    return false;
   if (steep) std::swap(px, py), std::swap(qx, qy);
   if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(za, zb);
   const float limit = float(steep ? canvas.height() : canvas.width()),
               limit_across = float(steep ? canvas.width() : canvas.height());
   const std::int32_t first = clipped(std::ceil(px - .5f), limit), last = clipped(std::ceil(qx - .5f), limit);
-  if (first >= last) return;
+  if (first >= last) return false;
   const float inverse = 1.f / (qx - px), slope = (qy - py) * inverse, rise = (zb - za) * inverse;
   const float begin = float(first) + .5f - px;
   float y = py + begin * slope - .5f, z = za + begin * rise;
@@ -131,6 +132,7 @@ void draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
     }
   }
+  return true;
 }
 
 // A thin capsule by its distance from the axis on screen: as draw_tube in render/opengl/shaders/capsule.glsl.
@@ -258,9 +260,9 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& c
     for (std::int32_t x = first; x < last; ++x) scan(x);
 }
 
-void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
+bool draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
-  if (r.width[i] < 0.f) return;
+  if (r.width[i] < 0.f) return false;
   const float width = c.focal * std::max(r.ra[i] / lens(c, r.az[i]), r.rb[i] / lens(c, r.bz[i]));
   if (width < .75f) return draw_line(r, i, c.subframes == 1, canvas);
   const float reach = 1.f + 1.05f * width;
@@ -269,10 +271,13 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
                     std::max(r.px[i], r.qx[i]) + reach, std::max(r.py[i], r.qy[i]) + reach,
                     depth_code(nearest)) &&
       nearest > c.near)
-    return;
+    return false;
   const float distance = std::hypot(r.qx[i] - r.px[i], r.qy[i] - r.py[i]);
-  2.f * width<tube_width && distance> .5f * width ? draw_tube(picture, r, i, canvas)
-                                                  : draw_capsule(picture, r, i, canvas);
+  if (2.f * width < tube_width && distance > .5f * width)
+    draw_tube(picture, r, i, canvas);
+  else
+    draw_capsule(picture, r, i, canvas);
+  return true;
 }
 
 // Small spheres: as render/opengl/shaders/dots.glsl.
@@ -307,10 +312,12 @@ void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) 
 
 }  // namespace
 
-void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
+std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
+  std::atomic<std::uint64_t> all = 0;
   parallel_ranges(items.size(), grain, [&](std::size_t begin, std::size_t end) {
     Run r{};
+    std::uint64_t drawn = 0;
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Item& item = items[k];
       if (!item.segment_count) continue;
@@ -332,17 +339,20 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       switch (kind) {
         case Kind::lines:
           for (std::size_t i = 0; i < r.count; ++i)
-            if (r.width[i] >= 0.f) draw_line(r, i, c.subframes == 1, canvas);
+            if (r.width[i] >= 0.f) drawn += draw_line(r, i, c.subframes == 1, canvas);
           break;
         case Kind::capsules:
-          for (std::size_t i = 0; i < r.count; ++i) draw_near(picture, r, i, canvas);
+          for (std::size_t i = 0; i < r.count; ++i) drawn += draw_near(picture, r, i, canvas);
           break;
         case Kind::dots:
+          ++drawn;
           draw_dot(picture, r, fraction(float(item.instance) * .7548777f + golden * float(c.subframe)),
                    canvas);
       }
     }
+    all += drawn;
   });
+  return all;
 }
 
 void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas) {
