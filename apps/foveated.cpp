@@ -32,12 +32,12 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     auto start = Clock::now();
     if (first == 0) {
       const frame::Viewport viewport{float(layer.width), float(layer.height)};
-      drawn.chooser.choose(
-          scene::Eye(view.camera, viewport, scene::detail_for(view, layer, width, height)), viewport);
+      drawn.chooser.choose(scene::Eye(view.camera, viewport, scene::detail_for(view, layer, width, height)),
+                           viewport);
     }
     figures_.cull += milliseconds_since(start);
-    frame::Frame frame = scene::compose(forest_, view, colouring, drawn.chooser.cut(), layer.width,
-                                        layer.height, overlays);
+    frame::Frame frame =
+        scene::compose(forest_, view, colouring, drawn.chooser.cut(), layer.width, layer.height, overlays);
     frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
     frame.glass = glass;
     frame.first_subframe = first, frame.last_subframe = last;

@@ -29,8 +29,8 @@ class Foveated {
   /// Its subframes [first, last) of view.samples, as frame::Frame has them.
   const frame::Image& draw(const scene::View& view, std::uint32_t width, std::uint32_t height,
                            const scene::Colouring& colouring, std::span<const frame::Overlay> overlays = {},
-                           const std::optional<frame::Glass>& glass = {},
-                           std::uint32_t first = 0, std::uint32_t last = 1024);
+                           const std::optional<frame::Glass>& glass = {}, std::uint32_t first = 0,
+                           std::uint32_t last = 1024);
   const Figures& figures() const { return figures_; }
 
  private:

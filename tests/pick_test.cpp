@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // What is picked is what is seen: the reference renderer's picture, one ray through the middle of every pixel, shows the
 // colour of the neuron that a pick finds there.
+#include "forest/scene/pick.h"
+
 #include <gtest/gtest.h>
 
 #include "forest/render/reference/reference_renderer.h"
 #include "forest/scene/path.h"
-#include "forest/scene/pick.h"
 #include "forest/scene/whole.h"
 
 #include "tests/sample_forest.h"

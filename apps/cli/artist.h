@@ -23,7 +23,7 @@ struct Drawn {
   double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
   std::uint64_t segments = 0;                            // chosen
   std::uint64_t reached = 0;  // of them, neither hidden nor beside the picture; 0: unknown
-  std::uint32_t neurons = 0;                             // in sight and not hidden
+  std::uint32_t neurons = 0;  // in sight and not hidden
   frame::Image image;
 };
 

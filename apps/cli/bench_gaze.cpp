@@ -50,10 +50,11 @@ scene::Scanpath looking_about(double milliseconds, std::uint64_t seed) {
 struct Part {
   std::string name;
   double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., unite = 0., covered = 0.;
-  std::uint64_t segments = 0, whole_segments = 0;  // chosen for the pictures compared, with and without a gaze
-  std::uint64_t drawn = 0, whole_drawn = 0;        // of them, neither hidden nor beside what is wanted
+  std::uint64_t segments = 0,
+                whole_segments = 0;          // chosen for the pictures compared, with and without a gaze
+  std::uint64_t drawn = 0, whole_drawn = 0;  // of them, neither hidden nor beside what is wanted
   std::uint64_t fovea_pixels = 0, fovea_differ = 0, compared = 0;
-  std::vector<double> took;  // ms
+  std::vector<double> took;           // ms
   std::vector<std::uint64_t> layers;  // segments of each, of the last picture compared
 
   double per_second() const { return frames / seconds; }
@@ -84,8 +85,7 @@ class Bench {
   Part measure(const std::string& name, const std::function<scene::View(float)>& view_at, bool moving_gaze) {
     Part part;
     part.name = name;
-    const scene::Colouring colouring =
-        scene::colour(forest_, scene::ColourBy::type, scene::Background::dark);
+    const scene::Colouring colouring = scene::colour(forest_, scene::ColourBy::type, scene::Background::dark);
     console_.progress().begin(name, options_.frames);
     const std::uint32_t every = std::max(1u, options_.frames / options_.compared);
     for (std::uint32_t i = 0; i < options_.frames; ++i) {
@@ -108,7 +108,8 @@ class Bench {
         part.covered += image.covered;
       }
       if (i % every == every - 1) {
-        artist_.draw(view_of(i - std::min(i, 1u)), size_.first, size_.second);  // what a moving picture goes by
+        artist_.draw(view_of(i - std::min(i, 1u)), size_.first,
+                     size_.second);  // what a moving picture goes by
         compare(view, image, part, artist_.draw(view_of(i), size_.first, size_.second));
       }
       console_.progress().advance();
@@ -116,7 +117,8 @@ class Bench {
     console_.progress().end();
     for (double* sum : {&part.cull, &part.draw, &part.resolve, &part.unite, &part.covered})
       *sum /= part.frames;
-    if (part.covered < .005) throw Error(fmt::format("{}: the pictures show nothing; nothing was measured", name));
+    if (part.covered < .005)
+      throw Error(fmt::format("{}: the pictures show nothing; nothing was measured", name));
     return part;
   }
 
@@ -165,9 +167,11 @@ void run(const Options& options, Console& console) {
     return view;
   };
   const std::vector<Part> parts{
-      bench.measure("outside, the gaze moves", [&](float) { return outside; }, true),
+      bench.measure(
+          "outside, the gaze moves", [&](float) { return outside; }, true),
       bench.measure("around, camera and gaze move", around, true),
-      bench.measure("inside, camera and gaze move", [&](float t) { return path.at(.5f + .5f * t); }, true)};
+      bench.measure(
+          "inside, camera and gaze move", [&](float t) { return path.at(.5f + .5f * t); }, true)};
 
   Json json{{"neurons", bench.forest().instances().size()},
             {"segments", bench.forest().segment_total()},
@@ -224,22 +228,28 @@ std::function<void()> bench_gaze(CLI::App& command, Console& console) {
   command.add_option("--frames", options->frames, "Pictures of each part")
       ->check(CLI::Range(2, 100000))
       ->capture_default_str();
-  command.add_option("--compared", options->compared, "Of them, how many are compared with those without a gaze")
+  command
+      .add_option("--compared", options->compared, "Of them, how many are compared with those without a gaze")
       ->check(CLI::Range(1, 100000))
       ->capture_default_str();
-  must_be_within(*command.add_option("--slope", options->slope,
-                                     "Arc minutes by which the smallest angle resolved grows a degree")
+  must_be_within(*command
+                      .add_option("--slope", options->slope,
+                                  "Arc minutes by which the smallest angle resolved grows a degree")
                       ->capture_default_str(),
                  .1, 60.);
-  must_be_within(*command.add_option("--fovea", options->fovea, "Degrees around the gaze that are drawn in full")
-                      ->capture_default_str(),
-                 0., 90.);
-  must_be_within(*command.add_option("--screen", options->screen,
-                                     "Degrees that the picture's height takes in the viewer's sight; 0: as many as "
-                                     "the field of view")
-                      ->capture_default_str(),
-                 0., 170.);
-  command.add_option("--scanpath", options->scanpath, "A recorded gaze (docs/scene/gaze.md); by default made up");
+  must_be_within(
+      *command.add_option("--fovea", options->fovea, "Degrees around the gaze that are drawn in full")
+           ->capture_default_str(),
+      0., 90.);
+  must_be_within(
+      *command
+           .add_option("--screen", options->screen,
+                       "Degrees that the picture's height takes in the viewer's sight; 0: as many as "
+                       "the field of view")
+           ->capture_default_str(),
+      0., 170.);
+  command.add_option("--scanpath", options->scanpath,
+                     "A recorded gaze (docs/scene/gaze.md); by default made up");
   command.add_option("--out", options->out, "A folder for the pictures compared");
   add_size(command, options->size);
   add_renderer(command, options->drawer);

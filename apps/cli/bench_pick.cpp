@@ -93,14 +93,16 @@ void run(const Options& options, Console& console) {
                 {{fmt::format("{}", right + wrong), fmt::format("{:.2f} %", 100. * double(right) / total),
                   fmt::format("{:.0f} %", 100. * double(something) / total),
                   fmt::format("{:.0f}", total / picking), fmt::format("{:.1f} s", plain)}});
-  if (wrong) throw Error(fmt::format("{} of {:.0f} picks are wrong; the first: {}", wrong, total, first_wrong));
+  if (wrong)
+    throw Error(fmt::format("{} of {:.0f} picks are wrong; the first: {}", wrong, total, first_wrong));
 }
 
 }  // namespace
 
 std::function<void()> bench_pick(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command.add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
+  command
+      .add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
       ->check(CLI::Range(10, 1'000'000))
       ->capture_default_str();
   command.add_option("--pixels", options->pixels, "Random pixels, of eight pictures in equal parts")

@@ -88,7 +88,8 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
   console.progress().end();
   console.print({{"file", options.out.string()}, {"pictures", count}, {"codec", film.codec()}});
   console.table({"film", "pictures", "through", "codec"},
-                {{options.out.string(), fmt::format("{}", count), fmt::format("{:g} µm", options.depth), film.codec()}});
+                {{options.out.string(), fmt::format("{}", count), fmt::format("{:g} µm", options.depth),
+                  film.codec()}});
 }
 
 void run(const Options& options, Console& console) {
@@ -150,15 +151,19 @@ std::function<void()> section(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command
-      .add_option("--plane", options->plane,
-                  "A point of the plane and its normal, x,y,z,nx,ny,nz (µm); by default across z through the middle")
+      .add_option(
+          "--plane", options->plane,
+          "A point of the plane and its normal, x,y,z,nx,ny,nz (µm); by default across z through the middle")
       ->type_name("X,Y,Z,NX,NY,NZ");
   add_size(command, options->size);
-  must_be_within(*command.add_option("--height", options->height,
-                                     "Height of the picture in µm, its middle the plane's point; by default all "
-                                     "of the forest is in it"),
-                 .01, 1e6);
-  command.add_option("--centre", options->centre, "The middle of the picture, µm along the section's right and up")
+  must_be_within(
+      *command.add_option("--height", options->height,
+                          "Height of the picture in µm, its middle the plane's point; by default all "
+                          "of the forest is in it"),
+      .01, 1e6);
+  command
+      .add_option("--centre", options->centre,
+                  "The middle of the picture, µm along the section's right and up")
       ->type_name("RIGHT,UP");
   command.add_option("--colour-by", options->colour_by, "What a colour means")
       ->check(CLI::IsMember({"type", "layer", "kind", "neuron"}))
@@ -169,9 +174,11 @@ std::function<void()> section(CLI::App& command, Console& console) {
   must_be_within(*command.add_option("--through", options->depth,
                                      "How far the plane moves along its normal in a film, µm"),
                  -1e6, 1e6);
-  must_be_within(*command.add_option("--seconds", options->seconds, "Length of the film")->capture_default_str(),
-                 .04, 3600.);
-  must_be_whole(*command.add_option("--fps", options->rate, "Pictures a second")->capture_default_str(), 1, 120);
+  must_be_within(
+      *command.add_option("--seconds", options->seconds, "Length of the film")->capture_default_str(), .04,
+      3600.);
+  must_be_whole(*command.add_option("--fps", options->rate, "Pictures a second")->capture_default_str(), 1,
+                120);
   command
       .add_option("-o,--out", options->out,
                   "A picture (.png), contours (.svg), areas by neuron and kind (.csv) or a film (.mp4)")

@@ -12,13 +12,14 @@
 namespace forest::studio {
 namespace {
 
-constexpr int soon_milliseconds = 15;       // changes that come together are drawn once
-constexpr double slider_step = .5;          // µm
+constexpr int soon_milliseconds = 15;                   // changes that come together are drawn once
+constexpr double slider_step = .5;                      // µm
 constexpr double least_height = 2., most_height = 1e5;  // µm
 
 }  // namespace
 
-SectionView::SectionView(scene::Forest forest, QWidget* parent) : QWidget(parent), forest_(std::move(forest)) {
+SectionView::SectionView(scene::Forest forest, QWidget* parent)
+    : QWidget(parent), forest_(std::move(forest)) {
   setMinimumSize(160, 120);
   setAccessibleName(tr("The section"));
   setAccessibleDescription(tr("What the plane of intersection cuts; wheel for size, drag to move across"));
@@ -58,8 +59,7 @@ void SectionView::draw() {
   }
   const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
   const scene::SlicePicture drawn = picture();
-  const frame::Image image =
-      scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);
+  const frame::Image image = scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);
   image_ = QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888).copy();
   image_.setDevicePixelRatio(devicePixelRatioF());
   update();
@@ -97,7 +97,10 @@ void SectionView::wheelEvent(QWheelEvent* event) {
 
 SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings,
                            std::function<void(const Settings&)> change, QWidget* parent)
-    : QWidget(parent), settings_(settings), view_(new SectionView(forest, this)), slider_(new QSlider(Qt::Horizontal, this)) {
+    : QWidget(parent),
+      settings_(settings),
+      view_(new SectionView(forest, this)),
+      slider_(new QSlider(Qt::Horizontal, this)) {
   setAccessibleName(tr("Section"));
   const Bounds bounds = forest.soma_bounds();
   const double far = bounds.empty() ? 100. : .5 * double(bounds.extent().norm()) + 200.;

@@ -105,7 +105,8 @@ struct Image {
 
 struct Timing {
   double draw = 0., resolve = 0.;  // milliseconds of one picture, all subframes
-  std::uint64_t drawn = 0;         // segments of the last subframe that were neither hidden nor beside what is wanted; 0: unknown
+  std::uint64_t drawn =
+      0;  // segments of the last subframe that were neither hidden nor beside what is wanted; 0: unknown
 };
 
 /// Where light comes from, in camera axes (x right, y up, z along the view); unit length.

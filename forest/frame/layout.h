@@ -29,8 +29,8 @@ struct Instance {
 struct Item {
   uint instance;
   uint first_segment;
-  uint segment_count;  // at most cluster_size
-  uint padding;
+  uint segment_count;     // at most cluster_size
+  uint without;           // bit i: its segment i is not drawn
   float x, y, z, radius;  // a sphere around all of it, in the world, µm
 };
 

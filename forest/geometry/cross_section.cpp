@@ -92,8 +92,7 @@ std::optional<CrossSection> CrossSection::of(const RoundConed& cone, const Plane
     const double step = reach - C / reach, start = -B / (2. * reach);
     disc(0., A, -INFINITY, start);
     // There s = (x - start) / step, and half the width squared is A + B s + C s² - ((B + 2 C s) / (2 reach))².
-    const double q0 = A - start * start, q1 = B - B * C / (reach * reach),
-                 q2 = C - C * C / (reach * reach);
+    const double q0 = A - start * start, q1 = B - B * C / (reach * reach), q2 = C - C * C / (reach * reach);
     std::array<double, 4> ends{0., 1.};
     std::size_t count = 2;
     const double under = q1 * q1 - 4. * q2 * q0;

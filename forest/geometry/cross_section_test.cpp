@@ -108,8 +108,8 @@ TEST(CrossSection, ContoursLieOnTheSurfaceAndAreConvexInAnyPosition) {
     };
     const RoundCone cone{any(4), any(4), float(random.uniform(0, 2)), float(random.uniform(0, 2))};
     const Plane plane = Plane::through(any(3), any(1));
-    const auto section = CrossSection::of(
-        {cone.a.cast<double>(), cone.b.cast<double>(), cone.radius_a, cone.radius_b}, plane);
+    const auto section =
+        CrossSection::of({cone.a.cast<double>(), cone.b.cast<double>(), cone.radius_a, cone.radius_b}, plane);
     if (!section) {  // then no point of the axis is nearer to the plane than its sphere is wide
       for (int k = 0; k <= 50; ++k) {
         const float t = float(k) / 50.f;

@@ -209,7 +209,8 @@ std::uint32_t half_pair(float a, float b) {
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
-  std::array<std::uint32_t, 2> visible{};
+  std::array<std::uint32_t, 8> visible{};
+  std::array<Sphere, Cluster::group_count> groups;
 };
 
 // The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
@@ -221,38 +222,51 @@ float appears_at(const frame::Segment& s, float thickest, float mean) {
                   1.f / (diagonal * std::max(thickest, 1e-6f)));
 }
 
-// Writes the segments of a draft in the order in which they appear, `section` (one entry each, of a leaf) with them.
-Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out,
-           std::span<std::uint32_t> section) {
+// Writes the segments of a draft.
+Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
   Drawn drawn;
-  struct Shown {
-    frame::Segment segment;
-    std::uint32_t section;
-    float from;
+  std::array<Bounds, Cluster::group_count> bounds;
+  std::uint32_t count = 0;
+  const auto for_each = [&](auto&& body) {
+    count = 0;
+    for (const Strip& s : strips)
+      for (std::size_t i = 1; i < s.vertices.size(); ++i, ++count) body(s, s.vertices[i - 1], s.vertices[i]);
   };
-  std::vector<Shown> segments;
-  for (const Strip& s : strips)
-    for (std::size_t i = 1; i < s.vertices.size(); ++i) {
-      const Vec4 &a = s.vertices[i - 1], &b = s.vertices[i];
-      const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
-                                   b.x(), b.y(), b.z(), s.kind | s.rank << 8 | half_pair(s.mean, 0.f) << 16};
-      segments.push_back(
-          {segment, section.empty() ? 0 : section[segments.size()],
-           appears_at(segment, std::max(a.w(), b.w()), s.mean > 0.f ? s.mean : std::min(a.w(), b.w()))});
-      if (a != b)
-        drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
-    }
-  std::ranges::stable_sort(segments, {}, &Shown::from);
-  for (std::size_t i = 0; i < segments.size(); ++i) {
-    out.push_back(segments[i].segment);
-    if (!section.empty()) section[i] = segments[i].section;
-  }
-  for (int step = 0; step < 8; ++step) {
-    const auto below = std::ranges::count_if(
-        segments, [&](const Shown& s) { return s.from <= Cluster::magnifications[step]; });
-    drawn.visible[std::size_t(step / 4)] |= std::uint32_t(below) << (8 * (step % 4));
-  }
+  for_each([&](const Strip& s, const Vec4& a, const Vec4& b) {
+    const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
+                                 b.x(), b.y(), b.z(), s.kind | s.rank << 8 | half_pair(s.mean, 0.f) << 16};
+    out.push_back(segment);
+    if (a != b)
+      drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
+    const float from =
+        appears_at(segment, std::max(a.w(), b.w()), s.mean > 0.f ? s.mean : std::min(a.w(), b.w()));
+    for (std::size_t step = 0; step < drawn.visible.size(); ++step)
+      drawn.visible[step] |= std::uint32_t(from <= Cluster::magnifications[step]) << count;
+    for (const Vec4* v : {&a, &b}) bounds[count / Cluster::group_size].add(v->head<3>());
+  });
+  for (std::size_t g = 0; g < bounds.size() && g * Cluster::group_size < count; ++g)
+    drawn.groups[g] = {bounds[g].centre(), 0.f};
+  for_each([&](const Strip&, const Vec4& a, const Vec4& b) {
+    Sphere& sphere = drawn.groups[count / Cluster::group_size];
+    for (const Vec4* v : {&a, &b})
+      sphere.radius = std::max(sphere.radius, (v->head<3>() - sphere.centre).norm() + v->w());
+  });
   return drawn;
+}
+
+// As Cluster::group unpacks it; never smaller than the sphere given.
+std::uint32_t packed(const Sphere& sphere, const Sphere& of_cluster) {
+  const float unit = std::max(of_cluster.radius, 1e-6f) / 127.f;
+  std::uint32_t bits = 0;
+  Vec3 centre;
+  for (int i = 0; i < 3; ++i) {
+    const float steps =
+        std::clamp(std::round((sphere.centre[i] - of_cluster.centre[i]) / unit), -127.f, 127.f);
+    bits |= (std::uint32_t(int(steps)) & 255u) << (8 * i);
+    centre[i] = of_cluster.centre[i] + steps * unit;
+  }
+  const float radius = sphere.radius + (sphere.centre - centre).norm();
+  return bits | std::uint32_t(std::clamp(std::ceil(radius * 1.0001f / unit), 0.f, 255.f)) << 24;
 }
 
 }  // namespace
@@ -439,10 +453,7 @@ ClusterTree build_clusters(const Morphology& m) {
   std::vector<std::uint32_t> first(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {
     first[i] = std::uint32_t(tree.segments.size());
-    const bool leaf = drafts[i].children[0] < 0;
-    const auto section = leaf ? std::span(tree.section).subspan(drafts[i].leaf_first, drafts[i].leaf_count)
-                              : std::span<std::uint32_t>();
-    drawn[i] = emit(drafts[i].strips, tree.segments, section);
+    drawn[i] = emit(drafts[i].strips, tree.segments);
   }
   const std::size_t count = drafts.size();
   const auto index = [&](std::int64_t draft) {
@@ -450,18 +461,21 @@ ClusterTree build_clusters(const Morphology& m) {
   };
   for (std::size_t i = count; i-- > 0;) {
     const Draft& d = drafts[i];
-    tree.clusters.push_back({d.sphere.centre.x(),
-                             d.sphere.centre.y(),
-                             d.sphere.centre.z(),
-                             d.sphere.radius + d.error,
-                             d.error,
-                             drawn[i].thickness,
-                             first[i],
-                             std::uint32_t(segment_count(d.strips)),
-                             {index(d.children[0]), index(d.children[1])},
-                             d.leaf_first,
-                             d.leaf_count,
-                             {drawn[i].visible[0], drawn[i].visible[1]}});
+    const Sphere sphere{d.sphere.centre, d.sphere.radius + d.error};
+    Cluster c{.x = sphere.centre.x(),
+              .y = sphere.centre.y(),
+              .z = sphere.centre.z(),
+              .radius = sphere.radius,
+              .error = d.error,
+              .thickness = drawn[i].thickness,
+              .first_segment = first[i],
+              .segment_count = std::uint32_t(segment_count(d.strips)),
+              .children = {index(d.children[0]), index(d.children[1])},
+              .leaf_first = d.leaf_first,
+              .leaf_count = d.leaf_count};
+    std::ranges::transform(drawn[i].groups, c.groups, [&](const Sphere& g) { return packed(g, sphere); });
+    std::ranges::copy(drawn[i].visible, c.visible);
+    tree.clusters.push_back(c);
   }
   return tree;
 }

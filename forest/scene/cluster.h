@@ -14,13 +14,17 @@
 #include <cstdint>
 #include <vector>
 
+#include "forest/core/bounds.h"
 #include "forest/frame/layout.h"
 #include "forest/morphology/morphology.h"
 
 namespace forest::scene {
 
-/// Laid out for the forest file: 56 bytes.
+/// Laid out for the forest file: 96 bytes. Its segments come in groups of 8 that follow one another along the branches, so
+/// that what is hidden, or beside the picture, can be told from what is not without a look at single segments.
 struct Cluster {
+  static constexpr std::uint32_t group_size = 8, group_count = frame::cluster_size / group_size;
+
   float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // bounding sphere of all that is below, µm
   float error = 0.f;                              // µm; 0 for a leaf, never less than a child's
   float thickness = 0.f;  // largest radius of a segment drawn, the soma's sphere aside, µm
@@ -28,21 +32,29 @@ struct Cluster {
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
   std::uint32_t leaf_count = 0;        // … and how many
-  std::uint32_t visible[2] = {0,
-                              0};  // how many of its segments show at each of `magnifications`: a byte each
+  std::uint32_t groups[group_count] = {};  // the sphere around each group: see group()
+  std::uint32_t visible[8] = {};  // which segments show at each of `magnifications`: bit i is segment i
 
   bool is_leaf() const { return children[0] == 0; }
 
-  /// Its segments lie in the order in which they appear when one comes nearer: a branch thinner than a pixel shows from
-  /// the magnification (pixels a µm) on at which its width reaches its rank. How many, from the first on, may show.
+  /// A branch thinner than a pixel shows from the magnification (pixels a µm) on at which its width reaches its rank. Which
+  /// segments may show.
   std::uint32_t visible_at(float magnification) const {
     for (int i = 0; i < 8; ++i)
-      if (magnification <= magnifications[i]) return visible[i / 4] >> (8 * (i % 4)) & 255;
-    return segment_count;
+      if (magnification <= magnifications[i]) return visible[i] & all();
+    return all();
+  }
+  std::uint32_t all() const { return segment_count < 32 ? (1u << segment_count) - 1u : 0xffffffffu; }
+  /// The sphere around the segments [8 i, 8 i + 8) drawn. Packed: its centre from that of the cluster, a signed byte a
+  /// coordinate in 127ths of the cluster's radius, and its radius, a byte in 127ths.
+  Sphere group(std::uint32_t i) const {
+    const float unit = radius / 127.f;
+    const auto at = [&](int shift) { return float(std::int8_t(groups[i] >> shift & 255)) * unit; };
+    return {{x + at(0), y + at(8), z + at(16)}, float(groups[i] >> 24) * unit};
   }
   static constexpr float magnifications[8] = {.05f, .1f, .17f, .25f, .35f, .5f, .8f, 1.5f};
 };
-static_assert(sizeof(Cluster) == 56);
+static_assert(sizeof(Cluster) == 96);
 
 struct ClusterTree {
   std::vector<frame::Segment> segments;  // the leaves' first (original_count), then the coarser ones

@@ -66,6 +66,9 @@ TEST(Cluster, ErrorsGrowUpwardsAndSpheresEnclose) {
     for (std::uint32_t i = c.first_segment; i < c.first_segment + c.segment_count; ++i) {
       EXPECT_LE((start(tree.segments[i]) - centre).norm(), c.radius * 1.001f);
       EXPECT_LE((finish(tree.segments[i]) - centre).norm(), c.radius * 1.001f);
+      const Sphere group = c.group((i - c.first_segment) / Cluster::group_size);
+      for (const Vec3& end : {start(tree.segments[i]), finish(tree.segments[i])})
+        EXPECT_LE((end - group.centre).norm(), group.radius);
     }
     if (c.is_leaf()) continue;
     for (const auto child : c.children) {

@@ -91,12 +91,14 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
     const frame::Instance& instance = forest_.instances()[index];
     std::vector<Vec3> begins, ends;
     for (const Piece& piece : pieces[index])
-      for (const frame::Segment& s :
-           forest_.segments().subspan(piece.item->first_segment, piece.item->segment_count))
+      for (std::uint32_t i = 0; i < piece.item->segment_count; ++i) {
+        if (piece.item->without >> i & 1u) continue;
+        const frame::Segment& s = forest_.segments()[piece.item->first_segment + i];
         if (subframes == 0 || draws(s, instance, camera, focal, piece.as_line, subframes)) {
           begins.push_back(begin_of(s));
           ends.push_back(end_of(s));
         }
+      }
     sort_places(ends);
     for (const Vec3& begin : begins) {
       if (holds(ends, begin)) continue;

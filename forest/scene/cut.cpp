@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numeric>
 
@@ -12,19 +13,27 @@ namespace forest::scene {
 namespace {
 
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
+constexpr float group_limit =
+    12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
 constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
 
 struct Placed {
   Vec3 position;
-  Quat turn;
-  Sphere operator()(const Cluster& c) const { return {position + turn * Vec3(c.x, c.y, c.z), c.radius}; }
+  Mat3 turn;
+  explicit Placed(const frame::Instance& i)
+      : position(i.x, i.y, i.z), turn(Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix()) {}
+  Sphere operator()(const Sphere& s) const { return {position + turn * s.centre, s.radius}; }
+  Sphere operator()(const Cluster& c) const { return (*this)(Sphere{{c.x, c.y, c.z}, c.radius}); }
 };
 
-frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t count, const Sphere& sphere) {
-  return {instance, first, count, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
+frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t count, std::uint32_t without,
+                 const Sphere& sphere) {
+  return {instance,          first,        count, without, sphere.centre.x(), sphere.centre.y(),
+          sphere.centre.z(), sphere.radius};
 }
 
 constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
+constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
 // What is looked at, and what is known to be hidden.
 struct Look {
@@ -35,13 +44,42 @@ struct Look {
   bool keep;                   // what they hide
 };
 
+// Of a cluster that is good enough, these groups.
+void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std::uint32_t groups,
+                   const Placed& placed, const Sphere& sphere, Cut& cut) {
+  const Cluster& c = look.forest.clusters()[at];
+  const float magnification = look.eye.magnification(sphere);
+  const Detail& detail = look.eye.detail();
+  const std::uint32_t shown = detail.thin ? c.visible_at(magnification) : c.all();
+  auto& list = 2.f * c.thickness * magnification <= detail.surface_width ? cut.lines : cut.capsules;
+  if (groups == every_group && sphere.radius * magnification <= group_limit) {
+    if (!shown) return;
+    list.push_back(item(index, c.first_segment, c.segment_count, ~shown & c.all(), sphere));
+    cut.segments += std::uint32_t(std::popcount(shown));
+    return;
+  }
+  std::uint32_t hidden = 0;
+  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
+    const std::uint32_t bits = shown >> (g * Cluster::group_size) & 255u;
+    if (!bits || !(groups >> g & 1u)) continue;
+    const Sphere around = placed(c.group(g));
+    if (!look.frustum.may_see(around)) continue;
+    if (look.occluders && look.occluders->hide(around)) {
+      hidden |= 1u << g;
+      continue;
+    }
+    const std::uint32_t before = g * Cluster::group_size,
+                        count = std::min(c.segment_count - before, Cluster::group_size);
+    list.push_back(item(index, c.first_segment + before, count, ~bits & ((1u << count) - 1u), around));
+    cut.segments += std::uint32_t(std::popcount(bits));
+  }
+  if (hidden && look.keep) cut.left_out.push_back({index, at, hidden});
+}
+
 void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
-  const frame::Instance& instance = look.forest.instances()[index];
-  const Placed placed{{instance.x, instance.y, instance.z},
-                      Quat(instance.qw, instance.qx, instance.qy, instance.qz)};
+  const Placed placed(look.forest.instances()[index]);
   const auto clusters = look.forest.clusters();
   const Eye& eye = look.eye;
-  const Detail& detail = eye.detail();
   std::uint32_t open[64];
   int depth = 0;
   open[depth++] = from;
@@ -51,7 +89,7 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
     const Sphere sphere = placed(c);
     if (!look.frustum.may_see(sphere)) continue;
     if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({index, at});
+      if (look.keep) cut.left_out.push_back({index, at, 0});
       continue;
     }
     if (!c.is_leaf() && depth + 2 <= 64 && !eye.good_enough(sphere, c.error)) {
@@ -59,12 +97,7 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
       open[depth++] = c.children[0];
       continue;
     }
-    const float width = 2.f * c.thickness * eye.magnification(sphere);
-    const std::uint32_t count = detail.thin ? c.visible_at(eye.magnification(sphere)) : c.segment_count;
-    if (!count) continue;
-    (width <= detail.surface_width ? cut.lines : cut.capsules)
-        .push_back(item(index, c.first_segment, count, sphere));
-    cut.segments += count;
+    choose_groups(look, index, at, every_group, placed, sphere, cut);
   }
 }
 
@@ -74,11 +107,11 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
   if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
   if (look.occluders && look.occluders->hide(sphere)) {
-    if (look.keep) cut.left_out.push_back({index, soma});
+    if (look.keep) cut.left_out.push_back({index, soma, 0});
     return;
   }
   const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
-  (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, sphere));
+  (large ? cut.capsules : cut.dots).push_back(item(index, neuron.first_segment, 1, 0, sphere));
   ++cut.segments;
 }
 
@@ -164,10 +197,15 @@ Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::
              const Occluders& now) {
   const Look look{forest, eye, eye.frustum(), &now, false};
   return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
-    if (left_out[i].cluster == soma)
-      choose_soma(look, left_out[i].instance, part);
-    else
-      choose_clusters(look, left_out[i].instance, left_out[i].cluster, part);
+    const auto [instance, cluster, groups] = left_out[i];
+    if (cluster == soma) {
+      choose_soma(look, instance, part);
+    } else if (groups) {
+      const Placed placed(forest.instances()[instance]);
+      choose_groups(look, instance, cluster, groups, placed, placed(forest.clusters()[cluster]), part);
+    } else {
+      choose_clusters(look, instance, cluster, part);
+    }
   });
 }
 

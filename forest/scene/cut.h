@@ -12,9 +12,11 @@
 
 namespace forest::scene {
 
-/// A cluster and all below it, or a soma, that were left out because an earlier picture hid them.
+/// What was left out because an earlier picture hid it: a cluster and all below it, some of the groups that a cluster draws,
+/// or a soma.
 struct LeftOut {
   std::uint32_t instance = 0, cluster = 0;  // 0xffffffff: the soma
+  std::uint32_t groups = 0;                 // bit i: group i of the cluster; 0: all of it, and all below
 };
 
 struct Cut {

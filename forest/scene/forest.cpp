@@ -23,7 +23,7 @@ static_assert(std::endian::native == std::endian::little,
               "the forest file is little-endian, as the graphics card is");
 
 constexpr std::array<char, 8> magic{'B', 'F', 'O', 'R', 'E', 'S', 'T', '\n'};
-constexpr std::uint32_t version = 1;
+constexpr std::uint32_t version = 2;
 constexpr std::size_t alignment = 64;
 
 // In the order of the file.

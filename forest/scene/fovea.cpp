@@ -10,9 +10,9 @@ namespace forest::scene {
 namespace {
 
 constexpr std::uint32_t coarsest = 8;
-constexpr float fade = .2f;          // of the eccentricity at which a layer ends: how far it reaches into the next
-constexpr float least_fade = .5f;    // degrees
-constexpr float margin = 6.f;        // pixels of a layer around what is shown of it: rims look two pixels far
+constexpr float fade = .2f;  // of the eccentricity at which a layer ends: how far it reaches into the next
+constexpr float least_fade = .5f;  // degrees
+constexpr float margin = 6.f;      // pixels of a layer around what is shown of it: rims look two pixels far
 constexpr std::size_t rows_at_once = 8;
 
 // A cluster of which less than this share of a square of pixels would show is left out of the coarser layers: its neighbours,
@@ -56,7 +56,8 @@ frame::Area hole_of(const Gaze& gaze, float eccentricity, const Layer& layer, fl
     if (inside(half + step)) half += step;
   half -= margin * layer.scale;
   const auto bound = [&](float at, float size, std::uint32_t layer_size) {
-    return std::uint32_t(std::clamp(in_layer(at, size, float(layer_size), layer.scale), 0.f, float(layer_size)));
+    return std::uint32_t(
+        std::clamp(in_layer(at, size, float(layer_size), layer.scale), 0.f, float(layer_size)));
   };
   if (half <= 0.f) return {};
   const Vec2 low = gaze.pixel() - Vec2(half, half), high = gaze.pixel() + Vec2(half, half);
@@ -72,9 +73,8 @@ struct Between {
           std::uint32_t high)
       : first(size), share(size) {
     for (std::uint32_t i = 0; i < size; ++i) {
-      const float at = std::clamp(
-          in_layer(float(i) + .5f, float(size), float(layer_size), layer.scale) - .5f, float(low),
-          std::max(float(low), float(high) - 1.f));
+      const float at = std::clamp(in_layer(float(i) + .5f, float(size), float(layer_size), layer.scale) - .5f,
+                                  float(low), std::max(float(low), float(high) - 1.f));
       first[i] = std::min(std::uint32_t(at), std::max(low, high >= 2 ? high - 2 : 0));
       share[i] = std::clamp(at - float(first[i]), 0.f, 1.f);
     }
@@ -84,8 +84,8 @@ struct Between {
 using Colour = Eigen::Array4f;
 
 // a + share × (b - a), byte by byte; and back to bytes. Flat loops become vector instructions.
-[[gnu::target_clones("default", "arch=haswell")]] void mix(const std::uint8_t* a, const std::uint8_t* b, float share,
-                                                           std::size_t count, float* out) {
+[[gnu::target_clones("default", "arch=haswell")]] void mix(const std::uint8_t* a, const std::uint8_t* b,
+                                                           float share, std::size_t count, float* out) {
   for (std::size_t i = 0; i < count; ++i) out[i] = float(a[i]) + share * (float(b[i]) - float(a[i]));
 }
 [[gnu::target_clones("default", "arch=haswell")]] void to_bytes(const float* from, std::size_t count,
@@ -108,7 +108,8 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
     farthest = std::max(farthest, gaze.eccentricity(corner));
   for (std::uint32_t k = 2; k <= coarsest && height / k >= 16; k *= 2) {
     // From here on the eye resolves nothing smaller than k pixels.
-    const float from = std::max(gaze.where_resolved(float(k), detail), layers.size() == 1 ? detail.fovea : 0.f);
+    const float from =
+        std::max(gaze.where_resolved(float(k), detail), layers.size() == 1 ? detail.fovea : 0.f);
     if (!(from < farthest)) break;
     layers.back().until = from;
     layers.back().gone = from + std::max(least_fade, fade * from);
@@ -149,9 +150,9 @@ Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std
   detail.thin = view.samples == 1;
   detail.area = layer.area;
   if (detail.gaze)
-    detail.gaze = Vec2(
-        in_layer(detail.gaze->x() * float(width), float(width), float(layer.width), layer.scale),
-        in_layer(detail.gaze->y() * float(height), float(height), float(layer.height), layer.scale));
+    detail.gaze =
+        Vec2(in_layer(detail.gaze->x() * float(width), float(width), float(layer.width), layer.scale),
+             in_layer(detail.gaze->y() * float(height), float(height), float(layer.height), layer.scale));
   return detail;
 }
 
@@ -177,8 +178,8 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
       return std::isinf(eccentricity) ? -2.f : std::cos(radians(std::min(eccentricity, 179.f)));
     };
     sources.push_back({*pictures[i], Between(width, layer, layer.width, a.left, a.right),
-                       Between(height, layer, layer.height, a.top, a.bottom), part.left, part.right,
-                       part.top, part.bottom, cosine(layer.until), cosine(layer.gone)});
+                       Between(height, layer, layer.height, a.top, a.bottom), part.left, part.right, part.top,
+                       part.bottom, cosine(layer.until), cosine(layer.gone)});
   }
   const Vec3 ahead = gaze.direction();
   parallel_ranges(height, rows_at_once, [&](std::size_t begin, std::size_t end) {
@@ -190,7 +191,8 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
         const std::uint32_t first = s.columns.first[s.left],
                             last = std::min(s.columns.first[s.right - 1] + 2, s.picture.width);
         mixed.resize(s.picture.width);
-        const std::size_t upper = s.rows.first[y], lower = std::min<std::size_t>(upper + 1, s.picture.height - 1);
+        const std::size_t upper = s.rows.first[y],
+                          lower = std::min<std::size_t>(upper + 1, s.picture.height - 1);
         const float down = s.rows.share[y];
         const std::uint8_t* source = s.picture.pixels.data();
         const std::size_t pitch = 4 * std::size_t(s.picture.width);

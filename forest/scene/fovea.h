@@ -17,9 +17,9 @@ struct Layer {
   float scale = 1.f;                    // pixels of the picture as wide as one of the layer
   frame::Area area = {};                // what of it is needed
   frame::Area hole = {};                // … and what of that finer layers show
-  float gaps = 0.f;                     // as frame::Frame has it: what is seen through them is too small to be resolved
-  float until = 0.f;                    // eccentricity where it begins to fade into the next, degrees
-  float gone = 0.f;                     // … and where it is gone; the last layer never is
+  float gaps = 0.f;   // as frame::Frame has it: what is seen through them is too small to be resolved
+  float until = 0.f;  // eccentricity where it begins to fade into the next, degrees
+  float gone = 0.f;   // … and where it is gone; the last layer never is
 };
 
 /// Finest first; one alone when the view has no gaze or all of the picture is resolved.

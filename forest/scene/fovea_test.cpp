@@ -101,9 +101,9 @@ TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
       for (std::uint32_t x = 0; x < layer.width; ++x) {
         const float px = (float(x) + .5f - .5f * float(layer.width)) * layer.scale + .5f * float(width),
                     py = (float(y) + .5f - .5f * float(layer.height)) * layer.scale + .5f * float(height);
-        image.pixels.insert(image.pixels.end(),
-                            {std::uint8_t(std::clamp(px / 8.f, 0.f, 255.f)),
-                             std::uint8_t(std::clamp(py / 8.f, 0.f, 255.f)), std::uint8_t(40 * pictures.size()), 255});
+        image.pixels.insert(image.pixels.end(), {std::uint8_t(std::clamp(px / 8.f, 0.f, 255.f)),
+                                                 std::uint8_t(std::clamp(py / 8.f, 0.f, 255.f)),
+                                                 std::uint8_t(40 * pictures.size()), 255});
       }
     pictures.push_back(std::move(image));
   }

@@ -15,56 +15,72 @@ constexpr float tile = float(FOREST_TILE);
 }  // namespace
 
 Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport)
-    : axes_(camera.axes()),
+    : width_(map.width),
+      height_(map.height),
       eye_(camera.eye),
       orthographic_(camera.orthographic()),
       near_(camera.near),
       focal_(camera.focal(viewport.height)),
       centre_x_(.5f * viewport.width),
       centre_y_(.5f * viewport.height) {
+  to_camera_ = camera.axes().transpose();
+  to_camera_.row(2) *= -1.f;
   if (map.depths.empty()) return;
-  levels_.push_back({map.width, map.height, map.depths});
-  while (levels_.back().width > 1 || levels_.back().height > 1) {
-    const Level& below = levels_.back();
-    Level level{(below.width + 1) / 2, (below.height + 1) / 2, {}};
-    level.depths.reserve(std::size_t(level.width) * level.height);
-    for (std::uint32_t y = 0; y < level.height; ++y)
-      for (std::uint32_t x = 0; x < level.width; ++x) {
-        const std::uint32_t right = std::min(2 * x + 1, below.width - 1),
-                            lower = std::min(2 * y + 1, below.height - 1);
-        level.depths.push_back(std::max({below.at(2 * x, 2 * y), below.at(right, 2 * y),
-                                         below.at(2 * x, lower), below.at(right, lower)}));
-      }
-    levels_.push_back(std::move(level));
+  squares_.push_back(map.depths);
+  for (std::uint32_t side = 1; 2 * side <= std::min(width_, height_); side *= 2) {
+    const std::vector<float>& small = squares_.back();
+    std::vector<float> large(small.size()), wide(small.size());
+    for (std::uint32_t y = 0; y < height_; ++y) {
+      const float* row = &small[std::size_t(y) * width_];
+      float* to = &wide[std::size_t(y) * width_];
+      for (std::uint32_t x = 0; x < width_ - side; ++x) to[x] = std::max(row[x], row[x + side]);
+      std::copy(row + (width_ - side), row + width_, to + (width_ - side));
+    }
+    for (std::uint32_t y = 0; y < height_; ++y) {
+      const float* row = &wide[std::size_t(y) * width_];
+      const float* below = &wide[std::size_t(std::min(y + side, height_ - 1)) * width_];
+      for (std::uint32_t x = 0; x < width_; ++x)
+        large[std::size_t(y) * width_ + x] = std::max(row[x], y + side < height_ ? below[x] : row[x]);
+    }
+    squares_.push_back(std::move(large));
+  }
+}
+
+float Occluders::farthest(std::uint32_t left, std::uint32_t top, std::uint32_t right,
+                          std::uint32_t bottom) const {
+  // Squares as large as fit, the last of each row and column moved back so as not to reach beyond.
+  const std::uint32_t shorter = std::min(right - left, bottom - top) + 1;
+  const auto k = std::min<std::size_t>(std::size_t(std::bit_width(shorter) - 1), squares_.size() - 1);
+  const std::uint32_t side = 1u << k, last_x = right + 1 - side, last_y = bottom + 1 - side;
+  const float* squares = squares_[k].data();
+  float result = 0.f;
+  for (std::uint32_t y = top;; y = std::min(y + side, last_y)) {
+    for (std::uint32_t x = left;; x = std::min(x + side, last_x)) {
+      result = std::max(result, squares[std::size_t(y) * width_ + x]);
+      if (x == last_x) break;
+    }
+    if (y == last_y) return result;
   }
 }
 
 bool Occluders::hide(const Sphere& sphere) const {
-  if (levels_.empty()) return false;
-  const Vec3 p = axes_.transpose() * (sphere.centre - eye_);
-  const float depth = -p.z(), nearest = depth - sphere.radius;
+  if (squares_.empty()) return false;
+  const Vec3 p = to_camera_ * (sphere.centre - eye_);
+  const float depth = p.z(), nearest = depth - sphere.radius;
   if (!(nearest > near_)) return false;
   // A point at distance r from the centre is seen at most f · r · |p| / (depth · nearest) beside it.
   const float scale = orthographic_ ? focal_ : focal_ / depth;
-  const float reach = focal_ * sphere.radius * (orthographic_ ? 1.f : p.norm() / (depth * nearest)) + margin;
+  const float spread = orthographic_ ? 1.f : std::sqrt(p.squaredNorm()) / nearest;
+  const float reach = scale * sphere.radius * spread + margin;
   const float x = centre_x_ + scale * p.x(), y = centre_y_ - scale * p.y();
-  const Level& finest = levels_.front();
-  const float wide = float(finest.width) * tile, high = float(finest.height) * tile;
+  const float wide = float(width_) * tile, high = float(height_) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;
-  auto left = std::uint32_t(std::max(x - reach, 0.f) / tile),
-       top = std::uint32_t(std::max(y - reach, 0.f) / tile);
-  auto right = std::min(std::uint32_t(std::min(x + reach, wide) / tile), finest.width - 1),
-       bottom = std::min(std::uint32_t(std::min(y + reach, high) / tile), finest.height - 1);
-  // The level at which the rectangle is at most four wide: few look-ups, and little that is not below it.
-  const std::uint32_t span = std::max(right - left, bottom - top);
-  const std::size_t k =
-      std::min<std::size_t>(std::size_t(std::max(int(std::bit_width(span)) - 2, 0)), levels_.size() - 1);
-  left >>= k, top >>= k, right >>= k, bottom >>= k;
-  const Level& level = levels_[k];
-  for (std::uint32_t row = top; row <= bottom; ++row)
-    for (std::uint32_t column = left; column <= right; ++column)
-      if (!(level.at(column, row) * depth_step < nearest)) return false;
-  return true;
+  constexpr float tiles = 1.f / tile;
+  const auto left = std::uint32_t(std::max(x - reach, 0.f) * tiles),
+             top = std::uint32_t(std::max(y - reach, 0.f) * tiles);
+  const auto right = std::min(std::uint32_t(std::min(x + reach, wide) * tiles), width_ - 1),
+             bottom = std::min(std::uint32_t(std::min(y + reach, high) * tiles), height_ - 1);
+  return farthest(left, top, right, bottom) * depth_step < nearest;
 }
 
 }  // namespace forest::scene

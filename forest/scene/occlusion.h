@@ -9,8 +9,8 @@
 
 namespace forest::scene {
 
-/// A picture's depth map as a pyramid, each level the farthest of four of the level below (Greene, Kass & Miller 1993,
-/// "Hierarchical Z-buffer visibility").
+/// A picture's depth map (Greene, Kass & Miller 1993, "Hierarchical Z-buffer visibility") with, of each square of 1, 2, 4, 8 …
+/// tiles, the farthest, wherever the square begins: the farthest of any rectangle is that of a few squares that cover it.
 class Occluders {
  public:
   /// @param map  of a picture of that size, as the camera saw it
@@ -21,13 +21,12 @@ class Occluders {
   bool hide(const Sphere& sphere) const;
 
  private:
-  struct Level {
-    std::uint32_t width = 0, height = 0;
-    std::vector<float> depths;
-    float at(std::uint32_t x, std::uint32_t y) const { return depths[std::size_t(y) * width + x]; }
-  };
-  std::vector<Level> levels_;
-  Mat3 axes_;
+  float farthest(std::uint32_t left, std::uint32_t top, std::uint32_t right, std::uint32_t bottom) const;
+
+  std::uint32_t width_ = 0, height_ = 0;  // tiles
+  std::vector<std::vector<float>>
+      squares_;     // of side 2^k, by their upper left tile; cut at the picture's edge
+  Mat3 to_camera_;  // rows: right, up, forward
   Vec3 eye_;
   bool orthographic_;
   float near_, focal_, centre_x_, centre_y_;

@@ -55,10 +55,8 @@ TEST(Pick, AThinBranchIsUnderThePixelsItTouches) {
   const Forest forest = Forest::from_bytes(pack(c, std::vector<Morphology>{builder.build()}));
   const Vec3 centre(forest.instances()[0].x, 0, forest.instances()[0].z);
   for (const auto projection : {frame::Projection::perspective, frame::Projection::orthographic}) {
-    const frame::Camera camera{.eye = centre + Vec3(0, 0, 800),
-                               .target = centre,
-                               .field_of_view = 40.f,
-                               .projection = projection};
+    const frame::Camera camera{
+        .eye = centre + Vec3(0, 0, 800), .target = centre, .field_of_view = 40.f, .projection = projection};
     const float x = frame::project(camera, viewport, centre + Vec3(0, 50, 0)).x();
     EXPECT_FALSE(pick(forest, camera, viewport, {x + .4f, 180.f}, 0.f));
     EXPECT_TRUE(pick(forest, camera, viewport, {x + .4f, 180.f}));

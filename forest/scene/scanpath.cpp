@@ -99,16 +99,20 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
       continue;
     }
     const auto x = number_of(cells[1]), y = number_of(cells[2]);
-    if (!x || !y) refuse(fmt::format("'{}, {}' is no place of the gaze; leave both empty in a blink", cells[1], cells[2]));
+    if (!x || !y)
+      refuse(
+          fmt::format("'{}, {}' is no place of the gaze; leave both empty in a blink", cells[1], cells[2]));
     Vec2 place{float(*x), float(*y)};
     if (pixels) place.array() /= size->array();
     if (!(place.cwiseAbs().maxCoeff() <= 100.f))
-      refuse(fmt::format("{}, {} lies a hundred pictures beside the picture; are these pixels? name the columns "
-                         "x_px and y_px then",
-                         cells[1], cells[2]));
+      refuse(
+          fmt::format("{}, {} lies a hundred pictures beside the picture; are these pixels? name the columns "
+                      "x_px and y_px then",
+                      cells[1], cells[2]));
     samples.push_back({*time, place});
   }
-  if (samples.empty()) throw InputError(name, 0, "holds no sample of the gaze; write time in ms, x, y on each line");
+  if (samples.empty())
+    throw InputError(name, 0, "holds no sample of the gaze; write time in ms, x, y on each line");
   return Scanpath(std::move(samples));
 }
 

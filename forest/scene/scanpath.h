@@ -13,7 +13,7 @@ namespace forest::scene {
 
 struct Fixation {
   double time = 0.;  // ms from the begin of the recording's clock
-  Vec2 place;        // shares of the picture's width and height, from its upper left corner; may lie beside it
+  Vec2 place;  // shares of the picture's width and height, from its upper left corner; may lie beside it
 };
 
 class Scanpath {

@@ -20,8 +20,9 @@ TEST(Scanpath, HoldsTheLastSampleAndJumps) {
 }
 
 TEST(Scanpath, ReadsPixelsBlinksCommentsAndForeignLineEnds) {
-  const Scanpath path =
-      parse_scanpath("# a recording\r\n# size 200x100\r\ntime,x_px,y_px\r\n0,100,50\r\n5,,\r\n9;nan;nan\r\n\r\n12, -20, 150");
+  const Scanpath path = parse_scanpath(
+      "# a recording\r\n# size 200x100\r\ntime,x_px,y_px\r\n0,100,50\r\n5,,\r\n9;nan;nan\r\n\r\n12, -20, "
+      "150");
   ASSERT_EQ(path.samples().size(), 4u);
   EXPECT_EQ(path.samples()[0].place, Vec2(.5f, .5f));
   EXPECT_EQ(path.samples()[2].place, Vec2(.5f, .5f));

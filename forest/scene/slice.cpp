@@ -114,7 +114,8 @@ Sheet sheet_of(const Forest& forest, const Plane& plane) {
         bounds.add(Vec3(bounds.centre().x(), layer.top, bounds.centre().z()));
   Sheet sheet{Place::Constant(INFINITY), Place::Constant(-INFINITY)};
   for (int corner = 0; corner < 8; ++corner) {
-    const Vec3 at(corner & 1 ? bounds.low.x() : bounds.high.x(), corner & 2 ? bounds.low.y() : bounds.high.y(),
+    const Vec3 at(corner & 1 ? bounds.low.x() : bounds.high.x(),
+                  corner & 2 ? bounds.low.y() : bounds.high.y(),
                   corner & 4 ? bounds.low.z() : bounds.high.z());
     const Place place = plane.place(at).cast<double>();
     sheet.low = sheet.low.cwiseMin(place - Place::Constant(beside));

@@ -35,7 +35,7 @@ Slice slice(const Forest& forest, const Plane& plane, const Sheet& sheet = {});
 struct ProfileArea {
   std::uint32_t instance = 0, kind = 0;
   std::uint32_t profiles = 0;  // of segments
-  double area = 0.;            // µm², of their union; what two kinds share belongs to that of the smaller number
+  double area = 0.;  // µm², of their union; what two kinds share belongs to that of the smaller number
 };
 /// By neuron and kind, in this order.
 std::vector<ProfileArea> areas(const Slice& slice);

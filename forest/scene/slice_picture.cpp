@@ -17,8 +17,8 @@ constexpr int lines = 4;            // a pixel's scan lines
 constexpr std::size_t rows_at_once = 16;
 
 struct Ground {
-  Vec3 paper, ink;       // linear light
-  float tint, rim;       // share of paper in a filled profile; light that its rim keeps
+  Vec3 paper, ink;  // linear light
+  float tint, rim;  // share of paper in a filled profile; light that its rim keeps
 };
 Ground ground_of(Background background) {
   return background == Background::light ? Ground{Vec3::Constant(.86f), Vec3::Constant(.01f), .30f, .22f}
@@ -81,7 +81,8 @@ class Paper {
     if (shape.size() < 3) return;
     double top = INFINITY, bottom = -INFINITY;
     for (const Place& p : shape) top = std::min(top, p.y()), bottom = std::max(bottom, p.y());
-    const auto from = std::max(double(first_), std::floor(top)), to = std::min(double(last_), std::ceil(bottom));
+    const auto from = std::max(double(first_), std::floor(top)),
+               to = std::min(double(last_), std::ceil(bottom));
     for (double row = from; row < to; row += 1.) {
       std::size_t low = width_, high = 0;
       for (int line = 0; line < lines; ++line) {
@@ -136,7 +137,8 @@ struct ScaleBar {
 ScaleBar scale_bar_of(const SlicePicture& picture) {
   const double length = scale_bar_length(.2 * picture.width_pixels * picture.pixel());
   if (length < 1.) return {length, fmt::format("{:.0f} nm", 1000. * length)};
-  return {length, length < 1000. ? fmt::format("{:.0f} um", length) : fmt::format("{:.0f} mm", length / 1000.)};
+  return {length,
+          length < 1000. ? fmt::format("{:.0f} um", length) : fmt::format("{:.0f} mm", length / 1000.)};
 }
 
 std::vector<Shape> scale_bar_shapes(const SlicePicture& picture) {
@@ -241,8 +243,9 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
       for (std::size_t k = 1; k < all.back().size(); ++k) svg += "L" + at(all.back()[k]);
       svg += "Z\"/>";
     }
-    svg += fmt::format("<path fill=\"none\" stroke=\"{}\" stroke-width=\"{:.4g}\" stroke-linecap=\"round\" d=\"",
-                       hex(ground.rim * fill_of(colouring, first, ground)), rim_pixels * picture.pixel());
+    svg +=
+        fmt::format("<path fill=\"none\" stroke=\"{}\" stroke-width=\"{:.4g}\" stroke-linecap=\"round\" d=\"",
+                    hex(ground.rim * fill_of(colouring, first, ground)), rim_pixels * picture.pixel());
     Place before = Place::Constant(INFINITY);
     for (const auto& [p, q] : boundary_of_union(all)) {
       if (p != before) svg += "M" + at(p);
@@ -257,7 +260,8 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     const double margin = .035 * picture.height, bottom = picture.height - margin;
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
-        "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" fill=\"{4}\">{7}</text>\n",
+        "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
+        "fill=\"{4}\">{7}</text>\n",
         margin, bottom - .25 * margin, bar.length, .25 * margin, hex(ground.ink), bottom - .5 * margin,
         .9 * margin, bar.label);
   }

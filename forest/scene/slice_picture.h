@@ -12,11 +12,11 @@ namespace forest::scene {
 /// The picture of a slice: profiles filled in the colour of their neuron, with a darker rim, on light ground as in electron
 /// micrographs, or on dark ground.
 struct SlicePicture {
-  Place centre{0., 0.};                      // in the middle of the picture, along the plane's right and up, µm
-  double height = 100.;                      // of the picture, µm
+  Place centre{0., 0.};  // in the middle of the picture, along the plane's right and up, µm
+  double height = 100.;  // of the picture, µm
   std::uint32_t width_pixels = 1280, height_pixels = 720;
   Background background = Background::light;
-  bool scale_bar = true;                     // labelled with its length
+  bool scale_bar = true;  // labelled with its length
 
   double pixel() const { return height / height_pixels; }  // µm
   Sheet sheet() const;

@@ -100,9 +100,9 @@ TEST(Slice, AreasAreThoseOfTheUnionOfANeuronsProfiles) {
     const int count = 200000;
     int hits = 0;
     for (int i = 0; i < count; ++i)
-      hits += in_profiles(one, forest,
-                          plane.point({float(random.uniform(low.x(), high.x())),
-                                       float(random.uniform(low.y(), high.y()))}));
+      hits += in_profiles(
+          one, forest,
+          plane.point({float(random.uniform(low.x(), high.x())), float(random.uniform(low.y(), high.y()))}));
     const double box = (high - low).prod(), share = double(hits) / count;
     EXPECT_NEAR(share * box, area, 4. * box * std::sqrt(share * (1. - share) / count) + 1e-3 * area);
   }

@@ -18,16 +18,30 @@ std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile
 
 }  // namespace
 
-void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area, const frame::Area& hole,
-                   float gaps) {
+void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area,
+                   const frame::Area& hole, float gaps) {
   area_ = area, hole_ = hole, gaps_ = gaps;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
-  keys_.resize(std::size_t(width) * height);
-  const std::size_t wide = area.right - area.left;
-  parallel_for(area.bottom - area.top, (1 << 16) / wide + 1, [&](std::size_t row) {
-    std::fill_n(keys_.begin() + std::ptrdiff_t((area.top + row) * width + area.left), wide, FOREST_KEY_EMPTY);
+  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
+  const std::size_t tiles_wide = std::size_t(fine_.width);
+  keys_.resize(tiles_wide * std::size_t(fine_.height) * tile * tile);
+  const std::size_t top = area.top / tile, rows = std::size_t(tiles_over(std::int32_t(area.bottom))) - top,
+                    left = area.left / tile,
+                    columns = std::size_t(tiles_over(std::int32_t(area.right))) - left;
+  parallel_for(rows, 16, [&](std::size_t row) {
+    const std::size_t ty = top + row;
+    std::uint32_t* keys = &keys_[(ty * tiles_wide + left) * tile * tile];
+    std::fill(keys, keys + columns * tile * tile, FOREST_KEY_EMPTY);
+    for (std::int32_t y = std::int32_t(ty) * tile; y < std::int32_t(ty + 1) * tile; ++y)
+      for (std::int32_t x = y < height_ ? width_ : 0; x < fine_.width * tile; ++x) keys_[place(x, y)] = 0;
   });
   looked_ = false;
+}
+
+void Canvas::read_row(std::int32_t y, std::uint32_t* keys) const {
+  const std::uint32_t* from = &keys_[place(0, y)];
+  for (std::int32_t x = 0; x < width_; x += tile, from += tile * tile)
+    std::copy(from, from + std::min(tile, width_ - x), keys + x);
 }
 
 // The farthest key of a tile's wanted pixels but for the share of gaps; 0 when there are none.
@@ -37,44 +51,34 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   };
   const auto [left, right] = within(tx * tile, area_.left, area_.right);
   const auto [top, bottom] = within(ty * tile, area_.top, area_.bottom);
+  if (left >= right || top >= bottom) return 0;
   if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
       top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
     return 0;
   std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile)> keys;
   std::size_t count = 0;
   for (std::int32_t y = top; y < bottom; ++y)
-    for (std::int32_t x = left; x < right; ++x) keys[count++] = row(y)[x];
-  if (!count) return 0;
+    for (std::int32_t x = left; x < right; ++x) keys[count++] = keys_[place(x, y)];
   const auto nth = keys.begin() + std::ptrdiff_t(float(count - 1) * (1.f - gaps_));
   std::nth_element(keys.begin(), nth, keys.begin() + std::ptrdiff_t(count));
   return *nth;
 }
 
 void Canvas::look() {
-  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
-  fine_.farthest.resize(std::size_t(fine_.width) * std::size_t(fine_.height));
-  if (gaps_ > 0.f || hole_.right > hole_.left) {
-    parallel_for(fine_.farthest.size(), 64, [&](std::size_t i) {
-      fine_.farthest[i] = far_in_tile(std::int32_t(i) % fine_.width, std::int32_t(i) / fine_.width);
-    });
-    return look_at_coarse();
-  }
-  const auto top = std::int32_t(area_.top), bottom = std::int32_t(area_.bottom);
-  parallel_for(std::size_t(fine_.height), 4, [&](std::size_t ty) {
-    std::vector<std::uint32_t> column(std::size_t(width_), 0u);  // the farthest of the tile's rows
-    for (std::int32_t y = std::max(std::int32_t(ty) * tile, top);
-         y < std::min(std::int32_t(ty + 1) * tile, bottom); ++y) {
-      const std::uint32_t* keys = row(y);
-      for (std::size_t x = area_.left; x < area_.right; ++x) column[x] = std::max(column[x], keys[x]);
+  fine_.farthest.resize(keys_.size() / (tile * tile));
+  const frame::Area& a = area_;
+  const bool partly = a.left > 0 || a.top > 0 || a.right < std::uint32_t(width_) ||
+                      a.bottom < std::uint32_t(height_) || gaps_ > 0.f || hole_.right > hole_.left;
+  parallel_for(fine_.farthest.size(), 512, [&](std::size_t t) {
+    if (partly) {
+      fine_.farthest[t] = far_in_tile(std::int32_t(t) % fine_.width, std::int32_t(t) / fine_.width);
+      return;
     }
-    for (std::int32_t tx = 0; tx < fine_.width; ++tx)
-      fine_.farthest[ty * std::size_t(fine_.width) + std::size_t(tx)] =
-          *std::max_element(column.begin() + tx * tile, column.begin() + std::min((tx + 1) * tile, width_));
+    const std::uint32_t* keys = &keys_[t * tile * tile];
+    std::uint32_t far = 0;
+    for (std::int32_t i = 0; i < tile * tile; ++i) far = std::max(far, keys[i]);
+    fine_.farthest[t] = far;
   });
-  look_at_coarse();
-}
-
-void Canvas::look_at_coarse() {
   coarse_.width = tiles_over(fine_.width), coarse_.height = tiles_over(fine_.height);
   coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
   for (std::int32_t y = 0; y < fine_.height; ++y)

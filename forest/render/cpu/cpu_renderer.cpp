@@ -34,9 +34,11 @@ struct CpuRenderer::State {
     for (const frame::Band& to : lists.bands.empty() ? std::span(&whole, 1) : lists.bands) {
       if (from.dots || from.lines || from.capsules) canvas.look();
       drawn += cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules),
-                 cpu::Kind::capsules, canvas);
-      drawn += cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
-      drawn += cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines, canvas);
+                          cpu::Kind::capsules, canvas);
+      drawn +=
+          cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
+      drawn += cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines,
+                          canvas);
       from = to;
     }
     return drawn;

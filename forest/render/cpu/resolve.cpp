@@ -93,16 +93,18 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
     const std::size_t begin = area.top + chunk * rows_at_once,
                       end = std::min<std::size_t>(area.bottom, begin + rows_at_once);
     std::vector<float> octaves((rows_at_once + 2 * beside) * padded), lit(width), fog(width);
+    std::vector<std::uint32_t> all_keys((rows_at_once + 2 * beside) * width);
     const auto row_of = [&](std::size_t y) {
       return &octaves[(y + beside - begin) * padded];
     };  // y may be `beside` outside
     for (std::size_t k = 0; k < end - begin + 2 * beside; ++k) {
       const std::size_t y = std::min(std::max(begin + k, beside) - beside, height - 1);
-      octaves_of(canvas.row(std::int32_t(y)), width, &octaves[k * padded]);
+      canvas.read_row(std::int32_t(y), &all_keys[k * width]);
+      octaves_of(&all_keys[k * width], width, &octaves[k * padded]);
     }
     std::uint64_t alpha = 0;
     for (std::size_t y = begin; y < end; ++y) {
-      const std::uint32_t* keys = canvas.row(std::int32_t(y));
+      const std::uint32_t* keys = &all_keys[(y + beside - begin) * width];
       Shading shading{{}, keys, c.halo, c.fog_start, c.fog_length};
       for (std::size_t k = 0; k < 5; ++k) shading.rows[k] = row_of(y + k - beside);
       // Only where something is drawn.

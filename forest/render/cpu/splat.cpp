@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/splat.h"
 
+#include <array>
 #include <atomic>
+#include <bit>
 #include <cmath>
 #include <limits>
 
@@ -16,24 +18,41 @@ constexpr float tube_width =
     7.f;  // pixels; below, a capsule is shaded by its distance from the axis on screen
 constexpr std::size_t run = FOREST_CLUSTER_SIZE;
 
+// Items lie in the order of depth, their segments anywhere.
+constexpr std::size_t ahead = 3;
+void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
+  const auto* at = reinterpret_cast<const char*>(&geometry.segments[item.first_segment]);
+  for (std::size_t i = 0; i < std::min<std::size_t>(item.segment_count, 8); i += 2)
+    __builtin_prefetch(at + i * sizeof(frame::Segment));
+  __builtin_prefetch(&geometry.instances[item.instance]);
+}
+
 // The segments of an item in camera coordinates (x right, y up, z depth), cut at the near distance, and in pixels.
 struct Run {
   std::size_t count = 0;
   float ax[run], ay[run], az[run], ra[run], bx[run], by[run], bz[run], rb[run];
-  float px[run], py[run], qx[run], qy[run];      // pixels of both ends
-  float code_a[run], code_b[run];                // of their depths
-  float width[run];                              // pixels; below 0: nothing of it lies before the eye
-  float mean_width[run], rank[run], shade[run];  // of its branch; in [0, 1); of a line
-  std::uint32_t entry[run];                      // of the palette
+  float px[run], py[run], qx[run], qy[run];  // pixels of both ends
+  float code_a[run], code_b[run];            // of their depths
+  // As a line: along the axis of the screen that it runs along more, from `first` to before `last`, where there is one.
+  float left[run], right[run], top[run], bottom[run],
+      nearest[run];       // pixels around it; code of its nearest depth
+  float line_width[run];  // across the axis; 0: nothing to draw
+  float first[run], last[run], y[run], slope[run], z[run], rise[run];  // y and z at the first step
+  std::uint32_t steep[run], payload[run];
+  float width[run];                  // pixels; below 0: nothing of it lies before the eye
+  float mean_width[run], rank[run];  // of its branch; in [0, 1)
+  std::uint32_t entry[run];          // of the palette
 };
 
 void load(const Picture& picture, const frame::Item& item, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
   const std::uint32_t colour = picture.colour_class[item.instance] * 8u;
   const float turn = golden * float(picture.constants.subframe);
-  r.count = item.segment_count;
-  for (std::size_t i = 0; i < r.count; ++i) {
-    const frame::Segment& s = segments[i];
+  r.count = 0;
+  for (std::uint32_t drawn = ~item.without & (0xffffffffu >> (32u - item.segment_count)); drawn;
+       drawn &= drawn - 1) {
+    const frame::Segment& s = segments[std::countr_zero(drawn)];
+    const std::size_t i = r.count++;
     r.ax[i] = s.ax, r.ay[i] = s.ay, r.az[i] = s.az;
     r.bx[i] = s.bx, r.by[i] = s.by, r.bz[i] = s.bz;
     r.ra[i] = from_half(s.radii), r.rb[i] = from_half(s.radii >> 16);
@@ -84,8 +103,46 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
                 towards = (ex * lx + ey * ly + ez * lz) * per_distance;
     const float b = (towards - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
     const float a2 = larger(0.f, 1.f - along * along - b * b);
-    r.shade[i] = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
-    r.rank[i] = fraction(r.rank[i]);
+    const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
+    const float rank = fraction(r.rank[i]);
+    r.rank[i] = rank;
+    r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
+  }
+}
+
+// What draw_line needs, after draw_line in render/opengl/shaders/common.glsl.
+[[gnu::target_clones("default", "arch=haswell")]] void prepare_lines(const frame::Constants& c, Run& r) {
+  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const float width = float(c.width), height = float(c.height);
+  const bool single = c.subframes == 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
+    const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
+    const bool steep = high > wide;
+    const float major = steep ? high : wide;
+    const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
+    const float of_branch = smaller(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
+    const float fair = across < 1.f && r.mean_width[i] > 0.f ? of_branch : across;
+    const float whole = std::floor(fair + 1.f - r.rank[i] - 1.f / 512.f);
+    const float line = single ? whole : across;
+    // From the end of the smaller coordinate to the other.
+    const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
+    const bool turned = ax > bx;
+    const float x0 = turned ? bx : ax, y0 = turned ? by : ay, z0 = turned ? zb : za;
+    const float x1 = turned ? ax : bx, y1 = turned ? ay : by, z1 = turned ? za : zb;
+    const float limit = steep ? height : width;
+    const float first = smaller(larger(std::ceil(x0 - .5f), 0.f), limit),
+                last = smaller(larger(std::ceil(x1 - .5f), 0.f), limit);
+    const float inverse = 1.f / (x1 - x0), slope = (y1 - y0) * inverse, rise = (z1 - z0) * inverse;
+    const float begin = first + .5f - x0, half = .5f * line;
+    r.line_width[i] = r.width[i] >= 0.f && first < last ? line : 0.f;
+    r.left[i] = smaller(px, qx) - half, r.right[i] = larger(px, qx) + half;
+    r.top[i] = smaller(py, qy) - half, r.bottom[i] = larger(py, qy) + half;
+    r.nearest[i] = smaller(za, zb);
+    r.first[i] = first, r.last[i] = last;
+    r.y[i] = y0 + begin * slope - .5f, r.slope[i] = slope;
+    r.z[i] = z0 + begin * rise, r.rise[i] = rise;
+    r.steep[i] = steep;
   }
 }
 
@@ -95,42 +152,22 @@ float lens(const frame::Constants& c, float z) { return c.converge * z + c.paral
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
 
-// As draw_line in render/opengl/shaders/common.glsl. Whether there was anything to draw.
-bool draw_line(const Run& r, std::size_t i, bool single, Canvas& canvas) {
-  float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
-  const bool steep = high > wide;
-  const float major = steep ? high : wide;
-  const float stretch = major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f;
-  float width = r.width[i] * stretch;
-  if (single) {
-    if (width < 1.f && r.mean_width[i] > 0.f)
-      width = std::min(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
-    width = std::floor(width + 1.f - r.rank[i] - 1.f / 512.f);
-    if (width < 1.f) return false;
-  }
-  const float half = .5f * width;
-  float za = r.code_a[i], zb = r.code_b[i];
-  if (canvas.hidden(std::min(px, qx) - half, std::min(py, qy) - half, std::max(px, qx) + half,
-                    std::max(py, qy) + half, std::min(za, zb)))
+// Whether there was anything to draw.
+bool draw_line(const Run& r, std::size_t i, Canvas& canvas) {
+  if (!(r.line_width[i] > 0.f) || canvas.hidden(r.left[i], r.top[i], r.right[i], r.bottom[i], r.nearest[i]))
     return false;
-  if (steep) std::swap(px, py), std::swap(qx, qy);
-  if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(za, zb);
-  const float limit = float(steep ? canvas.height() : canvas.width()),
-              limit_across = float(steep ? canvas.width() : canvas.height());
-  const std::int32_t first = clipped(std::ceil(px - .5f), limit), last = clipped(std::ceil(qx - .5f), limit);
-  if (first >= last) return false;
-  const float inverse = 1.f / (qx - px), slope = (qy - py) * inverse, rise = (zb - za) * inverse;
-  const float begin = float(first) + .5f - px;
-  float y = py + begin * slope - .5f, z = za + begin * rise;
-  const std::uint32_t payload = payload_of(r.entry[i], r.shade[i], fraction(r.rank[i] * 7.f));
-  for (std::int32_t x = first; x < last; ++x, y += slope, z += rise) {
+  const bool steep = r.steep[i];
+  const float half = .5f * r.line_width[i], slope = r.slope[i], rise = r.rise[i];
+  const float limit_across = float(steep ? canvas.width() : canvas.height());
+  const std::int32_t last = std::int32_t(r.last[i]);
+  const std::uint32_t payload = r.payload[i];
+  float y = r.y[i], z = r.z[i];
+  for (std::int32_t x = std::int32_t(r.first[i]); x < last; ++x, y += slope, z += rise) {
     const std::int32_t low = clipped(std::ceil(y - half), limit_across),
                        end = clipped(std::ceil(y + half), limit_across);
-    for (std::int32_t across = low; across < end; ++across) {
-      const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
+    const std::uint32_t key = key_of(smaller(larger(z, 0.f), float(FOREST_DEPTH_MAX)), payload);
+    for (std::int32_t across = low; across < end; ++across)
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
-    }
   }
   return true;
 }
@@ -176,95 +213,201 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, Canvas& canv
   }
 }
 
-struct Hit {
-  float t = std::numeric_limits<float>::infinity();
-  Vec3 normal = Vec3::Zero();
+// A tapered capsule as a ray meets it: the hull of two spheres, or the larger of them alone.
+struct Body {
+  Vec3 a, b, u;  // ends; axis, unit or zero
+  float ra, rb, length, s, c2, cosine;
+  bool nested;  // one sphere lies within the other
+
+  Body(const Run& r, std::size_t i)
+      : a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]), ra(r.ra[i]), rb(r.rb[i]) {
+    const Vec3 axis = b - a;
+    length = axis.norm();
+    const float taper = ra - rb;
+    nested = length <= std::abs(taper) + 1e-6f;
+    u = nested ? Vec3(0, 0, 0) : Vec3(axis / length);
+    s = nested ? 0.f : taper / length;
+    c2 = 1.f - s * s;
+    cosine = std::sqrt(c2);
+  }
 };
 
-void meet_sphere(const Vec3& ray, const Vec3& centre, float radius, Hit& hit) {
-  const float b = ray.dot(centre), h = radius * radius - (centre - b * ray).squaredNorm();
-  if (h < 0.f) return;
-  const float t = b - std::sqrt(h);
-  if (t > 0.f && t < hit.t) hit = {t, (t * ray - centre) / std::max(radius, 1e-9f)};
+// The pixels of a tile that lie in one row.
+constexpr std::int32_t lanes = std::int32_t(FOREST_TILE);
+using Keys = std::array<std::uint32_t, lanes>;
+
+// Every pixel meets the capsule with its own ray: as draw_capsule in render/opengl/shaders/capsule.glsl. Pixels that miss it
+// get the key of none.
+[[gnu::target_clones("default", "arch=haswell")]] void meet(const frame::Constants& c, const Vec3& light,
+                                                            const Body& body, std::uint32_t entry,
+                                                            std::int32_t first_x, std::int32_t y,
+                                                            Keys& keys) {
+  const float az = body.a.z(), bz = body.b.z(), ux = body.u.x(), uy = body.u.y(), uz = body.u.z(),
+              lx = light.x(), ly = light.y(), lz = light.z();
+  const float ra = body.ra, rb = body.rb, s = body.s, c2 = body.c2, cosine = body.cosine;
+  const float begin = s * ra, end = body.length + s * rb;  // of the cone's surface, along the axis
+  const float per_focal = 1.f / c.focal, near = c.near, converge = c.converge, parallel = c.parallel;
+  const float above = (c.centre_y - float(y) - .5f) * per_focal, slope_y = converge * above;
+  // From where the rays begin, which for an orthographic camera is beside the eye.
+  const float ay = body.a.y() - parallel * above, by = body.b.y() - parallel * above;
+  const float body_ax = body.a.x(), body_bx = body.b.x();
+  const float from_x = .5f - c.centre_x, per_ra = 1.f / larger(ra, 1e-9f), per_rb = 1.f / larger(rb, 1e-9f);
+  const std::int32_t cone = body.nested ? 0 : 1;
+  const std::uint32_t subframe = c.subframe;
+  for (std::int32_t lane = 0; lane < lanes; ++lane) {
+    const std::int32_t x = first_x + lane;
+    const float beside = (float(x) + from_x) * per_focal, slope_x = converge * beside;
+    const float ax = body_ax - parallel * beside, bx = body_bx - parallel * beside;
+    const float dz = 1.f / std::sqrt(slope_x * slope_x + slope_y * slope_y + 1.f), dx = slope_x * dz,
+                dy = slope_y * dz;
+    const float shift = ax * dx + ay * dy + az * dz;
+    const float ox = shift * dx - ax, oy = shift * dy - ay, oz = shift * dz - az;
+    const float o2 = ox * ox + oy * oy + oz * oz, ou = ox * ux + oy * uy + oz * uz,
+                du = dx * ux + dy * uy + dz * uz;
+    const float k0 = ra - s * ou, k1 = -s * du;
+    const float A = c2 * (1.f - du * du) - k1 * k1, B = -c2 * ou * du - k0 * k1,
+                C = c2 * (o2 - ou * ou) - k0 * k0, root = B * B - A * C;
+    const float local = (-B - std::sqrt(larger(root, 0.f))) / larger(A, 1e-9f), along = ou + local * du;
+    const float t_cone = local + shift;
+    const bool on_cone =
+        (cone != 0) & (root >= 0.f) & (A > 1e-9f) & (along >= begin) & (along <= end) & (t_cone > 0.f);
+    const float wx = ox + local * dx - along * ux, wy = oy + local * dy - along * uy,
+                wz = oz + local * dz - along * uz;
+    const float facing_cone =
+        cosine * (wx * lx + wy * ly + wz * lz) / std::sqrt(larger(wx * wx + wy * wy + wz * wz, 1e-30f)) +
+        s * (ux * lx + uy * ly + uz * lz);
+    // The spheres at its ends.
+    const float shift_b = bx * dx + by * dy + bz * dz;
+    const float qx = shift_b * dx - bx, qy = shift_b * dy - by, qz = shift_b * dz - bz;
+    const float ha = ra * ra - o2, hb = rb * rb - (qx * qx + qy * qy + qz * qz);
+    const float ta = shift - std::sqrt(larger(ha, 0.f)), tb = shift_b - std::sqrt(larger(hb, 0.f));
+    const bool on_a = (ha >= 0.f) & (ta > 0.f), on_b = (hb >= 0.f) & (tb > 0.f);
+    const bool take_b = on_b & (!on_a | (tb < ta));
+    const float t_sphere = take_b ? tb : ta;
+    const float facing_sphere =
+        take_b ? ((tb * dx - bx) * lx + (tb * dy - by) * ly + (tb * dz - bz) * lz) * per_rb
+               : ((ta * dx - ax) * lx + (ta * dy - ay) * ly + (ta * dz - az) * lz) * per_ra;
+    const bool within = (cone == 0) | (root >= 0.f);  // the cone, within which both spheres lie
+    const bool hit = on_cone | (within & (on_a | on_b));
+    const float t = on_cone ? t_cone : t_sphere, facing = on_cone ? facing_cone : facing_sphere;
+    const float code = depth_code(larger(t * dz, near));
+    const std::uint32_t key = key_of(code, payload_of(entry, .5f + .5f * facing, noise_at(x, y, subframe)));
+    keys[std::size_t(lane)] = hit ? key : FOREST_KEY_EMPTY;
+  }
 }
 
-// Every pixel meets the tapered capsule with its own ray: as draw_capsule in render/opengl/shaders/capsule.glsl.
+// Two discs of the picture and all between them: where a capsule is seen.
+class Outline {
+ public:
+  /// @param exact  nothing reaches beyond the discs; else, as before the eye, a little does
+  Outline(const Vec2& p, const Vec2& q, float rp, float rq, bool exact)
+      : p_(p), q_(q), rp_(rp), rq_(rq), exact_(exact) {
+    const Vec2 between = q - p;
+    const float distance = between.norm(), sine = distance > 0.f ? (rp - rq) / distance : 2.f;
+    if (std::abs(sine) >= 1.f) return;  // one lies within the other
+    const Vec2 along = between / distance, beside(-along.y(), along.x());
+    const float cosine = std::sqrt(1.f - sine * sine);
+    for (const float side : {-1.f, 1.f}) {
+      const Vec2 normal = sine * along + side * cosine * beside;
+      tangents_[side > 0.f] = {p + rp * normal, q + rq * normal};
+    }
+    apart_ = true;
+  }
+  float top() const { return std::min(p_.y() - rp_, q_.y() - rq_); }
+  float bottom() const { return std::max(p_.y() + rp_, q_.y() + rq_); }
+  /// Which part of the way from p to q has discs that may reach a height; 0 to 1.
+  std::pair<float, float> part(float y) const {
+    const float rise = q_.y() - p_.y(), reach = std::max(rp_, rq_);
+    if (std::abs(rise) <= 1e-3f) return {0.f, 1.f};
+    const float from = (y - reach - p_.y()) / rise, to = (y + reach - p_.y()) / rise;
+    return {std::clamp(std::min(from, to), 0.f, 1.f), std::clamp(std::max(from, to), 0.f, 1.f)};
+  }
+  /// From where to where it reaches at a height; empty (left > right) beside it.
+  std::pair<float, float> across(float y) const {
+    std::pair<float, float> range{INFINITY, -INFINITY};
+    const auto add = [&](float left, float right) {
+      range = {std::min(range.first, left), std::max(range.second, right)};
+    };
+    if (!exact_) {
+      const auto [from, to] = part(y);
+      for (const float t : {from, to}) {
+        const float x = p_.x() + t * (q_.x() - p_.x()), w = std::max(rp_, rq_);
+        add(x - w, x + w);
+      }
+      return range;
+    }
+    for (const auto& [centre, radius] : {std::pair(p_, rp_), std::pair(q_, rq_)})
+      if (const float h = radius * radius - (y - centre.y()) * (y - centre.y()); h >= 0.f)
+        add(centre.x() - std::sqrt(h), centre.x() + std::sqrt(h));
+    if (apart_)
+      for (const auto& [a, b] : tangents_)
+        if ((a.y() - y) * (b.y() - y) <= 0.f && a.y() != b.y()) {
+          const float x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
+          add(x, x);
+        }
+    return range;
+  }
+
+ private:
+  Vec2 p_, q_;
+  float rp_, rq_;
+  bool exact_, apart_ = false;
+  std::array<std::pair<Vec2, Vec2>, 2> tangents_;
+};
+
+// The discs are exact where spheres are small beside their distance and not far from the middle of the picture.
+Outline outline_of(const frame::Constants& c, const Run& r, std::size_t i, const Body& body) {
+  const auto small = [&](const Vec3& p, float radius) {
+    return c.parallel > 0.f || (radius < .25f * p.z() && p.squaredNorm() < 2.5f * p.z() * p.z());
+  };
+  const bool exact = small(body.a, body.ra) && small(body.b, body.rb);
+  const auto reach = [&](const Vec3& p, float radius) {
+    if (c.parallel > 0.f) return 1.f + c.focal * radius;
+    return 1.f + c.focal * radius *
+                     (exact ? p.norm() / (p.z() * (p.z() - radius))  // as scene/occlusion.cpp
+                            : 1.05f / std::max(p.z() - .5f * radius, c.near));
+  };
+  return {{r.px[i], r.py[i]}, {r.qx[i], r.qy[i]}, reach(body.a, body.ra), reach(body.b, body.rb), exact};
+}
+
 void draw_capsule(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
-  const Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
-  const float ra = r.ra[i], rb = r.rb[i];
-  const std::uint32_t nearest = key_of(depth_code(std::max(std::min(a.z() - ra, b.z() - rb), c.near)), 0);
-  float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  const float rp = 1.f + 1.05f * c.focal * ra / std::max(lens(c, a.z() - .5f * ra), lens(c, c.near)),
-              rq = 1.f + 1.05f * c.focal * rb / std::max(lens(c, b.z() - .5f * rb), lens(c, c.near));
-  const bool steep = std::abs(qy - py) > std::abs(qx - px);
-  if (steep) std::swap(px, py), std::swap(qx, qy);
-  const float limit = float(steep ? canvas.height() : canvas.width()),
-              limit_across = float(steep ? canvas.width() : canvas.height());
-  const std::int32_t first = clipped(std::floor(std::min(px - rp, qx - rq)), limit),
-                     last = clipped(std::ceil(std::max(px + rp, qx + rq)), limit);
-  const float reach = std::max(rp, rq);
-  const Vec3 axis = b - a;
-  const float length = axis.norm(), taper = ra - rb;
-  const bool nested = length <= std::abs(taper) + 1e-6f;
-  const Vec3 u = nested ? Vec3(0, 0, 0) : Vec3(axis / length);
-  const float s = nested ? 0.f : taper / length, c2 = 1.f - s * s, cosine = std::sqrt(c2);
-
-  const auto scan = [&](std::int32_t x) {
-    const float at = float(x) + .5f, dx = qx - px;
-    float t0 = 0.f, t1 = 1.f;
-    if (std::abs(dx) > 1e-3f) {
-      const float e0 = (at - reach - px) / dx, e1 = (at + reach - px) / dx;
-      t0 = std::clamp(std::min(e0, e1), 0.f, 1.f), t1 = std::clamp(std::max(e0, e1), 0.f, 1.f);
-    }
-    const float y0 = py + t0 * (qy - py), y1 = py + t1 * (qy - py);
-    const float w = std::max(rp + t0 * (rq - rp), rp + t1 * (rq - rp));
-    const std::int32_t low = clipped(std::floor(std::min(y0, y1) - w), limit_across),
-                       high = clipped(std::ceil(std::max(y0, y1) + w), limit_across);
-    for (std::int32_t y = low; y < high; ++y) {
-      const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
-      if (canvas.key(at_x, at_y) < nearest) continue;
-      const float beside = (float(at_x) + .5f - c.centre_x) / c.focal,
-                  above = (c.centre_y - float(at_y) - .5f) / c.focal;
-      const Vec3 ray = Vec3(c.converge * beside, c.converge * above, 1.f).normalized();
-      const Vec3 begin(c.parallel * beside, c.parallel * above, 0.f), to_a = a - begin;
-      Hit hit;
-      if (!nested) {
-        const float shift = to_a.dot(ray);
-        const Vec3 o = shift * ray - to_a;
-        const float oy = o.dot(u), dy = ray.dot(u), k0 = ra - s * oy, k1 = -s * dy;
-        const float A = c2 * (1.f - dy * dy) - k1 * k1, B = -c2 * oy * dy - k0 * k1,
-                    C = c2 * (o.squaredNorm() - oy * oy) - k0 * k0, root = B * B - A * C;
-        if (root < 0.f) continue;  // beside the cone, within which both spheres lie
-        if (A > 1e-9f) {
-          const float local = (-B - std::sqrt(root)) / A, along = oy + local * dy;
-          if (along >= s * ra && along <= length + s * rb && local + shift > 0.f)
-            hit = {local + shift, cosine * (o + local * ray - along * u).normalized() + s * u};
-        }
-      }
-      if (std::isinf(hit.t)) {
-        meet_sphere(ray, to_a, ra, hit);
-        meet_sphere(ray, b - begin, rb, hit);
-        if (std::isinf(hit.t)) continue;
-      }
-      const float z = std::max(hit.t * ray.z(), c.near);
-      canvas.put(at_x, at_y,
-                 key_of(depth_code(z), payload_of(r.entry[i], .5f + .5f * hit.normal.dot(picture.light),
-                                                  noise_at(at_x, at_y, c.subframe))));
+  const Body body(r, i);
+  const Outline outline = outline_of(c, r, i, body);
+  const float width = float(canvas.width()), height = float(canvas.height());
+  const std::int32_t first = clipped(std::floor(outline.top()), height),
+                     last = clipped(std::ceil(outline.bottom()), height);
+  const float thickest = std::max(body.ra, body.rb), from = 1.f / body.a.z(), to = 1.f / body.b.z();
+  const auto scan = [&](std::int32_t y) {
+    const float at = float(y) + .5f;
+    const auto [left, right] = outline.across(at);
+    if (!(left < right)) return;
+    const auto [begin, end] = outline.part(at);
+    const float depth = c.parallel > 0.f
+                            ? std::min(body.a.z(), body.b.z())
+                            : 1.f / std::max(from + begin * (to - from), from + end * (to - from));
+    const std::uint32_t nearest = key_of(depth_code(std::max(depth * .9999f - thickest, c.near)), 0);
+    const std::int32_t low = clipped(std::floor(left), width), high = clipped(std::ceil(right), width);
+    Keys keys;
+    for (std::int32_t x = low & -lanes; x < high; x += lanes) {
+      if (canvas.before(x, y, nearest)) continue;
+      meet(c, picture.light, body, r.entry[i], x, y, keys);
+      for (std::int32_t k = std::max(low - x, 0); k < std::min(lanes, high - x); ++k)
+        canvas.put(x + k, y, keys[std::size_t(k)]);
     }
   };
-  constexpr std::int32_t shared = 128;  // scan lines from which on other threads help
+  constexpr std::int32_t shared = 128;  // rows from which on other threads help
   if (last - first >= shared)
     parallel_for(std::size_t(last - first), 16, [&](std::size_t k) { scan(first + std::int32_t(k)); });
   else
-    for (std::int32_t x = first; x < last; ++x) scan(x);
+    for (std::int32_t y = first; y < last; ++y) scan(y);
 }
 
 bool draw_near(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   if (r.width[i] < 0.f) return false;
   const float width = c.focal * std::max(r.ra[i] / lens(c, r.az[i]), r.rb[i] / lens(c, r.bz[i]));
-  if (width < .75f) return draw_line(r, i, c.subframes == 1, canvas);
+  if (width < .75f) return draw_line(r, i, canvas);
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
   if (canvas.hidden(std::min(r.px[i], r.qx[i]) - reach, std::min(r.py[i], r.qy[i]) - reach,
@@ -321,6 +464,7 @@ std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, 
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Item& item = items[k];
       if (!item.segment_count) continue;
+      if (k + ahead < end) prefetch(picture.geometry, items[k + ahead]);
       const Vec3 centre = picture.to_camera * (Vec3(item.x, item.y, item.z) - picture.eye);
       const float nearest = centre.z() - item.radius;
       if (nearest > c.near) {
@@ -338,10 +482,11 @@ std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, 
       project(c, turn, at, picture.light, r);
       switch (kind) {
         case Kind::lines:
-          for (std::size_t i = 0; i < r.count; ++i)
-            if (r.width[i] >= 0.f) drawn += draw_line(r, i, c.subframes == 1, canvas);
+          prepare_lines(c, r);
+          for (std::size_t i = 0; i < r.count; ++i) drawn += draw_line(r, i, canvas);
           break;
         case Kind::capsules:
+          prepare_lines(c, r);
           for (std::size_t i = 0; i < r.count; ++i) drawn += draw_near(picture, r, i, canvas);
           break;
         case Kind::dots:
@@ -372,6 +517,7 @@ void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Can
       };
       r.ra[0] = least(o.a), r.rb[0] = least(o.b);
       project(c, picture.to_camera, at, picture.light, r);
+      prepare_lines(c, r);
       draw_near(picture, r, 0, canvas);
     }
   });

@@ -440,7 +440,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
       parallel_for(to - from, 64, [&](std::size_t i) {
         const Item& item = *items[from + i];
         for (std::uint32_t k = 0; k < item.segment_count; ++k)
-          in_sight[place[i] + k] = capsule_of(item, k, capsules[place[i] + k]);
+          if (!(item.without >> k & 1u)) in_sight[place[i] + k] = capsule_of(item, k, capsules[place[i] + k]);
       });
       std::size_t kept = 0;
       for (std::size_t i = 0; i < segments; ++i)

@@ -15,9 +15,10 @@ void main() {
   uint at = gl_GlobalInvocationID.x;
   uint item = view.first_item + at;
   if (at >= view.item_count || hidden(uintBitsToFloat(texelFetch(items, int(2u * item + 1u))))) return;
-  uint count = texelFetch(items, int(2u * item)).z;
+  uvec2 run = texelFetch(items, int(2u * item)).zw;
+  uint drawn = run.x == 0u ? 0u : ~run.y & (0xffffffffu >> (32u - run.x)), count = uint(bitCount(drawn));
   uint place = atomicAdd(queued, count);
-  for (uint i = 0u; i < count; ++i) queue[place + i] = item * 64u + i;
+  for (uint i = 0u; i < count; ++i, drawn &= drawn - 1u) queue[place + i] = item * 64u + uint(findLSB(drawn));
   uint groups = (place + count + FOREST_GROUP - 1u) / FOREST_GROUP;
   atomicMax(groups_x, min(groups, 32768u));
   atomicMax(groups_y, (groups + 32767u) / 32768u);
