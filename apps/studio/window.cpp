@@ -7,6 +7,7 @@
 #include <QCloseEvent>
 #include <QDialogButtonBox>
 #include <QDockWidget>
+#include <QFile>
 #include <QFileDialog>
 #include <QLabel>
 #include <QMenuBar>
@@ -130,6 +131,9 @@ void Window::add_menus() {
        [this] { save_picture(false); }},
       {"&File", "Save picture with &legend…", "Ctrl+Shift+S",
        "What is seen, with scale, directions and legend, as a PNG", [this] { save_picture(true); }},
+      {"&File", "Add the view to a &path…", "Ctrl+K",
+       "Appends the view as a line to a file that 'brainforest movie --path' films",
+       [this] { record_view(); }},
       {"&File", "&Quit", "Ctrl+Q", "Close the window; its panels are remembered", [this] { close(); }},
       {"&Edit", "&Copy view", "Ctrl+C", "Where the eye is and what colours mean, as one line of JSON",
        [this] { copy_view(); }},
@@ -214,6 +218,22 @@ void Window::show_figures() {
 void Window::copy_view() {
   QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->settings().view)));
   statusBar()->showMessage(tr("The view is on the clipboard as one line of JSON."), 4000);
+}
+
+void Window::record_view() {
+  if (path_.isEmpty())
+    path_ = QFileDialog::getSaveFileName(this, tr("Path of views"), "views.jsonl", tr("Views (*.jsonl)"),
+                                         nullptr, QFileDialog::DontConfirmOverwrite);
+  if (path_.isEmpty()) return;
+  QFile file(path_);
+  const std::string line = scene::to_json(viewport_->settings().view) + "\n";
+  if (!file.open(QIODevice::Append) || file.write(line.data(), qint64(line.size())) != qint64(line.size())) {
+    QMessageBox::warning(this, tr("Path of views"),
+                         tr("%1 cannot be written: %2").arg(path_, file.errorString()));
+    path_.clear();
+    return;
+  }
+  statusBar()->showMessage(tr("The view was added to %1").arg(path_), 3000);
 }
 
 void Window::paste_view() {

@@ -33,6 +33,7 @@ class Window final : public QMainWindow {
   void show_figures();
   void copy_view();
   void paste_view();
+  void record_view();
   void save_picture(bool as_seen);
   void explain();
   template <class Row, class Value>
@@ -43,6 +44,7 @@ class Window final : public QMainWindow {
   SelectionPanel* selection_panel_;
   SectionPanel* section_panel_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
+  QString path_;       // where views are recorded
   QTimer panel_rest_;  // the panel follows a moving view a few times a second
 };
 
