@@ -112,6 +112,14 @@ std::uint32_t section_of(const Forest& forest, const Neuron& neuron, std::uint32
   return forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
 }
 
+// At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
+bool better(const Pick& a, const std::optional<Pick>& b) {
+  constexpr double at_once = 1e-7;  // µm between what is entered at one point
+  if (!b || a.distance < b->distance - at_once) return true;
+  return a.distance <= b->distance + at_once &&
+         std::tuple(a.instance, a.segment) < std::tuple(b->instance, b->segment);
+}
+
 }  // namespace
 
 RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t segment) {
@@ -157,11 +165,8 @@ std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, cons
       const auto cone = before_the_eye(probe, in_world(forest, next.instance, s));
       const auto t = cone ? intersect(probe.exact, *cone) : std::nullopt;
       if (!t) continue;
-      // At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
-      if (best &&
-          std::tuple(*t, next.instance, s) >= std::tuple(best->distance, best->instance, best->segment))
-        continue;
-      best = Pick{next.instance, s, section_of(forest, neuron, s), *t};
+      if (const Pick here{next.instance, s, section_of(forest, neuron, s), *t}; better(here, best))
+        best = here;
     }
   }
   return best;
@@ -171,7 +176,6 @@ std::vector<std::optional<Pick>> plain_picks(const Forest& forest, const frame::
                                              const frame::Viewport& viewport, std::span<const Vec2> places,
                                              float reach) {
   constexpr std::size_t block = 32;
-  constexpr double at_once = 1e-7;  // µm between what is entered at one point
   std::vector<Probe> probes;
   for (const Vec2& place : places) probes.emplace_back(camera, viewport, place, reach);
   // Of each ray: its direction, and how far it begins from the eye. Rays are left out only by the distance of their line
@@ -184,11 +188,6 @@ std::vector<std::optional<Pick>> plain_picks(const Forest& forest, const frame::
   }
   std::vector<std::optional<Pick>> found(probes.size());
   std::mutex mutex;
-  const auto better = [&](const Pick& a, const std::optional<Pick>& b) {
-    if (!b || a.distance < b->distance - at_once) return true;
-    return a.distance <= b->distance + at_once &&
-           std::tuple(a.instance, a.segment) < std::tuple(b->instance, b->segment);
-  };
   parallel_ranges(forest.instances().size(), 4, [&](std::size_t begin, std::size_t end) {
     std::vector<std::optional<Pick>> nearest(probes.size());
     for (std::uint32_t index = std::uint32_t(begin); index < end; ++index) {
