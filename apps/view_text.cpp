@@ -33,4 +33,23 @@ scene::View read_view(const std::string& file_or_text) {
   return view_of(file.text(), file_or_text);
 }
 
+std::vector<scene::View> read_views(const std::string& name) {
+  const MappedFile file(name);
+  std::string_view text = file.text();
+  std::vector<scene::View> views;
+  for (std::size_t line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    const std::string_view row = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (row.find_first_not_of(" \t\r") == row.npos) continue;
+    try {
+      views.push_back(view_of(row, name));
+    } catch (const InputError& error) {
+      throw InputError(name, line, error.sentence());
+    }
+  }
+  if (views.empty()) throw InputError(name, 0, "holds no view; write one on each line (docs/scene/view.md)");
+  return views;
+}
+
 }  // namespace forest

@@ -4,6 +4,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "forest/scene/view.h"
 
@@ -14,5 +15,8 @@ scene::View view_of(std::string_view text, const std::string& name);
 
 /// A view from a file, or from the text itself when it begins with '{'. Throws InputError.
 scene::View read_view(const std::string& file_or_text);
+
+/// Views one after the other, as the studio records them: one on each line of the file. Throws InputError with the line.
+std::vector<scene::View> read_views(const std::string& file);
 
 }  // namespace forest

@@ -56,7 +56,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
       view.detail.error = error;
       (void)scene::choose(forest, scene::Eye(view.camera, viewport, view.detail), viewport);
     }
-    const auto pick = scene::pick(forest, frame::ray_through(view.camera, viewport, {320.f, 180.f}), .01f);
+    const auto pick = scene::pick(forest, view.camera, viewport, {320.f, 180.f});
     if (pick) (void)scene::subarbor(forest, pick->instance, pick->section);
   } catch (const InputError&) {
   }

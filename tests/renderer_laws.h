@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -274,6 +275,111 @@ TEST_P(RendererLaws, ABranchDrawnAsDotsCoversItsArea) {
   const double scale = f.frame.camera.focal(200.f) / 100.,
                expected = 20 * std::sqrt(8.) * 1.2 * scale * scale;
   EXPECT_NEAR(red_area(f.draw()), expected, .2 * expected);
+}
+
+// Where a point of the world is seen, as a pixel of the picture.
+std::array<std::uint8_t, 3> pixel_at(const frame::Frame& frame, const frame::Image& image,
+                                     const Vec3& point) {
+  const Vec3 at = frame::project(frame.camera, {float(frame.width), float(frame.height)}, point);
+  const std::size_t place = 4 * (std::size_t(at.y()) * image.width + std::size_t(at.x()));
+  return {image.pixels[place], image.pixels[place + 1], image.pixels[place + 2]};
+}
+
+TEST_P(RendererLaws, AnOrthographicCameraShowsThingsAsLargeAtAnyDepth) {
+  for (const float depth : {-60.f, 0.f, 60.f}) {
+    Fixture f(GetParam());
+    f.frame.camera.projection = frame::Projection::orthographic;
+    const double scale = f.frame.camera.focal(200.f);  // pixels a µm
+    const auto draw_as = [&](std::span<const frame::Item> frame::Lists::*list) {
+      f.frame.dots = f.frame.lines = f.frame.capsules = {};
+      f.frame.*list = f.items;
+      return f.draw();
+    };
+    f.frame.subframes = 16;
+    f.add({12, -9, depth}, {12, -9, depth}, 8.f);
+    const double disc = M_PI * 64. * scale * scale;
+    for (const auto list : {&frame::Lists::capsules, &frame::Lists::dots}) {
+      const frame::Image image = draw_as(list);
+      EXPECT_NEAR(red_area(image) / disc, 1., .03) << depth;
+      EXPECT_GT(pixel_at(f.frame, image, {12, -9, depth})[0], 60) << depth;
+      EXPECT_EQ(pixel_at(f.frame, image, {12, 2, depth})[0], 0) << depth;
+    }
+    f.segments.clear();
+    f.add({-20, 3, depth}, {15, -8, depth - 10}, 1.5f);  // a tube; and below a line and a capsule
+    const double length = Vec3(35, -11, 0).norm();
+    EXPECT_NEAR(red_area(draw_as(&frame::Lists::lines)) / (3. * length * scale * scale), 1., .05) << depth;
+    const double tube = (3. * length + M_PI * 2.25) * scale * scale;
+    EXPECT_NEAR(red_area(draw_as(&frame::Lists::capsules)) / tube, 1., .06) << depth;
+    f.segments.clear();
+    f.add({-20, 3, depth}, {15, -8, depth - 10}, 6.f);
+    const double capsule = (12. * length + M_PI * 36.) * scale * scale;
+    EXPECT_NEAR(red_area(draw_as(&frame::Lists::capsules)) / capsule, 1., .04) << depth;
+  }
+  // What lies behind the plane of the eye is not drawn, and what is marked is seen.
+  Fixture f(GetParam());
+  f.frame.camera.projection = frame::Projection::orthographic;
+  f.add({0, 0, 110}, {5, 5, 300}, 5.f);
+  f.frame.capsules = f.items;
+  EXPECT_EQ(f.draw().covered, 0.);
+  const std::vector<frame::Overlay> marks{{Vec3(-10, 0, -50), Vec3(10, 0, -50), 2.f, 5}};
+  f.frame.overlays = marks;
+  EXPECT_GT(red_area(f.draw()), 300.);
+}
+
+TEST_P(RendererLaws, GlassTintsWhatLiesBehindItAndNothingBefore) {
+  for (const auto projection : {frame::Projection::perspective, frame::Projection::orthographic}) {
+    Fixture f(GetParam());
+    f.frame.camera.projection = projection;
+    f.add({-12, 0, 20}, {-12, 0, 20}, 6.f);  // before
+    f.add({12, 0, -20}, {12, 0, -20}, 6.f);  // behind
+    f.frame.capsules = f.items;
+    const frame::Image clear = f.draw();
+    f.frame.glass = frame::Glass{.plane = Plane::through({1, 2, 0}, {0, 0, -1}),
+                                 .low = {-24, -22},
+                                 .high = {26, 18},
+                                 .colour = {0, 0, 1},
+                                 .opacity = .5f};
+    for (const std::uint32_t subframes : {1u, 4u}) {
+      f.frame.subframes = subframes;
+      const frame::Image tinted = f.draw();
+      const auto at = [&](const Vec3& point) { return pixel_at(f.frame, tinted, point); };
+      EXPECT_EQ(at({-12, 0, 20})[2], 0);
+      EXPECT_GT(at({-12, 0, 20})[0], 60);
+      EXPECT_GT(at({12, 0, -20})[2], 100);
+      EXPECT_LT(at({12, 0, -20})[0], pixel_at(f.frame, clear, {12, 0, -20})[0]);
+      EXPECT_GT(at({12, 0, -20})[0], 20);
+      EXPECT_GT(at({0, -15, 0})[2], 100);  // nothing, seen through it
+      // Its edges, in the world: x from -25 to 25 (the right of what is seen from behind points to -x), y from -20 to 20.
+      for (const float side : {-1.f, 1.f}) {
+        EXPECT_GT(at({side * 24.f, -19.f, 0})[2], 100) << side;
+        EXPECT_EQ(at({side * 26.f, -19.f, 0})[2], 0) << side;
+        EXPECT_GT(at({0, side * 19.f, 0})[2], 100) << side;
+        EXPECT_EQ(at({0, side * 21.f, 0})[2], 0) << side;
+      }
+    }
+  }
+}
+
+TEST_P(RendererLaws, WhatIsWantedOfAPictureIsThatOfTheWholePicture) {
+  Fixture f(GetParam());
+  f.add({-20, 3, 0}, {15, -8, 0}, 5.f);
+  f.add({-30, -9, 9}, {35, 20, -5}, .4f);
+  f.frame.capsules = f.items;
+  f.frame.style.halo = 1.f;
+  const frame::Area area{61, 80, 130, 143};
+  for (const std::uint32_t subframes : {1u, 4u}) {
+    f.frame.subframes = subframes;
+    f.frame.area.reset();
+    const frame::Image whole = f.draw();
+    f.frame.area = area;
+    const frame::Image part = f.draw();
+    for (std::uint32_t y = area.top + 2; y < area.bottom - 2; ++y)
+      for (std::uint32_t x = area.left + 2; x < area.right - 2; ++x)
+        for (std::size_t c = 0; c < 3; ++c)
+          ASSERT_EQ(part.pixels[4 * (y * 200 + x) + c], whole.pixels[4 * (y * 200 + x) + c]) << x << " " << y;
+  }
+  f.frame.area = frame::Area{0, 0, 201, 10};
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
 }
 
 TEST_P(RendererLaws, RefusesAFrameThatBreaksTheContract) {

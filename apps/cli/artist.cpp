@@ -27,6 +27,7 @@ Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
       targets_(forest_, std::move(sets)),
       chooser_(forest_),
       renderer_(make_renderer(drawer)),
+      foveated_(forest_, [drawer] { return make_renderer(drawer); }),
       outline_(scene::outline(forest_)) {
   renderer_->load(forest_.geometry());
 }
@@ -38,20 +39,28 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     coloured_by_ = view.colour_by, coloured_for_ = view.background, shown_as_ = view.targets;
   }
   Drawn drawn;
+  const auto lines =
+      with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
   auto start = Clock::now();
+  if (view.detail.gaze) {
+    drawn.image = foveated_.draw(view, width, height, *colouring_, lines);
+    for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
+    const Foveated::Figures& f = foveated_.figures();
+    drawn.cull = f.cull, drawn.draw = f.draw, drawn.resolve = f.resolve, drawn.read = f.unite;
+    drawn.segments = f.segments, drawn.reached = f.drawn, drawn.neurons = f.neurons;
+    return drawn;
+  }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
   const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown());
   drawn.cull = milliseconds_since(start);
-  const auto lines =
-      with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
   drawn.neurons = cut.neurons;
-  drawn.draw = timing.draw, drawn.resolve = timing.resolve;
+  drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;
   start = Clock::now();
   drawn.image = renderer_->read();
   drawn.read = milliseconds_since(start);
@@ -70,6 +79,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.samples = plan.samples;
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
+    if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     const Drawn drawn = artist.draw(view, plan.width, plan.height);
     if (drawn.segments && drawn.image.covered == 0.)
       throw Error(

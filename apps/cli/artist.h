@@ -10,17 +10,20 @@
 #include "forest/core/progress.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
+#include "forest/scene/scanpath.h"
 #include "forest/scene/view.h"
 
 #include "apps/cli/drawer.h"
+#include "apps/foveated.h"
 
 namespace forest::cli {
 
 /// What one picture took and showed.
 struct Drawn {
   double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
-  std::uint64_t segments = 0;                            // drawn
-  std::uint32_t neurons = 0;                             // in sight and not hidden
+  std::uint64_t segments = 0;                            // chosen
+  std::uint64_t reached = 0;  // of them, neither hidden nor beside the picture; 0: unknown
+  std::uint32_t neurons = 0;  // in sight and not hidden
   frame::Image image;
 };
 
@@ -29,6 +32,7 @@ class Artist {
   /// @param sets  names that targets of views may use
   explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic, circuit::NodeSets sets = {});
 
+  /// A view with a gaze is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   const scene::Forest& forest() const { return forest_; }
@@ -40,6 +44,7 @@ class Artist {
   scene::Targets targets_;
   scene::Chooser chooser_;
   std::unique_ptr<render::Renderer> renderer_;
+  Foveated foveated_;
   std::vector<frame::Overlay> outline_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
@@ -59,6 +64,7 @@ struct FilmPlan {
   std::uint32_t width = 1280, height = 720, samples = 4;
   int frames_per_second = 25;
   double seconds = 5.;
+  std::optional<scene::Scanpath> gaze;     // replayed from its begin; none: that of the views
   std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
   std::vector<scene::Appearance> targets;  // after those of the path's views
 };

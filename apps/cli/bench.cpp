@@ -14,9 +14,11 @@ namespace forest::cli {
 // One declaration and one row a benchmark.
 std::function<void()> bench_activity(CLI::App&, Console&);
 std::function<void()> bench_column(CLI::App&, Console&);
+std::function<void()> bench_gaze(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
 std::function<void()> bench_peers(CLI::App&, Console&);
+std::function<void()> bench_pick(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
 std::function<void()> bench_seam(CLI::App&, Console&);
 std::function<void()> bench_targets(CLI::App&, Console&);
@@ -25,10 +27,13 @@ std::span<const Benchmark> benchmarks() {
   static constexpr auto table = std::to_array<Benchmark>({
       {"activity", "How fast a simulation's values are packed, sought and clamped", bench_activity},
       {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
+      {"gaze", "How much less is drawn for an eye that looks at one place, and how fast", bench_gaze},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
       {"peers", "How fast, small and true the column is drawn beside VTK's lines, tube impostors and tubes",
        bench_peers},
+      {"pick", "How many picks a second, and whether each is what a plain loop over all segments finds",
+       bench_pick},
       {"repository", "How many neurons are stored in a repository in a second, and read back",
        bench_repository},
       {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer",

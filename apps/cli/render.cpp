@@ -7,6 +7,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/io/png.h"
 
 #include "apps/cli/artist.h"
@@ -28,6 +29,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
   struct Options {
     std::filesystem::path forest, out;
     std::string view, size = "1920x1080";
+    std::vector<float> gaze;
     bool outline = false;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
@@ -38,12 +40,20 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_targets(command, options->targets);
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
+  command
+      .add_option(
+          "--gaze", options->gaze,
+          "Where one looks, as shares of width and height: detail falls off around it (docs/scene/gaze.md)")
+      ->expected(2)
+      ->check(CLI::Range(0., 1.))
+      ->type_name("X Y");
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
   add_renderer(command, options->drawer);
   return [options, &console] {
     const auto [width, height] = parse_size(options->size);
     const scene::Forest forest = scene::Forest::open(options->forest);
     scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
+    if (!options->gaze.empty()) view.detail.gaze = Vec2(options->gaze[0], options->gaze[1]);
     add_appearances(options->targets, view.targets);
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
@@ -67,6 +77,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   struct Options {
     std::filesystem::path forest, out;
     std::vector<std::string> views;
+    std::string path, scanpath;
     std::string size = "1280x720";
     FilmPlan plan;
     TargetOptions targets;
@@ -77,6 +88,13 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   command.add_option("--view", options->views,
                      "Key views, two or more, as JSON files or texts; by default a walk into the forest");
   add_targets(command, options->targets);
+  command
+      .add_option("--path", options->path,
+                  "Key views from a file, one on each line, as the studio records them")
+      ->excludes("--view");
+  command.add_option(
+      "--scanpath", options->scanpath,
+      "A recorded gaze, a CSV file of time (ms), x, y: detail falls off around it (docs/scene/gaze.md)");
   add_size(command, options->size, true);
   command.add_option("--seconds", options->plan.seconds, "Length of the film")
       ->check(CLI::Range(0.04, 3600.))
@@ -96,6 +114,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     const scene::Forest forest = scene::Forest::open(options->forest);
     std::vector<scene::View> views;
     for (const std::string& view : options->views) views.push_back(read_view(view));
+    if (!options->path.empty()) views = read_views(options->path);
+    if (!options->scanpath.empty())
+      plan.gaze = scene::parse_scanpath(MappedFile(options->scanpath).text(), options->scanpath);
     if (views.size() == 1)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));

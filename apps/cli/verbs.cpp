@@ -28,6 +28,7 @@ std::function<void()> clamp(CLI::App&, Console&);
 std::function<void()> raster(CLI::App&, Console&);
 std::function<void()> movie(CLI::App&, Console&);
 std::function<void()> targets(CLI::App&, Console&);
+std::function<void()> section(CLI::App&, Console&);
 std::function<void()> view(CLI::App&, Console&);
 
 std::span<const Verb> verbs() {
@@ -87,6 +88,10 @@ std::span<const Verb> verbs() {
        "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
       {"movie", "Film a walk through a forest, without a display",
        "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
+      {"section", "Cut a forest by a plane, as a section of a series shows it: picture, contours or areas",
+       "brainforest section column.forest --plane 0,1000,0,0,0,1 --height 100 -o section.png\n"
+       "  brainforest section column.forest --plane 0,1000,0,1,1,0 -o areas.csv",
+       section},
       {"view", "Open a forest in the studio", "brainforest view column.forest", view},
       {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
   });

@@ -42,7 +42,8 @@ float round_length(float longest) {
 }
 
 void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
-  const float micrometres_a_point = (camera.eye - camera.target).norm() / camera.focal(float(area.height()));
+  const float micrometres_a_point =
+      camera.pixel_size(float(area.height()), (camera.eye - camera.target).norm());
   const float length = round_length(micrometres_a_point * 160.f);
   const qreal width = qreal(length / micrometres_a_point);
   const QPointF left(area.left() + margin + 10, area.bottom() - margin - 10),

@@ -31,7 +31,7 @@ float clamped(const frame::Camera& camera, float distance) {
 
 // µm that a pixel covers at the target's depth.
 float micrometres_a_pixel(const frame::Camera& camera, const frame::Viewport& viewport) {
-  return (camera.eye - camera.target).norm() / camera.focal(viewport.height);
+  return camera.pixel_size(viewport.height, (camera.eye - camera.target).norm());
 }
 
 }  // namespace

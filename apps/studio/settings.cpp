@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/settings.h"
 
+#include <cmath>
+
 #include "apps/studio/camera_control.h"
 
 namespace forest::studio {
@@ -8,9 +10,12 @@ namespace {
 
 using S = Settings;
 
-constexpr const char* group_names[] = {"Eye", "Flight", "Gaze", "Detail", "Colour", "Depth", "Shown"};
+constexpr const char* group_names[] = {"Eye",    "Flight", "Gaze",  "Plane",
+                                       "Detail", "Colour", "Depth", "Shown"};
 constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron", "Target", "Depth"};
 constexpr const char* background_words[] = {"Dark", "Light"};
+constexpr const char* projection_words[] = {"Perspective", "Orthographic"};
+constexpr const char* across_words[] = {"x", "y", "z", "Any direction"};
 
 constexpr double far = 1e6;  // µm
 
@@ -80,6 +85,24 @@ constexpr Number number_table[] = {
      "How fast detail falls off: arc minutes of resolution a degree of eccentricity (people: 1.3 to 1.7)",
      "Alt+U", 0, 60, .1, 2, [](const S& s) { return s.view.detail.acuity_slope; },
      [](S& s, float v) { s.view.detail.acuity_slope = v; }},
+    {"Gaze", "Fovea", "", "°", "Around the gaze so many degrees are drawn as without one", "Alt+Shift+F", 0,
+     90, .5, 1, [](const S& s) { return s.view.detail.fovea; },
+     [](S& s, float v) { s.view.detail.fovea = v; }},
+    {"Gaze", "Screen", "", "°",
+     "Height of the picture as an angle at your eye; 0: as large as the field of view", "Alt+Shift+S", 0, 170,
+     5, 1, [](const S& s) { return s.view.detail.screen; }, [](S& s, float v) { s.view.detail.screen = v; }},
+    {"Plane", "Place", "", "µm",
+     "Of the plane of intersection, along its normal from the middle of the forest", "Alt+T", -far, far, 5, 1,
+     [](const S& s) { return s.plane_at; }, [](S& s, float v) { s.plane_at = v; }},
+    {"Plane", "Normal", "az", "°", "Direction of the plane's normal about the vertical", "Alt+N", -180, 180,
+     5, 0, [](const S& s) { return s.normal_azimuth; },
+     [](S& s, float v) { s.normal_azimuth = v, s.across = Across::any; }},
+    {"Plane", "Normal", "el", "°", "Direction of the plane's normal above the horizontal", "Alt+Shift+N", -90,
+     90, 5, 0, [](const S& s) { return s.normal_elevation; },
+     [](S& s, float v) { s.normal_elevation = v, s.across = Across::any; }},
+    {"Plane", "Opacity", "", "%", "How much of what lies behind the plane it hides", "Alt+Shift+P", 0, 100, 5,
+     0, [](const S& s) { return 100.f * s.plane_opacity; },
+     [](S& s, float v) { s.plane_opacity = v / 100.f; }},
     {"Detail", "Acceptable error", "", "pixels", "How far, at most, anything may be drawn from its place",
      "Alt+R", .05, 100, .25, 2, [](const S& s) { return s.view.detail.error; },
      [](S& s, float v) { s.view.detail.error = v; }},
@@ -93,6 +116,12 @@ constexpr Number number_table[] = {
 };
 
 constexpr Choice choice_table[] = {
+    {"Eye", "Projection",
+     "Perspective as an eye sees, or orthographic: as large near as far, true at the target's depth", "J",
+     projection_words, [](const S& s) { return int(s.view.camera.projection); },
+     [](S& s, int i) { s.view.camera.projection = frame::Projection(i); }},
+    {"Plane", "Across", "The axis that the plane of intersection stands across", "Shift+K", across_words,
+     [](const S& s) { return int(s.across); }, [](S& s, int i) { s.across = Across(i); }},
     {"Colour", "Colour by", "What a colour means; the legend names it", "C", colour_words,
      [](const S& s) { return int(s.view.colour_by); },
      [](S& s, int i) { s.view.colour_by = scene::ColourBy(i); }},
@@ -116,6 +145,8 @@ constexpr Toggle toggle_table[] = {
        s.gaze_follows = on;
        if (on) s.view.detail.gaze = gaze(s);
      }},
+    {"Plane", "Plane of intersection", "A plane through the forest, and its section in a panel", "K",
+     [](const S& s) { return s.plane; }, [](S& s, bool on) { s.plane = on; }},
     {"Depth", "Dim the rest", "The forest steps back while a branch is selected", "X",
      [](const S& s) { return s.dim; }, [](S& s, bool on) { s.dim = on; }},
     {"Shown", "Outline", "The column and the limits of its layers", "O", [](const S& s) { return s.outline; },
@@ -127,6 +158,14 @@ constexpr Toggle toggle_table[] = {
 };
 
 }  // namespace
+
+Plane plane_of(const Settings& s, const Vec3& middle) {
+  const float azimuth = radians(s.normal_azimuth), elevation = radians(s.normal_elevation);
+  const Vec3 normals[] = {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ(),
+                          Vec3(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
+                               -std::cos(elevation) * std::cos(azimuth))};
+  return Plane::through(middle, normals[int(s.across)]).moved(s.plane_at);
+}
 
 std::span<const char* const> groups() { return group_names; }
 std::span<const Number> numbers() { return number_table; }

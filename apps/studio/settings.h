@@ -5,12 +5,20 @@
 
 #include <span>
 
+#include "forest/geometry/plane.h"
 #include "forest/scene/view.h"
 
 namespace forest::studio {
 
+enum class Across : std::uint8_t { x, y, z, any };
+
 struct Settings {
   scene::View view;
+  bool plane = false;         // of intersection, with its section in a panel
+  Across across = Across::z;  // the axis that the plane stands across, or a direction of its own
+  float normal_azimuth = 0.f, normal_elevation = 0.f;  // of that direction, degrees, as those of the eye
+  float plane_at = 0.f;                                // along its normal from the middle of the forest, µm
+  float plane_opacity = .18f;
   bool fly = false;           // a drag looks around instead of orbiting
   float speed = 120.f;        // of flight, µm/s
   bool gaze_follows = false;  // the gaze is where the mouse is
@@ -19,6 +27,9 @@ struct Settings {
   bool scale = true;          // scale bar and directions
   bool dim = true;            // the rest of the forest while a branch is selected
 };
+
+/// The plane of intersection, `middle` being that of the forest.
+Plane plane_of(const Settings& settings, const Vec3& middle);
 
 /// A number with its unit. Rows that follow one another with the same `row` share a line.
 struct Number {

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "forest/core/error.h"
+#include "forest/scene/slice_picture.h"
 
 #include "apps/studio/annotation.h"
 #include "apps/studio/camera_control.h"
@@ -42,10 +43,10 @@ bool is_flight_key(int key) {
 std::vector<frame::Overlay> visible(std::vector<frame::Overlay> marks, const frame::Camera& camera,
                                     float height) {
   const Vec3 forward = -camera.axes().col(2);
-  const float pixel = 1.f / camera.focal(height);
   for (frame::Overlay& mark : marks) {
     const float depth = std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(forward));
-    mark.radius = std::max(mark.radius, (mark.colour == section_entry ? 1.9f : 1.3f) * pixel * depth);
+    mark.radius = std::max(mark.radius,
+                           (mark.colour == section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
   }
   return marks;
 }
@@ -131,17 +132,18 @@ void Viewport::select(const std::optional<scene::Pick>& pick) {
 
 std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
   const frame::Camera& camera = settings_.view.camera;
-  const Ray ray = ray_through(camera, in_points(), vec(place) + Vec2(.5f, .5f));
-  const float pixel = 1.f / camera.focal(float(height()) * float(devicePixelRatioF()));
-  const auto exact = scene::pick(forest_, ray, .5f * pixel, camera.near, colouring_.states);
-  return exact ? exact : scene::pick(forest_, ray, reach * pixel, camera.near, colouring_.states);
+  const Vec2 at = vec(place) + Vec2(.5f, .5f);
+  const auto exact =
+      scene::pick(forest_, camera, in_points(), at, .5f / float(devicePixelRatioF()), colouring_.states);
+  return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.states);
 }
 
 frame::Image Viewport::picture() {
   makeCurrent();
   const std::uint32_t samples = std::max(settings_.view.samples, 16u);
   draw_still(samples, 0, samples);
-  frame::Image image = renderer_->read();
+  frame::Image image = united_ ? *united_ : renderer_->read();
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
   doneCurrent();
   touch();
   return image;
@@ -194,13 +196,36 @@ void Viewport::advance(float seconds) {
 void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
-  if (first == 0)
+  if (first == 0 && !layered())
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
                     {float(w), float(h)}, colouring_.shown());
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
-  frame::Frame frame = scene::compose(forest_, view, colouring_, chooser_.cut(), w, h, overlays);
-  mark_selection(frame.palette, view.background, selection_ && settings_.dim);
+  scene::Colouring colouring = colouring_;
+  mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
+  std::optional<frame::Glass> glass;
+  if (settings_.plane) {
+    const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
+    const scene::Sheet sheet = scene::sheet_of(forest_, plane);
+    glass = frame::Glass{.plane = plane,
+                         .low = sheet.low.cast<float>(),
+                         .high = sheet.high.cast<float>(),
+                         .colour = view.background == scene::Background::dark ? Vec3(.30f, .42f, .60f)
+                                                                              : Vec3(.25f, .40f, .65f),
+                         .opacity = settings_.plane_opacity};
+    const auto marks = scene::plane_marks(forest_, plane);
+    overlays.insert(overlays.end(), marks.begin(), marks.end());
+  }
+  if (layered()) {
+    if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
+    united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last);
+    figures_.segments = foveated_->figures().segments, figures_.neurons = foveated_->figures().neurons;
+    figures_.samples = last, figures_.error = view.detail.error;
+    return;
+  }
+  united_ = nullptr;
+  frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
+  frame.glass = glass;
   chooser_.complete(frame);
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
@@ -208,6 +233,8 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   figures_.segments = chooser_.segments(), figures_.neurons = chooser_.cut().neurons;
   figures_.samples = last, figures_.error = view.detail.error;
 }
+
+bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze; }
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
@@ -253,7 +280,7 @@ void Viewport::paintGL() {
     QOpenGLFunctions* gl = context()->functions();
     gl->glDisable(GL_SCISSOR_TEST);
     if (card_) card_->show(defaultFramebufferObject());
-    if (processor_) paint(processor_->image());
+    if (processor_) paint(united_ ? *united_ : *processor_->image());
     // The renderer's opacity says how much of a pixel is covered; the window itself is opaque.
     gl->glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
     gl->glClearColor(0, 0, 0, 1);

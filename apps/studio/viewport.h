@@ -16,6 +16,7 @@
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 
+#include "apps/foveated.h"
 #include "apps/studio/selection.h"
 #include "apps/studio/settings.h"
 
@@ -101,11 +102,14 @@ class Viewport final : public QOpenGLWidget {
   void took(float milliseconds);
   void paint(const frame::Image& image);
   void annotate();
+  bool layered() const;  // drawn layer by layer for the gaze
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;
   scene::Targets targets_;
   scene::Chooser chooser_;
+  std::optional<Foveated> foveated_;      // on the processor; a card draws one picture, with detail by gaze
+  const frame::Image* united_ = nullptr;  // its last picture, while that is what is shown
   Settings settings_;
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;

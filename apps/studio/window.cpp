@@ -7,6 +7,7 @@
 #include <QCloseEvent>
 #include <QDialogButtonBox>
 #include <QDockWidget>
+#include <QFile>
 #include <QFileDialog>
 #include <QLabel>
 #include <QMenuBar>
@@ -22,6 +23,7 @@
 
 #include "forest/io/png.h"
 
+#include "apps/studio/section_panel.h"
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/targets_panel.h"
 #include "apps/studio/view_panel.h"
@@ -65,6 +67,7 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   connect(&panel_rest_, &QTimer::timeout, this,
           [this] { view_panel_->show_settings(viewport_->settings()); });
   connect(viewport_, &Viewport::changed, this, [this] {
+    section_panel_->show_settings(viewport_->settings());
     if (!panel_rest_.isActive()) panel_rest_.start();
   });
   connect(viewport_, &Viewport::selected, this, [this] {
@@ -100,15 +103,27 @@ void Window::add_docks() {
                         },
                         [this](const QString& expression) { return add_target(expression); }},
                        this);
-  const std::pair<const char*, QWidget*> docks[] = {
-      {"Selection", selection_panel_}, {"Targets", targets_panel_}, {"View", scroll}};
+  section_panel_ = new SectionPanel(
+      viewport_->forest(), viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
+  const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_},
+                                                    {"Targets", targets_panel_},
+                                                    {"View", scroll},
+                                                    {"Section", section_panel_}};
   QList<QDockWidget*> added;
   for (const auto& [name, widget] : docks) {
     auto* dock = new QDockWidget(tr(name), this);
     dock->setObjectName(name);
     dock->setWidget(widget);
-    addDockWidget(Qt::RightDockWidgetArea, dock);
-    added.push_back(dock);
+    const bool section = widget == section_panel_;  // a picture of its own, for those who ask for it
+    addDockWidget(section ? Qt::LeftDockWidgetArea : Qt::RightDockWidgetArea, dock);
+    if (section)
+      connect(viewport_, &Viewport::changed, dock, [this, dock, shown = false]() mutable {
+        if (const bool wanted = viewport_->settings().plane; wanted != shown)
+          dock->setVisible(shown = wanted);
+      });
+    else
+      added.push_back(dock);
+    dock->setVisible(!section);
   }
   resizeDocks(added, {260, 300, 160}, Qt::Vertical);
 }
@@ -130,6 +145,9 @@ void Window::add_menus() {
        [this] { save_picture(false); }},
       {"&File", "Save picture with &legend…", "Ctrl+Shift+S",
        "What is seen, with scale, directions and legend, as a PNG", [this] { save_picture(true); }},
+      {"&File", "Add the view to a &path…", "Ctrl+K",
+       "Appends the view as a line to a file that 'brainforest movie --path' films",
+       [this] { record_view(); }},
       {"&File", "&Quit", "Ctrl+Q", "Close the window; its panels are remembered", [this] { close(); }},
       {"&Edit", "&Copy view", "Ctrl+C", "Where the eye is and what colours mean, as one line of JSON",
        [this] { copy_view(); }},
@@ -236,6 +254,22 @@ QString Window::add_target(const QString& expression) {
 void Window::copy_view() {
   QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->settings().view)));
   statusBar()->showMessage(tr("The view is on the clipboard as one line of JSON."), 4000);
+}
+
+void Window::record_view() {
+  if (path_.isEmpty())
+    path_ = QFileDialog::getSaveFileName(this, tr("Path of views"), "views.jsonl", tr("Views (*.jsonl)"),
+                                         nullptr, QFileDialog::DontConfirmOverwrite);
+  if (path_.isEmpty()) return;
+  QFile file(path_);
+  const std::string line = scene::to_json(viewport_->settings().view) + "\n";
+  if (!file.open(QIODevice::Append) || file.write(line.data(), qint64(line.size())) != qint64(line.size())) {
+    QMessageBox::warning(this, tr("Path of views"),
+                         tr("%1 cannot be written: %2").arg(path_, file.errorString()));
+    path_.clear();
+    return;
+  }
+  statusBar()->showMessage(tr("The view was added to %1").arg(path_), 3000);
 }
 
 void Window::paste_view() {

@@ -14,6 +14,7 @@ namespace forest::studio {
 /// As PNG, whole or not at all; throws Error.
 void write_image(const std::filesystem::path& path, const QImage& seen);
 
+class SectionPanel;
 class SelectionPanel;
 class TargetsPanel;
 class ViewPanel;
@@ -35,6 +36,7 @@ class Window final : public QMainWindow {
   QString add_target(const QString& expression);
   void copy_view();
   void paste_view();
+  void record_view();
   void save_picture(bool as_seen);
   void explain();
   template <class Row, class Value>
@@ -44,7 +46,9 @@ class Window final : public QMainWindow {
   ViewPanel* view_panel_;
   SelectionPanel* selection_panel_;
   TargetsPanel* targets_panel_;
+  SectionPanel* section_panel_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
+  QString path_;       // where views are recorded
   QTimer panel_rest_;  // the panel follows a moving view a few times a second
 };
 

@@ -39,6 +39,22 @@ Constants constants_of(const Frame& f, std::uint32_t subframe) {
   c.bottom_red = s.background_bottom.x(), c.bottom_green = s.background_bottom.y(),
   c.bottom_blue = s.background_bottom.z();
   c.fog_length = s.fog_length, c.exposure = s.exposure;
+  c.converge = f.camera.orthographic() ? 0.f : 1.f, c.parallel = 1.f - c.converge;
+  if (f.glass) {
+    const Glass& g = *f.glass;
+    const auto seen = [&](const Vec3& way) { return Vec3(right.dot(way), up.dot(way), forward.dot(way)); };
+    const Vec3 n = seen(g.plane.normal), r = seen(g.plane.right), u = seen(g.plane.up);
+    const Vec3 from = g.plane.origin - eye;
+    c.glass_opacity = g.opacity;
+    c.glass_x = n.x(), c.glass_y = n.y(), c.glass_z = n.z(), c.glass_at = g.plane.normal.dot(from);
+    c.glass_right_x = r.x(), c.glass_right_y = r.y(), c.glass_right_z = r.z();
+    c.glass_up_x = u.x(), c.glass_up_y = u.y(), c.glass_up_z = u.z();
+    c.glass_left_edge = g.low.x() + g.plane.right.dot(from),
+    c.glass_right_edge = g.high.x() + g.plane.right.dot(from);
+    c.glass_low_edge = g.low.y() + g.plane.up.dot(from),
+    c.glass_high_edge = g.high.y() + g.plane.up.dot(from);
+    c.glass_red = g.colour.x(), c.glass_green = g.colour.y(), c.glass_blue = g.colour.z();
+  }
   return c;
 }
 

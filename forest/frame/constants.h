@@ -2,12 +2,29 @@
 // The constants of a picture as every renderer takes them, derived from its frame in one place.
 #pragma once
 
+#include <cmath>
+
 #include "forest/frame/frame.h"
 
 namespace forest::frame {
 
 /// Of one subframe, which looks at sample_place.
 Constants constants_of(const Frame& frame, std::uint32_t subframe);
+
+/// Depth at which the ray through a place of the picture (pixels) meets the glass; infinite when it does not.
+inline float glass_depth(const Constants& c, float px, float py) {
+  const float x = (px - c.centre_x) / c.focal, y = (c.centre_y - py) / c.focal;
+  const float beside = c.glass_x * x + c.glass_y * y;
+  const float z = (c.glass_at - c.parallel * beside) / (c.converge * beside + c.glass_z);
+  if (!(z > c.near)) return INFINITY;
+  const float wide = c.converge * z + c.parallel;
+  const float right = wide * (c.glass_right_x * x + c.glass_right_y * y) + c.glass_right_z * z,
+              up = wide * (c.glass_up_x * x + c.glass_up_y * y) + c.glass_up_z * z;
+  return right >= c.glass_left_edge && right <= c.glass_right_edge && up >= c.glass_low_edge &&
+                 up <= c.glass_high_edge
+             ? z
+             : INFINITY;
+}
 
 /// How an overlay is drawn: a segment in the world whose meta word names its palette entry.
 Segment segment_of(const Overlay& overlay);

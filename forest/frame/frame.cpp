@@ -39,6 +39,10 @@ void check(const Frame& frame, const Geometry& geometry) {
   require(c.near > 0.f, "the near distance must be positive");
   require(frame.width > 0 && frame.height > 0 && frame.width <= 16384 && frame.height <= 16384,
           "a picture must be 1 to 16384 pixels wide and high");
+  if (const auto& a = frame.area)
+    require(a->left < a->right && a->top < a->bottom && a->right <= frame.width && a->bottom <= frame.height,
+            "the wanted part of a picture must lie in it and not be empty");
+  require(frame.gaps >= 0.f && frame.gaps < 1.f, "the share of gaps must be at least 0 and less than 1");
   require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");
   require(frame.first_subframe < std::min(frame.subframes, frame.last_subframe),
           "a part of a picture must have at least one of its subframes");
@@ -50,6 +54,10 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const State& state : frame.states) colours |= state.colour_class;
   require(colours < 16, "a colour class must be below 16");
   check(static_cast<const Lists&>(frame), geometry);
+  if (const auto& g = frame.glass)
+    require(g->plane.origin.allFinite() && g->plane.normal.allFinite() && g->colour.allFinite() &&
+                g->opacity >= 0.f && g->opacity <= 1.f && g->low.allFinite() && g->high.allFinite(),
+            "the glass must be finite and its opacity lie between 0 and 1");
   for (const Overlay& o : frame.overlays)
     require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
             "an overlay must be finite and its colour a palette entry");

@@ -6,12 +6,14 @@
 #include <bit>
 #include <cstdint>
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
 
 #include "forest/frame/camera.h"
 #include "forest/frame/layout.h"
+#include "forest/geometry/plane.h"
 
 namespace forest::frame {
 
@@ -97,10 +99,22 @@ struct DepthMap {
   std::vector<float> depths;
 };
 
+/// A clear rectangle in the world, through which what lies behind is seen tinted.
+struct Glass {
+  Plane plane;
+  Vec2 low = Vec2::Zero(), high = Vec2::Zero();  // along the plane's right and up, µm
+  Vec3 colour = Vec3::Constant(.5f);             // linear light
+  float opacity = .2f;                           // share of the colour in what lies behind, 0–1
+};
+
 struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
+  std::optional<Area> hole;  // of them these are not wanted either
+  // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.
+  float gaps = 0.f;
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,
   // and the image is the mean of all so far. The frames of the parts before must have shown the same.
   std::uint32_t first_subframe = 0, last_subframe = 1024;
@@ -109,6 +123,7 @@ struct Frame : Lists {
   Opacities opacities = opaque();
   std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
+  std::optional<Glass> glass;
   /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
   /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
   std::function<Lists(const DepthMap&)> rest;
@@ -123,6 +138,8 @@ struct Image {
 
 struct Timing {
   double draw = 0., resolve = 0.;  // milliseconds of one picture, all subframes
+  std::uint64_t drawn =
+      0;  // segments of the last subframe that were neither hidden nor beside what is wanted; 0: unknown
 };
 
 /// Where light comes from, in camera axes (x right, y up, z along the view); unit length.

@@ -50,6 +50,16 @@ struct Constants {
   float bottom_red, bottom_green, bottom_blue, exposure;  // background below
   uint subframes, item_count, flags,
       last_subframe;  // the items first_item … first_item + item_count are drawn
+  // A length at depth z covers focal × length / (converge × z + parallel) pixels: 1, 0 for a perspective camera, 0, 1 for an
+  // orthographic one, whose focal is pixels a µm.
+  float converge, parallel, glass_opacity, reserved;
+  float glass_x, glass_y, glass_z,
+      glass_at;  // glass: n · p = at, p in camera axes (z depth); opacity 0: none
+  float glass_right_x, glass_right_y, glass_right_z,
+      glass_left_edge;                                       // it reaches from here, along its right …
+  float glass_up_x, glass_up_y, glass_up_z, glass_low_edge;  // … and its up
+  float glass_right_edge, glass_high_edge, reserved_a, reserved_b;  // … to here
+  float glass_red, glass_green, glass_blue, reserved_c;             // linear light
 };
 
 // A pixel's key: depth (20 bits, logarithmic), palette entry (7 bits), shade (5 bits). The smallest key wins, so the
@@ -119,7 +129,7 @@ FOREST_SHARED bool forest_shows(uint opacity, uint key, uint subframe) {
 
 #ifdef __cplusplus
 static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 &&
-              sizeof(Constants) == 160);
+              sizeof(Constants) == 256);
 inline constexpr uint cluster_size = FOREST_CLUSTER_SIZE;
 /// Item::drawn of all of so many segments, of cluster_size when they are more.
 constexpr uint first_segments(std::uint64_t count) { return count < 32 ? (1u << count) - 1u : 0xffffffffu; }

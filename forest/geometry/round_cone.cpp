@@ -7,73 +7,82 @@
 namespace forest {
 namespace {
 
-std::optional<float> enter_sphere(const Ray& ray, const Vec3& centre, float radius) {
-  const Vec3 to = ray.origin - centre;
-  const float b = to.dot(ray.direction);
-  const Vec3 closest = to - b * ray.direction;
-  const float h = radius * radius - closest.squaredNorm();
-  if (h < 0.f) return {};
-  const float t = -b - std::sqrt(h);
-  return t >= 0.f ? std::optional(t) : std::nullopt;
+template <class S>
+using Vector = Eigen::Matrix<S, 3, 1>;
+
+template <class S>
+std::optional<S> enter_sphere(const RayOf<S>& ray, const Vector<S>& centre, S radius) {
+  const Vector<S> to = ray.origin - centre;
+  const S b = to.dot(ray.direction);
+  const Vector<S> closest = to - b * ray.direction;
+  const S h = radius * radius - closest.squaredNorm();
+  if (h < 0) return {};
+  const S t = -b - std::sqrt(h);
+  return t >= 0 ? std::optional(t) : std::nullopt;
 }
 
-}  // namespace
+template <class S>
+S distance(const Vector<S>& point, const RoundConeOf<S>& cone) {
+  const Vector<S> axis = cone.b - cone.a;
+  const S length = axis.norm(), taper = cone.radius_a - cone.radius_b;
+  if (length <= std::abs(taper))
+    return std::min((point - cone.a).norm() - cone.radius_a, (point - cone.b).norm() - cone.radius_b);
+  const Vector<S> u = axis / length, to = point - cone.a;
+  const S s = taper / length, c = std::sqrt(1 - s * s);
+  const S y = to.dot(u), rho = (to - y * u).norm();
+  const S along = c * y - s * rho;  // position along the slanted side, measured from the touching circle of a
+  if (along <= 0) return to.norm() - cone.radius_a;
+  if (along >= c * length) return (point - cone.b).norm() - cone.radius_b;
+  return c * rho + s * y - cone.radius_a;
+}
 
-std::optional<float> intersect(const Ray& ray, const RoundCone& cone) {
+template <class S>
+std::optional<S> enter(const RayOf<S>& ray, const RoundConeOf<S>& cone) {
+  if (distance<S>(ray.origin, cone) < 0) return {};  // what begins within leaves it only
   // The side touches both spheres along circles; between them it is a cone with sine of half angle s = (ra -
   // rb) / l.
-  const Vec3 axis = cone.b - cone.a;
-  const float length = axis.norm(), taper = cone.radius_a - cone.radius_b;
+  const Vector<S> axis = cone.b - cone.a;
+  const S length = axis.norm(), taper = cone.radius_a - cone.radius_b;
   const bool nested = length <= std::abs(taper);
   if (nested)
     return cone.radius_a >= cone.radius_b ? enter_sphere(ray, cone.a, cone.radius_a)
                                           : enter_sphere(ray, cone.b, cone.radius_b);
 
-  const Vec3 u = axis / length;
-  const float s = taper / length, c2 = 1.f - s * s;
+  const Vector<S> u = axis / length;
+  const S s = taper / length, c2 = 1 - s * s;
   // A point p with y = (p - a)·u lies on the infinite cone when |p - a|² - y² = ((ra - s y) ... )² scaled by
   // c: radial distance ρ = (ra - s y) / c, with c = sqrt(c2).
-  const Vec3 start = ray.origin - cone.a;
-  const float shift = -start.dot(ray.direction);  // work near the closest approach, for precision far away
-  const Vec3 o = start + shift * ray.direction;
-  const float oy = o.dot(u), dy = ray.direction.dot(u);
-  const float k0 = cone.radius_a - s * oy, k1 = -s * dy;
-  const float A = c2 * (1.f - dy * dy) - k1 * k1;
-  const float B = c2 * (o.dot(ray.direction) - oy * dy) - k0 * k1;
-  const float C = c2 * (o.squaredNorm() - oy * oy) - k0 * k0;
+  const Vector<S> start = ray.origin - cone.a;
+  const S shift = -start.dot(ray.direction);  // work near the closest approach, for precision far away
+  const Vector<S> o = start + shift * ray.direction;
+  const S oy = o.dot(u), dy = ray.direction.dot(u);
+  const S k0 = cone.radius_a - s * oy, k1 = -s * dy;
+  const S A = c2 * (1 - dy * dy) - k1 * k1;
+  const S B = c2 * (o.dot(ray.direction) - oy * dy) - k0 * k1;
+  const S C = c2 * (o.squaredNorm() - oy * oy) - k0 * k0;
 
-  std::optional<float> best;
-  const auto offer = [&](float t) {
-    if (t >= 0.f && (!best || t < *best)) best = t;
+  std::optional<S> best;
+  const auto offer = [&](S t) {
+    if (t >= 0 && (!best || t < *best)) best = t;
   };
-  const float discriminant = B * B - A * C;
-  if (std::abs(A) > 1e-12f && discriminant >= 0.f) {
-    const float root = std::sqrt(discriminant);
-    for (const float sign : {-1.f, 1.f}) {
-      const float local = (-B + sign * root) / A, y = oy + local * dy;
-      // The lateral part lies between the touching circles at y = s·ra and y = l + s·rb.
-      if (k0 + k1 * local >= 0.f && y >= s * cone.radius_a && y <= length + s * cone.radius_b)
-        offer(local + shift);
-    }
+  const S discriminant = B * B - A * C;
+  if (std::abs(A) > S(1e-12) && discriminant >= 0) {
+    // Of the two roots that at which the ray goes from outside to within, whichever comes first.
+    const S local = (-B - std::sqrt(discriminant)) / A, y = oy + local * dy;
+    // The lateral part lies between the touching circles at y = s·ra and y = l + s·rb.
+    if (k0 + k1 * local >= 0 && y >= s * cone.radius_a && y <= length + s * cone.radius_b)
+      offer(local + shift);
   }
   if (const auto t = enter_sphere(ray, cone.a, cone.radius_a)) offer(*t);
   if (const auto t = enter_sphere(ray, cone.b, cone.radius_b)) offer(*t);
   return best;
 }
 
-float signed_distance(const Vec3& point, const RoundCone& cone) {
-  const Vec3 axis = cone.b - cone.a;
-  const float length = axis.norm(), taper = cone.radius_a - cone.radius_b;
-  if (length <= std::abs(taper))
-    return std::min((point - cone.a).norm() - cone.radius_a, (point - cone.b).norm() - cone.radius_b);
-  const Vec3 u = axis / length, to = point - cone.a;
-  const float s = taper / length, c = std::sqrt(1.f - s * s);
-  const float y = to.dot(u), rho = (to - y * u).norm();
-  const float along =
-      c * y - s * rho;  // position along the slanted side, measured from the touching circle of a
-  if (along <= 0.f) return to.norm() - cone.radius_a;
-  if (along >= c * length) return (point - cone.b).norm() - cone.radius_b;
-  return c * rho + s * y - cone.radius_a;
-}
+}  // namespace
+
+std::optional<float> intersect(const Ray& ray, const RoundCone& cone) { return enter(ray, cone); }
+std::optional<double> intersect(const Rayd& ray, const RoundConed& cone) { return enter(ray, cone); }
+
+float signed_distance(const Vec3& point, const RoundCone& cone) { return distance<float>(point, cone); }
 
 }  // namespace forest

@@ -48,5 +48,16 @@ TEST(RoundCone, BehindOrBesideIsNoHit) {
   EXPECT_NEAR(*intersect({{0, 0, 5}, {0, 0, -1}}, cone), 4.f, 1e-2f);
 }
 
+TEST(RoundCone, WhatBeginsWithinEntersNothing) {
+  Random random(5);
+  for (int i = 0; i < 2000; ++i) {
+    const RoundCone cone{in_cube(random, 2), in_cube(random, 2), float(random.uniform(.2, 1)),
+                         float(random.uniform(.2, 1))};
+    const float t = float(random.uniform());
+    const Vec3 within = cone.a + t * (cone.b - cone.a);
+    EXPECT_FALSE(intersect({within, in_cube(random, 1).normalized()}, cone));
+  }
+}
+
 }  // namespace
 }  // namespace forest

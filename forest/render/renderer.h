@@ -16,6 +16,9 @@ class Renderer {
   virtual frame::Timing draw(const frame::Frame& frame) = 0;
   /// The pixels of the last frame.
   virtual frame::Image read() = 0;
+  /// The same without a copy, until the next frame is drawn; null where they lie elsewhere. Opacity is the share of a pixel
+  /// that is covered.
+  virtual const frame::Image* image() const { return nullptr; }
   /// How far one saw in the last subframe of the last frame, before its `rest` was drawn; empty when it had none.
   virtual const frame::DepthMap& seen() const = 0;
   /// Who draws, for people ("llvmpipe (LLVM 15.0.6, 256 bits)").

@@ -51,14 +51,15 @@ bool draws(const frame::Segment& segment, const frame::Instance& instance, const
   if (a.z() < camera.near && b.z() < camera.near) return false;
   const float za = std::max(a.z(), camera.near), zb = std::max(b.z(), camera.near);
   const float ra = half_to_float(segment.radii & 0xffff), rb = half_to_float(segment.radii >> 16);
-  if (!as_line && focal * std::max(ra / za, rb / zb) >= .75f) return true;
+  const float la = camera.orthographic() ? 1.f : za, lb = camera.orthographic() ? 1.f : zb;
+  if (!as_line && focal * std::max(ra / la, rb / lb) >= .75f) return true;
   if (subframes != 1) return subframes > 0;  // drawn where pixels' centres meet it
-  const Vec2 d = (b.head<2>() / zb - a.head<2>() / za).cwiseAbs();
+  const Vec2 d = (b.head<2>() / lb - a.head<2>() / la).cwiseAbs();
   const float stretch = d.maxCoeff() > 0.f ? d.norm() / d.maxCoeff() : 1.f;
-  float width = focal * (ra / za + rb / zb) * stretch;
+  float width = focal * (ra / la + rb / lb) * stretch;
   const float mean = half_to_float(segment.meta >> 16);
   if (width < 1.f && mean > 0.f)
-    width = std::min(focal * mean * (1.f / za + 1.f / zb) * float(FOREST_MEAN_STRETCH), 1.f);
+    width = std::min(focal * mean * (1.f / la + 1.f / lb) * float(FOREST_MEAN_STRETCH), 1.f);
   return int(width + 1.f - float(segment.meta >> 8 & 255u) / 256.f - 1.f / 512.f) >= 1;
 }
 

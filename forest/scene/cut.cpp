@@ -261,10 +261,9 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 
 }  // namespace
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Occluders* before,
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
            const Shown& shown) {
-  const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, before, true, shown};
+  const Look look{forest, eye, eye.frustum(), before, true, shown};
   Cut cut = in_chunks(forest.instances().size(),
                       [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
@@ -273,10 +272,9 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport
   return cut;
 }
 
-Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown) {
-  const frame::Frustum frustum(eye.camera(), viewport);
-  const Look look{forest, eye, frustum, &now, false, shown};
+Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
+             const Occluders& now, const Shown& shown) {
+  const Look look{forest, eye, eye.frustum(), &now, false, shown};
   return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
     const auto [instance, cluster, groups] = left_out[i];
     if (cluster == soma) {

@@ -6,14 +6,48 @@
 
 namespace forest::scene {
 
+namespace {
+
+constexpr float fovea_resolves = 1.f / 48.f;  // degrees
+constexpr float margin =
+    4.f;  // pixels that lines and their rims may reach beyond the bounds of what they show
+
+float distance_of(const frame::Camera& camera, float height, const Detail& detail) {
+  const float high = detail.screen > 0.f ? detail.screen : camera.field_of_view;
+  return .5f * height / std::tan(.5f * radians(high));
+}
+
+}  // namespace
+
+Gaze::Gaze(const frame::Camera& camera, const frame::Viewport& viewport, const Detail& detail)
+    : middle_(.5f * viewport.width, .5f * viewport.height),
+      pixel_(detail.gaze.value_or(middle_)),
+      distance_(distance_of(camera, viewport.height, detail)),
+      direction_(way_to(pixel_).normalized()) {}
+
+float Gaze::eccentricity(const Vec2& pixel) const {
+  const Vec3 way = way_to(pixel);
+  return degrees(std::atan2(way.cross(direction_).norm(), way.dot(direction_)));
+}
+
+float Gaze::resolved(float eccentricity, const Detail& detail) const {
+  return (detail.acuity_slope / 60.f * eccentricity + fovea_resolves) / angle(1.f);
+}
+
+float Gaze::where_resolved(float pixels, const Detail& detail) const {
+  if (!(detail.acuity_slope > 0.f)) return INFINITY;
+  return std::max(0.f, (pixels * angle(1.f) - fovea_resolves) * 60.f / detail.acuity_slope);
+}
+
 Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Detail& detail)
     : camera_(camera),
       detail_(detail),
+      frustum_(detail.area ? frame::Frustum(camera, viewport, *detail.area)
+                           : frame::Frustum(camera, viewport)),
       axes_(camera.axes()),
       focal_(camera.focal(viewport.height)),
-      pixel_degrees_(degrees(1.f / focal_)) {
-  if (detail.gaze) gaze_ray_ = frame::ray_through(camera, viewport, *detail.gaze).direction;
-}
+      middle_(.5f * viewport.width, .5f * viewport.height),
+      gaze_(camera, viewport, detail) {}
 
 float Eye::nearest_depth(const Sphere& sphere) const {
   const float depth = -axes_.col(2).dot(sphere.centre - camera_.eye);
@@ -22,15 +56,18 @@ float Eye::nearest_depth(const Sphere& sphere) const {
 
 float Eye::acceptable(const Sphere& sphere) const {
   if (!detail_.gaze) return detail_.error;
-  const Vec3 to = sphere.centre - camera_.eye;
-  const float distance = to.norm();
-  if (distance <= sphere.radius) return detail_.error;
-  const float between = std::acos(std::clamp(to.dot(gaze_ray_) / distance, -1.f, 1.f));
-  const float eccentricity = degrees(std::max(0.f, between - std::asin(sphere.radius / distance)));
-  // Guenter et al. 2012, equation 1: smallest resolved angle = slope × eccentricity + that of the fovea, which here is
-  // at least the pixel.
-  const float resolved = detail_.acuity_slope / 60.f * eccentricity + std::max(pixel_degrees_, 1.f / 60.f);
-  return detail_.error * std::max(1.f, resolved / pixel_degrees_);
+  const Vec3 p = axes_.transpose() * (sphere.centre - camera_.eye);
+  const float depth = -p.z(), nearest = depth - sphere.radius;
+  float scale = focal_, reach = focal_ * sphere.radius;
+  if (!camera_.orthographic()) {
+    if (!(nearest > camera_.near)) return detail_.error;
+    scale /= depth;
+    reach *= p.norm() / (depth * nearest);  // as scene/occlusion.cpp
+  }
+  const float eccentricity =
+      gaze_.eccentricity(middle_ + Vec2(scale * p.x(), -scale * p.y())) - gaze_.angle(reach + margin);
+  if (eccentricity <= detail_.fovea) return detail_.error;
+  return detail_.error * std::max(1.f, gaze_.resolved(eccentricity, detail_));
 }
 
 void Budget::took(double milliseconds) {

@@ -18,6 +18,7 @@ Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, co
     : width_(map.width),
       height_(map.height),
       eye_(camera.eye),
+      orthographic_(camera.orthographic()),
       near_(camera.near),
       focal_(camera.focal(viewport.height)),
       centre_x_(.5f * viewport.width),
@@ -68,8 +69,9 @@ bool Occluders::hide(const Sphere& sphere) const {
   const float depth = p.z(), nearest = depth - sphere.radius;
   if (!(nearest > near_)) return false;
   // A point at distance r from the centre is seen at most f · r · |p| / (depth · nearest) beside it.
-  const float scale = focal_ / depth;
-  const float reach = scale * sphere.radius * std::sqrt(p.squaredNorm()) / nearest + margin;
+  const float scale = orthographic_ ? focal_ : focal_ / depth;
+  const float spread = orthographic_ ? 1.f : std::sqrt(p.squaredNorm()) / nearest;
+  const float reach = scale * sphere.radius * spread + margin;
   const float x = centre_x_ + scale * p.x(), y = centre_y_ - scale * p.y();
   const float wide = float(width_) * tile, high = float(height_) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;

@@ -28,6 +28,7 @@ class Occluders {
       squares_;     // of side 2^k, by their upper left tile; cut at the picture's edge
   Mat3 to_camera_;  // rows: right, up, forward
   Vec3 eye_;
+  bool orthographic_;
   float near_, focal_, centre_x_, centre_y_;
 };
 

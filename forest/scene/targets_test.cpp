@@ -205,8 +205,8 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   int hidden = 0;
   for (float x = 100; x < 220; x += 3)
     for (float y = 20; y < 180; y += 5) {
-      const Ray ray = frame::ray_through(view.camera, {320, 200}, {x, y});
-      const auto any = pick(f, ray), seen = pick(f, ray, 0.f, 0.f, c.states);
+      const auto any = pick(f, view.camera, {320, 200}, {x, y}),
+                 seen = pick(f, view.camera, {320, 200}, {x, y}, .5f, c.states);
       hidden += any && f.types()[any->instance] == 0;
       if (any && f.types()[any->instance] == 1) {
         EXPECT_EQ(seen->segment, any->segment);

@@ -21,6 +21,7 @@ constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
 constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
 constexpr std::array<std::string_view, 5> kind_names{"any", "dots", "lines", "capsules", "somata"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
+constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
 Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
   if (!json.is_array() || json.size() != 3)
@@ -196,6 +197,12 @@ View parse_view(std::string_view text, const std::string& name) {
       v.detail.error = number_of(value, name, key, .05f, 100.f);
     else if (key == "acuity_slope")
       v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
+    else if (key == "fovea")
+      v.detail.fovea = number_of(value, name, key, 0.f, 90.f);
+    else if (key == "screen")
+      v.detail.screen = number_of(value, name, key, 0.f, 170.f);
+    else if (key == "projection")
+      v.camera.projection = frame::Projection(word_of(value, name, key, projection_names));
     else if (key == "samples")
       v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
     else if (key == "fog")
@@ -229,6 +236,7 @@ std::string to_json(const View& v) {
             {"target", list(v.camera.target)},
             {"up", list(v.camera.up)},
             {"field_of_view", v.camera.field_of_view},
+            {"projection", projection_names[std::size_t(v.camera.projection)]},
             {"near", v.camera.near},
             {"error", v.detail.error},
             {"acuity_slope", v.detail.acuity_slope},
@@ -237,7 +245,11 @@ std::string to_json(const View& v) {
             {"samples", v.samples},
             {"fog", v.fog},
             {"halo", v.halo}};
-  if (v.detail.gaze) json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+  if (v.detail.gaze) {
+    json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
+    json["fovea"] = v.detail.fovea;
+    if (v.detail.screen > 0.f) json["screen"] = v.detail.screen;
+  }
   for (const Appearance& a : v.targets) json["targets"].push_back(json_of(a));
   return json.dump();
 }

@@ -24,9 +24,9 @@ struct View {
   std::vector<Appearance> targets;  // how they are shown; later ones win
 };
 
-/// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"gaze":[.5,.5],"error":1,"colour_by":"type",
-///  "background":"dark","samples":16,"fog":1,"halo":1,"targets":[{"name":"L5","opacity":.4}]}; only eye and target are
-/// needed.
+/// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
+///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"targets":[{"name":"L5","opacity":.4}]}; only eye
+///  and target are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);

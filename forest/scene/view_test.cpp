@@ -61,50 +61,5 @@ TEST(View, EveryFrameKeepsTheContract) {
     }
 }
 
-TEST(Pick, FindsWhatBruteForceFinds) {
-  const Forest forest = sample();
-  const View view = overview(forest);
-  Random random(4);
-  int hits = 0;
-  for (int i = 0; i < 400; ++i) {
-    const Ray ray = frame::ray_through(view.camera, {320, 200},
-                                       {float(random.uniform(100, 220)), float(random.uniform(20, 180))});
-    std::optional<Pick> expected;
-    for (std::uint32_t n = 0; n < forest.instances().size(); ++n) {
-      const Neuron& neuron = forest.neurons()[forest.instances()[n].morphology];
-      for (std::uint32_t s = neuron.first_segment; s < neuron.first_segment + neuron.original_count; ++s)
-        if (const auto t = intersect(ray, in_world(forest, n, s));
-            t && (!expected || *t < expected->distance))
-          expected =
-              Pick{n, s, forest.section_of_segment()[neuron.first_original + s - neuron.first_segment], *t};
-    }
-    const auto found = pick(forest, ray);
-    ASSERT_EQ(found.has_value(), expected.has_value());
-    if (!found) continue;
-    ++hits;
-    EXPECT_FLOAT_EQ(found->distance, expected->distance);
-    EXPECT_EQ(found->instance, expected->instance);
-    EXPECT_EQ(found->section, expected->section);
-  }
-  EXPECT_GT(hits, 10);
-}
-
-TEST(Pick, TheSubarborOfTheSomaIsTheNeuronAndOfATipIsItself) {
-  const Forest forest = sample();
-  const Neuron& neuron = forest.neurons()[forest.instances()[0].morphology];
-  EXPECT_EQ(subarbor(forest, 0, soma_section).size(), neuron.original_count);
-  for (std::uint32_t s = 0; s < neuron.section_count; ++s) {
-    const auto segments = subarbor(forest, 0, s);
-    std::uint32_t own = 0;
-    for (std::uint32_t i = 0; i < neuron.original_count; ++i)
-      own += forest.section_of_segment()[neuron.first_original + i] == s;
-    if (forest.sections()[neuron.first_section + s].daughters == 0) {
-      EXPECT_EQ(segments.size(), own);
-    } else {
-      EXPECT_GT(segments.size(), own);
-    }
-  }
-}
-
 }  // namespace
 }  // namespace forest::scene

@@ -191,24 +191,6 @@ class Window : public ::testing::Test {
   Json picture_;
 };
 
-// The nearest segment of all that a ray meets, found by asking each of them.
-std::optional<scene::Pick> brute_force(const Ray& ray, float tolerance, float near) {
-  std::optional<scene::Pick> best;
-  const scene::Forest& forest = sample();
-  for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
-    const scene::Neuron& n = forest.neurons()[forest.instances()[i].morphology];
-    for (std::uint32_t k = 0; k < n.original_count; ++k) {
-      RoundCone cone = scene::in_world(forest, i, n.first_segment + k);
-      const float wider = tolerance * (.5f * (cone.a + cone.b) - ray.origin).norm();
-      cone.radius_a += wider, cone.radius_b += wider;
-      const auto t = intersect(ray, cone);
-      if (t && *t >= near && (!best || *t < best->distance))
-        best = scene::Pick{i, n.first_segment + k, forest.section_of_segment()[n.first_original + k], *t};
-    }
-  }
-  return best;
-}
-
 struct Target {
   Vec2 pixel;
   std::optional<scene::Pick> pick;
@@ -219,10 +201,9 @@ Target clear_target(Random& random, const scene::View& view, const frame::Viewpo
   for (;;) {
     const Vec2 pixel(float(20 + random.below(std::uint32_t(viewport.width) - 40)),
                      float(20 + random.below(std::uint32_t(viewport.height) - 40)));
-    const Ray ray = ray_through(view.camera, viewport, pixel + Vec2(.5f, .5f));
-    const float slope = 1.f / view.camera.focal(viewport.height);
-    const auto exact = brute_force(ray, 0.f, view.camera.near),
-               rough = brute_force(ray, 5.f * slope, view.camera.near);
+    const std::vector<Vec2> middle{pixel + Vec2(.5f, .5f)};
+    const auto exact = scene::plain_picks(sample(), view.camera, viewport, middle, 0.f)[0],
+               rough = scene::plain_picks(sample(), view.camera, viewport, middle, 5.f)[0];
     if (!something && !rough) return {pixel, {}};
     if (something && exact && rough && exact->instance == rough->instance && exact->section == rough->section)
       return {pixel, exact};

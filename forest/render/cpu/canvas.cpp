@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/canvas.h"
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "forest/core/parallel.h"
@@ -16,14 +18,20 @@ std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile
 
 }  // namespace
 
-void Canvas::clear(std::uint32_t width, std::uint32_t height) {
+void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area,
+                   const frame::Area& hole, float gaps) {
+  area_ = area, hole_ = hole, gaps_ = gaps;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
   fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
   const std::size_t tiles_wide = std::size_t(fine_.width);
   keys_.resize(tiles_wide * std::size_t(fine_.height) * tile * tile);
-  parallel_for(std::size_t(fine_.height), 16, [&](std::size_t ty) {
-    std::uint32_t* keys = &keys_[ty * tiles_wide * tile * tile];
-    std::fill(keys, keys + tiles_wide * tile * tile, FOREST_KEY_EMPTY);
+  const std::size_t top = area.top / tile, rows = std::size_t(tiles_over(std::int32_t(area.bottom))) - top,
+                    left = area.left / tile,
+                    columns = std::size_t(tiles_over(std::int32_t(area.right))) - left;
+  parallel_for(rows, 16, [&](std::size_t row) {
+    const std::size_t ty = top + row;
+    std::uint32_t* keys = &keys_[(ty * tiles_wide + left) * tile * tile];
+    std::fill(keys, keys + columns * tile * tile, FOREST_KEY_EMPTY);
     for (std::int32_t y = std::int32_t(ty) * tile; y < std::int32_t(ty + 1) * tile; ++y)
       for (std::int32_t x = y < height_ ? width_ : 0; x < fine_.width * tile; ++x) keys_[place(x, y)] = 0;
   });
@@ -36,9 +44,36 @@ void Canvas::read_row(std::int32_t y, std::uint32_t* keys) const {
     std::copy(from, from + std::min(tile, width_ - x), keys + x);
 }
 
+// The farthest key of a tile's wanted pixels but for the share of gaps; 0 when there are none.
+std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
+  const auto within = [&](std::int32_t low, std::uint32_t from, std::uint32_t to) {
+    return std::pair(std::max(low, std::int32_t(from)), std::min(low + tile, std::int32_t(to)));
+  };
+  const auto [left, right] = within(tx * tile, area_.left, area_.right);
+  const auto [top, bottom] = within(ty * tile, area_.top, area_.bottom);
+  if (left >= right || top >= bottom) return 0;
+  if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
+      top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
+    return 0;
+  std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile)> keys;
+  std::size_t count = 0;
+  for (std::int32_t y = top; y < bottom; ++y)
+    for (std::int32_t x = left; x < right; ++x) keys[count++] = keys_[place(x, y)];
+  const auto nth = keys.begin() + std::ptrdiff_t(float(count - 1) * (1.f - gaps_));
+  std::nth_element(keys.begin(), nth, keys.begin() + std::ptrdiff_t(count));
+  return *nth;
+}
+
 void Canvas::look() {
   fine_.farthest.resize(keys_.size() / (tile * tile));
+  const frame::Area& a = area_;
+  const bool partly = a.left > 0 || a.top > 0 || a.right < std::uint32_t(width_) ||
+                      a.bottom < std::uint32_t(height_) || gaps_ > 0.f || hole_.right > hole_.left;
   parallel_for(fine_.farthest.size(), 512, [&](std::size_t t) {
+    if (partly) {
+      fine_.farthest[t] = far_in_tile(std::int32_t(t) % fine_.width, std::int32_t(t) / fine_.width);
+      return;
+    }
     const std::uint32_t* keys = &keys_[t * tile * tile];
     std::uint32_t far = 0;
     for (std::int32_t i = 0; i < tile * tile; ++i) far = std::max(far, keys[i]);

@@ -29,7 +29,10 @@ namespace forest::render::cpu {
 class Canvas {
  public:
   /// All pixels empty.
-  void clear(std::uint32_t width, std::uint32_t height);
+  /// Those beside the area may hold anything, and with those of the hole count as hidden.
+  /// @param gaps  share of a tile's pixels that may be farther than what `hidden` goes by
+  void clear(std::uint32_t width, std::uint32_t height, const frame::Area& area, const frame::Area& hole = {},
+             float gaps = 0.f);
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
@@ -70,9 +73,13 @@ class Canvas {
   }
 
   std::int32_t width_ = 0, height_ = 0;
+  frame::Area area_, hole_;
+  float gaps_ = 0.f;
   std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
   Level fine_, coarse_;              // tiles, and tiles of tiles
   bool looked_ = false;
+
+  std::uint32_t far_in_tile(std::int32_t tx, std::int32_t ty) const;
 };
 
 }  // namespace forest::render::cpu

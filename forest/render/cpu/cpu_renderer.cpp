@@ -25,18 +25,23 @@ struct CpuRenderer::State {
   std::vector<float> sums;
   frame::Image image;
 
-  void draw(const frame::Lists& lists) {
+  // Returns how many segments there were to draw.
+  std::uint64_t draw(const frame::Lists& lists) {
+    std::uint64_t drawn = 0;
     const frame::Band whole{std::uint32_t(lists.dots.size()), std::uint32_t(lists.lines.size()),
                             std::uint32_t(lists.capsules.size())};
     frame::Band from;
     for (const frame::Band& to : lists.bands.empty() ? std::span(&whole, 1) : lists.bands) {
       if (from.dots || from.lines || from.capsules) canvas.look();
-      cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules),
-                 cpu::Kind::capsules, canvas);
-      cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
-      cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines, canvas);
+      drawn += cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules),
+                          cpu::Kind::capsules, canvas);
+      drawn +=
+          cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
+      drawn += cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines,
+                          canvas);
       from = to;
     }
+    return drawn;
   }
 };
 
@@ -51,6 +56,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   s.seen = {};
   s.picture.states = f.states, s.picture.opacities = f.opacities;
   s.picture.transparent = frame::transparent(f);
+  const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
   frame::Timing timing;
   for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes);
        ++subframe) {
@@ -60,19 +66,19 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
-    s.canvas.clear(f.width, f.height);
-    s.draw(f);
+    s.canvas.clear(f.width, f.height, area, f.hole.value_or(frame::Area{}), f.gaps);
+    timing.drawn = s.draw(f);
     if (f.rest) {
       s.canvas.look();
       s.seen = s.canvas.depth_map();
       const frame::Lists more = f.rest(s.seen);
       frame::check(more, s.picture.geometry);
-      s.draw(more);
+      timing.drawn += s.draw(more);
     }
     cpu::splat(s.picture, f.overlays, s.canvas);
     timing.draw += milliseconds_since(start);
     start = Clock::now();
-    cpu::resolve(s.canvas, c, f.palette, s.sums, s.image);
+    cpu::resolve(s.canvas, c, f.palette, area, s.sums, s.image);
     timing.resolve += milliseconds_since(start);
   }
   return timing;
@@ -84,7 +90,7 @@ frame::Image CpuRenderer::read() {
   return image;
 }
 
-const frame::Image& CpuRenderer::image() const { return state_->image; }
+const frame::Image* CpuRenderer::image() const { return &state_->image; }
 
 const frame::DepthMap& CpuRenderer::seen() const { return state_->seen; }
 

@@ -19,8 +19,7 @@ class CpuRenderer final : public Renderer {
   void load(const frame::Geometry& geometry) override;
   frame::Timing draw(const frame::Frame& frame) override;
   frame::Image read() override;
-  /// The pixels of the last frame without a copy, opacity the share of each that is covered.
-  const frame::Image& image() const;
+  const frame::Image* image() const override;
   const frame::DepthMap& seen() const override;
   std::string name() const override;
 

@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "forest/core/parallel.h"
+#include "forest/frame/constants.h"
 
 namespace forest::render::cpu {
 namespace {
@@ -73,7 +74,7 @@ struct Shading {
 }  // namespace
 
 void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palette& palette,
-             std::vector<float>& sums, frame::Image& image) {
+             const frame::Area& area, std::vector<float>& sums, frame::Image& image) {
   const auto width = std::size_t(canvas.width()), height = std::size_t(canvas.height());
   const bool first = c.subframe == 0, keep = c.subframe + 1 < c.subframes,
              show = c.subframe + 1 >= c.last_subframe;
@@ -83,10 +84,14 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
   const float share = 1.f / float(c.subframe + 1), exposure = c.exposure * share;
   const Vec3 top(c.top_red, c.top_green, c.top_blue), bottom(c.bottom_red, c.bottom_green, c.bottom_blue),
       mist(c.fog_red, c.fog_green, c.fog_blue);
+  const Vec3 glass(c.glass_red, c.glass_green, c.glass_blue);
+  const bool tinted = c.glass_opacity > 0.f;
   std::atomic<std::uint64_t> covered = 0;
-  const std::size_t chunks = (height + rows_at_once - 1) / rows_at_once, padded = width + 2 * beside;
+  const std::size_t high = area.bottom - area.top, chunks = (high + rows_at_once - 1) / rows_at_once,
+                    padded = width + 2 * beside;
   parallel_for(chunks, 1, [&](std::size_t chunk) {
-    const std::size_t begin = chunk * rows_at_once, end = std::min(height, begin + rows_at_once);
+    const std::size_t begin = area.top + chunk * rows_at_once,
+                      end = std::min<std::size_t>(area.bottom, begin + rows_at_once);
     std::vector<float> octaves((rows_at_once + 2 * beside) * padded), lit(width), fog(width);
     std::vector<std::uint32_t> all_keys((rows_at_once + 2 * beside) * width);
     const auto row_of = [&](std::size_t y) {
@@ -103,22 +108,22 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
       Shading shading{{}, keys, c.halo, c.fog_start, c.fog_length};
       for (std::size_t k = 0; k < 5; ++k) shading.rows[k] = row_of(y + k - beside);
       // Only where something is drawn.
-      for (std::size_t x = 0; x < width;) {
-        while (x < width && keys[x] == FOREST_KEY_EMPTY) ++x;
+      for (std::size_t x = area.left; x < area.right;) {
+        while (x < area.right && keys[x] == FOREST_KEY_EMPTY) ++x;
         const std::size_t from = x;
         std::size_t gap = 0;
-        for (; x < width && gap < 16; ++x) gap = keys[x] == FOREST_KEY_EMPTY ? gap + 1 : 0;
+        for (; x < area.right && gap < 16; ++x) gap = keys[x] == FOREST_KEY_EMPTY ? gap + 1 : 0;
         shade(shading, from, x, lit.data(), fog.data());
       }
       const Vec3 sky = top + (float(y) + .5f) / float(height) * (bottom - top);
       Vec3 sky_code;
       for (int i = 0; i < 3; ++i) sky_code[i] = encoded(sky[i] * c.exposure);
-      for (std::size_t x = 0; x < width; ++x) {
+      for (std::size_t x = area.left; x < area.right; ++x) {
         const std::size_t at = y * width + x;
         const bool empty = keys[x] == FOREST_KEY_EMPTY;
         const float noise = noise_at(std::int32_t(x), std::int32_t(y), c.subframe);
         std::uint8_t* pixel = &image.pixels[4 * at];
-        if (empty && c.subframes == 1) {
+        if (empty && c.subframes == 1 && !tinted) {
           for (int i = 0; i < 3; ++i) pixel[i] = std::uint8_t(smaller(sky_code[i] + noise, 255.f));
           pixel[3] = 0;
           continue;
@@ -127,6 +132,11 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
         if (!empty) {
           const Vec3& base = palette[keys[x] >> 5 & 127];
           colour = base * lit[x] + fog[x] * (mist - base * lit[x]);
+        }
+        if (tinted) {
+          const float z = frame::glass_depth(c, float(x) + .5f, float(y) + .5f);
+          if (empty ? std::isfinite(z) : z < frame::depth_of_code(keys[x] >> 12))
+            colour += c.glass_opacity * (glass - colour);
         }
         float sum[4] = {colour.x(), colour.y(), colour.z(), empty ? 0.f : 1.f};
         if (!first)
@@ -142,7 +152,7 @@ void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palet
     }
     covered += alpha;
   });
-  image.covered = double(covered) / 255. / double(std::max<std::size_t>(1, width * height));
+  image.covered = double(covered) / 255. / double(std::max<std::size_t>(1, high * (area.right - area.left)));
 }
 
 }  // namespace forest::render::cpu

@@ -2,6 +2,7 @@
 #include "forest/render/cpu/splat.h"
 
 #include <array>
+#include <atomic>
 #include <bit>
 #include <cmath>
 #include <limits>
@@ -65,12 +66,12 @@ struct Door {
   }
 };
 
-// Calls draw with the canvas of a segment.
-void through(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas, auto&& draw) {
+// Calls draw with the canvas of a segment; what it returns, false when the segment is left out.
+bool through(const Picture& picture, const Run& r, std::size_t i, Canvas& canvas, auto&& draw) {
   if (r.opacity[i] == 255) return draw(canvas);
-  if (r.opacity[i] == 0) return;
+  if (r.opacity[i] == 0) return false;
   Door door{canvas, r.opacity[i], r.key[i], picture.constants.subframe};
-  draw(door);
+  return draw(door);
 }
 
 // Of a run that is loaded, what is transparent, and what of that does not show in this subframe.
@@ -135,7 +136,8 @@ struct Beads {
   const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
               m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
   const float tx = at.x(), ty = at.y(), tz = at.z(), lx = light.x(), ly = light.y(), lz = light.z();
-  const float near = c.near, focal = c.focal, centre_x = c.centre_x, centre_y = c.centre_y;
+  const float near = c.near, focal = c.focal, converge = c.converge, parallel = c.parallel,
+              centre_x = c.centre_x, centre_y = c.centre_y;
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
   for (std::size_t i = 0; i < count; ++i) {
     float ax = m00 * r.ax[i] + m01 * r.ay[i] + m02 * r.az[i] + tx;
@@ -152,7 +154,7 @@ struct Beads {
     ax += from * dx, ay += from * dy, az = larger(az + from * dz, near);
     bx += to * dx, by += to * dy, bz = larger(bz + to * dz, near);
     const float ra = r.ra[i] + from * dr, rb = r.rb[i] + to * dr;
-    const float fa = focal / az, fb = focal / bz;
+    const float fa = focal / (converge * az + parallel), fb = focal / (converge * bz + parallel);
     r.ax[i] = ax, r.ay[i] = ay, r.az[i] = az, r.ra[i] = ra;
     r.bx[i] = bx, r.by[i] = by, r.bz[i] = bz, r.rb[i] = rb;
     r.px[i] = centre_x + fa * ax, r.py[i] = centre_y - fa * ay;
@@ -161,7 +163,7 @@ struct Beads {
     r.width[i] = seen ? fa * ra + fb * rb : -1.f;
     r.mean_width[i] = r.mean_width[i] * (fa + fb);
     // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
-    const float ex = -(ax + bx), ey = -(ay + by), ez = -(az + bz);
+    const float ex = -converge * (ax + bx), ey = -converge * (ay + by), ez = -(az + bz);
     const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
                 per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
     const float along = (dx * lx + dy * ly + dz * lz) * per_length,
@@ -212,13 +214,16 @@ struct Beads {
   }
 }
 
+// What a length at this depth is divided by to be seen.
+float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }
+
 // The whole number of `x`, cut at the edges of the picture: what stands right before the eye reaches far beyond all of them.
 std::int32_t clipped(float x, float limit) { return std::int32_t(smaller(larger(x, 0.f), limit)); }
 
-// As draw_line in render/opengl/shaders/common.glsl.
-void draw_line(const Run& r, std::size_t i, auto& canvas) {
+// As draw_line in render/opengl/shaders/common.glsl. Whether there was anything to draw.
+bool draw_line(const Run& r, std::size_t i, auto& canvas) {
   if (!(r.line_width[i] > 0.f) || canvas.hidden(r.left[i], r.top[i], r.right[i], r.bottom[i], r.nearest[i]))
-    return;
+    return false;
   const bool steep = r.steep[i];
   const float half = .5f * r.line_width[i], slope = r.slope[i], rise = r.rise[i];
   const float limit_across = float(steep ? canvas.width() : canvas.height());
@@ -232,14 +237,15 @@ void draw_line(const Run& r, std::size_t i, auto& canvas) {
     for (std::int32_t across = low; across < end; ++across)
       steep ? canvas.put(across, x, key) : canvas.put(x, across, key);
   }
+  return true;
 }
 
 // A thin capsule by its distance from the axis on screen: as draw_tube in render/opengl/shaders/capsule.glsl.
 void draw_tube(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
   const frame::Constants& c = picture.constants;
   float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i];
-  float wp = c.focal * r.ra[i] / r.az[i], wq = c.focal * r.rb[i] / r.bz[i], za = r.code_a[i],
-        zb = r.code_b[i];
+  float wp = c.focal * r.ra[i] / lens(c, r.az[i]), wq = c.focal * r.rb[i] / lens(c, r.bz[i]),
+        za = r.code_a[i], zb = r.code_b[i];
   constexpr float octave = 1.442695f * float(FOREST_DEPTH_STEPS);
   const float bulge = octave * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
   const bool steep = std::abs(qy - py) > std::abs(qx - px);
@@ -252,7 +258,8 @@ void draw_tube(const Picture& picture, const Run& r, std::size_t i, auto& canvas
   const std::int32_t first = clipped(std::ceil(px - over - .5f), limit),
                      last = clipped(std::ceil(qx + over - .5f), limit);
   const Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
-  const Vec3 tangent = (b - a).normalized(), eye = -(a + b).normalized();
+  const Vec3 tangent = (b - a).normalized(),
+             eye = -(a + b).cwiseProduct(Vec3(c.converge, c.converge, 1.f)).normalized();
   const Vec3 facing = (eye - eye.dot(tangent) * tangent).normalized();
   Vec3 side = tangent.cross(facing);
   if ((steep ? side.x() : -side.y()) < 0.f) side = -side;
@@ -303,18 +310,22 @@ using Keys = std::array<std::uint32_t, lanes>;
                                                             const Body& body, std::uint32_t entry,
                                                             std::int32_t first_x, std::int32_t y,
                                                             Keys& keys) {
-  const float ax = body.a.x(), ay = body.a.y(), az = body.a.z(), bx = body.b.x(), by = body.b.y(),
-              bz = body.b.z(), ux = body.u.x(), uy = body.u.y(), uz = body.u.z(), lx = light.x(),
-              ly = light.y(), lz = light.z();
+  const float az = body.a.z(), bz = body.b.z(), ux = body.u.x(), uy = body.u.y(), uz = body.u.z(),
+              lx = light.x(), ly = light.y(), lz = light.z();
   const float ra = body.ra, rb = body.rb, s = body.s, c2 = body.c2, cosine = body.cosine;
   const float begin = s * ra, end = body.length + s * rb;  // of the cone's surface, along the axis
-  const float per_focal = 1.f / c.focal, near = c.near, slope_y = (c.centre_y - float(y) - .5f) * per_focal;
+  const float per_focal = 1.f / c.focal, near = c.near, converge = c.converge, parallel = c.parallel;
+  const float above = (c.centre_y - float(y) - .5f) * per_focal, slope_y = converge * above;
+  // From where the rays begin, which for an orthographic camera is beside the eye.
+  const float ay = body.a.y() - parallel * above, by = body.b.y() - parallel * above;
+  const float body_ax = body.a.x(), body_bx = body.b.x();
   const float from_x = .5f - c.centre_x, per_ra = 1.f / larger(ra, 1e-9f), per_rb = 1.f / larger(rb, 1e-9f);
   const std::int32_t cone = body.nested ? 0 : 1;
   const std::uint32_t subframe = c.subframe;
   for (std::int32_t lane = 0; lane < lanes; ++lane) {
     const std::int32_t x = first_x + lane;
-    const float slope_x = (float(x) + from_x) * per_focal;
+    const float beside = (float(x) + from_x) * per_focal, slope_x = converge * beside;
+    const float ax = body_ax - parallel * beside, bx = body_bx - parallel * beside;
     const float dz = 1.f / std::sqrt(slope_x * slope_x + slope_y * slope_y + 1.f), dx = slope_x * dz,
                 dy = slope_y * dz;
     const float shift = ax * dx + ay * dy + az * dz;
@@ -414,11 +425,12 @@ class Outline {
 
 // The discs are exact where spheres are small beside their distance and not far from the middle of the picture.
 Outline outline_of(const frame::Constants& c, const Run& r, std::size_t i, const Body& body) {
-  const auto small = [](const Vec3& p, float radius) {
-    return radius < .25f * p.z() && p.squaredNorm() < 2.5f * p.z() * p.z();
+  const auto small = [&](const Vec3& p, float radius) {
+    return c.parallel > 0.f || (radius < .25f * p.z() && p.squaredNorm() < 2.5f * p.z() * p.z());
   };
   const bool exact = small(body.a, body.ra) && small(body.b, body.rb);
   const auto reach = [&](const Vec3& p, float radius) {
+    if (c.parallel > 0.f) return 1.f + c.focal * radius;
     return 1.f + c.focal * radius *
                      (exact ? p.norm() / (p.z() * (p.z() - radius))  // as scene/occlusion.cpp
                             : 1.05f / std::max(p.z() - .5f * radius, c.near));
@@ -439,7 +451,9 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, auto& can
     const auto [left, right] = outline.across(at);
     if (!(left < right)) return;
     const auto [begin, end] = outline.part(at);
-    const float depth = 1.f / std::max(from + begin * (to - from), from + end * (to - from));
+    const float depth = c.parallel > 0.f
+                            ? std::min(body.a.z(), body.b.z())
+                            : 1.f / std::max(from + begin * (to - from), from + end * (to - from));
     const std::uint32_t nearest = key_of(depth_code(std::max(depth * .9999f - thickest, c.near)), 0);
     const std::int32_t low = clipped(std::floor(left), width), high = clipped(std::ceil(right), width);
     Keys keys;
@@ -457,10 +471,10 @@ void draw_capsule(const Picture& picture, const Run& r, std::size_t i, auto& can
     for (std::int32_t y = first; y < last; ++y) scan(y);
 }
 
-void draw_near(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
+bool draw_near(const Picture& picture, const Run& r, std::size_t i, auto& canvas) {
   const frame::Constants& c = picture.constants;
-  if (r.width[i] < 0.f) return;
-  const float width = c.focal * std::max(r.ra[i] / r.az[i], r.rb[i] / r.bz[i]);
+  if (r.width[i] < 0.f) return false;
+  const float width = c.focal * std::max(r.ra[i] / lens(c, r.az[i]), r.rb[i] / lens(c, r.bz[i]));
   if (width < .75f) return draw_line(r, i, canvas);
   const float reach = 1.f + 1.05f * width;
   const float nearest = std::max(std::min(r.az[i] - r.ra[i], r.bz[i] - r.rb[i]), c.near);
@@ -468,17 +482,20 @@ void draw_near(const Picture& picture, const Run& r, std::size_t i, auto& canvas
                     std::max(r.px[i], r.qx[i]) + reach, std::max(r.py[i], r.qy[i]) + reach,
                     depth_code(nearest)) &&
       nearest > c.near)
-    return;
+    return false;
   const float distance = std::hypot(r.qx[i] - r.px[i], r.qy[i] - r.py[i]);
-  2.f * width<tube_width && distance> .5f * width ? draw_tube(picture, r, i, canvas)
-                                                  : draw_capsule(picture, r, i, canvas);
+  if (2.f * width < tube_width && distance > .5f * width)
+    draw_tube(picture, r, i, canvas);
+  else
+    draw_capsule(picture, r, i, canvas);
+  return true;
 }
 
 // Small spheres: as render/opengl/shaders/dots.glsl.
 void draw_dot(const Picture& picture, const Run& r, float rank, auto& canvas) {
   if (r.width[0] < 0.f) return;
   const frame::Constants& c = picture.constants;
-  const float px = r.px[0], py = r.py[0], z = r.az[0], radius = c.focal * r.ra[0] / z;
+  const float px = r.px[0], py = r.py[0], z = r.az[0], radius = c.focal * r.ra[0] / lens(c, z);
   if (radius < .6f) {  // less than a pixel: drawn for its share of subframes
     const float x = std::floor(px), y = std::floor(py);
     if (3.14159f * radius * radius > rank && x >= 0.f && y >= 0.f && x < float(canvas.width()) &&
@@ -508,23 +525,25 @@ void draw_dot(const Picture& picture, const Run& r, float rank, auto& canvas) {
 void draw_beads(const Picture& picture, const frame::Item& item, const Mat3& turn, const Vec3& at,
                 float depth, Run& r, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
-  const Beads beads(r, c.focal / std::max(depth, c.near));
+  const Beads beads(r, c.focal / lens(c, std::max(depth, c.near)));
   const float of_branch = (r.entry[0] & 7) == 1 ? 0.f : float(item.first_segment & 0xffff) * .5698403f;
   for (std::uint32_t k = 0; k < beads.count; ++k) {
     beads.put(k, r);
     project(c, turn, at, picture.light, r);
     const float rank = fraction(float(item.instance) * .7548777f + of_branch + float(k) * .3819660f +
                                 golden * float(c.subframe));
-    through(picture, r, 0, canvas, [&](auto& seen) { draw_dot(picture, r, rank, seen); });
+    through(picture, r, 0, canvas, [&](auto& seen) { return draw_dot(picture, r, rank, seen), true; });
   }
 }
 
 }  // namespace
 
-void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
+std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
+  std::atomic<std::uint64_t> all = 0;
   parallel_ranges(items.size(), grain, [&](std::size_t begin, std::size_t end) {
     Run r{};
+    std::uint64_t drawn = 0;
     for (std::size_t k = begin; k < end; ++k) {
       const frame::Item& item = items[k];
       if (!item.drawn) continue;
@@ -532,9 +551,10 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       const Vec3 centre = picture.to_camera * (Vec3(item.x, item.y, item.z) - picture.eye);
       const float nearest = centre.z() - item.radius;
       if (nearest > c.near) {
-        const float reach = c.focal * item.radius * centre.norm() / (centre.z() * nearest) + 2.f;
-        const float x = c.centre_x + c.focal * centre.x() / centre.z(),
-                    y = c.centre_y - c.focal * centre.y() / centre.z();
+        const float scale = c.focal / lens(c, centre.z());
+        const float reach =
+            c.focal * item.radius * (c.parallel + c.converge * centre.norm() / (centre.z() * nearest)) + 2.f;
+        const float x = c.centre_x + scale * centre.x(), y = c.centre_y - scale * centre.y();
         if (canvas.hidden(x - reach, y - reach, x + reach, y + reach, depth_code(nearest))) continue;
       }
       const frame::Instance& instance = picture.geometry.instances[item.instance];
@@ -544,6 +564,7 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       load(picture, item, r);
       if (kind == Kind::dots) {
         draw_beads(picture, item, turn, at, centre.z(), r, canvas);
+        ++drawn;
         continue;
       }
       project(c, turn, at, picture.light, r);
@@ -552,18 +573,21 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
           prepare_lines(c, r);
           for (std::size_t i = 0; i < r.count; ++i)
             if (r.line_width[i] > 0.f)
-              through(picture, r, i, canvas, [&](auto& seen) { draw_line(r, i, seen); });
+              drawn += through(picture, r, i, canvas, [&](auto& seen) { return draw_line(r, i, seen); });
           break;
         case Kind::capsules:
           prepare_lines(c, r);
           for (std::size_t i = 0; i < r.count; ++i)
-            through(picture, r, i, canvas, [&](auto& seen) { draw_near(picture, r, i, seen); });
+            drawn +=
+                through(picture, r, i, canvas, [&](auto& seen) { return draw_near(picture, r, i, seen); });
           break;
         case Kind::dots:
           break;
       }
     }
+    all += drawn;
   });
+  return all;
 }
 
 void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas) {
@@ -579,7 +603,7 @@ void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Can
       r.rank[0] = r.mean_width[0] = 0.f;
       r.entry[0] = o.colour;
       const auto least = [&](const Vec3& p) {
-        return std::max(o.radius, (picture.to_camera.row(2).dot(p) + at.z()) / c.focal);
+        return std::max(o.radius, lens(c, picture.to_camera.row(2).dot(p) + at.z()) / c.focal);
       };
       r.ra[0] = least(o.a), r.rb[0] = least(o.b);
       project(c, picture.to_camera, at, picture.light, r);

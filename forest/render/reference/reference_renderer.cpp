@@ -10,6 +10,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/frame/constants.h"
 
 namespace forest::render {
 namespace {
@@ -64,6 +65,7 @@ struct Eye {
   Mat3 to_camera;
   Vec3 at;
   float focal, near, centre_x, centre_y;
+  bool orthographic;
   int width, height;
   Vec3 light;
 
@@ -73,6 +75,7 @@ struct Eye {
         near(f.camera.near),
         centre_x(.5f * float(f.width)),
         centre_y(.5f * float(f.height)),
+        orthographic(f.camera.orthographic()),
         width(int(f.width)),
         height(int(f.height)),
         light(frame::light_direction()) {
@@ -80,10 +83,17 @@ struct Eye {
     to_camera.row(2) *= -1.f;
   }
   Vec3 seen(const Vec3& world) const { return to_camera * (world - at); }
+  // Pixels that a µm covers at a depth.
+  float scale(float depth) const { return orthographic ? focal : focal / depth; }
 };
 
 // The rectangle that a sphere covers, in pixels to the right of and below the centre; none when the eye is too near.
 bool extent(const Eye& eye, const Vec3& c, float r, float& left, float& right, float& top, float& bottom) {
+  if (eye.orthographic) {
+    left = eye.focal * (c.x() - r), right = eye.focal * (c.x() + r);
+    top = eye.focal * (-c.y() - r), bottom = eye.focal * (-c.y() + r);
+    return true;
+  }
   if (c.z() <= 1.001f * r) return false;
   const float scale = eye.focal / (c.z() * c.z() - r * r);
   const auto edge = [&](float across, float side) {
@@ -108,7 +118,7 @@ bool project(const Eye& eye, Capsule& c) {
       c.b = cut, c.rb = r;
   }
   const auto pixel = [&](const Vec3& v, float out[2]) {
-    out[0] = eye.centre_x + eye.focal * v.x() / v.z(), out[1] = eye.centre_y - eye.focal * v.y() / v.z();
+    out[0] = eye.centre_x + eye.scale(v.z()) * v.x(), out[1] = eye.centre_y - eye.scale(v.z()) * v.y();
   };
   pixel(c.a, c.p);
   pixel(c.b, c.q);
@@ -149,14 +159,20 @@ float distance_to_line(const Capsule& c, float x, float y) {
   return std::hypot(x - c.p[0] - t * dx, y - c.p[1] - t * dy);
 }
 
+// Rays (x, y, 1) that begin at (from_x, from_y, 0): slopes of a perspective camera, beginnings of an orthographic one.
+struct Rays {
+  Lanes x = Lanes::constant(0.f), y = x, from_x = x, from_y = x;
+};
+
 // Lowers depth to where the rays enter a sphere.
-void meet_sphere(const Vec3& centre, float radius, const Lanes& x, const Lanes& y, Lanes& depth) {
+void meet_sphere(const Vec3& centre, float radius, const Rays& rays, Lanes& depth) {
   Lanes shift, h, under;
+  const Lanes &x = rays.x, &y = rays.y;
   for (std::size_t i = 0; i < lanes; ++i) {
     const float dd = x[i] * x[i] + y[i] * y[i] + 1.f;
-    shift[i] = (x[i] * centre.x() + y[i] * centre.y() + centre.z()) / dd;  // the closest approach
-    const float ox = shift[i] * x[i] - centre.x(), oy = shift[i] * y[i] - centre.y(),
-                oz = shift[i] - centre.z();
+    const float cx = centre.x() - rays.from_x[i], cy = centre.y() - rays.from_y[i];
+    shift[i] = (x[i] * cx + y[i] * cy + centre.z()) / dd;  // the closest approach
+    const float ox = shift[i] * x[i] - cx, oy = shift[i] * y[i] - cy, oz = shift[i] - centre.z();
     h[i] = radius * radius - ox * ox - oy * oy - oz * oz;
     under[i] = (h[i] > 0.f ? h[i] : 0.f) / dd;
   }
@@ -170,12 +186,14 @@ void meet_sphere(const Vec3& centre, float radius, const Lanes& x, const Lanes& 
 
 // The same for the side between the spheres. Returns whether a ray may still meet one of them: both lie within the
 // infinite cone, and what enters by the side enters there first.
-bool meet_side(const Capsule& c, const Lanes& x, const Lanes& y, Lanes& depth) {
+bool meet_side(const Capsule& c, const Rays& rays, Lanes& depth) {
   Lanes shift, ou, du, A, B, under, upper, t, along;
+  const Lanes &x = rays.x, &y = rays.y;
   for (std::size_t i = 0; i < lanes; ++i) {
     const float dd = x[i] * x[i] + y[i] * y[i] + 1.f;
-    shift[i] = (x[i] * c.a.x() + y[i] * c.a.y() + c.a.z()) / dd;  // start there, for precision far away
-    const float ox = shift[i] * x[i] - c.a.x(), oy = shift[i] * y[i] - c.a.y(), oz = shift[i] - c.a.z();
+    const float gx = rays.from_x[i], gy = rays.from_y[i], ax = c.a.x() - gx, ay = c.a.y() - gy;
+    shift[i] = (x[i] * ax + y[i] * ay + c.a.z()) / dd;  // start there, for precision far away
+    const float ox = shift[i] * x[i] - ax, oy = shift[i] * y[i] - ay, oz = shift[i] - c.a.z();
     ou[i] = ox * c.u.x() + oy * c.u.y() + oz * c.u.z();
     du[i] = x[i] * c.u.x() + y[i] * c.u.y() + c.u.z();
     // What is across the axis of the start (p) and of the ray (d).
@@ -186,7 +204,8 @@ bool meet_side(const Capsule& c, const Lanes& x, const Lanes& y, Lanes& depth) {
     B[i] = c.c2 * (px * dx + py * dy + pz * dz) - k0 * k1;
     // B² - A·C, without the difference of large numbers: by the moment of the axis about the ray.
     const float mx = k0 * dx - k1 * px, my = k0 * dy - k1 * py, mz = k0 * dz - k1 * pz;
-    const float moment = c.moment.x() * x[i] + c.moment.y() * y[i] + c.moment.z();
+    const float moment = (c.moment.x() - gy * c.u.z()) * x[i] + (c.moment.y() + gx * c.u.z()) * y[i] +
+                         c.moment.z() - gx * c.u.y() + gy * c.u.x();
     under[i] = c.c2 * (mx * mx + my * my + mz * mz - c.c2 * moment * moment);
     upper[i] = under[i] > 0.f ? under[i] : 0.f;
   }
@@ -225,19 +244,19 @@ float facing(const Capsule& c, const Vec3& place, const Vec3& light) {
 // Where the rays (x, y, 1) enter the capsule, as geometry/round_cone.h but for sixteen rays, none of unit length: what
 // is solved for is the depth itself.
 // Only the samples whose bits are set in `shown` change.
-void meet(const Capsule& c, const Lanes& x, const Lanes& y, const Eye& eye, std::uint32_t shown,
-          Pixel& pixel) {
+void meet(const Capsule& c, const Rays& rays, const Eye& eye, std::uint32_t shown, Pixel& pixel) {
   Lanes depth = Lanes::constant(INFINITY);
-  if (c.c2 <= 0.f || meet_side(c, x, y, depth)) {
-    meet_sphere(c.a, c.ra, x, y, depth);
-    meet_sphere(c.b, c.rb, x, y, depth);
+  if (c.c2 <= 0.f || meet_side(c, rays, depth)) {
+    meet_sphere(c.a, c.ra, rays, depth);
+    meet_sphere(c.b, c.rb, rays, depth);
   }
   bool changed = false;
   for (std::size_t i = 0; i < lanes; ++i) {
     const float z = std::max(depth[i], eye.near);
     if (!(z < pixel.depth[i]) || !(shown >> i & 1)) continue;
     pixel.depth[i] = z;
-    pixel.shade[i] = std::clamp(.5f + .5f * facing(c, depth[i] * Vec3(x[i], y[i], 1.f), eye.light), 0.f, 1.f);
+    const Vec3 place = depth[i] * Vec3(rays.x[i], rays.y[i], 1.f) + Vec3(rays.from_x[i], rays.from_y[i], 0.f);
+    pixel.shade[i] = std::clamp(.5f + .5f * facing(c, place, eye.light), 0.f, 1.f);
     pixel.entry[i] = c.entry;
     changed = true;
   }
@@ -290,6 +309,11 @@ class Canvas {
   /// Adds the colours of the first `count` samples to sums.
   void resolve(const frame::Frame& f, std::size_t count, std::vector<Vec4>& sums) {
     const frame::Style& style = f.style;
+    if (f.glass) {  // of the middle of the picture: samples are shifted below
+      frame::Frame one = f;
+      one.subframes = 1;
+      glass_ = frame::constants_of(one, 0);
+    }
     parallel_for(pixels_.size(), 4096, [&](std::size_t i) {  // depths as octaves, which halos compare
       for (float& d : pixels_[i].depth) d = std::log2(d);
     });
@@ -301,15 +325,22 @@ class Canvas {
         const Pixel& pixel = at(x, y);
         Vec4& sum = sums[row * f.width + std::size_t(x)];
         for (std::size_t i = 0; i < count; ++i) {
+          const float glass =
+              f.glass ? frame::glass_depth(glass_, float(x) + .5f - shift_x_[i], float(y) + .5f - shift_y_[i])
+                      : INFINITY;
+          const auto tinted = [&](const Vec3& light) -> Vec3 {
+            return light + f.glass->opacity * (f.glass->colour - light);
+          };
           if (pixel.depth[i] == INFINITY) {
-            sum.head<3>() += behind;
+            sum.head<3>() += std::isfinite(glass) ? tinted(behind) : behind;
             continue;
           }
           const float z = std::exp2(pixel.depth[i]), shade = pixel.shade[i];
           const float fog = 1.f - std::exp(-std::max(0.f, z - style.fog_start) / style.fog_length);
           const Vec3 lit = f.palette[pixel.entry[i]] * (.16f + 1.05f * shade * shade) *
                            std::exp(-1.1f * style.halo * rim(x, y, i));
-          sum.head<3>() += lit + fog * (style.fog_colour - lit);
+          const Vec3 seen = lit + fog * (style.fog_colour - lit);
+          sum.head<3>() += glass < z ? tinted(seen) : seen;
           sum.w() += 1.f;
         }
       }
@@ -325,13 +356,15 @@ class Canvas {
         Pixel& pixel = at(x, y);
         const float px = float(x) + .5f, py = float(y) + .5f;
         if (c.nearest >= pixel.farthest || distance_to_line(c, px, py) > c.reach) continue;
-        Lanes ray_x, ray_y;
+        Rays rays;
+        Lanes &ray_x = eye_.orthographic ? rays.from_x : rays.x,
+              &ray_y = eye_.orthographic ? rays.from_y : rays.y;
         for (std::size_t i = 0; i < lanes; ++i) {
           ray_x[i] = (px - eye_.centre_x - shift_x_[i]) / eye_.focal;
           ray_y[i] = (eye_.centre_y + shift_y_[i] - py) / eye_.focal;
         }
         const auto place = std::uint32_t(y * eye_.width + x);
-        meet(c, ray_x, ray_y, eye_, shown(c, by_pixel_ ? frame::forest_mixed(place) : 0u), pixel);
+        meet(c, rays, eye_, shown(c, by_pixel_ ? frame::forest_mixed(place) : 0u), pixel);
       }
   }
 
@@ -364,6 +397,7 @@ class Canvas {
   Lanes shift_x_, shift_y_;
   std::vector<Pixel> pixels_;
   std::vector<float> farthest_;  // depth in each tile
+  frame::Constants glass_{};
 };
 
 float srgb(float c) {
@@ -445,7 +479,8 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     for (const frame::Overlay& o : f.overlays) {
       Capsule c{};
       c.a = eye.seen(o.a), c.b = eye.seen(o.b);
-      c.ra = std::max(o.radius, c.a.z() / eye.focal), c.rb = std::max(o.radius, c.b.z() / eye.focal);
+      c.ra = std::max(o.radius, 1.f / eye.scale(c.a.z())),
+      c.rb = std::max(o.radius, 1.f / eye.scale(c.b.z()));
       c.entry = std::uint8_t(o.colour);
       c.opacity = 255;
       if (project(eye, c)) capsules.push_back(c);

@@ -49,6 +49,40 @@ struct Fixture {
   double area() { return draw().covered * frame.width * frame.height; }  // pixels
 };
 
+TEST(ReferenceRenderer, AnOrthographicCameraShowsThingsAsLargeAtAnyDepth) {
+  for (const float depth : {-60.f, 0.f, 60.f})
+    for (const float radius : {.3f, 5.f}) {
+      Fixture f;
+      f.frame.camera.projection = frame::Projection::orthographic;
+      f.frame.subframes = 64;
+      f.add({-20, 3, depth}, {15, -8, depth - 10}, radius, radius);
+      const double scale = f.frame.camera.focal(200.f), length = Vec3(35, -11, 0).norm(),
+                   r = double(Eigen::half(radius));
+      EXPECT_NEAR(f.area() / (scale * scale * (2 * r * length + M_PI * r * r)), 1., .01) << radius;
+    }
+}
+
+TEST(ReferenceRenderer, GlassTintsWhatLiesBehindItAndNothingBefore) {
+  Fixture f;
+  f.add({-12, 0, 20}, {-12, 0, 20}, 6.f, 6.f);
+  f.add({12, 0, -20}, {12, 0, -20}, 6.f, 6.f);
+  f.frame.glass = frame::Glass{.plane = Plane::through({0, 0, 0}, {0, 0, 1}),
+                               .low = {-25, -20},
+                               .high = {25, 20},
+                               .colour = {0, 0, 1},
+                               .opacity = .5f};
+  const frame::Image image = f.draw();
+  const auto at = [&](const Vec3& point) {
+    const Vec3 place = frame::project(f.frame.camera, {200, 200}, point);
+    return &image.pixels[4 * (std::size_t(place.y()) * 200 + std::size_t(place.x()))];
+  };
+  EXPECT_EQ(at({-12, 0, 20})[2], 0);
+  EXPECT_GT(at({12, 0, -20})[2], 100);
+  EXPECT_GT(at({24, 19, 0})[2], 100);
+  EXPECT_EQ(at({26, 19, 0})[2], 0);
+  EXPECT_EQ(at({24, 21, 0})[2], 0);
+}
+
 TEST(ReferenceRenderer, CapsuleCoversItsProjectedAreaHoweverThin) {
   for (const float radius : {.01f, .05f, .3f, 1.f, 6.f}) {
     Fixture f;

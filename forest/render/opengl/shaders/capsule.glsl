@@ -22,8 +22,8 @@ void draw_capsule(Capsule c, int lane, int lanes) {
   // No pixel of it can be nearer than this.
   uint nearest = uint(depth_code(max(min(c.a.z - c.ra, c.b.z - c.rb), view.near))) << 12;
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
-  float rp = 1.0 + 1.05 * view.focal * c.ra / max(c.a.z - 0.5 * c.ra, view.near);
-  float rq = 1.0 + 1.05 * view.focal * c.rb / max(c.b.z - 0.5 * c.rb, view.near);
+  float rp = 1.0 + 1.05 * view.focal * c.ra / max(lens(c.a.z - 0.5 * c.ra), lens(view.near));
+  float rq = 1.0 + 1.05 * view.focal * c.rb / max(lens(c.b.z - 0.5 * c.rb), lens(view.near));
   bool steep = abs(q.y - p.y) > abs(q.x - p.x);
   if (steep) { p = p.yx; q = q.yx; }
   int limit_x = int(steep ? view.height : view.width), limit_y = int(steep ? view.width : view.height);
@@ -55,12 +55,13 @@ void draw_capsule(Capsule c, int lane, int lanes) {
 #ifdef FOREST_DOOR
       if (!open_at(pixel)) continue;
 #endif
-      vec3 ray = normalize(vec3((float(px) + 0.5 - view.centre_x) / view.focal,
-                                (view.centre_y - float(py) - 0.5) / view.focal, 1.0));
+      vec2 beside = vec2(float(px) + 0.5 - view.centre_x, view.centre_y - float(py) - 0.5) / view.focal;
+      vec3 ray = normalize(vec3(view.converge * beside, 1.0)), begin = vec3(view.parallel * beside, 0.0);
+      vec3 to_a = c.a - begin;
       Hit hit = Hit(1e30, vec3(0.0));
       if (!nested) {
-        float shift = dot(c.a, ray);
-        vec3 o = shift * ray - c.a;
+        float shift = dot(to_a, ray);
+        vec3 o = shift * ray - to_a;
         float oy = dot(o, u), dy = dot(ray, u);
         float k0 = c.ra - s * oy, k1 = -s * dy;
         float A = c2 * (1.0 - dy * dy) - k1 * k1;
@@ -78,8 +79,8 @@ void draw_capsule(Capsule c, int lane, int lanes) {
         }
       }
       if (hit.t > 1e29) {
-        meet_sphere(ray, c.a, c.ra, hit);
-        meet_sphere(ray, c.b, c.rb, hit);
+        meet_sphere(ray, to_a, c.ra, hit);
+        meet_sphere(ray, c.b - begin, c.rb, hit);
       }
       if (hit.t > 1e29) continue;
       float z = max(hit.t * ray.z, view.near);
@@ -94,7 +95,7 @@ void draw_capsule(Capsule c, int lane, int lanes) {
 // are cut along the scan line, a little beyond the joints, so that bends show no gap.
 void draw_tube(Capsule c) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
-  float wp = view.focal * c.ra / c.a.z, wq = view.focal * c.rb / c.b.z;
+  float wp = view.focal * c.ra / lens(c.a.z), wq = view.focal * c.rb / lens(c.b.z);
   float za = depth_code(c.a.z), zb = depth_code(c.b.z);
   const float octave = 1.442695 * FOREST_DEPTH_STEPS;  // of code, for a relative step in depth
   float bulge = octave * max(c.ra / c.a.z, c.rb / c.b.z);
@@ -111,7 +112,7 @@ void draw_tube(Capsule c) {
   int first = max(int(ceil(p.x - over - 0.5)), 0), last = min(int(ceil(q.x + over - 0.5)), limit_x);
 
   // The normal at distance t from the axis: t along `side`, sqrt(1 - t²) towards the eye, both across the tangent.
-  vec3 tangent = normalize(c.b - c.a), eye = -normalize(c.a + c.b);
+  vec3 tangent = normalize(c.b - c.a), eye = towards_eye(c.a + c.b);
   vec3 facing = normalize(eye - dot(eye, tangent) * tangent), side = cross(tangent, facing);
   vec2 across = steep ? vec2(1.0, 0.0) : vec2(0.0, -1.0);  // of growing y, in camera axes
   if (dot(side.xy, across) < 0.0) side = -side;

@@ -9,7 +9,7 @@ const float large_area = 300.0;  // pixels of the rectangle around it
 void main() {
   Capsule c;
   if (!fetch_queued(c)) return;
-  float width = view.focal * max(c.ra / c.a.z, c.rb / c.b.z);
+  float width = view.focal * max(c.ra / lens(c.a.z), c.rb / lens(c.b.z));
   if (width < 0.75) {
     draw_line(c);
     return;

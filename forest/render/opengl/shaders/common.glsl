@@ -39,8 +39,13 @@ vec3 to_camera(vec3 world) {
 
 vec3 turned(vec4 q, vec3 v) { return v + 2.0 * cross(q.xyz, cross(q.xyz, v) + q.w * v); }
 
+// What a length at this depth is divided by to be seen.
+float lens(float z) { return view.converge * z + view.parallel; }
+
+vec3 towards_eye(vec3 p) { return -normalize(vec3(view.converge * p.xy, p.z)); }
+
 vec2 to_pixel(vec3 p) {
-  float f = view.focal / p.z;
+  float f = view.focal / lens(p.z);
   return vec2(view.centre_x + f * p.x, view.centre_y - f * p.y);
 }
 
@@ -104,8 +109,8 @@ bool fetch(uint item_index, uint index, out Capsule c) {
   if ((view.flags & FOREST_OVERLAY) != 0u) {  // overlays: in the world, at least two pixels wide, entry in the meta word
     c.a = to_camera(c.a);
     c.b = to_camera(c.b);
-    c.ra = max(c.ra, c.a.z / view.focal);
-    c.rb = max(c.rb, c.b.z / view.focal);
+    c.ra = max(c.ra, lens(c.a.z) / view.focal);
+    c.rb = max(c.rb, lens(c.b.z) / view.focal);
     c.entry = meta >> 16;
     c.rank = 0.0;
     c.mean = 0.0;
@@ -164,7 +169,7 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
   return !seen;
 }
 
-float width_in_pixels(Capsule c) { return view.focal * (c.ra / c.a.z + c.rb / c.b.z); }
+float width_in_pixels(Capsule c) { return view.focal * (c.ra / lens(c.a.z) + c.rb / lens(c.b.z)); }
 
 // What stands right before the eye reaches far beyond the picture.
 int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit))); }
@@ -181,7 +186,7 @@ void draw_line(Capsule c) {
   float width = width_in_pixels(c) * stretch;
   if (view.subframes == 1u) {
     // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
-    if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / c.a.z + 1.0 / c.b.z) * FOREST_MEAN_STRETCH, 1.0);
+    if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH, 1.0);
     width = floor(width + 1.0 - c.rank - 1.0 / 512.0);
     if (width < 1.0) return;
   }
@@ -196,7 +201,7 @@ void draw_line(Capsule c) {
 
   // The mean light of the half cylinder one sees, of (0.5 + 0.5 n·l)² as resolve.glsl has it: with the front's share b and
   // the side's a of the light, the mean of n·l is π b / 4, and of its square (a² + 2 b²) / 3.
-  vec3 tangent = normalize(c.b - c.a + vec3(1e-9)), eye = -normalize(c.a + c.b);
+  vec3 tangent = normalize(c.b - c.a + vec3(1e-9)), eye = towards_eye(c.a + c.b);
   float along = dot(tangent, light()), end_on = dot(eye, tangent);
   float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
   float a2 = max(0.0, 1.0 - along * along - b * b);

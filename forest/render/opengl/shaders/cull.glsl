@@ -6,7 +6,7 @@ bool hidden(vec4 sphere) {
   vec3 centre = to_camera(sphere.xyz);
   float nearest = centre.z - sphere.w;
   if (nearest <= view.near) return false;
-  float reach = view.focal * sphere.w * length(centre) / (centre.z * nearest) + 2.0;  // as scene/occlusion.cpp
+  float reach = view.focal * sphere.w * (view.parallel + view.converge * length(centre) / (centre.z * nearest)) + 2.0;  // as scene/occlusion.cpp
   vec2 at = to_pixel(centre);
   return hidden(at - reach, at + reach, nearest, 64u);
 }

@@ -4,7 +4,7 @@ layout(local_size_x = FOREST_GROUP) in;
 
 void draw_dot(Capsule c, float rank) {
   vec2 p = to_pixel(c.a);
-  float r = view.focal * c.ra / c.a.z;
+  float r = view.focal * c.ra / lens(c.a.z);
   if (r < 0.6) {  // less than a pixel: drawn for its share of subframes
     if (3.14159 * r * r <= rank) return;
     ivec2 pixel = ivec2(floor(p));
@@ -33,7 +33,7 @@ void main() {
   vec3 from = c.a, way = c.b - c.a;
   uint count = 1u;
   if (len > 0.0) {  // of a branch: a string of beads, as in render/cpu/splat.cpp
-    float most = min(min(0.5 * len / max(width, 1e-6), 0.5 * len * view.focal / (0.5 * (c.a.z + c.b.z))), 16.0);
+    float most = min(min(0.5 * len / max(width, 1e-6), 0.5 * len * view.focal / lens(0.5 * (c.a.z + c.b.z))), 16.0);
     count = uint(max(most, 1.0));
     c.ra = sqrt(len * width / (3.14159 * float(count)));
   }

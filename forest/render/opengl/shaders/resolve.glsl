@@ -12,6 +12,18 @@ float depth_at(int x, int y) {
   return float(texelFetch(keys_seen, int(uint(y) * view.width + uint(x))).x >> 12) / FOREST_DEPTH_STEPS;  // octaves
 }
 
+// As frame::glass_depth; 1e30 where the ray does not meet the glass.
+float glass_depth(vec2 pixel) {
+  vec2 beside = vec2(pixel.x - view.centre_x, view.centre_y - pixel.y) / view.focal;
+  float across = dot(vec2(view.glass_x, view.glass_y), beside);
+  float z = (view.glass_at - view.parallel * across) / (view.converge * across + view.glass_z);
+  if (!(z > view.near)) return 1e30;
+  float wide = view.converge * z + view.parallel;
+  float right = wide * dot(vec2(view.glass_right_x, view.glass_right_y), beside) + view.glass_right_z * z;
+  float up = wide * dot(vec2(view.glass_up_x, view.glass_up_y), beside) + view.glass_up_z * z;
+  return right >= view.glass_left_edge && right <= view.glass_right_edge && up >= view.glass_low_edge && up <= view.glass_high_edge ? z : 1e30;
+}
+
 float srgb(float c) {
   c = clamp(c, 0.0, 1.0);
   return c <= 0.0031308 ? 12.92 * c : 1.055 * pow(c, 1.0 / 2.4) - 0.055;
@@ -42,6 +54,10 @@ void main() {
     vec3 base = texelFetch(palette, int(entry)).rgb;
     float fog = 1.0 - exp(-max(0.0, z - view.fog_start) / view.fog_length);
     colour = mix(base * (0.16 + 1.05 * shade * shade) * exp(-1.1 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
+  }
+  if (view.glass_opacity > 0.0) {
+    float z = key == FOREST_KEY_EMPTY ? 1e29 : exp2(float(key >> 12) / FOREST_DEPTH_STEPS - FOREST_DEPTH_BASE);
+    if (glass_depth(vec2(x, y) + 0.5) < z) colour = mix(colour, vec3(view.glass_red, view.glass_green, view.glass_blue), view.glass_opacity);
   }
   vec4 sum = vec4(colour, covered);
   if (view.subframe > 0u) sum += vec4(sums[at * 4u], sums[at * 4u + 1u], sums[at * 4u + 2u], sums[at * 4u + 3u]);

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest section: what a plane cuts of a forest, as a picture, as contours, as a table of areas, or as a film of the plane
+// moving through.
+#include <charconv>
+#include <cmath>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/io/film.h"
+#include "forest/io/png.h"
+#include "forest/morphology/morphology.h"
+#include "forest/scene/slice_picture.h"
+
+#include "apps/cli/artist.h"
+#include "apps/cli/console.h"
+#include "apps/cli/options.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::filesystem::path forest, out;
+  std::string plane, size = "1280x960", centre, colour_by = "type", background = "light";
+  double height = 0.;  // µm; 0: all of it
+  double depth = 0., seconds = 5.;
+  int rate = 25;
+};
+
+/// Numbers between commas; throws Error.
+std::vector<float> numbers_of(const std::string& text, std::size_t count, const char* meant) {
+  std::vector<float> numbers;
+  const char* at = text.data();
+  const char* const end = at + text.size();
+  while (true) {
+    float number = 0.f;
+    const auto [rest, error] = std::from_chars(at, end, number);
+    if (error != std::errc() || !std::isfinite(number)) break;
+    numbers.push_back(number);
+    at = rest;
+    if (at == end || *at != ',') break;
+    ++at;
+  }
+  if (at != end || numbers.size() != count) throw Error(fmt::format("'{}' is not {}", text, meant));
+  return numbers;
+}
+
+Plane plane_of(const std::string& text, const scene::Forest& forest) {
+  if (text.empty()) {
+    if (forest.soma_bounds().empty())
+      throw Error("the forest has no neurons, so there is no middle to cut; give --plane");
+    return Plane::through(forest.soma_bounds().centre(), Vec3::UnitZ());
+  }
+  const auto n = numbers_of(text, 6, "x,y,z,nx,ny,nz: a point of the plane in µm and its normal");
+  const Vec3 normal(n[3], n[4], n[5]);
+  if (!(normal.norm() > 1e-6f * normal.cwiseAbs().sum()) || normal.isZero())
+    throw Error(fmt::format("'{}' has no direction: its last three numbers are the normal", text));
+  return Plane::through({n[0], n[1], n[2]}, normal);
+}
+
+void write_csv(const std::filesystem::path& path, const scene::Forest& forest,
+               const std::vector<scene::ProfileArea>& areas) {
+  std::string text = "neuron,type,layer,kind,profiles,area\n";
+  for (const scene::ProfileArea& a : areas)
+    text += fmt::format("{},\"{}\",\"{}\",{},{},{:.6g}\n", a.instance,
+                        forest.circuit().types[forest.types()[a.instance]].name,
+                        forest.circuit().layers[forest.layers()[a.instance]].name,
+                        a.kind == 1 ? "soma" : name_of(SectionKind(a.kind)), a.profiles, a.area);
+  write_file(path, text);
+}
+
+void film(const Options& options, const scene::Forest& forest, const Plane& plane,
+          const scene::Colouring& colouring, const scene::SlicePicture& picture, Console& console) {
+  const int count = std::max(2, int(std::lround(options.seconds * options.rate)));
+  io::Film film(options.out, picture.width_pixels, picture.height_pixels, options.rate);
+  console.progress().begin("filming", std::size_t(count));
+  for (int i = 0; i < count; ++i) {
+    const Plane here = plane.moved(float(options.depth * i / (count - 1)));
+    film.add(scene::paint(scene::slice(forest, here, picture.sheet()), colouring, picture).pixels);
+    console.progress().advance();
+  }
+  film.finish();
+  console.progress().end();
+  console.print({{"file", options.out.string()}, {"pictures", count}, {"codec", film.codec()}});
+  console.table({"film", "pictures", "through", "codec"},
+                {{options.out.string(), fmt::format("{}", count), fmt::format("{:g} µm", options.depth),
+                  film.codec()}});
+}
+
+void run(const Options& options, Console& console) {
+  const std::string extension = options.out.extension().string();
+  const scene::Forest forest = scene::Forest::open(options.forest);
+  const Plane plane = plane_of(options.plane, forest);
+  scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
+                                                                         : scene::Background::light};
+  std::tie(picture.width_pixels, picture.height_pixels) = parse_size(options.size);
+  const scene::Sheet all = scene::sheet_of(forest, plane);
+  const Place extent = all.high - all.low;
+  picture.height = options.height > 0.
+                       ? options.height
+                       : std::max(extent.y(), extent.x() * picture.height_pixels / picture.width_pixels);
+  // The plane's own point lies in the middle; of the whole, the forest does.
+  picture.centre = options.height > 0. ? Place(0., 0.) : Place(.5 * (all.low + all.high));
+  if (!options.centre.empty()) {
+    const auto c = numbers_of(options.centre, 2, "two numbers, µm along the section's right and up");
+    picture.centre = {double(c[0]), double(c[1])};
+  }
+  scene::View view;
+  constexpr const char* ways[] = {"type", "layer", "kind", "neuron"};
+  for (std::size_t i = 0; i < std::size(ways); ++i)
+    if (options.colour_by == ways[i]) view.colour_by = scene::ColourBy(i);
+  const scene::Colouring colouring = scene::colour(forest, view.colour_by, picture.background);
+  if (extension == ".mp4") return film(options, forest, plane, colouring, picture, console);
+  if (options.depth != 0.) throw Error("--through makes a film; give its name with the ending .mp4");
+
+  // A table tells of all that the plane cuts, a picture of what is in it.
+  const bool table = extension == ".csv";
+  const scene::Slice slice = scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet());
+  const auto areas = scene::areas(slice);
+  if (table)
+    write_csv(options.out, forest, areas);
+  else if (extension == ".svg")
+    write_file(options.out, scene::to_svg(slice, colouring, picture));
+  else
+    io::write_png(options.out, picture.width_pixels, picture.height_pixels,
+                  scene::paint(slice, colouring, picture).pixels);
+  double total = 0.;
+  std::size_t neurons = 0;
+  for (std::size_t i = 0; i < areas.size(); ++i) {
+    total += areas[i].area;
+    neurons += i == 0 || areas[i].instance != areas[i - 1].instance;
+  }
+  console.print({{"file", options.out.string()},
+                 {"neurons", neurons},
+                 {"profiles", slice.profiles.size()},
+                 {"area", total},
+                 {"micrometres_a_pixel", picture.pixel()}});
+  console.table({"section", "neurons cut", "profiles", "their area, µm²"},
+                {{options.out.string(), fmt::format("{}", neurons), fmt::format("{}", slice.profiles.size()),
+                  fmt::format("{:.2f}", total)}});
+}
+
+}  // namespace
+
+std::function<void()> section(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command.add_option("forest", options->forest, "Forest file")->required();
+  command
+      .add_option(
+          "--plane", options->plane,
+          "A point of the plane and its normal, x,y,z,nx,ny,nz (µm); by default across z through the middle")
+      ->type_name("X,Y,Z,NX,NY,NZ");
+  add_size(command, options->size);
+  must_be_within(
+      *command.add_option("--height", options->height,
+                          "Height of the picture in µm, its middle the plane's point; by default all "
+                          "of the forest is in it"),
+      .01, 1e6);
+  command
+      .add_option("--centre", options->centre,
+                  "The middle of the picture, µm along the section's right and up")
+      ->type_name("RIGHT,UP");
+  command.add_option("--colour-by", options->colour_by, "What a colour means")
+      ->check(CLI::IsMember({"type", "layer", "kind", "neuron"}))
+      ->capture_default_str();
+  command.add_option("--background", options->background, "light as in electron micrographs, or dark")
+      ->check(CLI::IsMember({"light", "dark"}))
+      ->capture_default_str();
+  must_be_within(*command.add_option("--through", options->depth,
+                                     "How far the plane moves along its normal in a film, µm"),
+                 -1e6, 1e6);
+  must_be_within(
+      *command.add_option("--seconds", options->seconds, "Length of the film")->capture_default_str(), .04,
+      3600.);
+  must_be_whole(*command.add_option("--fps", options->rate, "Pictures a second")->capture_default_str(), 1,
+                120);
+  command
+      .add_option("-o,--out", options->out,
+                  "A picture (.png), contours (.svg), areas by neuron and kind (.csv) or a film (.mp4)")
+      ->required()
+      ->check([](const std::string& name) -> std::string {
+        const std::string ending = std::filesystem::path(name).extension().string();
+        return ending == ".png" || ending == ".svg" || ending == ".csv" || ending == ".mp4"
+                   ? ""
+                   : "give a file ending in .png, .svg, .csv or .mp4";
+      });
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,130 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/section_panel.h"
+
+#include <QMouseEvent>
+#include <QPainter>
+#include <QSignalBlocker>
+#include <QSlider>
+#include <QVBoxLayout>
+#include <algorithm>
+#include <cmath>
+
+namespace forest::studio {
+namespace {
+
+constexpr int soon_milliseconds = 15;                   // changes that come together are drawn once
+constexpr double slider_step = .5;                      // µm
+constexpr double least_height = 2., most_height = 1e5;  // µm
+
+}  // namespace
+
+SectionView::SectionView(scene::Forest forest, QWidget* parent)
+    : QWidget(parent), forest_(std::move(forest)) {
+  setMinimumSize(160, 120);
+  setAccessibleName(tr("The section"));
+  setAccessibleDescription(tr("What the plane of intersection cuts; wheel for size, drag to move across"));
+  soon_.setSingleShot(true);
+  soon_.setInterval(soon_milliseconds);
+  connect(&soon_, &QTimer::timeout, this, [this] { draw(); });
+}
+
+scene::SlicePicture SectionView::picture() const {
+  const qreal ratio = devicePixelRatioF();
+  return {.centre = centre_,
+          .height = height_,
+          .width_pixels = std::uint32_t(std::max(1l, std::lround(width() * ratio))),
+          .height_pixels = std::uint32_t(std::max(1l, std::lround(height() * ratio))),
+          .background = settings_.view.background,
+          .scale_bar = true};
+}
+
+void SectionView::show_settings(const Settings& settings) {
+  const bool moved = settings.plane != settings_.plane || settings.across != settings_.across ||
+                     settings.plane_at != settings_.plane_at ||
+                     settings.normal_azimuth != settings_.normal_azimuth ||
+                     settings.normal_elevation != settings_.normal_elevation;
+  const bool coloured = coloured_ && settings.view.colour_by == coloured_by_ &&
+                        settings.view.background == settings_.view.background;
+  settings_ = settings;
+  if (moved || !coloured) soon_.start();
+  coloured_ = coloured;
+}
+
+void SectionView::draw() {
+  if (!settings_.plane || !isVisible()) return;
+  if (!coloured_) {
+    colouring_ = scene::colour(forest_, settings_.view.colour_by, settings_.view.background);
+    coloured_by_ = settings_.view.colour_by;
+    coloured_ = true;
+  }
+  const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
+  const scene::SlicePicture drawn = picture();
+  const frame::Image image = scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);
+  image_ = QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888).copy();
+  image_.setDevicePixelRatio(devicePixelRatioF());
+  update();
+}
+
+void SectionView::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  if (settings_.plane && !image_.isNull()) return painter.drawImage(0, 0, image_);
+  painter.drawText(rect(), int(Qt::AlignCenter) | int(Qt::TextWordWrap),
+                   tr("K shows the plane of intersection and what it cuts"));
+}
+
+void SectionView::resizeEvent(QResizeEvent*) { soon_.start(); }
+
+void SectionView::mousePressEvent(QMouseEvent* event) { mouse_ = event->position(); }
+
+void SectionView::mouseMoveEvent(QMouseEvent* event) {
+  if (!event->buttons()) return;
+  const QPointF moved = event->position() - mouse_;
+  mouse_ = event->position();
+  const double pixel = height_ / std::max(1, height());
+  centre_ += Place(-moved.x() * pixel, moved.y() * pixel);
+  soon_.start();
+}
+
+void SectionView::wheelEvent(QWheelEvent* event) {
+  const double before = height_ / std::max(1, height());
+  height_ = std::clamp(height_ * std::pow(.85, event->angleDelta().y() / 120.), least_height, most_height);
+  const double after = height_ / std::max(1, height());
+  const QPointF off = event->position() - QPointF(.5 * width(), .5 * height());
+  centre_ += Place(off.x(), -off.y()) * (before - after);  // what is under the mouse stays there
+  event->accept();
+  soon_.start();
+}
+
+SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings,
+                           std::function<void(const Settings&)> change, QWidget* parent)
+    : QWidget(parent),
+      settings_(settings),
+      view_(new SectionView(forest, this)),
+      slider_(new QSlider(Qt::Horizontal, this)) {
+  setAccessibleName(tr("Section"));
+  const Bounds bounds = forest.soma_bounds();
+  const double far = bounds.empty() ? 100. : .5 * double(bounds.extent().norm()) + 200.;
+  slider_->setRange(int(-far / slider_step), int(far / slider_step));
+  slider_->setPageStep(int(10. / slider_step));
+  slider_->setAccessibleName(tr("Place of the plane"));
+  slider_->setToolTip(tr("Moves the plane along its normal"));
+  connect(slider_, &QSlider::valueChanged, this, [this, change = std::move(change)](int value) {
+    settings_.plane_at = float(value * slider_step);
+    settings_.plane = true;
+    change(settings_);
+  });
+  auto* column = new QVBoxLayout(this);
+  column->setContentsMargins(4, 4, 4, 4);
+  column->addWidget(view_, 1);
+  column->addWidget(slider_);
+  show_settings(settings);
+}
+
+void SectionPanel::show_settings(const Settings& settings) {
+  settings_ = settings;
+  const QSignalBlocker quiet(slider_);
+  slider_->setValue(int(std::lround(double(settings.plane_at) / slider_step)));
+  view_->show_settings(settings);
+}
+
+}  // namespace forest::studio

@@ -1,0 +1,63 @@
+// SPDX-License-Identifier: Apache-2.0
+// The section: what the plane of intersection cuts, as a section of a series shows it, with a slider that moves the plane.
+#pragma once
+
+#include <QImage>
+#include <QTimer>
+#include <QWidget>
+#include <functional>
+
+#include "forest/scene/slice_picture.h"
+
+#include "apps/studio/settings.h"
+
+class QSlider;
+
+namespace forest::studio {
+
+/// The picture alone. Wheel: larger or smaller; drag: across.
+class SectionView final : public QWidget {
+ public:
+  explicit SectionView(scene::Forest forest, QWidget* parent = nullptr);
+  /// Shows what `settings` say, soon.
+  void show_settings(const Settings& settings);
+
+ protected:
+  void paintEvent(QPaintEvent* event) override;
+  void resizeEvent(QResizeEvent* event) override;
+  void mousePressEvent(QMouseEvent* event) override;
+  void mouseMoveEvent(QMouseEvent* event) override;
+  void wheelEvent(QWheelEvent* event) override;
+  QSize sizeHint() const override { return {300, 300}; }
+
+ private:
+  void draw();
+  scene::SlicePicture picture() const;
+
+  scene::Forest forest_;
+  Settings settings_;
+  scene::Colouring colouring_;
+  scene::ColourBy coloured_by_ = scene::ColourBy::type;
+  bool coloured_ = false;
+  Place centre_{0., 0.};  // along the plane's right and up
+  double height_ = 200.;  // µm
+  QPointF mouse_;
+  QImage image_;
+  QTimer soon_;
+};
+
+class SectionPanel final : public QWidget {
+ public:
+  /// `change` is called with the new settings when a person moves the plane.
+  SectionPanel(scene::Forest forest, const Settings& settings, std::function<void(const Settings&)> change,
+               QWidget* parent = nullptr);
+  /// Shows `settings`, telling nobody.
+  void show_settings(const Settings& settings);
+
+ private:
+  Settings settings_;
+  SectionView* view_;
+  QSlider* slider_;
+};
+
+}  // namespace forest::studio

@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// A picture for an eye that looks at one place: the same view drawn at falling resolution, one layer within the other, as
+// Guenter et al. 2012 ("Foveated 3D graphics", ACM Trans Graph 31:164) do. Around the gaze every pixel is drawn as without
+// a gaze; from where the eye resolves two pixels no better than one, half the resolution is enough, and so on to an
+// eighth. Each layer draws what its own pixels show: fewer clusters, and of thin branches a share that keeps their area.
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "forest/scene/view.h"
+
+namespace forest::scene {
+
+struct Layer {
+  std::uint32_t width = 0, height = 0;  // of the whole view at this layer's resolution, pixels
+  float scale = 1.f;                    // pixels of the picture as wide as one of the layer
+  frame::Area area = {};                // what of it is needed
+  frame::Area hole = {};                // … and what of that finer layers show
+  float gaps = 0.f;   // as frame::Frame has it: what is seen through them is too small to be resolved
+  float until = 0.f;  // eccentricity where it begins to fade into the next, degrees
+  float gone = 0.f;   // … and where it is gone; the last layer never is
+};
+
+/// Finest first; one alone when the view has no gaze or all of the picture is resolved.
+std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_t height);
+
+/// The view's detail for drawing a layer: the gaze in its pixels, and only its area.
+Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std::uint32_t height);
+
+/// One picture of the layers' pictures, bilinearly enlarged. Up to the first layer's `until` it is that layer, pixel by pixel.
+void unite(const View& view, std::span<const Layer> layers, std::span<const frame::Image* const> pictures,
+           std::uint32_t width, std::uint32_t height, frame::Image& whole);
+
+}  // namespace forest::scene

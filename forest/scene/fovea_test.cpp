@@ -1,0 +1,160 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/fovea.h"
+
+#include <gtest/gtest.h>
+
+#include "forest/core/random.h"
+
+#include "tests/sample_forest.h"
+
+namespace forest::scene {
+namespace {
+
+constexpr std::uint32_t width = 1920, height = 1080;
+
+View view_with_gaze(const Vec2& gaze) {
+  View view;
+  view.camera = {.eye = {0, 0, 500}, .target = {0, 0, 0}};
+  view.detail.gaze = gaze;
+  view.samples = 1;
+  return view;
+}
+
+// Guenter et al. 2012: w = m e + w0 with w0 = 1/48°; a screen 40° high with 1080 pixels has .0386° a pixel in its middle.
+TEST(Gaze, ResolvesWhatThePaperSays) {
+  const View view = view_with_gaze({.5f, .5f});
+  const Gaze gaze(view.camera, {width, height}, detail_for(view, width, height));
+  EXPECT_NEAR(gaze.angle(1.f), .03862f, 1e-4f);
+  EXPECT_NEAR(gaze.eccentricity({960, 0}), 20.f, 1e-3f);  // half the field of view
+  EXPECT_NEAR(gaze.eccentricity({960, 540}), 0.f, 1e-3f);
+  for (const float e : {0.f, 5.f, 20.f})
+    EXPECT_NEAR(gaze.resolved(e, view.detail), (1.5f / 60.f * e + 1.f / 48.f) / .03862f, 2e-3f * (1.f + e));
+  EXPECT_NEAR(gaze.resolved(gaze.where_resolved(4.f, view.detail), view.detail), 4.f, 1e-3f);
+  Detail blind = view.detail;
+  blind.acuity_slope = 0.f;
+  EXPECT_TRUE(std::isinf(gaze.where_resolved(2.f, blind)));
+  // A screen that takes half as much of the sight is seen by half as large angles.
+  View small = view;
+  small.detail.screen = 20.f;
+  EXPECT_NEAR(Gaze(small.camera, {width, height}, detail_for(small, width, height)).eccentricity({960, 0}),
+              10.f, 1e-3f);
+}
+
+TEST(Layers, AreOneWithoutAGazeAndHalvedFromWhereNothingSmallerIsResolved) {
+  View view = view_with_gaze({.5f, .5f});
+  const auto layers = layers_of(view, width, height);
+  ASSERT_EQ(layers.size(), 4u);
+  const Gaze gaze(view.camera, {width, height}, detail_for(view, width, height));
+  float scale = 1.f;
+  for (std::size_t i = 0; i < layers.size(); ++i, scale *= 2.f) {
+    EXPECT_NEAR(layers[i].scale, scale, .01f * scale);
+    EXPECT_GE(float(layers[i].width) * layers[i].scale, float(width));
+    if (i + 1 == layers.size()) {
+      EXPECT_TRUE(std::isinf(layers[i].until));
+      EXPECT_EQ(layers[i].area, (frame::Area{0, 0, layers[i].width, layers[i].height}));
+    } else {
+      EXPECT_GE(layers[i].until, view.detail.fovea);
+      EXPECT_GE(gaze.resolved(layers[i].until, view.detail), 2.f * scale - .01f);
+      EXPECT_LT(layers[i].until, layers[i + 1].until);
+      EXPECT_GT(layers[i].gone, layers[i].until);
+    }
+  }
+  view.detail.gaze.reset();
+  EXPECT_EQ(layers_of(view, width, height).size(), 1u);
+}
+
+TEST(Layers, HoldAllPixelsThatAreShownOfThemWhereverTheGazeIs) {
+  Random random(8);
+  for (int i = 0; i < 60; ++i) {
+    const View view = view_with_gaze({float(random.uniform(-.5, 1.5)), float(random.uniform(-.5, 1.5))});
+    const std::uint32_t w = 200 + random.below(1900), h = 150 + random.below(1000);
+    const Gaze gaze(view.camera, {float(w), float(h)}, detail_for(view, w, h));
+    const auto layers = layers_of(view, w, h);
+    for (const Layer& layer : layers) {
+      ASSERT_LT(layer.area.left, layer.area.right);
+      ASSERT_LT(layer.area.top, layer.area.bottom);
+      ASSERT_LE(layer.area.right, layer.width);
+      ASSERT_LE(layer.area.bottom, layer.height);
+      if (std::isinf(layer.gone)) continue;
+      for (int k = 0; k < 300; ++k) {
+        const Vec2 pixel(float(random.uniform(0., double(w))), float(random.uniform(0., double(h))));
+        if (gaze.eccentricity(pixel) > layer.gone) continue;
+        const float x = (pixel.x() - .5f * float(w)) / layer.scale + .5f * float(layer.width),
+                    y = (pixel.y() - .5f * float(h)) / layer.scale + .5f * float(layer.height);
+        EXPECT_GE(x + .01f, float(layer.area.left));
+        EXPECT_LE(x - .01f, float(layer.area.right));
+        EXPECT_GE(y + .01f, float(layer.area.top));
+        EXPECT_LE(y - .01f, float(layer.area.bottom));
+      }
+    }
+  }
+}
+
+TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
+  const View view = view_with_gaze({.4f, .6f});
+  const auto layers = layers_of(view, width, height);
+  // A picture that rises evenly to the right and down, drawn by every layer.
+  std::vector<frame::Image> pictures;
+  for (const Layer& layer : layers) {
+    frame::Image image{layer.width, layer.height, {}};
+    for (std::uint32_t y = 0; y < layer.height; ++y)
+      for (std::uint32_t x = 0; x < layer.width; ++x) {
+        const float px = (float(x) + .5f - .5f * float(layer.width)) * layer.scale + .5f * float(width),
+                    py = (float(y) + .5f - .5f * float(layer.height)) * layer.scale + .5f * float(height);
+        image.pixels.insert(image.pixels.end(), {std::uint8_t(std::clamp(px / 8.f, 0.f, 255.f)),
+                                                 std::uint8_t(std::clamp(py / 8.f, 0.f, 255.f)),
+                                                 std::uint8_t(40 * pictures.size()), 255});
+      }
+    pictures.push_back(std::move(image));
+  }
+  std::vector<const frame::Image*> drawn;
+  for (const frame::Image& image : pictures) drawn.push_back(&image);
+  frame::Image whole;
+  unite(view, layers, drawn, width, height, whole);
+  ASSERT_EQ(whole.pixels.size(), std::size_t(width) * height * 4);
+  const Gaze gaze(view.camera, {width, height}, detail_for(view, width, height));
+  for (std::uint32_t y = 0; y < height; y += 7)
+    for (std::uint32_t x = 0; x < width; x += 5) {
+      const std::uint8_t* pixel = &whole.pixels[4 * (std::size_t(y) * width + x)];
+      ASSERT_NEAR(pixel[0], (float(x) + .5f) / 8.f, 1.6f) << x << " " << y;
+      ASSERT_NEAR(pixel[1], (float(y) + .5f) / 8.f, 1.6f) << x << " " << y;
+      const float e = gaze.eccentricity({float(x) + .5f, float(y) + .5f});
+      for (std::size_t i = 0; i < layers.size(); ++i)
+        if (e <= layers[i].until && (i == 0 || e >= layers[i - 1].gone)) {
+          EXPECT_EQ(pixel[2], 40 * i) << x << " " << y;
+        }
+      if (e <= layers[0].until) {
+        EXPECT_EQ(pixel[0], pictures[0].pixels[4 * (std::size_t(y) * width + x)]);
+      }
+    }
+}
+
+TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(), testing::sample_neurons()));
+  View view = overview(forest);
+  view.detail.gaze = Vec2(.5f, .5f);
+  view.samples = 1;
+  View without = view;
+  without.detail.gaze.reset();
+  const frame::Viewport viewport{width, height};
+  const auto layers = layers_of(view, width, height);
+  const Eye gazing(view.camera, viewport, detail_for(view, layers[0], width, height)),
+      seeing(view.camera, viewport, detail_for(without, width, height));
+  const Cut fine = choose(forest, gazing, viewport), all = choose(forest, seeing, viewport);
+  EXPECT_LT(fine.segments, all.segments);
+  const Gaze gaze(view.camera, viewport, detail_for(view, width, height));
+  std::size_t looked_at = 0;
+  for (const frame::Item& item : all.lines) {
+    const Vec3 at = frame::project(view.camera, viewport, {item.x, item.y, item.z});
+    if (gaze.eccentricity(at.head<2>()) > view.detail.fovea) continue;
+    ++looked_at;
+    EXPECT_TRUE(std::ranges::any_of(fine.lines, [&](const frame::Item& other) {
+      return other.instance == item.instance && other.first_segment == item.first_segment &&
+             other.drawn == item.drawn;
+    }));
+  }
+  EXPECT_GT(looked_at, 5u);
+}
+
+}  // namespace
+}  // namespace forest::scene

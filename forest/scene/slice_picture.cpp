@@ -1,0 +1,285 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/slice_picture.h"
+
+#include <algorithm>
+#include <array>
+#include <string_view>
+
+#include <fmt/format.h>
+
+#include "forest/core/parallel.h"
+
+namespace forest::scene {
+namespace {
+
+constexpr double rim_pixels = 1.1;  // how much darker line a profile has around it, where it is large enough
+constexpr int lines = 4;            // a pixel's scan lines
+constexpr std::size_t rows_at_once = 16;
+
+struct Ground {
+  Vec3 paper, ink;  // linear light
+  float tint, rim;  // share of paper in a filled profile; light that its rim keeps
+};
+Ground ground_of(Background background) {
+  return background == Background::light ? Ground{Vec3::Constant(.86f), Vec3::Constant(.01f), .30f, .22f}
+                                         : Ground{Vec3(.006f, .009f, .014f), Vec3::Constant(.8f), 0.f, .45f};
+}
+
+Vec3 fill_of(const Colouring& colouring, const Profile& p, const Ground& ground) {
+  const Vec3& base = colouring.palette[8u * colouring.states[p.instance].colour_class + p.kind];
+  return base.cwiseMin(1.f) * (1.f - ground.tint) + ground.paper * ground.tint;
+}
+
+float srgb(float c) {
+  c = std::clamp(c, 0.f, 1.f);
+  return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
+}
+
+std::string hex(const Vec3& linear) {
+  const auto byte = [](float c) { return std::lround(255.f * srgb(c)); };
+  return fmt::format("#{:02x}{:02x}{:02x}", byte(linear.x()), byte(linear.y()), byte(linear.z()));
+}
+
+// A profile in pixels, x to the right and y down, clockwise on the screen.
+using Shape = std::vector<Place>;
+Shape in_pixels(const Profile& profile, const SlicePicture& picture) {
+  Shape shape = profile.shape.outline(.1 * picture.pixel(), 4e-3);
+  for (Place& p : shape)
+    p = Place(.5 * picture.width_pixels + (p.x() - picture.centre.x()) / picture.pixel(),
+              .5 * picture.height_pixels - (p.y() - picture.centre.y()) / picture.pixel());
+  return shape;
+}
+
+// The shape less a rim; empty when nothing remains.
+Shape within_rim(const Shape& shape) {
+  Shape inner;
+  for (std::size_t i = 0; i < shape.size() && (inner.size() > 2 || i == 0); ++i) {
+    const Place &p = shape[i], &q = shape[(i + 1) % shape.size()];
+    const Place way = q - p;
+    const Place inward = Place(way.y(), -way.x()) / std::max(way.norm(), 1e-12);
+    // Cut what remains by the edge, moved inwards (Sutherland & Hodgman 1974).
+    const Shape open = i == 0 ? shape : inner;
+    inner.clear();
+    const auto depth = [&](const Place& at) { return inward.dot(at - p) - rim_pixels; };
+    for (std::size_t k = 0; k < open.size(); ++k) {
+      const Place &a = open[k], &b = open[(k + 1) % open.size()];
+      const double da = depth(a), db = depth(b);
+      if (da >= 0.) inner.push_back(a);
+      if ((da < 0.) != (db < 0.)) inner.push_back(a + da / (da - db) * (b - a));
+    }
+  }
+  return inner.size() > 2 ? inner : Shape{};
+}
+
+class Paper {
+ public:
+  Paper(std::size_t width, std::size_t first, std::size_t last, const Vec3& colour)
+      : width_(width), first_(first), last_(last), pixels_(width * (last - first), colour), covered_(width) {}
+
+  /// A convex shape, its edges by the share of each pixel that it covers.
+  void fill(const Shape& shape, const Vec3& colour) {
+    if (shape.size() < 3) return;
+    double top = INFINITY, bottom = -INFINITY;
+    for (const Place& p : shape) top = std::min(top, p.y()), bottom = std::max(bottom, p.y());
+    const auto from = std::max(double(first_), std::floor(top)),
+               to = std::min(double(last_), std::ceil(bottom));
+    for (double row = from; row < to; row += 1.) {
+      std::size_t low = width_, high = 0;
+      for (int line = 0; line < lines; ++line) {
+        const double y = row + (line + .5) / lines;
+        double left = INFINITY, right = -INFINITY;
+        for (std::size_t i = 0; i < shape.size(); ++i) {
+          const Place &p = shape[i], &q = shape[(i + 1) % shape.size()];
+          if ((p.y() <= y) == (q.y() <= y)) continue;
+          const double x = p.x() + (y - p.y()) / (q.y() - p.y()) * (q.x() - p.x());
+          left = std::min(left, x), right = std::max(right, x);
+        }
+        left = std::max(left, 0.), right = std::min(right, double(width_));
+        if (!(left < right)) continue;
+        const auto first = std::size_t(left), last = std::min(width_ - 1, std::size_t(right));
+        low = std::min(low, first), high = std::max(high, last + 1);
+        for (std::size_t x = first; x <= last; ++x)
+          covered_[x] += float(std::min(right, double(x + 1)) - std::max(left, double(x))) / float(lines);
+      }
+      Vec3* pixels = &pixels_[(std::size_t(row) - first_) * width_];
+      for (std::size_t x = low; x < high; ++x) {
+        pixels[x] += std::clamp(covered_[x], 0.f, 1.f) * (colour - pixels[x]);
+        covered_[x] = 0.f;
+      }
+    }
+  }
+  const std::vector<Vec3>& pixels() const { return pixels_; }
+
+ private:
+  std::size_t width_, first_, last_;
+  std::vector<Vec3> pixels_;
+  std::vector<float> covered_;
+};
+
+// What a scale bar's label needs, five columns of seven rows each, the highest bit to the left.
+struct Glyph {
+  char letter;
+  std::array<std::uint8_t, 7> rows;
+};
+constexpr Glyph glyphs[] = {{'0', {14, 17, 19, 21, 25, 17, 14}}, {'1', {4, 12, 4, 4, 4, 4, 14}},
+                            {'2', {14, 17, 1, 2, 4, 8, 31}},     {'5', {31, 16, 30, 1, 1, 17, 14}},
+                            {'u', {0, 0, 17, 17, 19, 29, 16}},   {'m', {0, 0, 26, 21, 21, 21, 21}},
+                            {'n', {0, 0, 22, 25, 17, 17, 17}},   {' ', {0, 0, 0, 0, 0, 0, 0}}};
+
+Shape rectangle(double left, double top, double right, double bottom) {
+  return {{left, top}, {right, top}, {right, bottom}, {left, bottom}};
+}
+
+struct ScaleBar {
+  double length;      // µm
+  std::string label;  // u for µ
+};
+ScaleBar scale_bar_of(const SlicePicture& picture) {
+  const double length = scale_bar_length(.2 * picture.width_pixels * picture.pixel());
+  if (length < 1.) return {length, fmt::format("{:.0f} nm", 1000. * length)};
+  return {length,
+          length < 1000. ? fmt::format("{:.0f} um", length) : fmt::format("{:.0f} mm", length / 1000.)};
+}
+
+std::vector<Shape> scale_bar_shapes(const SlicePicture& picture) {
+  const ScaleBar bar = scale_bar_of(picture);
+  const double dot = std::max(1., std::round(picture.height_pixels / 360.));  // a pixel of a letter
+  const double margin = 12. * dot, left = margin, bottom = picture.height_pixels - margin;
+  std::vector<Shape> shapes{rectangle(left, bottom - 3. * dot, left + bar.length / picture.pixel(), bottom)};
+  double x = left;
+  for (const char letter : bar.label) {
+    const auto* glyph = std::ranges::find(glyphs, letter, &Glyph::letter);
+    if (glyph == std::end(glyphs)) continue;
+    for (int row = 0; row < 7; ++row)
+      for (int column = 0; column < 5; ++column)
+        if (glyph->rows[std::size_t(row)] >> (4 - column) & 1) {
+          const double l = x + column * dot, t = bottom - (13. - row) * dot;
+          shapes.push_back(rectangle(l, t, l + dot, t + dot));
+        }
+    x += 6. * dot;
+  }
+  return shapes;
+}
+
+}  // namespace
+
+Sheet SlicePicture::sheet() const {
+  const Place half(.5 * width_pixels * pixel(), .5 * height);
+  return {centre - half, centre + half};
+}
+
+double scale_bar_length(double longest) {
+  const double decade = std::pow(10., std::floor(std::log10(longest)));
+  for (const double step : {5., 2.})
+    if (step * decade <= longest) return step * decade;
+  return decade;
+}
+
+frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+  const std::size_t width = picture.width_pixels, height = picture.height_pixels;
+  const Ground ground = ground_of(picture.background);
+  struct Drawn {
+    Shape whole, inner;
+    double top = INFINITY, bottom = -INFINITY;
+  };
+  std::vector<Drawn> drawn(slice.profiles.size());
+  parallel_for(drawn.size(), 64, [&](std::size_t i) {
+    Drawn& d = drawn[i];
+    d.whole = in_pixels(slice.profiles[i], picture);
+    for (const Place& p : d.whole) d.top = std::min(d.top, p.y()), d.bottom = std::max(d.bottom, p.y());
+    if (d.bottom - d.top > 2. * rim_pixels) d.inner = within_rim(d.whole);
+  });
+  frame::Image image{std::uint32_t(width), std::uint32_t(height),
+                     std::vector<std::uint8_t>(width * height * 4, 255), 0.};
+  const auto bar = picture.scale_bar ? scale_bar_shapes(picture) : std::vector<Shape>();
+  parallel_for((height + rows_at_once - 1) / rows_at_once, 1, [&](std::size_t band) {
+    const std::size_t first = band * rows_at_once, last = std::min(height, first + rows_at_once);
+    Paper paper(width, first, last, ground.paper);
+    const auto fill = [&](std::size_t i, bool rim) {
+      const Drawn& d = drawn[i];
+      if (d.bottom < double(first) || d.top > double(last)) return;
+      const Vec3 colour = fill_of(colouring, slice.profiles[i], ground);
+      if (rim)
+        paper.fill(d.whole, d.inner.empty() ? colour : Vec3(ground.rim * colour));
+      else
+        paper.fill(d.inner, colour);
+    };
+    // A neuron's rims first, so that where its profiles overlap no line runs through them; the soma, its first, on top.
+    for (std::size_t i = 0; i < drawn.size();) {
+      std::size_t end = i;
+      while (end < drawn.size() && slice.profiles[end].instance == slice.profiles[i].instance) ++end;
+      for (std::size_t k = i; k < end; ++k) fill(k, true);
+      for (std::size_t k = end; k-- > i;) fill(k, false);
+      i = end;
+    }
+    for (const Shape& shape : bar) paper.fill(shape, ground.ink);
+    for (std::size_t i = 0; i < paper.pixels().size(); ++i)
+      for (int c = 0; c < 3; ++c)
+        image.pixels[4 * (first * width + i) + std::size_t(c)] =
+            std::uint8_t(std::lround(255.f * srgb(paper.pixels()[i][c])));
+  });
+  return image;
+}
+
+std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {
+  const Ground ground = ground_of(picture.background);
+  const double wide = picture.width_pixels * picture.pixel();
+  const auto at = [&](const Place& p) {  // µm from the upper left corner
+    return fmt::format("{:.3f} {:.3f}", p.x() - picture.centre.x() + .5 * wide,
+                       picture.centre.y() + .5 * picture.height - p.y());
+  };
+  std::string svg = fmt::format(
+      "<svg xmlns=\"http://www.w3.org/2000/svg\" width=\"{}\" height=\"{}\" viewBox=\"0 0 {:.6g} {:.6g}\">\n"
+      "<rect width=\"100%\" height=\"100%\" fill=\"{}\"/>\n",
+      picture.width_pixels, picture.height_pixels, wide, picture.height, hex(ground.paper));
+  for (std::size_t i = 0; i < slice.profiles.size();) {
+    const Profile& first = slice.profiles[i];
+    svg += fmt::format("<g id=\"neuron-{}\">", first.instance);
+    std::vector<std::vector<Place>> all;
+    while (i < slice.profiles.size() && slice.profiles[i].instance == first.instance) {
+      const Profile& p = slice.profiles[i++];
+      all.push_back(p.shape.outline(.1 * picture.pixel(), 4e-3));
+      svg += fmt::format("<path fill=\"{}\" d=\"M{}", hex(fill_of(colouring, p, ground)), at(all.back()[0]));
+      for (std::size_t k = 1; k < all.back().size(); ++k) svg += "L" + at(all.back()[k]);
+      svg += "Z\"/>";
+    }
+    svg +=
+        fmt::format("<path fill=\"none\" stroke=\"{}\" stroke-width=\"{:.4g}\" stroke-linecap=\"round\" d=\"",
+                    hex(ground.rim * fill_of(colouring, first, ground)), rim_pixels * picture.pixel());
+    Place before = Place::Constant(INFINITY);
+    for (const auto& [p, q] : boundary_of_union(all)) {
+      if (p != before) svg += "M" + at(p);
+      svg += "L" + at(q);
+      before = q;
+    }
+    svg += "\"/></g>\n";
+  }
+  if (picture.scale_bar) {
+    ScaleBar bar = scale_bar_of(picture);
+    if (const auto u = bar.label.find('u'); u != std::string::npos) bar.label.replace(u, 1, "µ");
+    const double margin = .035 * picture.height, bottom = picture.height - margin;
+    svg += fmt::format(
+        "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
+        "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
+        "fill=\"{4}\">{7}</text>\n",
+        margin, bottom - .25 * margin, bar.length, .25 * margin, hex(ground.ink), bottom - .5 * margin,
+        .9 * margin, bar.label);
+  }
+  return svg + "</svg>\n";
+}
+
+std::vector<frame::Overlay> plane_marks(const Forest& forest, const Plane& plane) {
+  const Sheet sheet = sheet_of(forest, plane);
+  std::vector<frame::Overlay> marks;
+  const auto line = [&](double ax, double ay, double bx, double by) {
+    marks.push_back({plane.point(Vec2(float(ax), float(ay))), plane.point(Vec2(float(bx), float(by))), .5f,
+                     outline_entry});
+  };
+  const auto [left, low] = std::pair(sheet.low.x(), sheet.low.y());
+  const auto [right, high] = std::pair(sheet.high.x(), sheet.high.y());
+  line(left, low, right, low), line(right, low, right, high), line(right, high, left, high),
+      line(left, high, left, low);
+  return marks;
+}
+
+}  // namespace forest::scene

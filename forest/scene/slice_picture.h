@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// A slice drawn: as pixels, as vector graphics, and where it lies in the main view.
+#pragma once
+
+#include <string>
+
+#include "forest/scene/slice.h"
+#include "forest/scene/view.h"
+
+namespace forest::scene {
+
+/// The picture of a slice: profiles filled in the colour of their neuron, with a darker rim, on light ground as in electron
+/// micrographs, or on dark ground.
+struct SlicePicture {
+  Place centre{0., 0.};  // in the middle of the picture, along the plane's right and up, µm
+  double height = 100.;  // of the picture, µm
+  std::uint32_t width_pixels = 1280, height_pixels = 720;
+  Background background = Background::light;
+  bool scale_bar = true;  // labelled with its length
+
+  double pixel() const { return height / height_pixels; }  // µm
+  Sheet sheet() const;
+};
+frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
+
+/// A length of 1, 2 or 5 times a power of ten, at most `longest`.
+double scale_bar_length(double longest);
+
+/// The same as SVG with one path a neuron, its profiles united; ids are the neurons' numbers.
+std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
+
+/// The plane in the main view: its edge around the forest and light hatching, as overlays.
+std::vector<frame::Overlay> plane_marks(const Forest& forest, const Plane& plane);
+
+}  // namespace forest::scene
