@@ -4,6 +4,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -221,6 +222,60 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   EXPECT_EQ(f.draw().pixels, whole.pixels);
   EXPECT_EQ(asked, 4);
   EXPECT_EQ(f.renderer->seen().depths.size(), 625u);
+}
+
+TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
+  Fixture f(GetParam());
+  f.frame.palette.fill(Vec3::Zero());
+  f.frame.palette[3] = Vec3(1, 0, 0);  // of the colour class, which is not asked
+  f.frame.palette[40] = Vec3(0, 1, 0), f.frame.palette[41] = Vec3(0, 0, 1);
+  f.frame.subframes = 4;
+  const auto channels = [](const frame::Image& image) {
+    std::array<double, 3> sum{};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      if (i % 4 < 3) sum[i % 4] += image.pixels[i];
+    return sum;
+  };
+  f.add({-30, 10, 0}, {-5, 10, 0}, 3.f);
+  f.add({5, 10, 0}, {30, 10, 0}, 3.f);
+  f.add({0, -20, 0}, {0, -20, 0}, 4.f);
+  const std::vector<std::uint8_t> entries{0, 40, 41, 40}, others{41, 41, 41};
+  std::vector<frame::Item> run{{0, 0, 2, 1, 0, 0, 0, 200}}, dot{{0, 2, 1, 3, 0, 0, 0, 200}};
+  for (const bool as_lines : {false, true}) {
+    (as_lines ? f.frame.lines : f.frame.capsules) = run;
+    (as_lines ? f.frame.capsules : f.frame.lines) = {};
+    f.frame.dots = {};
+    f.frame.entries = entries;
+    const auto two = channels(f.draw());
+    EXPECT_EQ(two[0], 0.);
+    EXPECT_GT(two[1], 1000.);
+    EXPECT_NEAR(two[2] / two[1], 1., .1);  // as long and as thick
+    f.frame.dots = dot;
+    const auto three = channels(f.draw());
+    EXPECT_GT(three[1], two[1] + 1000.);
+    EXPECT_NEAR(three[2], two[2], .01 * two[2]);
+  }
+  // What is revealed brings its own, also when the picture is drawn several times.
+  f.frame.dots = {}, f.frame.lines = {};
+  f.frame.capsules = run;
+  const auto before = channels(f.draw());
+  for (frame::Item& item : dot) item.first_entry = 0;
+  f.frame.rest = [&](const frame::DepthMap&) {
+    frame::Lists more;
+    more.capsules = dot, more.entries = others;
+    return more;
+  };
+  const auto after = channels(f.draw());
+  EXPECT_NEAR(after[1], before[1], .01 * before[1]);
+  EXPECT_GT(after[2], before[2] + 1000.);
+  f.frame.rest = {};
+  f.frame.entries = others;  // three for the two from the second on: enough
+  EXPECT_NO_THROW(f.renderer->draw(f.frame));
+  f.frame.entries = std::span(others).first(2);
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
+  const std::vector<std::uint8_t> wrong{0, 128, 3};
+  f.frame.entries = wrong;
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
 }
 
 }  // namespace

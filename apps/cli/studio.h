@@ -9,6 +9,7 @@ namespace forest::cli {
 bool has_display();
 
 /// Becomes the studio: returns only by throwing Error.
-[[noreturn]] void open_studio(const std::filesystem::path& forest, const std::string& view = "");
+[[noreturn]] void open_studio(const std::filesystem::path& forest, const std::string& view = "",
+                              const std::filesystem::path& activity = {});
 
 }  // namespace forest::cli

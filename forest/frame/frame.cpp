@@ -63,6 +63,16 @@ void check(const Lists& lists, const Geometry& geometry) {
       require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
               "an item's sphere must be finite");
     }
+  if (!lists.entries.empty()) {
+    for (const auto list : {lists.dots, lists.lines, lists.capsules})
+      for (const Item& item : list)
+        require(item.first_entry + std::size_t(item.segment_count) <= lists.entries.size(),
+                "an item names colours that are not there");
+    static_assert(std::tuple_size_v<Palette> == 128);
+    std::uint32_t bits = 0;  // of all of them: there may be a million
+    for (const std::uint8_t entry : lists.entries) bits |= entry;
+    require(bits < 128, "a segment's colour must be a palette entry");
+  }
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     require(list.size() < (1u << 26), "a list must have fewer than 67,108,864 items");
   for (const Item& item : lists.dots) require(item.segment_count == 1, "a dot is one segment");

@@ -56,6 +56,8 @@ struct Lists {
   std::span<const Item> lines;     // thin runs
   std::span<const Item> capsules;  // runs near enough to have a surface
   std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
+  // Where colours change along branches: the palette entry of every segment, item by item. None: the colour classes say.
+  std::span<const std::uint8_t> entries;
 };
 
 /// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,

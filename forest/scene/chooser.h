@@ -3,6 +3,7 @@
 // again once the rest is drawn. The pictures are those that would be drawn without a guess; they are drawn sooner.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "forest/scene/cut.h"
@@ -13,8 +14,11 @@ class Chooser {
  public:
   explicit Chooser(Forest forest) : forest_(std::move(forest)) {}
 
+  /// Colours all that is drawn, now and when it is revealed.
+  using Painter = std::function<void(Cut&, const Eye&)>;
+
   /// The cut of the next picture; valid until the one after it.
-  const Cut& choose(const Eye& eye, const frame::Viewport& viewport);
+  const Cut& choose(const Eye& eye, const frame::Viewport& viewport, Painter painter = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);
@@ -29,6 +33,7 @@ class Chooser {
   std::optional<Eye> eye_;
   frame::Viewport viewport_;
   std::optional<Occluders> before_;
+  Painter painter_;
   Cut cut_, revealed_;
   std::uint64_t revealed_segments_ = 0, drawings_ = 0;
 };

@@ -23,8 +23,10 @@ struct Cut {
   std::uint64_t segments = 0;  // drawn
   std::uint32_t neurons = 0;   // in sight
   std::vector<LeftOut> left_out;
+  std::vector<std::uint8_t>
+      entries;  // palette entries of their segments, where something coloured them (playback.h)
 
-  frame::Lists lists() const { return {dots, lines, capsules, bands}; }
+  frame::Lists lists() const { return {dots, lines, capsules, bands, entries}; }
 };
 
 /// Pure: depends on its arguments alone, and is the same at any number of threads.

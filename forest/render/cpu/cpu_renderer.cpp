@@ -26,6 +26,7 @@ struct CpuRenderer::State {
   frame::Image image;
 
   void draw(const frame::Lists& lists) {
+    picture.entries = lists.entries;
     const frame::Band whole{std::uint32_t(lists.dots.size()), std::uint32_t(lists.lines.size()),
                             std::uint32_t(lists.capsules.size())};
     frame::Band from;

@@ -40,6 +40,8 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.rank[i] = float(s.meta >> 8 & 255) * (1.f / 256.f) + turn;
     r.entry[i] = colour + (s.meta & 7);
   }
+  if (!picture.entries.empty())
+    for (std::size_t i = 0; i < r.count; ++i) r.entry[i] = picture.entries[item.first_entry + i];
 }
 
 // From the coordinates of their neuron to pixels: camera = turn · p + at.

@@ -12,6 +12,7 @@ namespace forest::render::cpu {
 struct Picture {
   frame::Geometry geometry;
   std::span<const std::uint8_t> colour_class;
+  std::span<const std::uint8_t> entries;  // of the lists that are drawn; may be empty
   frame::Constants constants;
   Mat3 to_camera;  // rows: right, up, forward
   Vec3 eye, light;

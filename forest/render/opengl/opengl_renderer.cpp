@@ -111,8 +111,8 @@ struct OpenGLRenderer::Device {
       capsules{"capsules", shaders::capsules, shaders::capsule},
       close_ups{"close_ups", shaders::close_ups, shaders::capsule}, cull{"cull", shaders::cull},
       tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
-      large_queue, tiles;
+  Buffer segments, instances, colour_classes, entries, entries_of_rest, palette, overlay_segments, uniforms,
+      keys, sums, image, queue, large_queue, tiles;
   ListSet lists{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}},
       rest{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}};
   List overlays{&capsules, FOREST_OVERLAY, {}};
@@ -132,6 +132,8 @@ struct OpenGLRenderer::Device {
   }
 
   void upload(ListSet& to, const frame::Lists& from) {
+    (&to == &rest ? entries_of_rest : entries).upload(from.entries);
+    for (List& list : to) list.flags = from.entries.empty() ? 0 : FOREST_ENTRIES;
     set(to[capsule_list], from.capsules);
     set(to[dot_list], from.dots);
     set(to[line_list], from.lines);
@@ -228,6 +230,7 @@ struct OpenGLRenderer::Device {
   void draw_bands(ListSet& set, std::span<const frame::Band> bands, bool first_band) {
     const frame::Band whole{set[dot_list].count, set[line_list].count, set[capsule_list].count};
     if (bands.empty()) bands = std::span(&whole, 1);
+    (&set == &rest ? entries_of_rest : entries).bind_texels(9, GL_R8UI);
     frame::Band from;
     for (const frame::Band& to : bands) {
       const bool first = &to == &bands.front();

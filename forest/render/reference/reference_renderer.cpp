@@ -362,10 +362,15 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   width_ = f.width, height_ = f.height, exposure_ = f.style.exposure;
 
   // From near to far, so that what is hidden is found early.
-  std::vector<const Item*> items;
+  struct Drawn {
+    const Item* item;
+    const std::uint8_t* entries;  // of its segments; null: its colour class says
+  };
+  std::vector<Drawn> items;
   const auto add = [&](const frame::Lists& lists) {
     for (const auto list : {lists.dots, lists.lines, lists.capsules})
-      for (const Item& item : list) items.push_back(&item);
+      for (const Item& item : list)
+        items.push_back({&item, lists.entries.empty() ? nullptr : lists.entries.data() + item.first_entry});
   };
   add(f);
   if (f.rest) {
@@ -373,10 +378,13 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     frame::check(rest, geometry_);
     add(rest);
   }
-  const auto depth = [&](const Item* i) { return eye.to_camera.row(2).dot(Vec3(i->x, i->y, i->z) - eye.at); };
+  const auto depth = [&](const Drawn& d) {
+    return eye.to_camera.row(2).dot(Vec3(d.item->x, d.item->y, d.item->z) - eye.at);
+  };
   std::ranges::stable_sort(items, {}, depth);
 
-  const auto capsule_of = [&](const Item& item, std::uint32_t index, Capsule& c) {
+  const auto capsule_of = [&](const Drawn& drawn, std::uint32_t index, Capsule& c) {
+    const Item& item = *drawn.item;
     const Segment& s = geometry_.segments[item.first_segment + index];
     const frame::Instance& i = geometry_.instances[item.instance];
     const Quat turn(i.qw, i.qx, i.qy, i.qz);
@@ -384,7 +392,8 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     c.a = eye.seen(at + turn * Vec3(s.ax, s.ay, s.az));
     c.b = eye.seen(at + turn * Vec3(s.bx, s.by, s.bz));
     c.ra = half_to_float(s.radii & 0xffff), c.rb = half_to_float(s.radii >> 16);
-    c.entry = std::uint8_t(f.colour_class[item.instance] * 8u + (s.meta & 7u));
+    c.entry = drawn.entries ? drawn.entries[index]
+                            : std::uint8_t(f.colour_class[item.instance] * 8u + (s.meta & 7u));
     return project(eye, c);
   };
 
@@ -398,14 +407,13 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     for (std::size_t from = 0; from < items.size();) {
       std::size_t to = from, segments = 0;
       std::vector<std::size_t> place;
-      for (; to < items.size() && segments < chunk; segments += items[to++]->segment_count)
+      for (; to < items.size() && segments < chunk; segments += items[to++].item->segment_count)
         place.push_back(segments);
       capsules.resize(segments);
       std::vector<char> in_sight(segments);
       parallel_for(to - from, 64, [&](std::size_t i) {
-        const Item& item = *items[from + i];
-        for (std::uint32_t k = 0; k < item.segment_count; ++k)
-          in_sight[place[i] + k] = capsule_of(item, k, capsules[place[i] + k]);
+        for (std::uint32_t k = 0; k < items[from + i].item->segment_count; ++k)
+          in_sight[place[i] + k] = capsule_of(items[from + i], k, capsules[place[i] + k]);
       });
       std::size_t kept = 0;
       for (std::size_t i = 0; i < segments; ++i)
