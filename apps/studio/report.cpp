@@ -25,6 +25,11 @@ void report(Window& window) {
     const auto& selection = viewport->selection();
     print({{"event", "selected"}, {"facts", selection ? to_json(viewport->forest(), *selection) : Json()}});
   });
+  QObject::connect(&window, &Window::clamped, &window, [&window](double milliseconds) {
+    Json names = Json::array();
+    for (const reports::Trace& trace : window.traces()) names.push_back(trace.name());
+    print({{"event", "clamped"}, {"traces", names}, {"milliseconds", milliseconds}});
+  });
   QObject::connect(viewport, &Viewport::settled, viewport, [viewport] {
     const QPoint corner = viewport->mapToGlobal(QPoint(0, 0));
     const Viewport::Figures& f = viewport->figures();
@@ -38,7 +43,8 @@ void report(Window& window) {
              {"pixel_ratio", viewport->devicePixelRatioF()}}},
            {"segments", f.segments},
            {"neurons", f.neurons},
-           {"samples", f.samples}});
+           {"samples", f.samples},
+           {"playing", viewport->playing()}});
   });
 }
 

@@ -5,8 +5,11 @@
 #include <QMainWindow>
 #include <filesystem>
 
+#include "forest/reports/trace.h"
+
 #include "apps/studio/viewport.h"
 
+class QDockWidget;
 class QLabel;
 
 namespace forest::studio {
@@ -14,14 +17,21 @@ namespace forest::studio {
 /// As PNG, whole or not at all; throws Error.
 void write_image(const std::filesystem::path& path, const QImage& seen);
 
+class ActivityPanel;
 class SelectionPanel;
 class ViewPanel;
 
 class Window final : public QMainWindow {
+  Q_OBJECT
+
  public:
   Window(scene::Forest forest, const scene::View& view, const QString& title);
 
   Viewport& viewport() { return *viewport_; }
+  const std::vector<reports::Trace>& traces() const;
+
+ Q_SIGNALS:
+  void clamped(double milliseconds);  // another trace is shown, or none: how long it took to read
 
  protected:
   void closeEvent(QCloseEvent* event) override;
@@ -34,12 +44,16 @@ class Window final : public QMainWindow {
   void paste_view();
   void save_picture(bool as_seen);
   void explain();
+  void open_activity();
+  void save_traces();
   template <class Row, class Value>
   void set(const Row& row, Value value);
 
   Viewport* viewport_;
   ViewPanel* view_panel_;
   SelectionPanel* selection_panel_;
+  ActivityPanel* activity_panel_;
+  QDockWidget* activity_dock_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
   QTimer panel_rest_;  // the panel follows a moving view a few times a second
 };

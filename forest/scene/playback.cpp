@@ -170,13 +170,14 @@ Level Playback::level(std::uint32_t row, float magnification, float pixels) cons
   return Level(level);
 }
 
-std::optional<std::uint64_t> Playback::compartment(std::uint32_t instance, std::uint32_t segment) const {
+std::optional<Playback::Compartment> Playback::compartment(std::uint32_t instance,
+                                                           std::uint32_t segment) const {
   if (instance >= row_of_.size() || row_of_[instance] == none) return std::nullopt;
-  const reports::Row& row = activity_.rows()[row_of_[instance]];
-  const auto& values = tables_[row.layout].value[0];
+  const std::uint32_t row = row_of_[instance];
+  const auto& values = tables_[activity_.rows()[row].layout].value[0];
   const std::uint32_t first = shapes_[forest_.instances()[instance].morphology].first_segment;
   if (!within(segment, 1, first, values.size()) || values[segment - first] == none) return std::nullopt;
-  return row.first[std::size_t(Level::compartment)] + values[segment - first];
+  return Compartment{row, values[segment - first]};
 }
 
 void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const PlaybackOptions& options) {

@@ -43,8 +43,11 @@ class Playback {
 
   /// The level at which a neuron is coloured when 1 µm of it covers so many pixels at its nearest.
   reports::Level level(std::uint32_t row, float magnification, float pixels = 12.f) const;
-  /// The compartment of a picked segment, for its history: its value in Level::compartment. None where nothing was reported.
-  std::optional<std::uint64_t> compartment(std::uint32_t instance, std::uint32_t segment) const;
+  /// The compartment of a picked segment, for its history. None where nothing was reported.
+  struct Compartment {
+    std::uint32_t row = 0, index = 0;  // of its neuron in Activity::rows(), and within that
+  };
+  std::optional<Compartment> compartment(std::uint32_t instance, std::uint32_t segment) const;
 
   /// Of the last call of `colour`.
   struct Figures {

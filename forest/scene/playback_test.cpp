@@ -10,6 +10,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/geometry/polyline.h"
+#include "forest/reports/trace.h"
 
 #include "tests/sample_activity.h"
 #include "tests/sample_forest.h"
@@ -265,8 +266,8 @@ TEST(Playback, WhatIsNoNumberAndWhoWasNotReportedIsNeutral) {
       }
   EXPECT_GT(neutral, 500u);
   EXPECT_GT(other, 500u);
-  EXPECT_EQ(playback.compartment(29, cut.lines.empty() ? 0 : sample.forest.neurons()[0].first_segment),
-            std::nullopt);
+  const std::uint32_t shape = sample.forest.instances()[29].morphology;
+  EXPECT_FALSE(playback.compartment(29, sample.forest.neurons()[shape].first_segment));
 }
 
 // One neuron with a straight axon of 600 µm and a dendrite.
@@ -410,8 +411,7 @@ TEST(Playback, APickedSegmentHasItsHistory) {
   for (std::uint32_t i = 0; i < neuron.original_count; i += 17) {
     const auto compartment = playback.compartment(instance, neuron.first_segment + i);
     ASSERT_TRUE(compartment);
-    const auto history = activity.history(*compartment);
-    const float value = activity.facts().range.value(history[40]);
+    const float value = reports::trace(activity, compartment->row, compartment->index).values[40];
     const auto entry = expected(sample, activity, instance, neuron.first_segment + i, 40, view);
     EXPECT_EQ(std::uint32_t(std::lround(std::clamp((value + 80.f) / 100.f, 0.f, 1.f) * 95.f)), entry);
   }
