@@ -22,7 +22,7 @@ namespace forest::studio {
 namespace {
 
 // Okabe & Ito (2008), those that are seen on dark ground.
-const QColor trace_colours[] = {{230, 159, 0}, {86, 180, 233},  {0, 178, 130},  {240, 228, 66},
+const QColor trace_colours[] = {{230, 159, 0}, {86, 180, 233},  {0, 178, 130},   {240, 228, 66},
                                 {213, 94, 0},  {204, 121, 167}, {150, 170, 255}, {230, 230, 230}};
 const QColor ground(13, 16, 22), frame_colour(37, 45, 57), faint(108, 120, 138), ink(207, 215, 226),
     moment_colour(255, 255, 255, 190);
@@ -69,8 +69,8 @@ void RasterView::paintEvent(QPaintEvent*) {
     for (std::size_t code = 0; code < 256; ++code) {
       const float value = activity.facts().range.value(reports::Code(code));
       const bool none = std::isnan(value) || (look.threshold && value < *look.threshold);
-      colours[code] =
-          none ? frame_colour.rgb() : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
+      colours[code] = none ? frame_colour.rgb()
+                           : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
     }
     for (int y = 0; y < height(); ++y)
       for (int x = 0; x < width(); ++x)
@@ -93,7 +93,8 @@ void RasterView::mousePressEvent(QMouseEvent* event) {
   const scene::Playback* playback = viewport_.playback();
   if (!playback) return;
   const auto rows = playback->activity().rows();
-  const auto row = std::size_t(std::clamp(event->position().y() / height(), 0., .999999) * double(rows.size()));
+  const auto row =
+      std::size_t(std::clamp(event->position().y() / height(), 0., .999999) * double(rows.size()));
   const std::uint32_t instance = rows[row].instance;
   const scene::Forest& forest = viewport_.forest();
   const scene::Neuron& neuron = forest.neurons()[forest.instances()[instance].morphology];
@@ -184,8 +185,8 @@ void TraceView::draw() {
     }
     painter.setPen(QPen(trace_colours[t % std::size(trace_colours)], 1.3));
     painter.drawPath(path);
-    painter.drawText(QRectF(area.left() + 4, area.top() + 14. * double(t), area.width() - 8, 14), Qt::AlignRight,
-                     QString::fromStdString(traces_[t].name()));
+    painter.drawText(QRectF(area.left() + 4, area.top() + 14. * double(t), area.width() - 8, 14),
+                     Qt::AlignRight, QString::fromStdString(traces_[t].name()));
   }
 }
 
@@ -230,7 +231,8 @@ ActivityPanel::ActivityPanel(Viewport& viewport, std::function<void(double)> cla
   moment_->setMinimumWidth(130);
   moment_->setAlignment(Qt::AlignRight | Qt::AlignVCenter);
   rate_ = field("Speed", "ms/s", "Milliseconds of the simulation that are played in a second", .001, 1e6);
-  connect(rate_, &QDoubleSpinBox::valueChanged, this, [this](double rate) { viewport_.set_rate(float(rate)); });
+  connect(rate_, &QDoubleSpinBox::valueChanged, this,
+          [this](double rate) { viewport_.set_rate(float(rate)); });
   transport->addWidget(play_);
   transport->addWidget(slider_, 1);
   transport->addWidget(moment_);
@@ -311,8 +313,9 @@ void ActivityPanel::follow() {
   setEnabled(playback != nullptr);
   if (!playback) return;
   const auto step = playback->step_at(viewport_.time());
-  const QSignalBlocker quiet[] = {QSignalBlocker(slider_), QSignalBlocker(rate_),  QSignalBlocker(low_),
-                                  QSignalBlocker(high_),   QSignalBlocker(threshold_), QSignalBlocker(speed_)};
+  const QSignalBlocker quiet[] = {QSignalBlocker(slider_),    QSignalBlocker(rate_),
+                                  QSignalBlocker(low_),       QSignalBlocker(high_),
+                                  QSignalBlocker(threshold_), QSignalBlocker(speed_)};
   slider_->setValue(int(step));
   moment_->setText(tr("%1 of %2 ms").arg(viewport_.time(), 0, 'f', 1).arg(playback->end(), 0, 'f', 1));
   play_->setText(viewport_.playing() ? tr("Pause") : tr("Play"));

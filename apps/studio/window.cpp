@@ -63,8 +63,10 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
 
   panel_rest_.setSingleShot(true);
   panel_rest_.setInterval(100);
-  connect(&panel_rest_, &QTimer::timeout, this,
-          [this] { view_panel_->show_settings(viewport_->settings()); });
+  connect(&panel_rest_, &QTimer::timeout, this, [this] {
+    view_panel_->show_settings(viewport_->settings());
+    activity_panel_->follow();
+  });
   connect(viewport_, &Viewport::changed, this, [this] {
     if (!panel_rest_.isActive()) panel_rest_.start();
   });

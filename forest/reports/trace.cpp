@@ -9,11 +9,14 @@
 
 namespace forest::reports {
 
-std::string Trace::name() const { return fmt::format("node {} section {} at {:.4g}", node, element, position); }
+std::string Trace::name() const {
+  return fmt::format("node {} section {} at {:.4g}", node, element, position);
+}
 
 Trace trace(const Activity& activity, std::uint32_t row, std::uint32_t compartment) {
   if (row >= activity.rows().size() || compartment >= activity.count(row, Level::compartment))
-    throw Error(fmt::format("compartment {} of neuron {} is asked for and was not reported", compartment, row));
+    throw Error(
+        fmt::format("compartment {} of neuron {} is asked for and was not reported", compartment, row));
   const Row& neuron = activity.rows()[row];
   const LayoutView layout = activity.layout(neuron.layout);
   const auto run = std::ranges::upper_bound(layout.sections, compartment, {}, &SectionRun::end);
