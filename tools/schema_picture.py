@@ -19,7 +19,8 @@ PLACES = [
     ["sections", "spines", "annotations", "section_kinds"],
 ]
 # Numbers that name a row without being declared as foreign keys.
-IMPLIED = [("sections", "id", "neurons"), ("sections", "kind", "section_kinds"), ("arbors", "kind", "section_kinds")]
+IMPLIED = [("sections", "id", "neurons"), ("sections", "kind", "section_kinds"), ("arbors", "kind", "section_kinds"),
+           ("neuron_metrics", "neuron", "neurons"), ("neuron_metrics", "metric", "metrics")]
 COLOURS = {"neurons": "#0072B2", "grammars": "#009E73", "populations": "#D55E00", "metrics": "#CC79A7",
            "models": "#7A6A00", "distributions": "#B8860B", "section_kinds": "#777777"}  # of the lines to a table, in the order of their ways
 
@@ -33,6 +34,7 @@ def database():
     header = (ROOT / "forest/repository/schema.h").read_text(encoding="utf-8")
     db = sqlite3.connect(":memory:")
     for script in re.findall(r'R"sql\((.*?)\)sql"', header, re.S):
+        script = re.sub(r"^@on_a_server .*?;\n", "", script, flags=re.M)
         for word, ours in sorted(WORDS.items(), key=lambda pair: -len(pair[0])):
             script = script.replace(word, ours)
         db.executescript(script)

@@ -159,9 +159,12 @@ void run(const Options& options, Console& console) {
       throw Error(
           "a neuron did not come back as it was stored; this is an error of the program, please report it");
 
-  // The middle two percent of every metric.
-  double slowest = 0.;
-  std::size_t ranges = 0;
+  // The middle two percent of every metric. Where nearly all neurons have the same value all of them are found, and the time
+  // is that of listing them: such ranges are told apart.
+  struct Ranges {
+    std::size_t count = 0, most = 0;  // ranges; neurons found by one of them
+    double slowest = 0.;              // s
+  } narrow, wide;
   for (const statistics::Metric& metric : statistics::metrics()) {
     const auto at = [&](double part) {
       const std::string number = fmt::format("(select id from metrics where name = '{}')", metric.name);
@@ -174,12 +177,12 @@ void run(const Options& options, Console& console) {
     };
     const double low = at(.49), high = at(.51);
     if (std::isnan(low)) continue;  // not defined for such neurons
-    ++ranges;
     std::vector<NeuronRow> found;
-    slowest = std::max(
-        slowest, seconds([&] {
-          found = repository.neurons_where(fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
-        }));
+    const double time = seconds([&] {
+      found = repository.neurons_where(fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
+    });
+    Ranges& of = found.size() > rows.size() / 10 ? wide : narrow;
+    of = {of.count + 1, std::max(of.most, found.size()), std::max(of.slowest, time)};
     if (found.empty()) throw Error(fmt::format("no neuron was found by its {}", metric.name));
   }
 
@@ -192,8 +195,11 @@ void run(const Options& options, Console& console) {
                  {"listed", fmt::format("{:.0f}", double(rows.size()) / list)}});
   console.say(fmt::format(
       "{:.0f} bytes a neuron of {} points; another reader got {} neurons meanwhile and waited {:.0f} ms "
-      "at most; the slowest of {} range queries took {:.0f} ms",
-      bytes, rows[0].points, reader.neurons(), 1e3 * reader.longest_wait(), ranges, 1e3 * slowest));
+      "at most; the slowest of {} range queries that found up to {} neurons took {:.0f} ms, of {} that found "
+      "up to {} "
+      "{:.0f} ms",
+      bytes, rows[0].points, reader.neurons(), 1e3 * reader.longest_wait(), narrow.count, narrow.most,
+      1e3 * narrow.slowest, wide.count, wide.most, 1e3 * wide.slowest));
   console.print({{"sections_per_neuron", options.sections},
                  {"points_per_neuron", rows[0].points},
                  {"neurons", rows.size()},
@@ -202,8 +208,12 @@ void run(const Options& options, Console& console) {
                  {"stored_singly_per_second", alone / single},
                  {"read_per_second", some / read},
                  {"listed_per_second", double(rows.size()) / list},
-                 {"range_query_milliseconds", 1e3 * slowest},
-                 {"range_queries", ranges},
+                 {"range_query_milliseconds", 1e3 * narrow.slowest},
+                 {"range_queries", narrow.count},
+                 {"range_found", narrow.most},
+                 {"wide_query_milliseconds", 1e3 * wide.slowest},
+                 {"wide_queries", wide.count},
+                 {"wide_found", wide.most},
                  {"read_meanwhile", reader.neurons()},
                  {"longest_wait_milliseconds", 1e3 * reader.longest_wait()},
                  {"bytes_per_neuron", bytes}});

@@ -10,7 +10,7 @@ namespace {
 
 void run_script(Database& database, std::string_view script) {
   for (std::size_t end; (end = script.find(";\n")) != std::string_view::npos; script.remove_prefix(end + 2))
-    database.sql() << database.dialect(script.substr(0, end));
+    if (const std::string sql = database.dialect(script.substr(0, end)); !sql.empty()) database.sql() << sql;
 }
 
 void fill_section_kinds(soci::session& sql) {

@@ -46,6 +46,11 @@ std::string of_sections(long long neuron) {
   return fmt::format("sections where id >= {} and id < {}", first_section(neuron), first_section(neuron + 1));
 }
 
+/// One look-up a metric: the table is in the order of metrics.
+std::string of_metrics(long long neuron) {
+  return fmt::format("neuron_metrics where metric in (select id from metrics) and neuron = {}", neuron);
+}
+
 std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
 
 void check_name(std::string_view what, std::string_view name) {
@@ -167,7 +172,7 @@ class Statements {
           Part{soma_, 1, of("somata", "")},
           Part{arbors_, rows.arbors.size(), of("arbors", " order by number")},
           Part{sections_, rows.sections.size(), of_sections(id) + " order by id"},
-          Part{metrics_, rows.metric.size(), of("neuron_metrics", " order by metric")},
+          Part{metrics_, rows.metric.size(), of_metrics(id) + " order by metric"},
           Part{spines_, rows.spines.size(), of("spines", " order by number")}}) {
       std::vector<const InsertColumn*> columns;
       std::vector<std::string_view> names;
@@ -333,8 +338,9 @@ struct Repository::Impl {
       const Morphology m =
           morphology_of(stored(NeuronId(std::size_t(id)), "point_count",
                                fmt::format("old_sections where neuron = {} order by number", id)));
-      for (const char* table : {"points", "arbors", "neuron_metrics"})
+      for (const char* table : {"points", "arbors"})
         sql << fmt::format("delete from {} where neuron = {}", table, id);
+      sql << "delete from " + of_metrics(id);
       all.id = id;
       all.rows = rows_of(m);
       all.packed_points = packed(m.points());
@@ -1052,10 +1058,10 @@ bool Repository::remove(NeuronId id) {
   return impl_->write([&] {
     const int neuron = number_of(id);
     if (!impl_->ask<int>("select id from neurons where id = :id", neuron)) return false;
-    for (const char* table :
-         {"provenance", "somata", "arbors", "points", "spines", "annotations", "neuron_metrics"})
+    for (const char* table : {"provenance", "somata", "arbors", "points", "spines", "annotations"})
       impl_->sql << fmt::format("delete from {} where neuron = :id", table), use(neuron);
     impl_->sql << "delete from " + of_sections(neuron);
+    impl_->sql << "delete from " + of_metrics(neuron);
     impl_->sql << "delete from neurons where id = :id", use(neuron);
     return true;
   });

@@ -1,7 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // The tables of a repository, as steps from version to version; docs/repository/schema.md draws them. Plain SQL but for
 // words in @, for which each database has its own: @id and @long_id (a whole number of 32 or 64 bits that names a row), @bytes,
-// and @by_key (rows kept in the order of their key).
+// @by_key (rows kept in the order of their key), and
+// @on_a_server before a statement that a file does not need.
 #pragma once
 
 #include <array>
@@ -244,6 +245,28 @@ create view model as
 create view distribution as
   select d.id, d.name, p.name as population, d.version, d.text
   from distributions d left join populations p on p.id = d.population;
+)sql"},
+    // Values are kept in the order of neurons and not in that of values: a new neuron is written at the ends of the metrics
+    // and not all over them, and a range of values is found among one metric's neighbouring rows. The rows of a neuron are
+    // removed by the program, so that no key need be looked up.
+    Migration{5, R"sql(
+drop view metric;
+alter table neuron_metrics rename to old_metrics;
+drop index metrics_of_neuron;
+create table neuron_metrics (
+  metric integer not null,            -- as metrics.id
+  neuron integer not null,            -- as neurons.id
+  value  double precision not null,   -- no row where the metric is not defined
+  primary key (metric, neuron)
+) @by_key;
+insert into neuron_metrics (metric, neuron, value)
+  select metric, neuron, value from old_metrics order by metric, neuron;
+drop table old_metrics;
+@on_a_server create index metrics_by_value on neuron_metrics (metric, value);
+create view metric as
+  select n.id as neuron, n.name as name, p.name as population, m.name as metric, v.value, m.unit
+  from neurons n join populations p on p.id = n.population cross join metrics m
+       join neuron_metrics v on v.metric = m.id and v.neuron = n.id;
 )sql"}};
 
 inline constexpr int section_bits = 24;                      // of sections.id
