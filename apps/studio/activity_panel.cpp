@@ -42,7 +42,7 @@ double time_at(const scene::Playback& playback, double share) {
 
 RasterView::RasterView(Viewport& viewport, QWidget* parent) : QWidget(parent), viewport_(viewport) {
   setObjectName("raster");
-  setMinimumSize(160, 80);
+  setMinimumSize(160, 120);
   setAccessibleName(tr("Raster"));
   setAccessibleDescription(
       tr("Soma voltages: time to the right, neurons downwards; click a row to select its neuron"));
@@ -108,7 +108,7 @@ void RasterView::mousePressEvent(QMouseEvent* event) {
 TraceView::TraceView(Viewport& viewport, const std::vector<reports::Trace>& traces, QWidget* parent)
     : QWidget(parent), viewport_(viewport), traces_(traces) {
   setObjectName("traces");
-  setMinimumSize(160, 80);
+  setMinimumSize(160, 120);
   setAccessibleName(tr("Traces"));
   setAccessibleDescription(tr("Histories of clicked compartments; click to go to a time"));
   setToolTip(accessibleDescription());
@@ -185,8 +185,18 @@ void TraceView::draw() {
     }
     painter.setPen(QPen(trace_colours[t % std::size(trace_colours)], 1.3));
     painter.drawPath(path);
-    painter.drawText(QRectF(area.left() + 4, area.top() + 14. * double(t), area.width() - 8, 14),
-                     Qt::AlignRight, QString::fromStdString(traces_[t].name()));
+  }
+  // Names over a plate, so that no curve runs through them.
+  qreal widest = 0;
+  for (const reports::Trace& trace : traces_)
+    widest =
+        std::max(widest, painter.fontMetrics().horizontalAdvance(QString::fromStdString(trace.name())) + 10.);
+  const QRectF names(area.right() - widest, area.top(), widest, 14. * double(traces_.size()) + 2.);
+  painter.fillRect(names, QColor(13, 16, 22, 215));
+  for (std::size_t t = 0; t < traces_.size(); ++t) {
+    painter.setPen(trace_colours[t % std::size(trace_colours)]);
+    painter.drawText(QRectF(names.left(), names.top() + 14. * double(t), widest - 5., 14), Qt::AlignRight,
+                     QString::fromStdString(traces_[t].name()));
   }
 }
 

@@ -29,8 +29,8 @@ struct Instance {
 struct Item {
   uint instance;
   uint first_segment;
-  uint segment_count;     // at most cluster_size
-  uint first_entry;       // in the list's entries: the colours of its segments, when it has any
+  uint segment_count;  // at most cluster_size
+  uint padding;
   float x, y, z, radius;  // a sphere around all of it, in the world, µm
 };
 
@@ -67,7 +67,8 @@ struct Constants {
 #define FOREST_OVERLAY 1u     // segments lie in the world and name their palette entry
 #define FOREST_COARSE 2u      // tiles of tiles
 #define FOREST_FIRST_BAND 4u  // nothing is hidden yet
-#define FOREST_ENTRIES 8u     // every segment has a palette entry of its own
+#define FOREST_ENTRIES 8u     // every segment has a palette entry of its own …
+#define FOREST_SINGLE 16u     // … and the list has one an item, not FOREST_CLUSTER_SIZE
 
 // Occlusion: the farthest key of every square of 8 × 8 pixels, then of every 8 × 8 of those.
 #define FOREST_TILE 8u

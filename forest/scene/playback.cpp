@@ -186,33 +186,38 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   for (const std::uint32_t i : in_sight_) shown_[i] = {};
   in_sight_.clear();
   figures_ = {};
-  std::uint32_t entries = 0;
-  for (auto* list : {&cut.dots, &cut.lines, &cut.capsules})
-    for (frame::Item& item : *list) {
-      item.first_entry = entries;
-      entries += item.segment_count;
-      Shown& s = shown_[item.instance];
-      if (s.magnification < 0.f) in_sight_.push_back(item.instance);
-      s.magnification = std::max(s.magnification, eye.magnification({{item.x, item.y, item.z}, item.radius}));
+  for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
+    for (const frame::Item& item : *list) {
+      figures_.segments += item.segment_count;
+      if (Shown& s = shown_[item.instance]; !s.in_sight) {
+        s.in_sight = true;
+        in_sight_.push_back(item.instance);
+      }
     }
-  read(options, step_at(time));
+  read(eye, options, step_at(time));
   find_spikes(time, view, options);
   figures_.gather = milliseconds_since(start);
 
   start = Clock::now();
   const auto entry_of = entries_of(activity_.facts().range, view);
-  // Never empty: that would say that colour classes decide, also of what is revealed later.
-  cut.entries.assign(std::max(entries, 1u), std::uint8_t(no_value_entry));
-  for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
-    parallel_ranges(list->size(), 512, [&](std::size_t from, std::size_t to) {
-      paint(std::span(*list).subspan(from, to - from), entry_of, view, time, options.window, cut.entries);
+  Cut::Entries& entries = cut.entries.emplace();
+  const auto paint_list = [&](std::span<const frame::Item> list, std::size_t each,
+                              std::vector<std::uint8_t>& out) {
+    out.assign(list.size() * each, std::uint8_t(no_value_entry));
+    parallel_ranges(list.size(), 512, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i)
+        paint(list[i], entry_of, view, time, options.window, &out[i * each]);
     });
-  figures_.segments = entries;
+  };
+  paint_list(cut.dots, 1, entries.dots);
+  paint_list(cut.lines, frame::cluster_size, entries.lines);
+  paint_list(cut.capsules, frame::cluster_size, entries.capsules);
   figures_.paint = milliseconds_since(start);
 }
 
-// Reads the values of what is in sight, each neuron's in its level.
-void Playback::read(const PlaybackOptions& options, std::uint64_t step) {
+// Reads the values of what is in sight, each neuron's in its level: a matter of the eye and the neuron alone, so that what
+// hides parts of it changes no colour.
+void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step) {
   wanted_.clear();
   std::uint64_t values = 0;
   const auto want = [&](std::uint32_t row, Level level) {
@@ -223,7 +228,11 @@ void Playback::read(const PlaybackOptions& options, std::uint64_t step) {
     const std::uint32_t row = row_of_[i];
     if (row == none) continue;
     Shown& s = shown_[i];
-    s.level = level(row, s.magnification, options.pixels);
+    const frame::Instance& instance = forest_.instances()[i];
+    const Cluster& root = forest_.clusters()[forest_.neurons()[instance.morphology].first_cluster];
+    const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
+    const Vec3 middle = Vec3(instance.x, instance.y, instance.z) + turn * Vec3(root.x, root.y, root.z);
+    s.level = level(row, eye.magnification({middle, root.radius}), options.pixels);
     s.first = values;
     want(row, s.level);
     if (s.level == Level::neuron) want(row, Level::soma);
@@ -247,7 +256,7 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
       double(farthest_ / view.speed) + double(view.fade) * std::log(double(flash_steps)) + options.window;
   for (const reports::Spike& s :
        activity_.spikes(time - under_way, std::nextafter(time, std::numeric_limits<double>::infinity())))
-    if (s.instance < shown_.size() && shown_[s.instance].magnification >= 0.f) spikes_.push_back(s);
+    if (s.instance < shown_.size() && shown_[s.instance].in_sight) spikes_.push_back(s);
   std::ranges::stable_sort(spikes_, {}, &reports::Spike::instance);
   for (std::uint32_t i = 0; i < spikes_.size(); ++i) {
     Shown& s = shown_[spikes_[i].instance];
@@ -257,34 +266,30 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
   figures_.flashes = spikes_.size();
 }
 
-void Playback::paint(std::span<const frame::Item> items, const std::array<std::uint8_t, 256>& entry_of,
-                     const ActivityView& view, double time, double window,
-                     std::span<std::uint8_t> entries) const {
-  for (const frame::Item& item : items) {
-    const Shown& s = shown_[item.instance];
-    const Shape& shape = shapes_[forest_.instances()[item.instance].morphology];
-    if (!within(item.first_segment, item.segment_count, shape.first_segment, shape.distance.size())) continue;
-    const std::size_t first = item.first_segment - shape.first_segment;
-    std::uint8_t* const out = &entries[item.first_entry];
-    if (const std::uint32_t row = row_of_[item.instance]; row != none) {
-      const auto& value = tables_[activity_.rows()[row].layout].value[std::size_t(s.level)];
-      for (std::uint32_t i = 0; i < item.segment_count; ++i)
-        if (const std::uint32_t v = value[first + i]; v != none) out[i] = entry_of[codes_[s.first + v]];
-    }
-    for (std::uint32_t k = s.spikes; k < s.spikes_end; ++k)
-      for (std::uint32_t i = 0; i < item.segment_count; ++i) {
-        const float distance = shape.distance[first + i];
-        if (distance < 0.f) continue;
-        const double age = time - spikes_[k].time - double(distance / view.speed);  // since it arrived there
-        if (age < 0.) continue;
-        const float bright = std::exp(-float(std::max(0., age - window)) / view.fade);
-        const bool lit = out[i] >= flash_entry && out[i] < flash_entry + flash_steps;
-        if (bright < (lit || out[i] == no_value_entry ? dimmest : dimmest_over_value)) continue;
-        const auto step = std::min(std::uint32_t(bright * float(flash_steps)), flash_steps);
-        const auto entry = std::uint8_t(flash_entry + step - 1);
-        out[i] = lit ? std::max(out[i], entry) : entry;
-      }
+void Playback::paint(const frame::Item& item, const std::array<std::uint8_t, 256>& entry_of,
+                     const ActivityView& view, double time, double window, std::uint8_t* out) const {
+  const Shown& s = shown_[item.instance];
+  const Shape& shape = shapes_[forest_.instances()[item.instance].morphology];
+  if (!within(item.first_segment, item.segment_count, shape.first_segment, shape.distance.size())) return;
+  const std::size_t first = item.first_segment - shape.first_segment;
+  if (const std::uint32_t row = row_of_[item.instance]; row != none) {
+    const auto& value = tables_[activity_.rows()[row].layout].value[std::size_t(s.level)];
+    for (std::uint32_t i = 0; i < item.segment_count; ++i)
+      if (const std::uint32_t v = value[first + i]; v != none) out[i] = entry_of[codes_[s.first + v]];
   }
+  for (std::uint32_t k = s.spikes; k < s.spikes_end; ++k)
+    for (std::uint32_t i = 0; i < item.segment_count; ++i) {
+      const float distance = shape.distance[first + i];
+      if (distance < 0.f) continue;
+      const double age = time - spikes_[k].time - double(distance / view.speed);  // since it arrived there
+      if (age < 0.) continue;
+      const float bright = std::exp(-float(std::max(0., age - window)) / view.fade);
+      const bool lit = out[i] >= flash_entry && out[i] < flash_entry + flash_steps;
+      if (bright < (lit || out[i] == no_value_entry ? dimmest : dimmest_over_value)) continue;
+      const auto step = std::min(std::uint32_t(bright * float(flash_steps)), flash_steps);
+      const auto entry = std::uint8_t(flash_entry + step - 1);
+      out[i] = lit ? std::max(out[i], entry) : entry;
+    }
 }
 
 }  // namespace forest::scene

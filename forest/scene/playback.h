@@ -18,7 +18,7 @@ namespace forest::scene {
 struct PlaybackOptions {
   double window =
       0.;  // ms that a picture stands for, up to its moment: of the steps within, the greatest is shown
-  float pixels = 12.f;  // that one value may stand for, along a branch
+  float pixels = 16.f;  // that one value may stand for, along a branch
 };
 
 class Playback {
@@ -41,8 +41,8 @@ class Playback {
   /// Over that, spikes: a flash leaves the soma at the time of the spike, runs along the axon and fades.
   void colour(Cut& cut, const Eye& eye, const ActivityView& view, const PlaybackOptions& options = {});
 
-  /// The level at which a neuron is coloured when 1 µm of it covers so many pixels at its nearest.
-  reports::Level level(std::uint32_t row, float magnification, float pixels = 12.f) const;
+  /// The level at which a neuron is coloured when 1 µm of it covers so many pixels where it is nearest.
+  reports::Level level(std::uint32_t row, float magnification, float pixels = PlaybackOptions().pixels) const;
   /// The compartment of a picked segment, for its history. None where nothing was reported.
   struct Compartment {
     std::uint32_t row = 0, index = 0;  // of its neuron in Activity::rows(), and within that
@@ -71,16 +71,16 @@ class Playback {
         distance;  // of each segment along the branches from the soma; negative where no spike runs
   };
   struct Shown {
-    float magnification = -1.f;  // −1: not in the cut
+    bool in_sight = false;
     reports::Level level = reports::Level::compartment;
     std::uint64_t first = 0;                   // in codes_
     std::uint32_t spikes = 0, spikes_end = 0;  // in spikes_
   };
 
-  void read(const PlaybackOptions& options, std::uint64_t step);
+  void read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step);
   void find_spikes(double time, const ActivityView& view, const PlaybackOptions& options);
-  void paint(std::span<const frame::Item> items, const std::array<std::uint8_t, 256>& entry_of,
-             const ActivityView& view, double time, double window, std::span<std::uint8_t> entries) const;
+  void paint(const frame::Item& item, const std::array<std::uint8_t, 256>& entry_of, const ActivityView& view,
+             double time, double window, std::uint8_t* out) const;
 
   Forest forest_;
   reports::Activity activity_;

@@ -24,6 +24,28 @@ using reports::Code;
 using reports::Level;
 using ::testing::HasSubstr;
 
+// Calls visit(item, index of a segment in it, its palette entry) for all that a cut shows.
+template <class Visit>
+void for_each_segment(const Cut& cut, Visit&& visit) {
+  ASSERT_TRUE(cut.entries);
+  const auto walk = [&](const auto& list, const auto& entries, std::size_t each) {
+    ASSERT_EQ(entries.size(), list.size() * each);
+    for (std::size_t k = 0; k < list.size(); ++k)
+      for (std::uint32_t i = 0; i < list[k].segment_count; ++i)
+        visit(list[k], i, std::uint32_t(entries[k * each + i]));
+  };
+  walk(cut.dots, cut.entries->dots, 1);
+  walk(cut.lines, cut.entries->lines, frame::cluster_size);
+  walk(cut.capsules, cut.entries->capsules, frame::cluster_size);
+}
+
+std::vector<std::uint32_t> all_entries(const Cut& cut) {
+  std::vector<std::uint32_t> all;
+  for_each_segment(cut,
+                   [&](const frame::Item&, std::uint32_t, std::uint32_t entry) { all.push_back(entry); });
+  return all;
+}
+
 struct Sample {
   circuit::Circuit circuit = forest::testing::sample_circuit(30);
   std::vector<Morphology> neurons = forest::testing::sample_neurons();
@@ -130,15 +152,12 @@ TEST(Playback, EverySegmentHasTheColourOfItsCompartmentAtEveryLevelOfShape) {
     playback.colour(cut, eye, view, {.pixels = 0.f});
     std::set<std::uint32_t> colours;
     std::size_t seen = 0;
-    for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
-      for (const frame::Item& item : *list)
-        for (std::uint32_t i = 0; i < item.segment_count; ++i, ++seen) {
-          const std::uint32_t entry = cut.entries[item.first_entry + i];
-          ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 40, view));
-          colours.insert(entry);
-        }
+    for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
+      ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 40, view));
+      colours.insert(entry);
+      ++seen;
+    });
     EXPECT_EQ(seen, cut.segments);
-    EXPECT_EQ(cut.entries.size(), cut.segments);
     EXPECT_GT(colours.size(), 10u);
     EXPECT_TRUE(colours.contains(below_entry));
     const Colouring colouring = colour(sample.forest, ColourBy::type, Background::dark);
@@ -177,12 +196,12 @@ TEST(Playback, FarNeuronsAreColouredByMeansThatAreNearTheirCompartments) {
     if (means.dots.size() == 30u) {
       // Somata keep their own value at any distance.
       for (std::size_t i = 0; i < means.dots.size(); ++i)
-        EXPECT_EQ(means.entries[means.dots[i].first_entry], exact.entries[exact.dots[i].first_entry]);
+        EXPECT_EQ(means.entries->dots[i], exact.entries->dots[i]);
     }
     double sum = 0., mean_sum = 0.;
-    for (std::size_t i = 0; i < means.entries.size(); ++i)
-      sum += exact.entries[i], mean_sum += means.entries[i];
-    EXPECT_NEAR(mean_sum / double(means.entries.size()), sum / double(means.entries.size()), 4.) << farther;
+    const auto by_means = all_entries(means), by_values = all_entries(exact);
+    for (std::size_t i = 0; i < by_means.size(); ++i) sum += by_values[i], mean_sum += by_means[i];
+    EXPECT_NEAR(mean_sum / double(by_means.size()), sum / double(by_means.size()), 4.) << farther;
   }
   EXPECT_EQ(values, 60u);  // of each neuron its mean and its soma
 }
@@ -223,7 +242,7 @@ TEST(Playback, IsTheSameAtAnyNumberOfThreads) {
     Playback playback(sample.forest, sample.activity());
     Cut cut = choose(sample.forest, eye, viewport);
     playback.colour(cut, eye, playback.view());
-    return cut.entries;
+    return all_entries(cut);
   };
   const auto all = entries();
   const ThreadLimit one(1);
@@ -254,16 +273,13 @@ TEST(Playback, WhatIsNoNumberAndWhoWasNotReportedIsNeutral) {
   const ActivityView view = playback.view();
   playback.colour(cut, eye, view, {.pixels = 0.f});
   std::size_t neutral = 0, other = 0;
-  for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
-    for (const frame::Item& item : *list)
-      for (std::uint32_t i = 0; i < item.segment_count; ++i) {
-        const std::uint32_t entry = cut.entries[item.first_entry + i];
-        ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 0, view));
-        if (item.instance == 29) {
-          EXPECT_EQ(entry, no_value_entry);
-        }
-        ++(entry == no_value_entry ? neutral : other);
-      }
+  for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
+    ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 0, view));
+    if (item.instance == 29) {
+      EXPECT_EQ(entry, no_value_entry);
+    }
+    ++(entry == no_value_entry ? neutral : other);
+  });
   EXPECT_GT(neutral, 500u);
   EXPECT_GT(other, 500u);
   const std::uint32_t shape = sample.forest.instances()[29].morphology;
@@ -323,35 +339,30 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
       Cut cut = choose(forest, eye, viewport);
       playback.colour(cut, eye, view);
       std::size_t lit = 0;
-      for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
-        for (const frame::Item& item : *list)
-          for (std::uint32_t i = 0; i < item.segment_count; ++i) {
-            const frame::Segment& s = forest.segments()[item.first_segment + i];
-            const std::uint32_t entry = cut.entries[item.first_entry + i];
-            const bool flash = entry >= flash_entry && entry < flash_entry + flash_steps;
-            const float y = .5f * (s.ay + s.by);
-            if (y > 8.f) {  // the dendrite
-              EXPECT_FALSE(flash) << y;
-              continue;
-            }
-            if (std::abs(s.ay - s.by) > 12.f) {  // coarse: its middle decides
-              lit += flash;
-              continue;
-            }
-            const double way = std::max(0., (-8. - double(y)) * std::sqrt(1.01)),
-                         age = time - 5. - way / 100.;
-            const double bright = age < 0. ? 0. : std::exp(-age / .5);
-            // Of a branch that has a value of its own the bright part of a flash is shown, of others all of it.
-            const double least = y < -300.f ? 1. / 16. : .4;
-            if (std::abs(age) > .1 && std::abs(bright - least) > .02) {
-              EXPECT_EQ(flash, bright > least) << time << " at " << y;
-            }
-            if (flash) {
-              EXPECT_NEAR(double(entry - flash_entry + 1) / 16., bright,
-                          .14 + (std::abs(age) < .1 ? 1. : 0.));
-            }
-            lit += flash;
-          }
+      for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
+        const frame::Segment& s = forest.segments()[item.first_segment + i];
+        const bool flash = entry >= flash_entry && entry < flash_entry + flash_steps;
+        const float y = .5f * (s.ay + s.by);
+        if (y > 8.f) {  // the dendrite
+          EXPECT_FALSE(flash) << y;
+          return;
+        }
+        if (std::abs(s.ay - s.by) > 12.f) {  // coarse: its middle decides
+          lit += flash;
+          return;
+        }
+        const double way = std::max(0., (-8. - double(y)) * std::sqrt(1.01)), age = time - 5. - way / 100.;
+        const double bright = age < 0. ? 0. : std::exp(-age / .5);
+        // Of a branch that has a value of its own the bright part of a flash is shown, of others all of it.
+        const double least = y < -300.f ? 1. / 16. : .4;
+        if (std::abs(age) > .1 && std::abs(bright - least) > .02) {
+          EXPECT_EQ(flash, bright > least) << time << " at " << y;
+        }
+        if (flash) {
+          EXPECT_NEAR(double(entry - flash_entry + 1) / 16., bright, .14 + (std::abs(age) < .1 ? 1. : 0.));
+        }
+        lit += flash;
+      });
       if (error < 1.f || time < 5. || time > 12.) {  // coarse, a straight axon is one segment
         EXPECT_EQ(lit > 0, time >= 5. && time < 12.) << time;
       }
@@ -360,7 +371,7 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
   const Eye eye = eye_at(camera, .01f);
   Cut cut = choose(forest, eye, viewport);
   playback.colour(cut, eye, view);
-  for (const std::uint8_t entry : cut.entries) EXPECT_LT(entry, flash_entry);
+  for (const std::uint32_t entry : all_entries(cut)) EXPECT_LT(entry, flash_entry);
 }
 
 TEST(Playback, APictureOfALongWhileShowsTheGreatest) {
@@ -373,8 +384,9 @@ TEST(Playback, APictureOfALongWhileShowsTheGreatest) {
   Cut now = choose(sample.forest, eye, viewport), longer = now;
   playback.colour(now, eye, view, {.pixels = 0.f});
   playback.colour(longer, eye, view, {.window = 2.5, .pixels = 0.f});
-  for (std::size_t i = 0; i < now.entries.size(); ++i) ASSERT_GE(longer.entries[i], now.entries[i]);
-  EXPECT_NE(longer.entries, now.entries);
+  const auto at_once = all_entries(now), greatest = all_entries(longer);
+  for (std::size_t i = 0; i < at_once.size(); ++i) ASSERT_GE(greatest[i], at_once[i]);
+  EXPECT_NE(greatest, at_once);
 }
 
 TEST(Playback, ASimulationOfAnotherCircuitIsRefusedAndTheMismatchNamed) {

@@ -336,7 +336,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.camera = view.camera;
   f.width = width, f.height = height, f.subframes = view.samples;
   f.palette = colouring.palette;
-  if (!cut.entries.empty())
+  if (cut.entries)
     paint(f.palette, view.activity.value_or(ActivityView()), view.background == Background::light);
   f.colour_class = colouring.classes;
   static_cast<frame::Lists&>(f) = cut.lists();

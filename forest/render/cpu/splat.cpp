@@ -26,7 +26,8 @@ struct Run {
   std::uint32_t entry[run];                      // of the palette
 };
 
-void load(const Picture& picture, const frame::Item& item, Run& r) {
+// `entries`: of its segments; null: the colour class says.
+void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
   const std::uint32_t colour = picture.colour_class[item.instance] * 8u;
   const float turn = golden * float(picture.constants.subframe);
@@ -40,8 +41,8 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.rank[i] = float(s.meta >> 8 & 255) * (1.f / 256.f) + turn;
     r.entry[i] = colour + (s.meta & 7);
   }
-  if (!picture.entries.empty())
-    for (std::size_t i = 0; i < r.count; ++i) r.entry[i] = picture.entries[item.first_entry + i];
+  if (entries)
+    for (std::size_t i = 0; i < r.count; ++i) r.entry[i] = entries[i];
 }
 
 // From the coordinates of their neuron to pixels: camera = turn · p + at.
@@ -303,7 +304,8 @@ void draw_dot(const Picture& picture, const Run& r, float rank, Canvas& canvas) 
 
 }  // namespace
 
-void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
+void splat(const Picture& picture, std::span<const frame::Item> items, std::span<const std::uint8_t> entries,
+           Kind kind, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   parallel_ranges(items.size(), grain, [&](std::size_t begin, std::size_t end) {
     Run r{};
@@ -322,7 +324,7 @@ void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind
       const Mat3 turn =
           picture.to_camera * Quat(instance.qw, instance.qx, instance.qy, instance.qz).toRotationMatrix();
       const Vec3 at = picture.to_camera * (Vec3(instance.x, instance.y, instance.z) - picture.eye);
-      load(picture, item, r);
+      load(picture, item, entries.empty() ? nullptr : &entries[kind == Kind::dots ? k : k * run], r);
       project(c, turn, at, picture.light, r);
       switch (kind) {
         case Kind::lines:

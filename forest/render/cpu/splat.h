@@ -12,7 +12,6 @@ namespace forest::render::cpu {
 struct Picture {
   frame::Geometry geometry;
   std::span<const std::uint8_t> colour_class;
-  std::span<const std::uint8_t> entries;  // of the lists that are drawn; may be empty
   frame::Constants constants;
   Mat3 to_camera;  // rows: right, up, forward
   Vec3 eye, light;
@@ -21,7 +20,9 @@ struct Picture {
 enum class Kind { dots, lines, capsules };
 
 /// Draws every item of the list; the picture is the same in any order and at any number of threads.
-void splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas);
+/// @param entries  of the list (frame::Entries); may be empty
+void splat(const Picture& picture, std::span<const frame::Item> items, std::span<const std::uint8_t> entries,
+           Kind kind, Canvas& canvas);
 /// Overlays: at least two pixels wide, in the world.
 void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas);
 

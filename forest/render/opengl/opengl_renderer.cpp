@@ -99,7 +99,7 @@ struct OpenGLRenderer::Device {
   struct List {
     const Program* program;
     std::uint32_t flags;
-    Buffer items;
+    Buffer items, entries{};
     std::uint32_t count = 0;
     std::size_t segments = 0;
   };
@@ -111,8 +111,8 @@ struct OpenGLRenderer::Device {
       capsules{"capsules", shaders::capsules, shaders::capsule},
       close_ups{"close_ups", shaders::close_ups, shaders::capsule}, cull{"cull", shaders::cull},
       tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, colour_classes, entries, entries_of_rest, palette, overlay_segments, uniforms,
-      keys, sums, image, queue, large_queue, tiles;
+  Buffer segments, instances, colour_classes, palette, overlay_segments, uniforms, keys, sums, image, queue,
+      large_queue, tiles;
   ListSet lists{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}},
       rest{{{&capsules, 0, {}}, {&dots, 0, {}}, {&lines, 0, {}}}};
   List overlays{&capsules, FOREST_OVERLAY, {}};
@@ -124,19 +124,20 @@ struct OpenGLRenderer::Device {
   GLuint texture = 0, framebuffer = 0;
   std::uint32_t texture_width = 0, texture_height = 0;
 
-  static void set(List& list, std::span<const Item> items) {
+  static void set(List& list, std::span<const Item> items, std::span<const std::uint8_t> entries = {},
+                  std::uint32_t flags = 0) {
     list.items.upload(items);
+    list.entries.upload(entries);
+    list.flags = (list.flags & FOREST_OVERLAY) | (entries.empty() ? 0 : FOREST_ENTRIES | flags);
     list.count = std::uint32_t(items.size());
     list.segments = 0;
     for (const Item& item : items) list.segments += item.segment_count;
   }
 
   void upload(ListSet& to, const frame::Lists& from) {
-    (&to == &rest ? entries_of_rest : entries).upload(from.entries);
-    for (List& list : to) list.flags = from.entries.empty() ? 0 : FOREST_ENTRIES;
-    set(to[capsule_list], from.capsules);
-    set(to[dot_list], from.dots);
-    set(to[line_list], from.lines);
+    set(to[capsule_list], from.capsules, from.entries.capsules);
+    set(to[dot_list], from.dots, from.entries.dots, FOREST_SINGLE);
+    set(to[line_list], from.lines, from.entries.lines);
     std::size_t longest = overlays.segments;
     for (const List& list : to) longest = std::max(longest, list.segments);
     queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
@@ -199,6 +200,7 @@ struct OpenGLRenderer::Device {
     constants.flags = list.flags | (first_band ? FOREST_FIRST_BAND : 0);
     set_constants();
     list.items.bind_texels(2, GL_RGBA32UI);
+    list.entries.bind_texels(9, GL_R8UI);
     (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind_texels(0, GL_RGBA32UI);
     cull.use();
     glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
@@ -230,7 +232,6 @@ struct OpenGLRenderer::Device {
   void draw_bands(ListSet& set, std::span<const frame::Band> bands, bool first_band) {
     const frame::Band whole{set[dot_list].count, set[line_list].count, set[capsule_list].count};
     if (bands.empty()) bands = std::span(&whole, 1);
-    (&set == &rest ? entries_of_rest : entries).bind_texels(9, GL_R8UI);
     frame::Band from;
     for (const frame::Band& to : bands) {
       const bool first = &to == &bands.front();

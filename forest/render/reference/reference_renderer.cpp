@@ -367,10 +367,15 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     const std::uint8_t* entries;  // of its segments; null: its colour class says
   };
   std::vector<Drawn> items;
+  const auto add_list = [&](std::span<const Item> list, std::span<const std::uint8_t> entries,
+                            std::size_t each) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      items.push_back({&list[i], entries.empty() ? nullptr : &entries[i * each]});
+  };
   const auto add = [&](const frame::Lists& lists) {
-    for (const auto list : {lists.dots, lists.lines, lists.capsules})
-      for (const Item& item : list)
-        items.push_back({&item, lists.entries.empty() ? nullptr : lists.entries.data() + item.first_entry});
+    add_list(lists.dots, lists.entries.dots, 1);
+    add_list(lists.lines, lists.entries.lines, frame::cluster_size);
+    add_list(lists.capsules, lists.entries.capsules, frame::cluster_size);
   };
   add(f);
   if (f.rest) {

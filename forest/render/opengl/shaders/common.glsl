@@ -11,7 +11,7 @@ layout(binding = 5) uniform samplerBuffer palette;          // linear
 layout(binding = 6) uniform usamplerBuffer queue_seen;
 layout(binding = 7) uniform usamplerBuffer large_seen;
 layout(binding = 8) uniform usamplerBuffer tiles_seen;
-layout(binding = 9) uniform usamplerBuffer entries;         // a segment, where FOREST_ENTRIES
+layout(binding = 9) uniform usamplerBuffer entries;         // of this list's segments, where FOREST_ENTRIES
 
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
 // Segments of this band's items that are not hidden, one thread each (item * 64 + index), and the workgroups that draw
@@ -104,7 +104,8 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.a = to_camera(at + turned(q, c.a));
     c.b = to_camera(at + turned(q, c.b));
     c.mean = unpackHalf2x16(meta >> 16).x;
-    c.entry = (view.flags & FOREST_ENTRIES) != 0u ? texelFetch(entries, int(item.w + index)).x
+    uint entry_index = (view.flags & FOREST_SINGLE) != 0u ? item_index : item_index * FOREST_CLUSTER_SIZE + index;
+    c.entry = (view.flags & FOREST_ENTRIES) != 0u ? texelFetch(entries, int(entry_index)).x
                                                   : texelFetch(colour_classes, int(item.x)).x * 8u + (meta & 7u);
     c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
