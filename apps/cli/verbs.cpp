@@ -79,9 +79,13 @@ std::span<const Verb> verbs() {
       {"raster", "Draw the somata of all neurons over time as a picture",
        "brainforest raster run.activity --out raster.png", raster},
       {"render", "Draw a forest as a picture, without a display",
-       "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
+       "brainforest render column.forest --view view.json --size 1920x1080 -o column.png\n"
+       "  brainforest render column.forest --activity run.activity --time 12.5 -o moment.png",
+       render},
       {"movie", "Film a walk through a forest, without a display",
-       "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
+       "brainforest movie column.forest --seconds 5 -o walk.mp4\n"
+       "  brainforest movie column.forest --activity run.activity --rate 4 -o playing.mp4",
+       movie},
       {"view", "Open a forest in the studio", "brainforest view column.forest", view},
       {"bench", "Measure speed and memory", "brainforest bench io --json", bench},
   });
