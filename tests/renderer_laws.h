@@ -416,5 +416,66 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   EXPECT_EQ(f.renderer->seen().depths.size(), 625u);
 }
 
+TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
+  Fixture f(GetParam());
+  f.frame.palette.fill(Vec3::Zero());
+  f.frame.palette[3] = Vec3(1, 0, 0);  // of the colour class, which is not asked
+  f.frame.palette[40] = Vec3(0, 1, 0), f.frame.palette[41] = Vec3(0, 0, 1);
+  f.frame.subframes = 4;
+  const auto channels = [](const frame::Image& image) {
+    std::array<double, 3> sum{};
+    for (std::size_t i = 0; i < image.pixels.size(); ++i)
+      if (i % 4 < 3) sum[i % 4] += image.pixels[i];
+    return sum;
+  };
+  f.add({-30, 10, 0}, {-5, 10, 0}, 3.f);
+  f.add({5, 10, 0}, {30, 10, 0}, 3.f);
+  f.add({0, -20, 0}, {0, -20, 0}, 4.f);
+  std::vector<std::uint8_t> entries(frame::cluster_size), others(frame::cluster_size, 41);
+  entries[0] = 40, entries[1] = 41;
+  const std::vector<std::uint8_t> of_dots{40};
+  const std::vector<frame::Item> run{{0, 0, 3, 0, 0, 0, 0, 200}}, dot{{0, 2, 1, 0, 0, 0, 0, 200}};
+  for (const bool as_lines : {false, true}) {
+    f.frame.capsules = f.frame.lines = f.frame.dots = {};
+    f.frame.entries = {};
+    (as_lines ? f.frame.lines : f.frame.capsules) = run;
+    (as_lines ? f.frame.entries.lines : f.frame.entries.capsules) = entries;
+    const auto two = channels(f.draw());
+    EXPECT_EQ(two[0], 0.);
+    EXPECT_GT(two[1], 1000.);
+    EXPECT_NEAR(two[2] / two[1], 1., .1);  // as long and as thick
+    f.frame.dots = dot, f.frame.entries.dots = of_dots;
+    const auto three = channels(f.draw());
+    EXPECT_GT(three[1], two[1] + 1000.);
+    EXPECT_NEAR(three[2], two[2], .01 * two[2]);
+  }
+  // Items of later bands find theirs.
+  const std::vector<frame::Item> halves{{0, 0, 1, 0, 0, 0, 0, 200}, {0, 1, 1, 0, 0, 0, 0, 200}};
+  const std::vector<frame::Band> bands{{0, 0, 1}, {0, 0, 2}};
+  std::vector<std::uint8_t> of_halves(2 * frame::cluster_size);
+  of_halves[0] = 40, of_halves[frame::cluster_size] = 41;
+  f.frame.dots = f.frame.lines = {}, f.frame.entries = {};
+  f.frame.capsules = run, f.frame.entries.capsules = entries;
+  const auto before = channels(f.draw());
+  f.frame.capsules = halves, f.frame.entries.capsules = of_halves, f.frame.bands = bands;
+  EXPECT_EQ(channels(f.draw()), before);
+  f.frame.bands = {};
+  // What is revealed brings its own, also when the picture is drawn several times.
+  f.frame.rest = [&](const frame::DepthMap&) {
+    frame::Lists more;
+    more.capsules = dot, more.entries.capsules = others;
+    return more;
+  };
+  const auto after = channels(f.draw());
+  EXPECT_NEAR(after[1], before[1], .01 * before[1]);
+  EXPECT_GT(after[2], before[2] + 1000.);
+  f.frame.rest = {};
+  f.frame.entries.capsules = entries;  // for one of the two
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
+  of_halves[40] = 128;
+  f.frame.entries.capsules = of_halves;
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
+}
+
 }  // namespace
 }  // namespace forest::render

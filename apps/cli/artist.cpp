@@ -5,6 +5,7 @@
 #include <cmath>
 #include <cstdio>
 
+#include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
@@ -52,7 +53,14 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown());
+  scene::Chooser::Painter painter;
+  if (playback_)
+    painter = [this, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
+                                                                       const scene::Eye& from) {
+      playback_->colour(cut, from, look, {.window = window_});
+    };
+  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown(), painter);
+  if (playback_) drawn.activity = playback_->figures();
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
@@ -68,18 +76,25 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
 }
 
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
-                 const std::filesystem::path& file, Progress& progress) {
+                 const std::filesystem::path& file, Progress& progress,
+                 const std::optional<scene::ActivityView>& activity) {
   const auto start = Clock::now();
   const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
   io::Film film(file, plan.width, plan.height, plan.frames_per_second);
   if (!plan.pictures.empty()) std::filesystem::create_directories(plan.pictures);
   FilmFigures figures;
+  const double picture_ms = plan.rate / plan.frames_per_second;
+  artist.set_window(picture_ms);
   progress.begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.samples = plan.samples;
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
+    if (activity) {
+      view.activity = activity;
+      view.activity->time = plan.from + i * picture_ms;
+    }
     const Drawn drawn = artist.draw(view, plan.width, plan.height);
     if (drawn.segments && drawn.image.covered == 0.)
       throw Error(
@@ -98,6 +113,26 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   figures.seconds = milliseconds_since(start) / 1000.;
   figures.codec = film.codec();
   return figures;
+}
+
+void add_activity(CLI::App& command, ActivityOptions& options, const char* name, const char* help) {
+  auto* activity = command.add_option(
+      "--activity", options.file,
+      "Colour the branches by a simulation: an activity file, made by 'brainforest activity'");
+  command.add_option(name, options.time, help)->needs(activity);
+}
+
+void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
+  if (options.file.empty()) return;
+  artist.play(scene::Playback::open(artist.forest(), options.file));
+  const scene::Playback& playback = *artist.playback();
+  if (!view.activity) view.activity = playback.view();
+  if (options.time) view.activity->time = options.time;
+  const double time = view.activity->time.value_or(playback.begin());
+  if (!(time >= playback.begin() && time <= playback.end() + playback.activity().facts().step))
+    throw Error(fmt::format("{}: holds no time {} ms; it runs from {} to {} ms", options.file.string(), time,
+                            playback.begin(), playback.end()));
+  view.activity->time = time;
 }
 
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {

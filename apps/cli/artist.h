@@ -10,6 +10,7 @@
 #include "forest/core/progress.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
+#include "forest/scene/playback.h"
 #include "forest/scene/scanpath.h"
 #include "forest/scene/view.h"
 
@@ -22,8 +23,9 @@ namespace forest::cli {
 struct Drawn {
   double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
   std::uint64_t segments = 0;                            // chosen
-  std::uint64_t reached = 0;  // of them, neither hidden nor beside the picture; 0: unknown
-  std::uint32_t neurons = 0;  // in sight and not hidden
+  std::uint64_t reached = 0;          // of them, neither hidden nor beside the picture; 0: unknown
+  std::uint32_t neurons = 0;          // in sight and not hidden
+  scene::Playback::Figures activity;  // of what was chosen first; zeros when nothing plays
   frame::Image image;
 };
 
@@ -35,6 +37,11 @@ class Artist {
   /// A view with a gaze is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  /// From now on branches show the simulation, at the time of View::activity.
+  void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
+  /// ms that each picture stands for, for pictures that leave out steps.
+  void set_window(double milliseconds) { window_ = milliseconds; }
+  const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
   const scene::Forest& forest() const { return forest_; }
   const scene::Targets& targets() const { return targets_; }
   std::string renderer() const { return renderer_->name(); }
@@ -43,6 +50,8 @@ class Artist {
   scene::Forest forest_;
   scene::Targets targets_;
   scene::Chooser chooser_;
+  std::optional<scene::Playback> playback_;
+  double window_ = 0.;
   std::unique_ptr<render::Renderer> renderer_;
   Foveated foveated_;
   std::vector<frame::Overlay> outline_;
@@ -67,11 +76,24 @@ struct FilmPlan {
   std::optional<scene::Scanpath> gaze;     // replayed from its begin; none: that of the views
   std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
   std::vector<scene::Appearance> targets;  // after those of the path's views
+  double from = 0., rate = 0.;             // of activity: ms at the first picture, ms a second of film
 };
 
-/// Films what a path shows. Throws Error when not a single pixel was covered in a picture that should show the forest.
+/// Films what a path shows, with activity as it goes on when it is given a look. Throws Error when not a single pixel was covered in a picture that should show the forest.
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
-                 const std::filesystem::path& file, Progress& progress);
+                 const std::filesystem::path& file, Progress& progress,
+                 const std::optional<scene::ActivityView>& activity = {});
+
+/// --activity and what belongs to it.
+struct ActivityOptions {
+  std::filesystem::path file;
+  std::optional<double> time;
+};
+/// @param name  of the option for the time, with its help
+void add_activity(CLI::App& command, ActivityOptions& options, const char* name, const char* help);
+/// Lets the artist play the file, if one was given; and the view, which may say how, be of a time that the file holds. Throws
+/// Error when it is not, or when the activity is of another circuit.
+void play(Artist& artist, const ActivityOptions& options, scene::View& view);
 
 /// "1920x1080" to numbers; throws Error.
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);

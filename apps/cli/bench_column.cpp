@@ -2,7 +2,9 @@
 // brainforest bench column: the whole column drawn with a moving camera. How fast, in how much memory?
 #include <chrono>
 #include <cmath>
+#include <filesystem>
 #include <memory>
+#include <unistd.h>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -10,6 +12,7 @@
 #include <sys/resource.h>
 
 #include "forest/core/error.h"
+#include "forest/reports/synthetic.h"
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
@@ -28,6 +31,9 @@ struct Options {
   double budget = 85.;  // milliseconds a picture
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
+  bool activity = false;
+  std::uint32_t compartments = 1500, steps = 64;
+  std::filesystem::path folder = std::filesystem::temp_directory_path();
 };
 
 /// Once around the column, at the distance from which all of it is seen, rising and sinking a little.
@@ -40,6 +46,7 @@ scene::View around(const scene::Forest& forest, float turn) {
 }
 
 struct Part {
+  double values = 0., segments = 0., gather = 0., paint = 0., touched = 0.;  // of activity, means a picture
   double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., covered = 0., error = 0.;
   double per_second() const { return frames / seconds; }
 };
@@ -56,6 +63,12 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     scene::View view = view_at(float(i) / float(options.frames));
     view.samples = 1;
     view.detail.error = budget.error();
+    std::uint64_t touched = 0;
+    if (const scene::Playback* playback = artist.playback()) {
+      view.activity = playback->view();
+      view.activity->time = playback->activity().facts().time(i % options.steps);
+      touched = playback->activity().touched();
+    }
     const Drawn drawn = artist.draw(view, width, height);
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     if (drawn.image.covered < .02)
@@ -64,6 +77,13 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     part.frames += 1, part.seconds += seconds;
     part.cull += drawn.cull / options.frames, part.draw += drawn.draw / options.frames;
     part.resolve += drawn.resolve / options.frames, part.covered += drawn.image.covered / options.frames;
+    if (artist.playback()) {
+      part.values += double(drawn.activity.values) / options.frames;
+      part.segments += double(drawn.segments) / options.frames;
+      part.gather += drawn.activity.gather / options.frames,
+          part.paint += drawn.activity.paint / options.frames;
+      part.touched += double(artist.playback()->activity().touched() - touched) / options.frames;
+    }
     part.error += double(budget.error()) / options.frames;
     budget.took(1000. * seconds);
     console.progress().advance();
@@ -72,8 +92,47 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
   return part;
 }
 
+/// Makes up a simulation of the column and lets the artist play it; the file is gone when the program ends.
+void make_up(Artist& artist, const GrownColumn& column, const Options& options, Console& console) {
+  std::string name = (options.folder / "bench.activity.XXXXXX").string();
+  const int file = ::mkstemp(name.data());
+  if (file < 0)
+    throw Error(options.folder.string() + ": nothing can be written there; name another --folder");
+  ::close(file);
+  const std::shared_ptr<void> cleaner(nullptr, [&](void*) { std::filesystem::remove(name); });
+  const auto report = reports::synthetic_report(
+      column.circuit, column.neurons,
+      {.compartments = options.compartments, .steps = options.steps, .step = .1, .seed = options.seed});
+  reports::pack(report, column.circuit, column.neurons, reports::nodes_of(column.circuit), {}, name, {},
+                console.progress());
+  artist.play(scene::Playback::open(artist.forest(), name));  // stays mapped
+}
+
+/// The share of covered pixels that change from one step to another, the eye standing still.
+double changing(Artist& artist, const Options& options, scene::View view) {
+  const auto [width, height] = parse_size(options.size);
+  view.samples = 1;
+  view.activity = artist.playback()->view();
+  std::vector<std::uint8_t> before;
+  double changed = 0., covered = 0.;
+  for (const std::uint32_t step : {options.steps / 4, options.steps / 2}) {
+    view.activity->time = artist.playback()->activity().facts().time(step);
+    const Drawn drawn = artist.draw(view, width, height);
+    covered = drawn.image.covered * width * height;
+    for (std::size_t i = 0; i < before.size(); i += 4)
+      changed += !std::equal(&before[i], &before[i] + 3, &drawn.image.pixels[i]);
+    before = drawn.image.pixels;
+  }
+  if (!(changed > .02 * covered))
+    throw Error(fmt::format("{:.2f} % of the pixels change from step to step: nothing was played",
+                            100. * changed / covered));
+  return changed / covered;
+}
+
 void run(const Options& options, Console& console) {
-  const scene::Forest forest = grown_column(options.neurons, options.seed, console);
+  const GrownColumn column = planted_column(options.neurons, options.seed, console);
+  const scene::Forest forest =
+      scene::Forest::from_bytes(scene::pack(column.circuit, column.neurons, console.progress()));
   const auto start = Clock::now();
   Artist artist(forest, options.drawer);
   const auto [width, height] = parse_size(options.size);
@@ -82,6 +141,11 @@ void run(const Options& options, Console& console) {
   artist.draw(first, width, height);
   const double first_picture = std::chrono::duration<double>(Clock::now() - start).count();
 
+  double changes = 0.;
+  if (options.activity) {
+    make_up(artist, column, options, console);
+    changes = changing(artist, options, first);
+  }
   const Part outside = measure(
       artist, options, [&](float t) { return around(forest, t); }, console);
   const scene::CameraPath path = scene::walk(forest);
@@ -91,12 +155,15 @@ void run(const Options& options, Console& console) {
   ::getrusage(RUSAGE_SELF, &usage);
   const std::uint64_t peak = std::uint64_t(usage.ru_maxrss) * 1024;
 
-  const auto json_of = [](const Part& p) {
-    return nlohmann::ordered_json{
-        {"frames_per_second", p.per_second()},
-        {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}}},
-        {"covered", p.covered},
-        {"error_pixels", p.error}};
+  const auto json_of = [&](const Part& p) {
+    nlohmann::ordered_json of{{"frames_per_second", p.per_second()},
+                              {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}}},
+                              {"covered", p.covered},
+                              {"error_pixels", p.error}};
+    if (options.activity)
+      of["activity"] = {{"segments", p.segments}, {"values", p.values},   {"bytes_touched", p.touched},
+                        {"gather_ms", p.gather},  {"colour_ms", p.paint}, {"made_up", true}};
+    return of;
   };
   nlohmann::ordered_json json{{"neurons", forest.instances().size()}, {"segments", forest.segment_total()}};
   json.update(json_of(outside));
@@ -106,6 +173,10 @@ void run(const Options& options, Console& console) {
                {"inside", json_of(inside)},
                {"size", options.size},
                {"renderer", artist.renderer()}});
+  if (options.activity) {
+    json["pixels_changing"] = changes;
+    json["values_per_step"] = artist.playback()->activity().width(reports::Level::compartment);
+  }
   console.print(json);
   const auto row = [](const char* name, const Part& p) {
     return std::vector<std::string>{name,
@@ -120,6 +191,23 @@ void run(const Options& options, Console& console) {
                           forest.segment_total(), options.size, artist.renderer()));
   console.table({"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "error px"},
                 {row("around the column", outside), row("inside it", inside)});
+  if (options.activity) {
+    const auto of = [](const char* name, const Part& p) {
+      return std::vector<std::string>{name,
+                                      fmt::format("{:.0f}", p.segments),
+                                      fmt::format("{:.0f}", p.values),
+                                      fmt::format("{:.2f}", p.touched / 1e6),
+                                      fmt::format("{:.1f}", p.gather),
+                                      fmt::format("{:.1f}", p.paint)};
+    };
+    console.say(fmt::format(
+        "\na made-up simulation plays, a step a picture, {} values a step; {:.0f} % of the covered pixels "
+        "change in "
+        "{} steps",
+        artist.playback()->activity().width(reports::Level::compartment), 100. * changes, options.steps / 4));
+    console.table({"activity", "segments", "values read", "MB touched", "gather ms", "colour ms"},
+                  {of("around the column", outside), of("inside it", inside)});
+  }
   console.say(fmt::format("first picture after {:.2f} s; peak memory {:.0f} MB; forest file {:.1f} MB",
                           first_picture, double(peak) / 1e6, double(forest.bytes()) / 1e6));
 }
@@ -141,6 +229,19 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
       ->capture_default_str();
   add_size(command, options->size);
   add_renderer(command, options->drawer);
+  command.add_flag("--activity", options->activity,
+                   "A made-up simulation plays on the branches, one step a picture");
+  must_be_whole(
+      *command.add_option("--compartments", options->compartments, "Of each neuron, with --activity")
+           ->capture_default_str(),
+      1, 100'000);
+  must_be_whole(
+      *command
+           .add_option("--steps", options->steps, "With --activity; 64 take 0.7 GB of disk at the size given")
+           ->capture_default_str(),
+      8, 100'000);
+  command.add_option("--folder", options->folder, "Where the activity file is made, and removed")
+      ->capture_default_str();
   add_seed(command, options->seed, "Of the neurons and their places");
   return [options, &console] { run(*options, console); };
 }

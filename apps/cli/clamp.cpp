@@ -11,7 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
-#include "forest/reports/activity.h"
+#include "forest/reports/trace.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -30,19 +30,14 @@ struct Options {
   bool force = false;
 };
 
-/// A compartment, and what it did.
-struct Trace {
-  std::uint64_t node = 0;
-  std::uint32_t section = 0;
-  float position = 0.f;  // of the middle of the compartment
-  std::uint64_t value = 0;
-  std::vector<float> values;
+/// What is told of a trace.
+struct Told {
   float low = NAN, high = NAN;
   double mean = NAN;
   std::size_t highest = 0, numbers = 0;
 };
 
-const reports::Row& row_of(const reports::Activity& activity, const Options& options, std::uint64_t node) {
+std::uint32_t row_of(const reports::Activity& activity, const Options& options, std::uint64_t node) {
   const auto& names = activity.facts().populations;
   const reports::Row* found = nullptr;
   for (const reports::Row& row : activity.rows()) {
@@ -58,13 +53,13 @@ const reports::Row& row_of(const reports::Activity& activity, const Options& opt
                             options.file.string(), node,
                             options.population.empty() ? "" : " of population " + options.population,
                             activity.rows().size(), activity.rows().front().node_id));
-  return *found;
+  return std::uint32_t(found - activity.rows().data());
 }
 
-Trace find(const reports::Activity& activity, const Options& options, std::uint64_t node,
-           std::uint32_t section, float position) {
-  const reports::Row& row = row_of(activity, options, node);
-  const reports::LayoutView layout = activity.layout(row.layout);
+reports::Trace find(const reports::Activity& activity, const Options& options, std::uint64_t node,
+                    std::uint32_t section, float position) {
+  const std::uint32_t row = row_of(activity, options, node);
+  const reports::LayoutView layout = activity.layout(activity.rows()[row].layout);
   const auto compartment = layout.at_element(section, position);
   if (!compartment) {
     std::uint32_t most = 0;
@@ -74,38 +69,21 @@ Trace find(const reports::Activity& activity, const Options& options, std::uint6
         "(0 is the soma)",
         options.file.string(), section, node, layout.sections.size(), most));
   }
-  return {.node = node,
-          .section = section,
-          .position = layout.compartments[*compartment].position,
-          .value = row.first[std::size_t(reports::Level::compartment)] + *compartment,
-          .values = {}};
+  return reports::trace(activity, row, *compartment);
 }
 
-void read(const reports::Activity& activity, Trace& trace) {
+Told told(const reports::Trace& trace) {
+  Told t;
   double sum = 0.;
-  for (const reports::Code code : activity.history(trace.value)) {
-    const float v = activity.facts().range.value(code);
-    if (code != reports::no_value) {
-      if (!(v >= trace.low)) trace.low = v;
-      if (!(v <= trace.high)) trace.high = v, trace.highest = trace.values.size();
-      sum += double(v), ++trace.numbers;
-    }
-    trace.values.push_back(v);
+  for (std::size_t i = 0; i < trace.values.size(); ++i) {
+    const float v = trace.values[i];
+    if (std::isnan(v)) continue;
+    if (!(v >= t.low)) t.low = v;
+    if (!(v <= t.high)) t.high = v, t.highest = i;
+    sum += double(v), ++t.numbers;
   }
-  if (trace.numbers) trace.mean = sum / double(trace.numbers);
-}
-
-std::string csv_of(const reports::Facts& facts, const std::vector<Trace>& traces) {
-  std::string text = "time (ms)";
-  for (const Trace& trace : traces)
-    text += fmt::format(",node {} section {} at {:.4g} ({})", trace.node, trace.section, trace.position,
-                        facts.units);
-  for (std::uint64_t i = 0; i < facts.steps; ++i) {
-    text += fmt::format("\n{:.10g}", facts.time(i));
-    for (const Trace& trace : traces)
-      text += std::isnan(trace.values[i]) ? std::string(",") : fmt::format(",{:.3f}", trace.values[i]);
-  }
-  return text + "\n";
+  if (t.numbers) t.mean = sum / double(t.numbers);
+  return t;
 }
 
 void run(const Options& options, Console& console) {
@@ -120,30 +98,31 @@ void run(const Options& options, Console& console) {
                       list.size(), count));
     return list[list.size() == 1 ? 0 : i];
   };
-  std::vector<Trace> traces;
+  std::vector<reports::Trace> traces;
+  const auto begin = std::chrono::steady_clock::now();
   for (std::size_t i = 0; i < count; ++i)
     traces.push_back(find(activity, options, nth(options.neurons, i, "--neuron"),
                           nth(options.sections, i, "--section"), nth(options.positions, i, "--position")));
-  const auto begin = std::chrono::steady_clock::now();
-  for (Trace& trace : traces) read(activity, trace);
   const double ms =
       std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - begin).count();
-  if (!options.csv.empty()) write_unless_there(options.csv, csv_of(facts, traces), options.force);
+  if (!options.csv.empty()) write_unless_there(options.csv, reports::csv_of(facts, traces), options.force);
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;
-  for (const Trace& t : traces) {
+  for (const reports::Trace& trace : traces) {
+    const Told t = told(trace);
     const double when = facts.time(t.highest);
-    list.push_back({{"neuron", t.node},
-                    {"section", t.section},
-                    {"position", t.position},
+    list.push_back({{"neuron", trace.node},
+                    {"section", trace.element},
+                    {"position", trace.position},
                     {"lowest", t.low},
                     {"highest", t.high},
                     {"highest_at", when},
                     {"mean", t.mean},
                     {"not_numbers", facts.steps - t.numbers}});
-    lines.push_back({std::to_string(t.node), std::to_string(t.section), fmt::format("{:.3g}", t.position),
-                     fmt::format("{:.1f}", t.low), fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
+    lines.push_back({std::to_string(trace.node), std::to_string(trace.element),
+                     fmt::format("{:.3g}", trace.position), fmt::format("{:.1f}", t.low),
+                     fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
                      fmt::format("{:.1f}", t.mean)});
   }
   console.print({{"file", options.file.string()},

@@ -24,7 +24,7 @@ constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 
 
 }  // namespace
 
-std::vector<std::byte> packed_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
+GrownColumn planted_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
   std::vector<circuit::Candidate> candidates;
   std::vector<Morphology> neurons;
   for (const Share& share : shares)
@@ -37,12 +37,17 @@ std::vector<std::byte> packed_column(std::uint32_t neurons_planted, std::uint64_
   circuit::Recipe recipe = find_recipe("column-10000");
   recipe.radius *= std::sqrt(float(neurons_planted) / 10000.f);  // the same density
   recipe.neurons = neurons_planted;
-  const circuit::Circuit circuit = circuit::plant(recipe, candidates, seed, console.progress());
+  circuit::Circuit circuit = circuit::plant(recipe, candidates, seed, console.progress());
   std::vector<Morphology> planted;
   for (const std::string& name : circuit.morphologies)
     for (std::size_t i = 0; i < candidates.size(); ++i)
       if (candidates[i].name == name) planted.push_back(neurons[i]);
-  return scene::pack(circuit, planted, console.progress());
+  return {std::move(circuit), std::move(planted)};
+}
+
+std::vector<std::byte> packed_column(std::uint32_t neurons, std::uint64_t seed, Console& console) {
+  const GrownColumn column = planted_column(neurons, seed, console);
+  return scene::pack(column.circuit, column.neurons, console.progress());
 }
 
 scene::Forest grown_column(std::uint32_t neurons, std::uint64_t seed, Console& console) {

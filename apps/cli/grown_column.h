@@ -12,7 +12,14 @@ namespace forest::cli {
 
 class Console;
 
-/// So many neurons, at the density of the recipe column-10000; the same for the same seed. As a forest file.
+struct GrownColumn {
+  circuit::Circuit circuit;
+  std::vector<Morphology> neurons;  // of each morphology of the circuit
+};
+
+/// So many neurons, at the density of the recipe column-10000; the same for the same seed.
+GrownColumn planted_column(std::uint32_t neurons, std::uint64_t seed, Console& console);
+/// The same as a forest file.
 std::vector<std::byte> packed_column(std::uint32_t neurons, std::uint64_t seed, Console& console);
 /// The same, opened.
 scene::Forest grown_column(std::uint32_t neurons, std::uint64_t seed, Console& console);

@@ -13,6 +13,7 @@
 #include "forest/core/error.h"
 #include "forest/io/png.h"
 #include "forest/reports/activity.h"
+#include "forest/scene/colour_map.h"
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
@@ -27,27 +28,16 @@ struct Options {
   std::string size = "1200x800";
   double from = -INFINITY, to = INFINITY;  // ms
   std::vector<float> range{-80.f, 20.f};
+  std::string map = "viridis";
 };
 
-// viridis (Smith & van der Walt 2015), perceptually even; what has no value is grey, which it never is.
-constexpr std::array<std::uint32_t, 10> ramp{0x440154, 0x482878, 0x3E4A89, 0x31688E, 0x26828E,
-                                             0x1F9E89, 0x35B779, 0x6DCD59, 0xB4DE2C, 0xFDE725};
-constexpr std::uint32_t nothing = 0x808080;
-
 using Colour = std::array<std::uint8_t, 3>;
-Colour bytes_of(std::uint32_t rgb) {
-  return {std::uint8_t(rgb >> 16), std::uint8_t(rgb >> 8), std::uint8_t(rgb)};
-}
 
-Colour colour_of(float value, float low, float high) {
-  if (std::isnan(value)) return bytes_of(nothing);
-  const float at = std::clamp((value - low) / (high - low), 0.f, 1.f) * float(ramp.size() - 1);
-  const std::size_t i = std::min<std::size_t>(std::size_t(at), ramp.size() - 2);
-  const Colour a = bytes_of(ramp[i]), b = bytes_of(ramp[i + 1]);
-  Colour mixed;
-  for (std::size_t c = 0; c < 3; ++c)
-    mixed[c] = std::uint8_t(std::lround(float(a[c]) + (at - float(i)) * (float(b[c]) - float(a[c]))));
-  return mixed;
+Colour colour_of(const scene::ColourMap& map, float value, float low, float high) {
+  if (std::isnan(value)) return {128, 128, 128};
+  const Vec3 screen = 255.f * map.screen((value - low) / (high - low));
+  return {std::uint8_t(std::lround(screen.x())), std::uint8_t(std::lround(screen.y())),
+          std::uint8_t(std::lround(screen.z()))};
 }
 
 void run(const Options& options, Console& console) {
@@ -66,9 +56,11 @@ void run(const Options& options, Console& console) {
     throw Error(fmt::format("{} to {} ms holds no step; the simulation runs from {} to {} ms", options.from,
                             options.to, facts.start, facts.time(facts.steps)));
   const auto codes = activity.raster_picture(begin, end, width, height);
+  const scene::ColourMap& map = *scene::find_colour_map(options.map);
   std::array<Colour, 256> colours;
   for (std::size_t code = 0; code < colours.size(); ++code)
-    colours[code] = colour_of(facts.range.value(reports::Code(code)), options.range[0], options.range[1]);
+    colours[code] =
+        colour_of(map, facts.range.value(reports::Code(code)), options.range[0], options.range[1]);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(4 * codes.size());
   for (const reports::Code code : codes) {
@@ -83,12 +75,13 @@ void run(const Options& options, Console& console) {
                  {"to", last},
                  {"steps", end - begin},
                  {"range", options.range},
+                 {"map", map.name},
                  {"units", facts.units}});
   console.table(
       {"picture", "neurons (down)", "ms (to the right)", "colours"},
       {{options.out.string(), std::to_string(activity.rows().size()),
         fmt::format("{:g} to {:g}", first, last),
-        fmt::format("{:g} to {:g} {}, purple to yellow", options.range[0], options.range[1], facts.units)}});
+        fmt::format("{:g} to {:g} {}, {}", options.range[0], options.range[1], facts.units, map.name)}});
 }
 
 }  // namespace
@@ -103,6 +96,9 @@ std::function<void()> raster(CLI::App& command, Console& console) {
       ->expected(2)
       ->capture_default_str()
       ->type_name("LOW HIGH");
+  std::vector<std::string> maps;
+  for (const scene::ColourMap& map : scene::colour_maps()) maps.push_back(map.name);
+  command.add_option("--map", options->map, "Colour map")->check(CLI::IsMember(maps))->capture_default_str();
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   return [options, &console] { run(*options, console); };
 }

@@ -33,11 +33,13 @@ std::function<void()> render(CLI::App& command, Console& console) {
     bool outline = false;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
+    ActivityOptions activity;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->view, view_help);
   add_targets(command, options->targets);
+  add_activity(command, options->activity, "--time", "Its moment that is shown, ms; by default the first");
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   command
@@ -57,9 +59,18 @@ std::function<void()> render(CLI::App& command, Console& console) {
     add_appearances(options->targets, view.targets);
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
+    play(artist, options->activity, view);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
+    nlohmann::ordered_json activity;
+    if (artist.playback())
+      activity = {{"neurons", drawn.activity.neurons},
+                  {"values", drawn.activity.values},
+                  {"flashes", drawn.activity.flashes},
+                  {"touched", artist.playback()->activity().touched()},
+                  {"milliseconds", drawn.activity.gather + drawn.activity.paint}};
     console.print({{"file", options->out.string()},
+                   {"activity", activity},
                    {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
                    {"neurons", drawn.neurons},
                    {"segments", drawn.segments},
@@ -82,11 +93,21 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     FilmPlan plan;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
+    ActivityOptions activity;
+    std::optional<double> rate;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("forest", options->forest, "Forest file")->required();
-  command.add_option("--view", options->views,
-                     "Key views, two or more, as JSON files or texts; by default a walk into the forest");
+  command.add_option(
+      "--view", options->views,
+      "Key views, two or more, as JSON files or texts; by default a walk into the forest. With "
+      "--activity one is enough: the eye stands still");
+  add_activity(command, options->activity, "--from",
+               "Its moment at the first picture, ms; by default the first");
+  must_be_within(
+      *command.add_option("--rate", options->rate,
+                          "Milliseconds of activity a second of film; by default all of it is shown"),
+      1e-6, 1e9);
   add_targets(command, options->targets);
   command
       .add_option("--path", options->path,
@@ -117,13 +138,23 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (!options->path.empty()) views = read_views(options->path);
     if (!options->scanpath.empty())
       plan.gaze = scene::parse_scanpath(MappedFile(options->scanpath).text(), options->scanpath);
-    if (views.size() == 1)
+    const bool playing = !options->activity.file.empty();
+    if (options->rate && !playing) throw Error("--rate plays an activity file; name it with --activity");
+    if (views.size() == 1 && !playing)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
-    const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
     add_appearances(options->targets, plan.targets);
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
-    const FilmFigures figures = film(artist, path, plan, options->out, console.progress());
+    std::optional<scene::View> look;
+    if (playing) {
+      look = views.empty() ? scene::overview(forest) : views.front();
+      play(artist, options->activity, *look);
+      plan.from = *look->activity->time;
+      plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
+    }
+    const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
+    const FilmFigures figures =
+        film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);
     console.print({{"file", options->out.string()},
                    {"pictures", figures.pictures},
                    {"frames_per_second", figures.pictures / figures.seconds},

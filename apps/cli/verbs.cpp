@@ -85,9 +85,13 @@ std::span<const Verb> verbs() {
        "  brainforest targets column.forest --define \"deep=(L5 or L6) and not inhibitory\" --out sets.json",
        targets},
       {"render", "Draw a forest as a picture, without a display",
-       "brainforest render column.forest --view view.json --size 1920x1080 -o column.png", render},
+       "brainforest render column.forest --view view.json --size 1920x1080 -o column.png\n"
+       "  brainforest render column.forest --activity run.activity --time 12.5 -o moment.png",
+       render},
       {"movie", "Film a walk through a forest, without a display",
-       "brainforest movie column.forest --seconds 5 -o walk.mp4", movie},
+       "brainforest movie column.forest --seconds 5 -o walk.mp4\n"
+       "  brainforest movie column.forest --activity run.activity --rate 4 -o playing.mp4",
+       movie},
       {"section", "Cut a forest by a plane, as a section of a series shows it: picture, contours or areas",
        "brainforest section column.forest --plane 0,1000,0,0,0,1 --height 100 -o section.png\n"
        "  brainforest section column.forest --plane 0,1000,0,1,1,0 -o areas.csv",

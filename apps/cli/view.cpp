@@ -22,7 +22,7 @@ namespace forest::cli {
 bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
 
 void open_studio(const std::filesystem::path& forest, const std::string& view,
-                 const std::vector<std::filesystem::path>& node_sets) {
+                 const std::vector<std::filesystem::path>& node_sets, const std::filesystem::path& activity) {
   if (!has_display())
     throw Error(
         "there is no display to open the studio on; make a picture with 'brainforest render' instead");
@@ -32,6 +32,7 @@ void open_studio(const std::filesystem::path& forest, const std::string& view,
   std::vector<std::string> words{studio.string(), forest.string()};
   if (!view.empty()) words.insert(words.end(), {"--view", view});
   for (const auto& file : node_sets) words.insert(words.end(), {"--node-sets", file.string()});
+  if (!activity.empty()) words.insert(words.end(), {"--activity", activity.string()});
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -43,7 +44,7 @@ void open_studio(const std::filesystem::path& forest, const std::string& view,
 
 std::function<void()> view(CLI::App& command, Console&) {
   struct Options {
-    std::filesystem::path forest;
+    std::filesystem::path forest, activity;
     std::string view;
     std::vector<std::filesystem::path> node_sets;
   };
@@ -51,9 +52,11 @@ std::function<void()> view(CLI::App& command, Console&) {
   command.add_option("forest", options->forest, "Forest file")->required();
   command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
   add_node_sets(command, options->node_sets);
+  command.add_option("--activity", options->activity, "An activity file to play");
   return [options] {
     MappedFile exists(options->forest);  // says so here rather than in a window
-    open_studio(options->forest, options->view, options->node_sets);
+    if (!options->activity.empty()) MappedFile also(options->activity);
+    open_studio(options->forest, options->view, options->node_sets, options->activity);
   };
 }
 

@@ -105,6 +105,34 @@ void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene:
   }
 }
 
+void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
+                    const std::string& units, const Ink& ink) {
+  constexpr qreal width = 190, bar = 12;
+  const qreal line = painter.fontMetrics().height() + 3.;
+  const bool flashes = activity.speed > 0.f;
+  const QPointF corner(area.left() + margin, area.top() + margin);
+  plate(painter, QRectF(corner, QSizeF(width + 28, bar + (flashes ? 3. : 2.) * line + 20)), ink);
+  const QPointF top = corner + QPointF(14, 6);
+  painter.setPen(ink.text);
+  painter.drawText(QRectF(top, QSizeF(width, line)), Qt::AlignLeft, QString("%1 ms").arg(time, 0, 'f', 1));
+  painter.drawText(QRectF(top, QSizeF(width, line)), Qt::AlignRight, QString::fromStdString(units));
+  painter.setPen(Qt::NoPen);
+  for (int x = 0; x < int(width); ++x) {
+    const float t = float(x) / float(width - 1), value = activity.low + t * (activity.high - activity.low);
+    const bool below = activity.threshold && value < *activity.threshold;
+    const Vec3 c = below ? Vec3(.25f, .28f, .32f) : activity.map->screen(t);
+    painter.fillRect(QRectF(top + QPointF(x, line + 2), QSizeF(1, bar)),
+                     QColor::fromRgbF(c.x(), c.y(), c.z()));
+  }
+  painter.setPen(ink.faint);
+  const QRectF below(top + QPointF(0, line + bar + 4), QSizeF(width, line));
+  painter.drawText(below, Qt::AlignLeft, QString::number(activity.low));
+  painter.drawText(below, Qt::AlignRight, QString::number(activity.high));
+  if (flashes)
+    painter.drawText(below.translated(0, line), Qt::AlignLeft,
+                     QString("spikes: %1 µm/ms").arg(activity.speed));
+}
+
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(ink.faint, 1.4));

@@ -29,6 +29,9 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
 /// At the top left.
 void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
                   const Ink& ink);
+/// At the top left: the colours of activity with their values, and the moment that is shown.
+void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
+                    const std::string& units, const Ink& ink);
 /// A ring around the point that is looked at.
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink);
 

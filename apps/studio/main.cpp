@@ -22,7 +22,7 @@ namespace forest::studio {
 namespace {
 
 struct Options {
-  std::filesystem::path forest, screenshot;
+  std::filesystem::path forest, activity, screenshot;
   std::string view, size;
   std::vector<std::filesystem::path> node_sets;
   bool report = false;
@@ -56,6 +56,8 @@ int run(const Options& options, int& argc, char** argv) {
   scene::View view = scene::overview(forest);
   view.camera.near = .5f;
   if (!options.view.empty()) view = read_view(options.view);
+  std::optional<scene::Playback> playback;
+  if (!options.activity.empty()) playback.emplace(scene::Playback::open(forest, options.activity));
   const QSize size = options.size.empty() ? QSize() : size_of(options.size);
 
   QSurfaceFormat format;
@@ -78,6 +80,7 @@ int run(const Options& options, int& argc, char** argv) {
   Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets));
   if (size.isValid()) window.resize(size);
   if (options.report) report(window);
+  if (playback) window.viewport().play(std::move(*playback));
   int status = 0;
   const auto end = [&](int code) { application.exit(status = code); };
   QObject::connect(
@@ -118,6 +121,8 @@ int main(int argc, char** argv) {
   app.add_option("--view", options.view, "Begin with this view: a JSON file, or the text that Ctrl+C copies");
   app.add_option("--node-sets", options.node_sets,
                  "SONATA node sets, JSON files: names that targets may use besides the forest's own");
+  app.add_option("--activity", options.activity,
+                 "A simulation to play on the branches: an activity file, made by 'brainforest activity'");
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");

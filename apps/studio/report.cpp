@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/report.h"
 
+#include <QWidget>
 #include <cstdio>
 
 #include <nlohmann/json.hpp>
@@ -11,6 +12,11 @@ namespace forest::studio {
 namespace {
 
 using Json = nlohmann::ordered_json;
+
+Json place_of(const QWidget* widget) {  // on the screen
+  const QPoint corner = widget->mapToGlobal(QPoint(0, 0));
+  return {{"x", corner.x()}, {"y", corner.y()}, {"width", widget->width()}, {"height", widget->height()}};
+}
 
 void print(const Json& line) {
   std::puts(line.dump().c_str());
@@ -25,17 +31,23 @@ void report(Window& window) {
     const auto& selection = viewport->selection();
     print({{"event", "selected"}, {"facts", selection ? to_json(viewport->forest(), *selection) : Json()}});
   });
-  QObject::connect(viewport, &Viewport::settled, viewport, [viewport] {
-    const QPoint corner = viewport->mapToGlobal(QPoint(0, 0));
+  QObject::connect(&window, &Window::clamped, &window, [&window](double milliseconds) {
+    Json names = Json::array();
+    for (const reports::Trace& trace : window.traces()) names.push_back(trace.name());
+    print({{"event", "clamped"}, {"traces", names}, {"milliseconds", milliseconds}});
+  });
+  QObject::connect(viewport, &Viewport::settled, viewport, [viewport, &window] {
+    Json picture = place_of(viewport), activity;
+    picture["pixel_ratio"] = viewport->devicePixelRatioF();
+    if (viewport->playback())
+      activity = {{"time", viewport->time()},
+                  {"playing", viewport->playing()},
+                  {"raster", place_of(window.findChild<QWidget*>("raster"))}};
     const Viewport::Figures& f = viewport->figures();
     print({{"event", "settled"},
            {"view", Json::parse(scene::to_json(viewport->settings().view))},
-           {"picture",
-            {{"x", corner.x()},
-             {"y", corner.y()},
-             {"width", viewport->width()},
-             {"height", viewport->height()},
-             {"pixel_ratio", viewport->devicePixelRatioF()}}},
+           {"picture", picture},
+           {"activity", activity},
            {"segments", f.segments},
            {"neurons", f.neurons},
            {"samples", f.samples}});

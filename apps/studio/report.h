@@ -6,7 +6,7 @@ namespace forest::studio {
 
 class Window;
 
-/// {"event": "selected" | "settled", …}; docs/studio/studio.md has the keys of each.
+/// {"event": "selected" | "clamped" | "settled", …}; docs/studio/studio.md has the keys of each.
 void report(Window& window);
 
 }  // namespace forest::studio

@@ -6,6 +6,7 @@
 #include <QComboBox>
 #include <QFormLayout>
 #include <QHeaderView>
+#include <QKeyEvent>
 #include <QLabel>
 #include <QLineEdit>
 #include <QPainter>
@@ -31,6 +32,18 @@ QIcon swatch(const QColor& colour) {
   painter.drawEllipse(4, 4, 16, 16);
   return QIcon(picture);
 }
+
+// Space ticks the box of a row, whatever else it does in the window.
+class KeepsSpace final : public QObject {
+ public:
+  using QObject::QObject;
+  bool eventFilter(QObject*, QEvent* event) override {
+    if (event->type() != QEvent::ShortcutOverride || static_cast<QKeyEvent*>(event)->key() != Qt::Key_Space)
+      return false;
+    event->accept();
+    return true;
+  }
+};
 
 Qt::CheckState check_of(TargetRow::Seen seen) {
   return seen == TargetRow::Seen::all    ? Qt::Checked
@@ -59,6 +72,7 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
 
   list_ = named(new QTreeWidget(this), "Targets",
                 "Sets of neurons: the box shows or hides one, Space does so too", "Alt+T");
+  list_->installEventFilter(new KeepsSpace(list_));
   list_->setColumnCount(2);
   list_->setHeaderHidden(true);
   list_->setRootIsDecorated(false);

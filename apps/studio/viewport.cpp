@@ -138,6 +138,45 @@ std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
   return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.states);
 }
 
+void Viewport::play(scene::Playback playback) {
+  playback_.emplace(std::move(playback));
+  playing_ = false;
+  if (!settings_.view.activity) settings_.view.activity = playback_->view();
+  set_time(settings_.view.activity->time.value_or(playback_->begin()));
+  Q_EMIT opened();
+  Q_EMIT changed();
+}
+
+scene::ActivityView Viewport::activity() const {
+  return settings_.view.activity.value_or(playback_ ? playback_->view() : scene::ActivityView());
+}
+
+void Viewport::change(const scene::ActivityView& activity) {
+  settings_.view.activity = activity;
+  touch();
+  Q_EMIT changed();
+}
+
+double Viewport::time() const { return activity().time.value_or(playback_ ? playback_->begin() : 0.); }
+
+void Viewport::set_time(double milliseconds) {
+  if (!playback_) return;
+  scene::ActivityView shown = activity();
+  shown.time = std::clamp(milliseconds, playback_->begin(), playback_->end());
+  settings_.view.activity = shown;
+  window_ = 0.;
+  touch();
+  Q_EMIT moved();
+}
+
+void Viewport::set_playing(bool playing) {
+  playing_ = playing && playback_;
+  tick_.restart();
+  window_ = 0.;
+  touch();
+  Q_EMIT moved();
+}
+
 frame::Image Viewport::picture() {
   makeCurrent();
   const std::uint32_t samples = std::max(settings_.view.samples, 16u);
@@ -177,6 +216,11 @@ void Viewport::initializeGL() {
 void Viewport::resizeGL(int, int) { touch(); }
 
 void Viewport::advance(float seconds) {
+  if (playing_) {
+    const double step = double(rate_ * seconds), next = time() + step;
+    set_time(next > playback_->end() ? playback_->begin() : next);  // and again
+    window_ = step;
+  }
   if (glide_) {
     const float t = float(glide_->clock.elapsed()) / (1000.f * glide_seconds);
     const bool there = t >= 1.f;
@@ -196,10 +240,18 @@ void Viewport::advance(float seconds) {
 void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
-  if (first == 0 && !layered())
+  if (first == 0 && !layered()) {
+    scene::Chooser::Painter painter;
+    if (playback_)
+      painter = [this, shown = activity(), window = window_](scene::Cut& cut, const scene::Eye& eye) {
+        playback_->colour(cut, eye, shown, {.window = window});
+      };
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
-                    {float(w), float(h)}, colouring_.shown());
+                    {float(w), float(h)}, colouring_.shown(), painter);
+  }
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
+  // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
+  if (playback_) std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != section_entry; });
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
@@ -294,7 +346,7 @@ void Viewport::paintGL() {
     return;
   }
   Q_EMIT drawn();
-  if (glide_ || flies() || stage_ == Stage::refining) update();
+  if (glide_ || flies() || playing_ || stage_ == Stage::refining) update();
   if (stage == Stage::refining && stage_ == Stage::finished) Q_EMIT settled();
 }
 
@@ -317,7 +369,10 @@ void Viewport::annotate() {
     paint_scale(painter, rect(), settings_.view.camera, ink);
     paint_directions(painter, rect(), settings_.view.camera, ink);
   }
-  if (settings_.legend) paint_legend(painter, rect(), colouring_.legend, ink);
+  if (settings_.legend && playback_)
+    paint_activity(painter, rect(), activity(), time(), playback_->activity().facts().units, ink);
+  else if (settings_.legend)
+    paint_legend(painter, rect(), colouring_.legend, ink);
   if (const auto& gaze = settings_.view.detail.gaze)
     paint_gaze(painter, QPointF(gaze->x() * float(width()), gaze->y() * float(height())), ink);
 }

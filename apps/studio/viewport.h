@@ -15,6 +15,7 @@
 #include "forest/render/opengl/opengl_renderer.h"
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
+#include "forest/scene/playback.h"
 
 #include "apps/foveated.h"
 #include "apps/studio/selection.h"
@@ -46,6 +47,20 @@ class Viewport final : public QOpenGLWidget {
   /// What is drawn at a place of this widget: to half a pixel, else the nearest branch within a few.
   std::optional<scene::Pick> pick(const QPointF& place) const;
 
+  /// Shows a simulation on the branches, at its first moment and standing still.
+  void play(scene::Playback playback);
+  const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
+  /// How it is shown, and the moment (View::activity).
+  scene::ActivityView activity() const;
+  void change(const scene::ActivityView& activity);
+  double time() const;  // ms
+  /// To the nearest moment that the simulation has.
+  void set_time(double milliseconds);
+  bool playing() const { return playing_; }
+  void set_playing(bool playing);
+  float rate() const { return rate_; }  // ms of activity a second
+  void set_rate(float rate) { rate_ = rate; }
+
   /// The picture alone, in full, at its size on the screen.
   frame::Image picture();
   /// What is seen, with legend and scale.
@@ -65,6 +80,8 @@ class Viewport final : public QOpenGLWidget {
   void changed();     // the settings, by hand or otherwise
   void recoloured();  // how neurons are shown
   void selected();    // something else, or nothing
+  void opened();      // another simulation
+  void moved();       // its moment, or whether it plays
   void drawn();
   void settled();  // the picture is finished
   void failed(const QString& sentence);
@@ -111,6 +128,10 @@ class Viewport final : public QOpenGLWidget {
   std::optional<Foveated> foveated_;      // on the processor; a card draws one picture, with detail by gaze
   const frame::Image* united_ = nullptr;  // its last picture, while that is what is shown
   Settings settings_;
+  std::optional<scene::Playback> playback_;
+  bool playing_ = false;
+  float rate_ = 5.f;
+  double window_ = 0.;  // ms of activity that the picture stands for
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
   std::optional<Selection> selection_;

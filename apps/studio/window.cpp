@@ -21,8 +21,10 @@
 
 #include <nlohmann/json.hpp>
 
+#include "forest/core/file.h"
 #include "forest/io/png.h"
 
+#include "apps/studio/activity_panel.h"
 #include "apps/studio/section_panel.h"
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/targets_panel.h"
@@ -64,8 +66,10 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
 
   panel_rest_.setSingleShot(true);
   panel_rest_.setInterval(100);
-  connect(&panel_rest_, &QTimer::timeout, this,
-          [this] { view_panel_->show_settings(viewport_->settings()); });
+  connect(&panel_rest_, &QTimer::timeout, this, [this] {
+    view_panel_->show_settings(viewport_->settings());
+    activity_panel_->follow();
+  });
   connect(viewport_, &Viewport::changed, this, [this] {
     section_panel_->show_settings(viewport_->settings());
     if (!panel_rest_.isActive()) panel_rest_.start();
@@ -74,9 +78,16 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
     const auto& selection = viewport_->selection();
     selection_panel_->show_facts(selection ? facts(viewport_->forest(), *selection) : std::vector<Fact>{});
     show_targets();
+    activity_panel_->show_selection();
   });
   connect(viewport_, &Viewport::recoloured, this, &Window::show_targets);
   show_targets();
+  connect(viewport_, &Viewport::opened, this, [this] {
+    activity_panel_->show_activity();
+    activity_dock_->show();
+    activity_dock_->raise();
+  });
+  connect(viewport_, &Viewport::moved, this, [this] { activity_panel_->follow(); });
   connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
 
   resize(1280, 800);
@@ -126,6 +137,13 @@ void Window::add_docks() {
     dock->setVisible(!section);
   }
   resizeDocks(added, {260, 300, 160}, Qt::Vertical);
+  activity_panel_ = new ActivityPanel(
+      *viewport_, [this](double milliseconds) { Q_EMIT clamped(milliseconds); }, this);
+  activity_dock_ = new QDockWidget(tr("Activity"), this);
+  activity_dock_->setObjectName("Activity");
+  activity_dock_->setWidget(activity_panel_);
+  addDockWidget(Qt::BottomDockWidgetArea, activity_dock_);
+  activity_dock_->hide();  // until there is a simulation
 }
 
 template <class Row, class Value>
@@ -141,6 +159,8 @@ void Window::add_menus() {
     std::function<void()> run;
   };
   const Command commands[] = {
+      {"&File", "&Open activity…", "Ctrl+O", "Play a simulation on the branches: an activity file",
+       [this] { open_activity(); }},
       {"&File", "&Save picture…", "Ctrl+S", "The forest alone as a PNG, smooth, at its size on the screen",
        [this] { save_picture(false); }},
       {"&File", "Save picture with &legend…", "Ctrl+Shift+S",
@@ -148,6 +168,8 @@ void Window::add_menus() {
       {"&File", "Add the view to a &path…", "Ctrl+K",
        "Appends the view as a line to a file that 'brainforest movie --path' films",
        [this] { record_view(); }},
+      {"&File", "Save &traces…", "Ctrl+T", "The histories of clamped compartments as a table (CSV)",
+       [this] { save_traces(); }},
       {"&File", "&Quit", "Ctrl+Q", "Close the window; its panels are remembered", [this] { close(); }},
       {"&Edit", "&Copy view", "Ctrl+C", "Where the eye is and what colours mean, as one line of JSON",
        [this] { copy_view(); }},
@@ -174,6 +196,15 @@ void Window::add_menus() {
        }},
       {"&View", "&Full screen", "F11", "The window over the whole screen, and back",
        [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); }},
+      {"&Activity", "&Play or pause", "Space", "Let the simulation go on, or stand still",
+       [this] { viewport_->set_playing(!viewport_->playing()); }},
+      {"&Activity", "Step &forward", ".", "To the next moment of the simulation",
+       [this] { activity_panel_->step(1); }},
+      {"&Activity", "Step &back", ",", "To the moment before", [this] { activity_panel_->step(-1); }},
+      {"&Activity", "To the &beginning", "Ctrl+Home", "To the first moment",
+       [this] { viewport_->set_time(-INFINITY); }},
+      {"&Activity", "&Clear traces", "Ctrl+Backspace", "Forget the histories that are shown",
+       [this] { activity_panel_->clear_traces(); }},
       {"&Help", "&Keys and mouse", "F1", "What the keys and the mouse do", [this] { explain(); }},
   };
   const auto menu = [this](const char* name) {
@@ -188,7 +219,7 @@ void Window::add_menus() {
     action->setToolTip(tr(hint));
     return action;
   };
-  for (const char* name : {"&File", "&Edit", "&View", "&Panels", "&Help"}) menu(name);
+  for (const char* name : {"&File", "&Edit", "&View", "&Activity", "&Panels", "&Help"}) menu(name);
   for (const Command& c : commands)
     connect(add(menu(c.menu), c.name, c.shortcut, c.hint), &QAction::triggered, this, c.run);
   QMenu* view = menu("&View");
@@ -297,6 +328,38 @@ void Window::save_picture(bool as_seen) {
     statusBar()->showMessage(tr("Saved %1").arg(path), 6000);
   } catch (const std::exception& error) {
     QMessageBox::warning(this, tr("Save picture"), QString::fromUtf8(error.what()));
+  }
+}
+
+const std::vector<reports::Trace>& Window::traces() const { return activity_panel_->traces(); }
+
+void Window::open_activity() {
+  const QString path = QFileDialog::getOpenFileName(this, tr("Open activity"), {},
+                                                    tr("Activity files (*.activity);;All files (*)"), nullptr,
+                                                    QFileDialog::DontUseNativeDialog);
+  if (path.isEmpty()) return;
+  try {
+    viewport_->play(scene::Playback::open(viewport_->forest(), path.toStdString()));
+  } catch (const std::exception& error) {
+    QMessageBox::warning(this, tr("Open activity"), QString::fromUtf8(error.what()));
+  }
+}
+
+void Window::save_traces() {
+  if (traces().empty()) {
+    statusBar()->showMessage(tr("No compartment is clamped: click a branch while a simulation is shown."),
+                             6000);
+    return;
+  }
+  QString path = QFileDialog::getSaveFileName(this, tr("Save traces"), "traces.csv", tr("Tables (*.csv)"),
+                                              nullptr, QFileDialog::DontUseNativeDialog);
+  if (path.isEmpty()) return;
+  if (!path.endsWith(".csv", Qt::CaseInsensitive)) path += ".csv";
+  try {
+    write_file(path.toStdString(), csv_of(viewport_->playback()->activity().facts(), traces()));
+    statusBar()->showMessage(tr("Saved %1").arg(path), 6000);
+  } catch (const std::exception& error) {
+    QMessageBox::warning(this, tr("Save traces"), QString::fromUtf8(error.what()));
   }
 }
 

@@ -5,8 +5,11 @@
 #include <QMainWindow>
 #include <filesystem>
 
+#include "forest/reports/trace.h"
+
 #include "apps/studio/viewport.h"
 
+class QDockWidget;
 class QLabel;
 
 namespace forest::studio {
@@ -14,16 +17,23 @@ namespace forest::studio {
 /// As PNG, whole or not at all; throws Error.
 void write_image(const std::filesystem::path& path, const QImage& seen);
 
+class ActivityPanel;
 class SectionPanel;
 class SelectionPanel;
 class TargetsPanel;
 class ViewPanel;
 
 class Window final : public QMainWindow {
+  Q_OBJECT
+
  public:
   Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets = {});
 
   Viewport& viewport() { return *viewport_; }
+  const std::vector<reports::Trace>& traces() const;
+
+ Q_SIGNALS:
+  void clamped(double milliseconds);  // another trace is shown, or none: how long it took to read
 
  protected:
   void closeEvent(QCloseEvent* event) override;
@@ -39,6 +49,8 @@ class Window final : public QMainWindow {
   void record_view();
   void save_picture(bool as_seen);
   void explain();
+  void open_activity();
+  void save_traces();
   template <class Row, class Value>
   void set(const Row& row, Value value);
 
@@ -47,6 +59,8 @@ class Window final : public QMainWindow {
   SelectionPanel* selection_panel_;
   TargetsPanel* targets_panel_;
   SectionPanel* section_panel_;
+  ActivityPanel* activity_panel_;
+  QDockWidget* activity_dock_;
   QLabel *pace_, *drawn_, *sight_, *quality_, *renderer_;
   QString path_;       // where views are recorded
   QTimer panel_rest_;  // the panel follows a moving view a few times a second

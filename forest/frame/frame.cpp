@@ -80,6 +80,17 @@ void check(const Lists& lists, const Geometry& geometry) {
       require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
               "an item's sphere must be finite");
     }
+  const auto check_entries = [](std::span<const std::uint8_t> entries, std::size_t wanted) {
+    require(entries.empty() || entries.size() == wanted,
+            "a list has colours for all of its segments, or for none");
+    static_assert(std::tuple_size_v<Palette> == 128);
+    std::uint32_t bits = 0;  // of all of them: there may be a million
+    for (const std::uint8_t entry : entries) bits |= entry;
+    require(bits < 128, "a segment's colour must be a palette entry");
+  };
+  check_entries(lists.entries.dots, lists.dots.size());
+  check_entries(lists.entries.lines, lists.lines.size() * cluster_size);
+  check_entries(lists.entries.capsules, lists.capsules.size() * cluster_size);
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     require(list.size() < (1u << 26), "a list must have fewer than 67,108,864 items");
   for (const Item& item : lists.dots) require(item.drawn == 1, "a dot is one segment");

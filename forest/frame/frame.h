@@ -85,11 +85,18 @@ struct Band {
   std::uint32_t dots = 0, lines = 0, capsules = 0;
 };
 
+/// Palette entries of single segments: one for each dot, cluster_size for each item of the other lists. A list without any
+/// is coloured by the colour classes.
+struct Entries {
+  std::span<const std::uint8_t> dots, lines, capsules;
+};
+
 struct Lists {
   std::span<const Item> dots;      // somata, branches as beads: one segment an item
   std::span<const Item> lines;     // thin runs
   std::span<const Item> capsules;  // runs near enough to have a surface
   std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
+  Entries entries;                 // where colours change along branches
 };
 
 /// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,

@@ -79,12 +79,6 @@ struct LayoutView {
   }
 };
 
-/// A place on a neuron: where along a section of its morphology, 0 to 1; or the soma (soma_run).
-struct Place {
-  std::uint32_t section = soma_run;
-  float position = .5f;
-};
-
 /// The compartment of each place, for whoever colours segments. Where a section was not reported its nearest reported
 /// ancestor's end answers for it, else the compartment at the soma: a soma report colours the whole neuron.
 /// @param parents  of each section of the morphology; all ones for a root

@@ -30,6 +30,14 @@ struct SectionRun {
 };
 inline constexpr std::uint32_t soma_run = 0xffffffffu;
 
+/// A place on a neuron: where along a section of its morphology, 0 to 1; or the soma (soma_run).
+struct Place {
+  std::uint32_t section = soma_run;
+  float position = .5f;
+
+  bool operator==(const Place&) const = default;
+};
+
 /// The order of compartments that all neurons with one morphology and one list of elements share.
 struct Layout {
   std::uint32_t morphology = 0;  // in Circuit::morphologies

@@ -3,6 +3,7 @@
 // again once the rest is drawn. The pictures are those that would be drawn without a guess; they are drawn sooner.
 #pragma once
 
+#include <functional>
 #include <optional>
 
 #include "forest/scene/cut.h"
@@ -13,8 +14,12 @@ class Chooser {
  public:
   explicit Chooser(Forest forest) : forest_(std::move(forest)) {}
 
+  /// Colours all that is drawn, now and when it is revealed.
+  using Painter = std::function<void(Cut&, const Eye&)>;
+
   /// The cut of the next picture; valid until the one after it. What `shown` points to must last until it is drawn.
-  const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
+  const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {},
+                    Painter painter = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);
@@ -30,6 +35,7 @@ class Chooser {
   frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
+  Painter painter_;
   Cut cut_, revealed_;
   std::uint64_t revealed_segments_ = 0, drawings_ = 0;
 };

@@ -25,7 +25,8 @@ constexpr float widest = 3.f;     // a coarse segment is at most this many times
 
 // A run of vertices of one section, or of several joined end to end where nothing else leaves.
 struct Strip {
-  std::vector<Vec4> vertices;  // x, y, z, radius
+  std::vector<Vec4> vertices;          // x, y, z, radius
+  std::vector<reports::Place> places;  // of each; where sections join: the end of the first
   std::uint32_t kind = 0, rank = 0;
   float mean = 0.f;                  // radius of its branch
   std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
@@ -106,6 +107,7 @@ void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_
     Strip& previous = strips[head];
     if (head == i || previous.end != next.begin || previous.kind != next.kind) continue;
     previous.vertices.insert(previous.vertices.end(), next.vertices.begin() + 1, next.vertices.end());
+    previous.places.insert(previous.places.end(), next.places.begin() + 1, next.places.end());
     previous.end = next.end;
     if (next.rank < previous.rank) previous.rank = next.rank, previous.mean = next.mean;
     next.dropped = true;
@@ -144,8 +146,9 @@ std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::u
   for (Strip& s : strips) {
     const auto kept = simplify(s.vertices, tolerance);
     std::vector<Vec4> vertices;
-    for (const std::uint32_t i : kept) vertices.push_back(s.vertices[i]);
-    s.vertices = std::move(vertices);
+    std::vector<reports::Place> places;
+    for (const std::uint32_t i : kept) vertices.push_back(s.vertices[i]), places.push_back(s.places[i]);
+    s.vertices = std::move(vertices), s.places = std::move(places);
   }
   const float after = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
   const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
@@ -222,20 +225,49 @@ float appears_at(const frame::Segment& s, float thickest, float mean) {
                   1.f / (diagonal * std::max(thickest, 1e-6f)));
 }
 
-// Writes the segments of a draft.
-Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
+// Half way along the branches from one place to another, which lies on the same section or grows out of it.
+struct Middle {
+  const Morphology& morphology;
+  std::vector<float> lengths;  // of sections
+
+  reports::Place operator()(const reports::Place& from, const reports::Place& to) const {
+    if (to.section == soma_section || from.section == soma_section) return to;
+    if (from.section == to.section) return {to.section, .5f * (from.position + to.position)};
+    const auto parent = [&](std::uint32_t s) { return morphology.sections()[s].parent; };
+    float way = lengths[to.section] * to.position;
+    for (SectionId s = parent(to.section); s.valid(); s = parent(s.value())) {
+      const bool there = s.value() == from.section;
+      way += lengths[s.value()] * (there ? 1.f - from.position : 1.f);
+      if (there) break;
+    }
+    way *= .5f;
+    reports::Place at = to;
+    for (float here = lengths[to.section] * to.position; way > here; here = lengths[at.section]) {
+      const SectionId before = parent(at.section);
+      if (!before.valid() || at.section == from.section) return {at.section, 0.f};
+      way -= here;
+      at = {std::uint32_t(before.value()), 1.f};
+    }
+    return {at.section, std::clamp(at.position - way / std::max(lengths[at.section], 1e-9f), 0.f, 1.f)};
+  }
+};
+
+// Writes the segments of a draft, their places with them.
+Drawn emit(const std::vector<Strip>& strips, const Middle& middle, ClusterTree& out) {
   Drawn drawn;
   std::array<Bounds, Cluster::group_count> bounds;
   std::uint32_t count = 0;
   const auto for_each = [&](auto&& body) {
     count = 0;
     for (const Strip& s : strips)
-      for (std::size_t i = 1; i < s.vertices.size(); ++i, ++count) body(s, s.vertices[i - 1], s.vertices[i]);
+      for (std::size_t i = 1; i < s.vertices.size(); ++i, ++count)
+        body(s, i, s.vertices[i - 1], s.vertices[i]);
   };
-  for_each([&](const Strip& s, const Vec4& a, const Vec4& b) {
+  for_each([&](const Strip& s, std::size_t i, const Vec4& a, const Vec4& b) {
     const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
                                  b.x(), b.y(), b.z(), s.kind | s.rank << 8 | half_pair(s.mean, 0.f) << 16};
-    out.push_back(segment);
+    out.segments.push_back(segment);
+    out.places.push_back(middle(s.places[i - 1], s.places[i]));
     if (a != b)
       drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
     const float from =
@@ -246,7 +278,7 @@ Drawn emit(const std::vector<Strip>& strips, std::vector<frame::Segment>& out) {
   });
   for (std::size_t g = 0; g < bounds.size() && g * Cluster::group_size < count; ++g)
     drawn.groups[g] = {bounds[g].centre(), 0.f};
-  for_each([&](const Strip&, const Vec4& a, const Vec4& b) {
+  for_each([&](const Strip&, std::size_t, const Vec4& a, const Vec4& b) {
     Sphere& sphere = drawn.groups[count / Cluster::group_size];
     for (const Vec4* v : {&a, &b})
       sphere.radius = std::max(sphere.radius, (v->head<3>() - sphere.centre).norm() + v->w());
@@ -336,23 +368,36 @@ ClusterTree build_clusters(const Morphology& m) {
   std::vector<Strip> runs;
   if (soma.radius > 0.f) {
     const Vec4 centre(soma.x - origin.x(), soma.y - origin.y(), soma.z - origin.z(), soma.radius);
-    runs.push_back({.vertices = {centre, centre}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0});
-    tree.section.push_back(soma_section);
+    runs.push_back({.vertices = {centre, centre},
+                    .places = {{}, {}},
+                    .kind = 1,
+                    .rank = 0,
+                    .mean = 0.f,
+                    .begin = 0,
+                    .end = 0});
   }
   std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
-  std::vector<std::uint32_t> run_section(runs.size(), soma_section);
+  std::vector<float> ways(sections);  // along the points of each section
   while (!open.empty()) {
     const SectionId id = open.back();
     open.pop_back();
     const auto points = m.points(id);
     const Section& section = m.section(id);
     Strip strip{.vertices = {},
+                .places = {},
                 .kind = std::uint32_t(section.kind),
                 .rank = rank_of(id.value()),
                 .mean = float(means[numbers[id.value()]]),
                 .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
                 .end = id.value() + 1};
-    for (const Point& p : points) strip.vertices.push_back(vertex(p));
+    float way = 0.f;
+    for (const Point& p : points) {
+      if (!strip.vertices.empty()) way += (vertex(p) - strip.vertices.back()).head<3>().norm();
+      strip.vertices.push_back(vertex(p));
+      strip.places.push_back({id.value(), way});
+    }
+    for (reports::Place& place : strip.places) place.position = way > 0.f ? place.position / way : .5f;
+    ways[id.value()] = way;
     if (!section.parent.valid() && soma.radius > 0.f) {
       // A cone from inside the soma to the stem, when it begins near enough to belong there.
       const Vec4 first = strip.vertices.front();
@@ -361,20 +406,15 @@ ClusterTree build_clusters(const Morphology& m) {
         const float inside = std::max(.3f * soma.radius, 0.f);
         const Vec3 direction = first.head<3>() / gap;
         const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
-        Strip cone{.vertices = {}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0};
+        Strip cone{
+            .vertices = {}, .places = {{}, {}}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0};
         Vec4 start;
         start << direction * inside, width;
         cone.vertices = {start, first};
-        if (gap > inside) {
-          runs.push_back(std::move(cone));
-          run_section.push_back(soma_section);
-        }
+        if (gap > inside) runs.push_back(std::move(cone));
       }
     }
-    if (strip.vertices.size() >= 2) {
-      runs.push_back(std::move(strip));
-      run_section.push_back(id.value());
-    }
+    if (strip.vertices.size() >= 2) runs.push_back(std::move(strip));
     std::vector<SectionId> next(m.children(id).begin(), m.children(id).end());
     std::ranges::stable_sort(
         next, [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
@@ -385,21 +425,23 @@ ClusterTree build_clusters(const Morphology& m) {
   // Leaves: runs of at most `limit` segments, sections cut where a leaf is full.
   std::vector<Draft> drafts;
   std::uint32_t nodes = std::uint32_t(sections + 1);
-  tree.section.clear();
   std::size_t filled = limit;
-  for (std::size_t r = 0; r < runs.size(); ++r) {
-    const Strip& run = runs[r];
+  for (const Strip& run : runs) {
     std::uint32_t begin = run.begin;
     for (std::size_t at = 0; at + 1 < run.vertices.size();) {
       if (filled == limit) {
         drafts.push_back({});
-        drafts.back().leaf_first = std::uint32_t(tree.section.size());
+        drafts.back().leaf_first = tree.original_count;
         filled = 0;
       }
       const std::size_t take = std::min(limit - filled, run.vertices.size() - 1 - at);
       const bool last = at + take + 1 == run.vertices.size();
-      Strip piece{.vertices = {run.vertices.begin() + std::ptrdiff_t(at),
-                               run.vertices.begin() + std::ptrdiff_t(at + take + 1)},
+      const auto part = [&](const auto& list) {
+        return std::remove_cvref_t<decltype(list)>(list.begin() + std::ptrdiff_t(at),
+                                                   list.begin() + std::ptrdiff_t(at + take + 1));
+      };
+      Strip piece{.vertices = part(run.vertices),
+                  .places = part(run.places),
                   .kind = run.kind,
                   .rank = run.rank,
                   .mean = run.mean,
@@ -408,7 +450,7 @@ ClusterTree build_clusters(const Morphology& m) {
       begin = piece.end;
       drafts.back().strips.push_back(std::move(piece));
       drafts.back().leaf_count += std::uint32_t(take);
-      tree.section.insert(tree.section.end(), take, run_section[r]);
+      tree.original_count += std::uint32_t(take);
       filled += take;
       at += take;
     }
@@ -448,13 +490,14 @@ ClusterTree build_clusters(const Morphology& m) {
   }
 
   // Out: leaf segments first and in order, then the coarser ones; clusters root first.
-  tree.original_count = std::uint32_t(tree.section.size());
+  const Middle middle{m, std::move(ways)};
   std::vector<Drawn> drawn(drafts.size());
   std::vector<std::uint32_t> first(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {
     first[i] = std::uint32_t(tree.segments.size());
-    drawn[i] = emit(drafts[i].strips, tree.segments);
+    drawn[i] = emit(drafts[i].strips, middle, tree);
   }
+  for (std::uint32_t i = 0; i < tree.original_count; ++i) tree.section.push_back(tree.places[i].section);
   const std::size_t count = drafts.size();
   const auto index = [&](std::int64_t draft) {
     return draft < 0 ? 0u : std::uint32_t(count - 1 - std::size_t(draft));

@@ -17,6 +17,7 @@
 #include "forest/core/bounds.h"
 #include "forest/frame/layout.h"
 #include "forest/morphology/morphology.h"
+#include "forest/reports/layout.h"
 
 namespace forest::scene {
 
@@ -58,6 +59,7 @@ static_assert(sizeof(Cluster) == 96);
 
 struct ClusterTree {
   std::vector<frame::Segment> segments;  // the leaves' first (original_count), then the coarser ones
+  std::vector<reports::Place> places;    // of every segment: the middle of what it stands for
   std::vector<Cluster> clusters;         // [0] is the root
   std::vector<std::uint32_t> section;    // of every original segment: the section it shows, or soma_section
   std::uint32_t original_count = 0;

@@ -2,6 +2,7 @@
 // The choice of what is drawn: for every neuron in sight the coarsest clusters that are good enough for the eye.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -37,8 +38,17 @@ struct Cut {
   std::uint64_t segments = 0;  // drawn
   std::uint32_t neurons = 0;   // in sight
   std::vector<LeftOut> left_out;
+  // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
+  struct Entries {
+    std::vector<std::uint8_t> dots, lines, capsules;
+  };
+  std::optional<Entries> entries;
 
-  frame::Lists lists() const { return {dots, lines, capsules, bands}; }
+  frame::Lists lists() const {
+    frame::Lists lists{dots, lines, capsules, bands, {}};
+    if (entries) lists.entries = {entries->dots, entries->lines, entries->capsules};
+    return lists;
+  }
 };
 
 /// Pure: depends on its arguments alone, and is the same at any number of threads.

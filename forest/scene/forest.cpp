@@ -37,6 +37,7 @@ enum Part : std::uint32_t {
   types,
   layers,
   text,
+  places,
   part_count
 };
 constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment),
@@ -47,7 +48,8 @@ constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segm
                                                               sizeof(SectionFacts),
                                                               4,
                                                               4,
-                                                              1};
+                                                              1,
+                                                              sizeof(reports::Place)};
 
 struct Entry {
   std::uint32_t part, element_size;
@@ -131,6 +133,7 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
   std::vector<Neuron> all_neurons;
   std::vector<std::uint32_t> all_section_of_segment, all_types, all_layers;
   std::vector<SectionFacts> all_sections;
+  std::vector<reports::Place> all_places;
   for (std::size_t i = 0; i < trees.size(); ++i) {
     const ClusterTree& tree = trees[i];
     const auto facts = facts_of(morphologies[i]);
@@ -150,6 +153,7 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
       all_clusters.push_back(cluster);
     }
     all_segments.insert(all_segments.end(), tree.segments.begin(), tree.segments.end());
+    all_places.insert(all_places.end(), tree.places.begin(), tree.places.end());
     all_section_of_segment.insert(all_section_of_segment.end(), tree.section.begin(), tree.section.end());
     all_sections.insert(all_sections.end(), facts.begin(), facts.end());
     all_neurons.push_back(n);
@@ -175,7 +179,8 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
       std::as_bytes(std::span(all_sections)),
       std::as_bytes(std::span(all_types)),
       std::as_bytes(std::span(all_layers)),
-      std::as_bytes(std::span(description))};
+      std::as_bytes(std::span(description)),
+      std::as_bytes(std::span(all_places))};
   Header header{
       .magic = magic, .version = version, .parts = part_count, .file_size = 0, .table_hash = 0, .table = {}};
   std::uint64_t at = sizeof(Header);
@@ -220,6 +225,7 @@ std::span<const std::uint32_t> Forest::section_of_segment() const {
   return data_->as<std::uint32_t>(Part::section_of_segment);
 }
 std::span<const SectionFacts> Forest::sections() const { return data_->as<SectionFacts>(Part::sections); }
+std::span<const reports::Place> Forest::places() const { return data_->as<reports::Place>(Part::places); }
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
@@ -289,7 +295,8 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     throw InputError(name, 0, "has a damaged description" + again);
   }
   require(f.neurons().size() == data->circuit.morphologies.size() &&
-              f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
+              f.places().size() == f.segments().size() && f.types().size() == f.instances().size() &&
+              f.layers().size() == f.instances().size(),
           wrong);
   for (const Cluster& c : f.clusters()) {
     require(c.segment_count <= frame::cluster_size &&
@@ -311,6 +318,12 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     for (std::uint32_t i = n.first_original; i < n.first_original + n.original_count; ++i)
       require(f.section_of_segment()[i] == soma_section || f.section_of_segment()[i] < n.section_count,
               wrong);
+  for (const Neuron& n : f.neurons())
+    for (const Cluster& c : f.clusters().subspan(n.first_cluster, n.cluster_count))
+      for (const reports::Place& p : f.places().subspan(c.first_segment, c.segment_count))
+        require((p.section == soma_section || p.section < n.section_count) && p.position >= 0.f &&
+                    p.position <= 1.f,
+                wrong);
   for (const Neuron& n : f.neurons())
     for (std::uint32_t i = 0; i < n.section_count; ++i) {
       const std::uint32_t parent = f.sections()[n.first_section + i].parent;

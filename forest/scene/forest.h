@@ -61,8 +61,9 @@ class Forest {
   std::span<const Neuron> neurons() const;
   std::span<const std::uint32_t> section_of_segment() const;
   std::span<const SectionFacts> sections() const;
-  std::span<const std::uint32_t> types() const;   // of every instance: index in circuit().types
-  std::span<const std::uint32_t> layers() const;  // of every instance: index in circuit().layers
+  std::span<const reports::Place> places() const;  // of every segment: the middle of what it stands for
+  std::span<const std::uint32_t> types() const;    // of every instance: index in circuit().types
+  std::span<const std::uint32_t> layers() const;   // of every instance: index in circuit().layers
 
   /// Names, types, layers and radius; its instances are left empty, they are above.
   const circuit::Circuit& circuit() const;

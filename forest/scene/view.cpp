@@ -167,6 +167,52 @@ Json json_of(const Appearance& a) {
   return json;
 }
 
+ActivityView activity_of(const Json& json, const std::string& name) {
+  if (!json.is_object())
+    throw InputError(name, 0, "'activity' must be an object such as {\"map\":\"plasma\",\"range\":[-80,20]}");
+  constexpr float far = 1e9f;
+  ActivityView a;
+  for (const auto& [key, value] : json.items()) {
+    if (key == "map") {
+      a.map = value.is_string() ? find_colour_map(value.get<std::string>()) : nullptr;
+      if (!a.map) {
+        std::vector<std::string_view> names;
+        for (const ColourMap& map : colour_maps()) names.push_back(map.name);
+        throw InputError(name, 0, fmt::format("'map' must be one of: {}", fmt::join(names, ", ")));
+      }
+    } else if (key == "range") {
+      if (!value.is_array() || value.size() != 2)
+        throw InputError(name, 0, "'range' must be the values at both ends of the colours, as [-80, 20]");
+      a.low = number_of(value[0], name, key, -far, far), a.high = number_of(value[1], name, key, -far, far);
+      if (!(a.low < a.high)) throw InputError(name, 0, "'range' must have its lower end first");
+    } else if (key == "threshold") {
+      a.threshold = number_of(value, name, key, -far, far);
+    } else if (key == "speed") {
+      a.speed = number_of(value, name, key, 0.f, 1e6f);
+    } else if (key == "fade") {
+      a.fade = number_of(value, name, key, .01f, 1e6f);
+    } else if (key == "time") {
+      number_of(value, name, key, -far, far);
+      a.time = value.get<double>();
+    } else {
+      throw InputError(name, 0,
+                       fmt::format("'{}' is no key of a view's activity; see docs/scene/view.md", key));
+    }
+  }
+  return a;
+}
+
+// The colours of activity on a background.
+void paint(frame::Palette& palette, const ActivityView& a, bool light) {
+  for (std::uint32_t i = 0; i < map_steps; ++i)
+    palette[i] = (*a.map)(float(i) / float(map_steps - 1)) * (light ? .85f : 1.f);
+  palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x2A303A);
+  palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x3C4450);
+  const Vec3 dim = palette[no_value_entry], bright = light ? light_of(0xC00010) : Vec3(1.f, 1.f, .92f);
+  for (std::uint32_t i = 0; i < flash_steps; ++i)
+    palette[flash_entry + i] = dim + (bright - dim) * (float(i + 1) / float(flash_steps));
+}
+
 }  // namespace
 
 View parse_view(std::string_view text, const std::string& name) {
@@ -213,6 +259,8 @@ View parse_view(std::string_view text, const std::string& name) {
       v.colour_by = ColourBy(word_of(value, name, key, colour_names));
     else if (key == "background")
       v.background = Background(word_of(value, name, key, background_names));
+    else if (key == "activity")
+      v.activity = activity_of(value, name);
     else if (key == "targets") {
       if (!value.is_array()) throw InputError(name, 0, "'targets' must be a list; see docs/scene/targets.md");
       for (const Json& one : value) v.targets.push_back(appearance_of(one, name));
@@ -251,6 +299,13 @@ std::string to_json(const View& v) {
     if (v.detail.screen > 0.f) json["screen"] = v.detail.screen;
   }
   for (const Appearance& a : v.targets) json["targets"].push_back(json_of(a));
+  if (v.activity) {
+    const ActivityView& a = *v.activity;
+    Json& activity = json["activity"] = {
+        {"map", a.map->name}, {"range", {a.low, a.high}}, {"speed", a.speed}, {"fade", a.fade}};
+    if (a.threshold) activity["threshold"] = *a.threshold;
+    if (a.time) activity["time"] = *a.time;
+  }
   return json.dump();
 }
 
@@ -301,6 +356,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
   f.width = width, f.height = height, f.subframes = view.samples;
   f.palette = colouring.palette;
   f.opacities = colouring.opacities, f.states = colouring.states;
+  if (cut.entries)
+    paint(f.palette, view.activity.value_or(ActivityView()), view.background == Background::light);
   static_cast<frame::Lists&>(f) = cut.lists();
   f.overlays = overlays;
   frame::Style& s = f.style;

@@ -8,25 +8,39 @@
 #include <vector>
 
 #include "forest/frame/frame.h"
+#include "forest/scene/colour_map.h"
 #include "forest/scene/colouring.h"
 #include "forest/scene/cut.h"
 
 namespace forest::scene {
+
+/// How a simulation is shown (playback.h), and which moment of it.
+struct ActivityView {
+  const ColourMap* map = &colour_maps().front();  // one of colour_maps()
+  float low = -80.f, high = 20.f;                 // values at its ends, in the unit of the report
+  std::optional<float> threshold;                 // what is less is dim and grey
+  float speed =
+      300.f;  // of spikes along axons, µm/ms; 0 for no flashes. Thin axons without myelin have some hundreds
+  float fade = 1.f;            // ms in which a flash falls to 1/e
+  std::optional<double> time;  // ms; none: the beginning
+};
 
 struct View {
   frame::Camera camera;
   Detail detail;  // gaze in shares of the width and height here, so that a view fits every picture size
   ColourBy colour_by = ColourBy::type;
   Background background = Background::dark;
-  std::uint32_t samples = 16;       // subframes of a still picture
-  float fog = 1.f;                  // strength of the depth cue; 0 for none
-  float halo = 1.f;                 // strength of the rim around nearer branches; 0 for none
-  std::vector<Appearance> targets;  // how they are shown; later ones win
+  std::uint32_t samples = 16;            // subframes of a still picture
+  float fog = 1.f;                       // strength of the depth cue; 0 for none
+  float halo = 1.f;                      // strength of the rim around nearer branches; 0 for none
+  std::vector<Appearance> targets;       // how they are shown; later ones win
+  std::optional<ActivityView> activity;  // used where there is a simulation to show
 };
 
 /// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
-///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"targets":[{"name":"L5","opacity":.4}]}; only eye
-///  and target are needed.
+///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"targets":[{"name":"L5","opacity":.4}],
+///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5}}; only eye and target
+///  are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);
@@ -36,6 +50,11 @@ View overview(const Forest& forest);
 
 /// A picture to hang on a wall: near enough to follow single dendrites, far enough to see the layers.
 View portrait(const Forest& forest);
+
+/// Entries where activity colours branches: the map from low to high, what is below the threshold, what has no value, and
+/// flashes from dim to bright.
+inline constexpr std::uint32_t map_steps = 96, below_entry = 96, no_value_entry = 97, flash_entry = 98,
+                               flash_steps = 16;
 
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,

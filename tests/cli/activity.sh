@@ -174,6 +174,81 @@ fails_with 2 '--neuron' "$program" clamp run.activity
 fails_with 2 '--circuit' "$program" activity run.h5 --out x.activity
 [ -z "$(find . -name '*.activity.??????')" ]  # nothing half written is left
 
+# On the branches: pictures of two moments differ, of one are the same, with any renderer; a threshold takes colour away.
+"$program" pack column -o few.forest >/dev/null
+view='{"eye":[0,150,420],"target":[0,150,0],"samples":4,"fog":0,"activity":{"range":[-75,-55],"speed":2,"fade":9'
+draw() {  # name, words after the view…
+  local name=$1 more=$2
+  shift 2
+  "$program" render few.forest --view "$view$more}}" --activity run.activity --size 240x200 -o "$name.png" --json "$@" >"$name.json"
+}
+draw at10 "" --time 10
+draw again "" --time 10 --threads 1
+cmp at10.png again.png
+draw in_view ',"time":10'
+cmp at10.png in_view.png
+draw at30 "" --time 30
+draw dim ',"threshold":49' --time 30
+draw still ',"threshold":49,"time":30'
+draw opengl "" --time 10 --renderer opengl
+cmp dim.png still.png
+"$program" render few.forest --view "$view}}" --size 240x200 -o plain.png --json >plain.json
+"$program" render few.forest --view "$view}}" --activity odd.activity --time 3.5 --size 240x200 -o odd.png --json >nan.json
+"$program" movie few.forest --view "$view}}" --activity run.activity --rate 20 --from 10 --seconds 1 --fps 4 --samples 1 --size 160x120 --pictures film -o film.mp4 >/dev/null
+$python - <<'PY'
+import json, struct, zlib
+def pixels(name):
+    data, at, packed, size = open(name, "rb").read(), 8, b"", None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR": size = struct.unpack(">II", data[at + 8:at + 16])
+        if kind == b"IDAT": packed += data[at + 8:at + 8 + length]
+        at += length + 12
+    rows, (width, height) = zlib.decompress(packed), size
+    channels = len(rows) // height // width
+    out, before = [], bytes(width * channels)
+    for y in range(height):
+        kind, line = rows[y * (width * channels + 1)], bytearray(rows[y * (width * channels + 1) + 1:(y + 1) * (width * channels + 1)])
+        for x in range(len(line)):
+            a = line[x - channels] if x >= channels else 0
+            b, c = before[x], before[x - channels] if x >= channels else 0
+            p = a + b - c
+            paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+            line[x] = (line[x] + (0, a, b, (a + b) // 2, paeth)[kind]) & 255
+        out += [bytes(line[i:i + 3]) for i in range(0, len(line), channels)]
+        before = line
+    return out
+def saturation(picture):
+    return sum(max(p) - min(p) for p in picture)
+first, later, dim, plain, opengl = (pixels(n + ".png") for n in ("at10", "at30", "dim", "plain", "opengl"))
+changed = sum(a != b for a, b in zip(first, later))
+covered = json.load(open("at10.json"))["covered"] * len(first)
+assert changed > .3 * covered, (changed, covered)
+assert saturation(later) > 1.2 * saturation(dim), (saturation(later), saturation(dim))  # the sky has some, too
+assert sum(a != b for a, b in zip(first, plain)) > .3 * covered
+mean = sum(abs(a - b) for p, q in zip(first, opengl) for a, b in zip(p, q)) / len(first) / 3
+assert mean < 1, mean
+told = json.load(open("at30.json"))
+assert told["activity"]["neurons"] == 7 and told["activity"]["flashes"] >= 1, told
+assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))["activity"] is None
+film = [pixels(f"film/{i:05}.png") for i in range(4)]
+assert all(a != b for a, b in zip(film, film[1:]))
+PY
+fails_with 1 'run.activity: holds no time 400 ms; it runs from 0 to 149.5 ms' "$program" render few.forest --activity run.activity --time 400 -o no.png
+"$program" plant --recipe few.toml --repo cells.db --seed 3 --out turned >/dev/null
+"$program" pack turned -o turned.forest >/dev/null
+fails_with 1 'make the activity file and the forest file from the same circuit' "$program" render turned.forest --activity run.activity -o no.png
+sed 's/count = 7/count = 5/' few.toml >fewer.toml
+"$program" plant --recipe fewer.toml --repo cells.db --seed 2 --out fewer >/dev/null
+"$program" pack fewer -o fewer.forest >/dev/null
+fails_with 1 'with 7 neurons and the forest has 5' "$program" render fewer.forest --activity run.activity -o no.png
+fails_with 1 "'map' must be one of: plasma" "$program" render few.forest --view "$view,\"map\":\"jet\"}}" --activity run.activity -o no.png
+fails_with 1 'is not an activity file' "$program" render few.forest --activity few.forest -o no.png
+fails_with 1 'short.activity' "$program" render few.forest --activity short.activity -o no.png
+fails_with 2 '--activity' "$program" render few.forest --time 3 -o no.png
+fails_with 1 'give another --view' "$program" movie few.forest --view "$view}}" -o no.mp4
+[ ! -e no.png ] && [ ! -e no.mp4 ]
+
 # Killed in the middle: the old file is whole. (Its unfinished neighbour stays, as with every program that is killed.)
 $python report.py long.h5 20000
 for wait in .02 .05 .1; do

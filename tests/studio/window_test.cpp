@@ -22,9 +22,12 @@
 #include "forest/io/png.h"
 #include "forest/render/opengl/context.h"
 #include "forest/render/opengl/opengl_renderer.h"
+#include "forest/reports/trace.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/playback.h"
 #include "forest/scene/view.h"
 
+#include "tests/sample_activity.h"
 #include "tests/sample_forest.h"
 
 namespace forest::studio {
@@ -47,6 +50,20 @@ std::filesystem::path sample_file() {
 const scene::Forest& sample() {
   static const scene::Forest forest = scene::Forest::open(sample_file());
   return forest;
+}
+
+// A made-up simulation of its neurons: 300 steps of 0.5 ms.
+std::filesystem::path sample_activity() {
+  static const std::filesystem::path path = [] {
+    const auto circuit = testing::sample_circuit(120);
+    const auto neurons = testing::sample_neurons();
+    const auto report = reports::synthetic_report(circuit, neurons,
+                                                  {.compartments = 150, .steps = 300, .step = .5, .seed = 2});
+    write_file(folder / "sample.activity", testing::packed_activity(report, circuit, neurons));
+    return folder / "sample.activity";
+  }();
+  sample_file();
+  return path;
 }
 
 // A running studio.
@@ -123,6 +140,8 @@ void xdotool(const std::string& what) {
 // A studio on the sample from a near view, with a hand on its mouse.
 class Window : public ::testing::Test {
  protected:
+  virtual std::vector<std::string> more() const { return {}; }  // arguments
+
   void SetUp() override {
     if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
     scene::View view = scene::overview(sample());
@@ -132,8 +151,10 @@ class Window : public ::testing::Test {
     write_file(folder / "near.json", scene::to_json(view));
     setenv("XDG_CONFIG_HOME", (folder / "settings").c_str(), 1);
     std::filesystem::remove_all(folder / "settings");
-    studio_ = std::make_unique<Studio>(std::vector<std::string>{sample_file(), "--view", folder / "near.json",
-                                                                "--size", "1280x800", "--report"});
+    std::vector<std::string> arguments{sample_file(), "--view",   folder / "near.json",
+                                       "--size",      "1280x800", "--report"};
+    for (const std::string& word : more()) arguments.push_back(word);
+    studio_ = std::make_unique<Studio>(arguments);
     finish();
     xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
     settle();
@@ -144,6 +165,7 @@ class Window : public ::testing::Test {
     const Json report = studio_->wait_for("settled");
     view_ = scene::parse_view(report.at("view").dump());
     picture_ = report.at("picture");
+    activity_ = report.at("activity");
   }
   // The same after everything that the hand did so far: events are worked off in order, and Escape (which leaves
   // nothing selected) is answered at once. What was finished before, between two moves of a slow mouse, is passed over.
@@ -188,7 +210,13 @@ class Window : public ::testing::Test {
 
   std::unique_ptr<Studio> studio_;
   scene::View view_;
-  Json picture_;
+  Json picture_, activity_;
+};
+
+class Playing : public Window {
+ protected:
+  std::vector<std::string> more() const override { return {"--activity", sample_activity()}; }
+  double time() const { return activity_.at("time").get<double>(); }
 };
 
 struct Target {
@@ -432,6 +460,7 @@ TEST_F(Window, WhatIsHiddenCannotBePicked) {
   key("End");  // all
   key("space");
   settle();
+  ASSERT_EQ(view_.targets.size(), 1u);
   EXPECT_EQ(view_.targets[0].name, "all");
   Random random(14);
   const Target target = clear_target(random, view_, viewport(), true);
@@ -461,6 +490,106 @@ TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
   EXPECT_GT(height, 300);
   EXPECT_LE(x + width, 1280);
   EXPECT_LE(y + height, 800);  // the button at its lower end can be clicked
+}
+
+TEST_F(Playing, SpacePlaysAndStopsAndStepsGoBothWays) {
+  EXPECT_EQ(time(), 0.);
+  EXPECT_FALSE(activity_.at("playing").get<bool>());
+  const io::Picture first = saved("moment_0.png");
+  key("period period period");
+  settle();
+  EXPECT_NEAR(time(), 1.5, 1e-6);
+  EXPECT_NEAR(view_.activity.value().time.value(), 1.5, 1e-6);
+  key("comma");
+  settle();
+  EXPECT_NEAR(time(), 1., 1e-6);
+  xdotool("key space sleep 0.8 key space");
+  settle();
+  EXPECT_FALSE(activity_.at("playing").get<bool>());
+  EXPECT_GT(time(), 3.);
+  EXPECT_LT(time(), 149.5);
+  EXPECT_GT(difference(first, saved("moment_later.png")), .01);
+  key("ctrl+Home");
+  settle();
+  EXPECT_EQ(time(), 0.);
+  EXPECT_EQ(saved("moment_again.png").pixels, first.pixels);
+}
+
+TEST_F(Playing, AClickShowsTheWholeHistoryOfTheCompartmentAndTracesAreSaved) {
+  const scene::Playback playback = scene::Playback::open(sample(), sample_activity());
+  Random random(21);
+  std::vector<reports::Trace> wanted;
+  for (int i = 0; i < 3; ++i) {
+    // A place where half a pixel more or less is still the same compartment.
+    Target target;
+    std::optional<scene::Playback::Compartment> compartment, beside;
+    do {
+      target = clear_target(random, view_, viewport(), true);
+      const std::array middle{Vec2(target.pixel + Vec2(.5f, .5f))};
+      const auto rough = scene::plain_picks(sample(), view_.camera, viewport(), middle, .5f)[0];
+      compartment = playback.compartment(target.pick->instance, target.pick->segment);
+      beside = playback.compartment(rough->instance, rough->segment);
+    } while (compartment->index != beside->index);
+    const reports::Trace trace = reports::trace(playback.activity(), compartment->row, compartment->index);
+    const auto again = std::ranges::find_if(
+        wanted, [&](const auto& t) { return t.row == trace.row && t.compartment == trace.compartment; });
+    if (again != wanted.end()) wanted.erase(again);
+    wanted.push_back(trace);
+    xdotool("mousemove " + place(target.pixel) + " click 1");
+    const Json clamped = studio_->wait_for("clamped");
+    ASSERT_EQ(clamped.at("traces").size(), wanted.size());
+    EXPECT_EQ(clamped.at("traces").back(), trace.name());
+    EXPECT_LT(clamped.at("milliseconds").get<double>(), 200.);
+    finish();
+  }
+  const auto path = folder / "traces.csv";
+  std::filesystem::remove(path);
+  key("ctrl+t");
+  xdotool("search --sync --onlyvisible --name 'Save traces' windowfocus");
+  xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", path.string()));
+  key("Return");
+  for (int i = 0; i < patience / 50 && !std::filesystem::exists(path); ++i) usleep(50'000);
+  EXPECT_EQ(MappedFile(path).text(), reports::csv_of(playback.activity().facts(), wanted));
+}
+
+TEST_F(Playing, AClickOnARowOfTheRasterSelectsItsNeuron) {
+  const scene::Playback playback = scene::Playback::open(sample(), sample_activity());
+  const Json raster = activity_.at("raster");
+  const auto rows = playback.activity().rows();
+  for (const double share : {.1, .5, .93}) {
+    const int y = int(share * raster.at("height").get<double>());
+    xdotool(fmt::format("mousemove {} {} click 1", raster.at("x").get<int>() + 40,
+                        raster.at("y").get<int>() + y));
+    studio_->wait_for("clamped");  // the soma's voltage is shown, too
+    const Json facts = studio_->wait_for("selected").at("facts");
+    const auto row = std::size_t((double(y) + .5) / raster.at("height").get<double>() * double(rows.size()));
+    EXPECT_NEAR(facts.at("neuron").get<int>(), int(rows[row].instance), 1);
+    EXPECT_EQ(facts.at("section"), "soma");
+    finish();
+  }
+}
+
+TEST_F(Playing, AViewCopiedWithItsMomentGoesBackThere) {
+  key("period period");
+  settle();
+  key("ctrl+c");
+  key("ctrl+Home");
+  settle();
+  EXPECT_EQ(time(), 0.);
+  key("ctrl+v");
+  settle();
+  EXPECT_NEAR(time(), 1., 1e-6);
+}
+
+TEST(Studio, RefusesASimulationOfAnotherCircuit) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  sample_activity();
+  write_file(folder / "fewer.forest", scene::pack(testing::sample_circuit(100), testing::sample_neurons()));
+  const auto [said, status] =
+      Studio({folder / "fewer.forest", "--activity", folder / "sample.activity"}).end();
+  EXPECT_EQ(status, 1);
+  EXPECT_NE(said.find("with 120 neurons and the forest has 100"), std::string::npos) << said;
+  EXPECT_EQ(std::ranges::count(said, '\n'), 1) << said;
 }
 
 TEST(Studio, TakesAViewAsTextAndSaysWhatIsWrongWithIt) {

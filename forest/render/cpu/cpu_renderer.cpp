@@ -33,12 +33,15 @@ struct CpuRenderer::State {
     frame::Band from;
     for (const frame::Band& to : lists.bands.empty() ? std::span(&whole, 1) : lists.bands) {
       if (from.dots || from.lines || from.capsules) canvas.look();
-      drawn += cpu::splat(picture, lists.capsules.subspan(from.capsules, to.capsules - from.capsules),
-                          cpu::Kind::capsules, canvas);
-      drawn +=
-          cpu::splat(picture, lists.dots.subspan(from.dots, to.dots - from.dots), cpu::Kind::dots, canvas);
-      drawn += cpu::splat(picture, lists.lines.subspan(from.lines, to.lines - from.lines), cpu::Kind::lines,
-                          canvas);
+      const auto draw = [&](std::span<const frame::Item> list, std::span<const std::uint8_t> entries,
+                            std::size_t begin, std::size_t end, cpu::Kind kind) {
+        const std::size_t each = kind == cpu::Kind::dots ? 1 : frame::cluster_size;
+        if (!entries.empty()) entries = entries.subspan(begin * each, (end - begin) * each);
+        drawn += cpu::splat(picture, list.subspan(begin, end - begin), entries, kind, canvas);
+      };
+      draw(lists.capsules, lists.entries.capsules, from.capsules, to.capsules, cpu::Kind::capsules);
+      draw(lists.dots, lists.entries.dots, from.dots, to.dots, cpu::Kind::dots);
+      draw(lists.lines, lists.entries.lines, from.lines, to.lines, cpu::Kind::lines);
       from = to;
     }
     return drawn;

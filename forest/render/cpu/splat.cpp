@@ -87,7 +87,8 @@ void leave_out(const Picture& picture, const frame::Item& item, const frame::Sta
   }
 }
 
-void load(const Picture& picture, const frame::Item& item, Run& r) {
+// `entries`: of its segments; null: the colour class says.
+void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
   const frame::State state = picture.state_of(item);
   const std::uint32_t colour = state.colour_class * 8u;
@@ -106,6 +107,11 @@ void load(const Picture& picture, const frame::Item& item, Run& r) {
     r.opacity[i] = 255;
   }
   if (picture.transparent) leave_out(picture, item, state, r);
+  if (entries) {
+    std::size_t i = 0;
+    for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1)
+      r.entry[i++] = entries[std::countr_zero(drawn)];
+  }
 }
 
 // A segment of a branch as a string of beads: spheres that cover as much of the picture together, a bead for two
@@ -538,7 +544,8 @@ void draw_beads(const Picture& picture, const frame::Item& item, const Mat3& tur
 
 }  // namespace
 
-std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas) {
+std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items,
+                    std::span<const std::uint8_t> entries, Kind kind, Canvas& canvas) {
   const frame::Constants& c = picture.constants;
   std::atomic<std::uint64_t> all = 0;
   parallel_ranges(items.size(), grain, [&](std::size_t begin, std::size_t end) {
@@ -561,7 +568,7 @@ std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, 
       const Mat3 turn =
           picture.to_camera * Quat(instance.qw, instance.qx, instance.qy, instance.qz).toRotationMatrix();
       const Vec3 at = picture.to_camera * (Vec3(instance.x, instance.y, instance.z) - picture.eye);
-      load(picture, item, r);
+      load(picture, item, entries.empty() ? nullptr : &entries[kind == Kind::dots ? k : k * run], r);
       if (kind == Kind::dots) {
         draw_beads(picture, item, turn, at, centre.z(), r, canvas);
         ++drawn;

@@ -27,7 +27,9 @@ enum class Kind { dots, lines, capsules };
 
 /// Draws every item of the list; the picture is the same in any order and at any number of threads. Returns how many segments
 /// were neither hidden nor beside the picture.
-std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items, Kind kind, Canvas& canvas);
+/// @param entries  of the list (frame::Entries); may be empty
+std::uint64_t splat(const Picture& picture, std::span<const frame::Item> items,
+                    std::span<const std::uint8_t> entries, Kind kind, Canvas& canvas);
 /// Overlays: at least two pixels wide, in the world.
 void splat(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas);
 

@@ -111,7 +111,7 @@ struct OpenGLRenderer::Device {
   struct List {
     Program Drawing::*program;
     std::uint32_t flags;
-    Buffer items;
+    Buffer items, entries{};
     std::uint32_t count = 0;
     std::size_t segments = 0;
   };
@@ -136,17 +136,20 @@ struct OpenGLRenderer::Device {
   GLuint texture = 0, framebuffer = 0;
   std::uint32_t texture_width = 0, texture_height = 0;
 
-  static void set(List& list, std::span<const Item> items) {
+  static void set(List& list, std::span<const Item> items, std::span<const std::uint8_t> entries = {},
+                  std::uint32_t flags = 0) {
     list.items.upload(items);
+    list.entries.upload(entries);
+    list.flags = (list.flags & FOREST_OVERLAY) | (entries.empty() ? 0 : FOREST_ENTRIES | flags);
     list.count = std::uint32_t(items.size());
     list.segments = 0;
     for (const Item& item : items) list.segments += std::size_t(std::popcount(item.drawn));
   }
 
   void upload(ListSet& to, const frame::Lists& from) {
-    set(to[capsule_list], from.capsules);
-    set(to[dot_list], from.dots);
-    set(to[line_list], from.lines);
+    set(to[capsule_list], from.capsules, from.entries.capsules);
+    set(to[dot_list], from.dots, from.entries.dots, FOREST_SINGLE);
+    set(to[line_list], from.lines, from.entries.lines);
     std::size_t longest = overlays.segments;
     for (const List& list : to) longest = std::max(longest, list.segments);
     queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
@@ -217,6 +220,7 @@ struct OpenGLRenderer::Device {
     constants.flags = list.flags | (first_band ? FOREST_FIRST_BAND : 0);
     set_constants();
     list.items.bind_texels(2, GL_RGBA32UI);
+    list.entries.bind_texels(9, GL_R8UI);
     (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind_texels(0, GL_RGBA32UI);
     cull.use();
     glDispatchCompute((constants.item_count + 63) / 64, 1, 1);

@@ -418,10 +418,20 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   width_ = f.width, height_ = f.height, exposure_ = f.style.exposure;
 
   // From near to far, so that what is hidden is found early.
-  std::vector<const Item*> items;
+  struct Drawn {
+    const Item* item;
+    const std::uint8_t* entries;  // of its segments; null: its colour class says
+  };
+  std::vector<Drawn> items;
+  const auto add_list = [&](std::span<const Item> list, std::span<const std::uint8_t> entries,
+                            std::size_t each) {
+    for (std::size_t i = 0; i < list.size(); ++i)
+      items.push_back({&list[i], entries.empty() ? nullptr : &entries[i * each]});
+  };
   const auto add = [&](const frame::Lists& lists) {
-    for (const auto list : {lists.dots, lists.lines, lists.capsules})
-      for (const Item& item : list) items.push_back(&item);
+    add_list(lists.dots, lists.entries.dots, 1);
+    add_list(lists.lines, lists.entries.lines, frame::cluster_size);
+    add_list(lists.capsules, lists.entries.capsules, frame::cluster_size);
   };
   add(f);
   if (f.rest) {
@@ -429,10 +439,13 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     frame::check(rest, geometry_);
     add(rest);
   }
-  const auto depth = [&](const Item* i) { return eye.to_camera.row(2).dot(Vec3(i->x, i->y, i->z) - eye.at); };
+  const auto depth = [&](const Drawn& d) {
+    return eye.to_camera.row(2).dot(Vec3(d.item->x, d.item->y, d.item->z) - eye.at);
+  };
   std::ranges::stable_sort(items, {}, depth);
 
-  const auto capsule_of = [&](const Item& item, std::uint32_t index, Capsule& c) {
+  const auto capsule_of = [&](const Drawn& drawn, std::uint32_t index, Capsule& c) {
+    const Item& item = *drawn.item;
     const Segment& s = geometry_.segments[item.first_segment + index];
     const frame::Instance& i = geometry_.instances[item.instance];
     const Quat turn(i.qw, i.qx, i.qy, i.qz);
@@ -444,6 +457,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     c.entry = std::uint8_t(state.colour_class * 8u + (s.meta & 7u));
     c.opacity = (state.opacity * f.opacities[c.entry] + 127u) / 255u;
     c.key = frame::forest_branch_key(item.instance, s.meta);
+    if (drawn.entries) c.entry = drawn.entries[index];
     return c.opacity > 0 && project(eye, c);
   };
 
@@ -458,15 +472,14 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
       std::size_t to = from, segments = 0;
       std::vector<std::size_t> place;
       for (; to < items.size() && segments < chunk;
-           segments += std::size_t(std::popcount(items[to++]->drawn)))
+           segments += std::size_t(std::popcount(items[to++].item->drawn)))
         place.push_back(segments);
       capsules.resize(segments);
       std::vector<char> in_sight(segments);
       parallel_for(to - from, 64, [&](std::size_t i) {
-        const Item& item = *items[from + i];
         std::size_t at = place[i];
-        for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1, ++at)
-          in_sight[at] = capsule_of(item, std::uint32_t(std::countr_zero(drawn)), capsules[at]);
+        for (std::uint32_t drawn = items[from + i].item->drawn; drawn; drawn &= drawn - 1, ++at)
+          in_sight[at] = capsule_of(items[from + i], std::uint32_t(std::countr_zero(drawn)), capsules[at]);
       });
       std::size_t kept = 0;
       for (std::size_t i = 0; i < segments; ++i)

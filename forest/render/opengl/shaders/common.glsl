@@ -11,6 +11,7 @@ layout(binding = 5) uniform samplerBuffer palette;          // linear, and 0–2
 layout(binding = 6) uniform usamplerBuffer queue_seen;
 layout(binding = 7) uniform usamplerBuffer large_seen;
 layout(binding = 8) uniform usamplerBuffer tiles_seen;
+layout(binding = 9) uniform usamplerBuffer entries;         // of this list's segments, where FOREST_ENTRIES
 
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
 // Segments of this band's items that are not hidden, one thread each (item * 64 + index), and the workgroups that draw
@@ -130,6 +131,8 @@ bool fetch(uint item_index, uint index, out Capsule c) {
       door_opacity = 255u;
     }
 #endif
+    if ((view.flags & FOREST_ENTRIES) != 0u)
+      c.entry = texelFetch(entries, int((view.flags & FOREST_SINGLE) != 0u ? item_index : item_index * FOREST_CLUSTER_SIZE + index)).x;
     c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
   }
   return clip_near(c);

@@ -1,0 +1,392 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/studio/activity_panel.h"
+
+#include <QCheckBox>
+#include <QComboBox>
+#include <QDoubleSpinBox>
+#include <QElapsedTimer>
+#include <QHBoxLayout>
+#include <QLabel>
+#include <QMouseEvent>
+#include <QPainter>
+#include <QPainterPath>
+#include <QPushButton>
+#include <QSignalBlocker>
+#include <QSlider>
+#include <algorithm>
+#include <cmath>
+
+#include "apps/studio/annotation.h"
+
+namespace forest::studio {
+namespace {
+
+// Okabe & Ito (2008), those that are seen on dark ground.
+const QColor trace_colours[] = {{230, 159, 0}, {86, 180, 233},  {0, 178, 130},   {240, 228, 66},
+                                {213, 94, 0},  {204, 121, 167}, {150, 170, 255}, {230, 230, 230}};
+const QColor ground(13, 16, 22), frame_colour(37, 45, 57), faint(108, 120, 138), ink(207, 215, 226),
+    moment_colour(255, 255, 255, 190);
+
+QColor colour_of(const Vec3& c) { return QColor::fromRgbF(c.x(), c.y(), c.z()); }
+
+// Where a time lies between the first step and the last, 0 to 1, and back.
+double share_of(const scene::Playback& playback, double time) {
+  const double length = playback.end() - playback.begin();
+  return length > 0. ? std::clamp((time - playback.begin()) / length, 0., 1.) : 0.;
+}
+double time_at(const scene::Playback& playback, double share) {
+  return playback.begin() + std::clamp(share, 0., 1.) * (playback.end() - playback.begin());
+}
+
+}  // namespace
+
+RasterView::RasterView(Viewport& viewport, QWidget* parent) : QWidget(parent), viewport_(viewport) {
+  setObjectName("raster");
+  setMinimumSize(160, 120);
+  setAccessibleName(tr("Raster"));
+  setAccessibleDescription(
+      tr("Soma voltages: time to the right, neurons downwards; click a row to select its neuron"));
+  setToolTip(accessibleDescription());
+}
+
+void RasterView::forget() {
+  drawn_ = {};
+  update();
+}
+
+void RasterView::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  painter.fillRect(rect(), ground);
+  const scene::Playback* playback = viewport_.playback();
+  if (!playback) return;
+  const reports::Activity& activity = playback->activity();
+  if (drawn_.size() != size()) {
+    drawn_ = QImage(size(), QImage::Format_RGB32);
+    const auto codes =
+        activity.raster_picture(0, activity.facts().steps, std::uint32_t(width()), std::uint32_t(height()));
+    const scene::ActivityView look = viewport_.activity();
+    QRgb colours[256];
+    for (std::size_t code = 0; code < 256; ++code) {
+      const float value = activity.facts().range.value(reports::Code(code));
+      const bool none = std::isnan(value) || (look.threshold && value < *look.threshold);
+      colours[code] = none ? frame_colour.rgb()
+                           : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
+    }
+    for (int y = 0; y < height(); ++y)
+      for (int x = 0; x < width(); ++x)
+        drawn_.setPixel(x, y, colours[codes[std::size_t(y) * std::size_t(width()) + std::size_t(x)]]);
+  }
+  painter.drawImage(0, 0, drawn_);
+  const double x = share_of(*playback, viewport_.time()) * width();
+  painter.setPen(QPen(moment_colour, 1.));
+  painter.drawLine(QPointF(x, 0), QPointF(x, height()));
+  if (const auto& selection = viewport_.selection())
+    if (const auto row = activity.row_of_instance(selection->pick.instance)) {
+      const double rows = double(activity.rows().size()), line = height() / rows;
+      const QRectF mark(0, *row * line - 1., width() - 1., std::max(line, 2.) + 1.);
+      painter.setPen(QPen(QColor(255, 90, 130), 1.4));
+      painter.drawRect(mark);
+    }
+}
+
+void RasterView::mousePressEvent(QMouseEvent* event) {
+  const scene::Playback* playback = viewport_.playback();
+  if (!playback) return;
+  const auto rows = playback->activity().rows();
+  const auto row =
+      std::size_t(std::clamp(event->position().y() / height(), 0., .999999) * double(rows.size()));
+  const std::uint32_t instance = rows[row].instance;
+  const scene::Forest& forest = viewport_.forest();
+  const scene::Neuron& neuron = forest.neurons()[forest.instances()[instance].morphology];
+  if (!neuron.original_count) return;
+  scene::Pick pick{.instance = instance, .segment = neuron.first_segment, .section = scene::soma_section};
+  // A neuron without a soma is picked by its first section.
+  if (!(neuron.soma_radius > 0.f)) pick.section = forest.section_of_segment()[neuron.first_original];
+  viewport_.select(pick);
+}
+
+TraceView::TraceView(Viewport& viewport, const std::vector<reports::Trace>& traces, QWidget* parent)
+    : QWidget(parent), viewport_(viewport), traces_(traces) {
+  setObjectName("traces");
+  setMinimumSize(160, 120);
+  setAccessibleName(tr("Traces"));
+  setAccessibleDescription(tr("Histories of clicked compartments; click to go to a time"));
+  setToolTip(accessibleDescription());
+}
+
+void TraceView::forget() {
+  drawn_ = {};
+  update();
+}
+
+QRectF TraceView::plot() const { return QRectF(rect()).adjusted(44, 8, -8, -20); }
+
+void TraceView::draw() {
+  drawn_ = QImage(size() * devicePixelRatioF(), QImage::Format_RGB32);
+  drawn_.setDevicePixelRatio(devicePixelRatioF());
+  drawn_.fill(ground);
+  QPainter painter(&drawn_);
+  painter.setFont(font());
+  painter.setRenderHint(QPainter::Antialiasing);
+  const scene::Playback& playback = *viewport_.playback();
+  const reports::Facts& facts = playback.activity().facts();
+  const QRectF area = plot();
+  if (traces_.empty()) {
+    painter.setPen(faint);
+    painter.drawText(rect(), Qt::AlignCenter, tr("Click a branch: its whole history is shown here."));
+    return;
+  }
+  float low = INFINITY, high = -INFINITY;
+  for (const reports::Trace& t : traces_)
+    for (const float v : t.values)
+      if (!std::isnan(v)) low = std::min(low, v), high = std::max(high, v);
+  if (!(low <= high)) low = 0.f, high = 1.f;
+  const float room = std::max(.05f * (high - low), .5f);
+  low -= room, high += room;
+  const auto y_of = [&](float v) { return area.bottom() - qreal((v - low) / (high - low)) * area.height(); };
+  const float step = round_length((high - low) / 3.f);
+  for (float v = std::ceil(low / step) * step; v <= high; v += step) {
+    painter.setPen(frame_colour);
+    painter.drawLine(QPointF(area.left(), y_of(v)), QPointF(area.right(), y_of(v)));
+    painter.setPen(faint);
+    painter.drawText(QRectF(0, y_of(v) - 8, area.left() - 5, 16), Qt::AlignRight | Qt::AlignVCenter,
+                     QString::number(std::abs(v) < .01f * step ? 0. : double(v)));
+  }
+  painter.setPen(faint);
+  const QRectF below(area.left(), area.bottom() + 3, area.width(), 16);
+  painter.drawText(below, Qt::AlignLeft, QString("%1 ms").arg(playback.begin()));
+  painter.drawText(below, Qt::AlignRight, QString("%1 ms").arg(playback.end()));
+  painter.drawText(below, Qt::AlignHCenter, QString::fromStdString(facts.units));
+  // Of the steps under one column of pixels the least and the greatest: no spike is lost.
+  const auto columns = std::max<std::size_t>(2, std::size_t(area.width()));
+  for (std::size_t t = 0; t < traces_.size(); ++t) {
+    const auto& values = traces_[t].values;
+    const auto x_of = [&](std::size_t i) {
+      return area.left() + area.width() * double(i) / double(std::max<std::size_t>(1, values.size() - 1));
+    };
+    QPainterPath path;
+    bool down = false;  // the pen
+    const std::size_t bundle = std::max<std::size_t>(1, values.size() / columns);
+    for (std::size_t i = 0; i < values.size(); i += bundle) {
+      std::size_t least = i, most = i;
+      for (std::size_t k = i; k < std::min(i + bundle, values.size()); ++k) {
+        if (!(values[k] >= values[least])) least = k;
+        if (!(values[k] <= values[most])) most = k;
+      }
+      for (const std::size_t k : {std::min(least, most), std::max(least, most)}) {
+        if (std::isnan(values[k])) {
+          down = false;
+          continue;
+        }
+        const QPointF point(x_of(k), y_of(values[k]));
+        down ? path.lineTo(point) : path.moveTo(point);
+        down = true;
+      }
+    }
+    painter.setPen(QPen(trace_colours[t % std::size(trace_colours)], 1.3));
+    painter.drawPath(path);
+  }
+  // Names over a plate, so that no curve runs through them.
+  qreal widest = 0;
+  for (const reports::Trace& trace : traces_)
+    widest =
+        std::max(widest, painter.fontMetrics().horizontalAdvance(QString::fromStdString(trace.name())) + 10.);
+  const QRectF names(area.right() - widest, area.top(), widest, 14. * double(traces_.size()) + 2.);
+  painter.fillRect(names, QColor(13, 16, 22, 215));
+  for (std::size_t t = 0; t < traces_.size(); ++t) {
+    painter.setPen(trace_colours[t % std::size(trace_colours)]);
+    painter.drawText(QRectF(names.left(), names.top() + 14. * double(t), widest - 5., 14), Qt::AlignRight,
+                     QString::fromStdString(traces_[t].name()));
+  }
+}
+
+void TraceView::paintEvent(QPaintEvent*) {
+  QPainter painter(this);
+  if (!viewport_.playback()) return painter.fillRect(rect(), ground);
+  if (drawn_.size() != size() * devicePixelRatioF()) draw();
+  painter.drawImage(0, 0, drawn_);
+  const double x = plot().left() + share_of(*viewport_.playback(), viewport_.time()) * plot().width();
+  painter.setPen(QPen(moment_colour, 1.));
+  painter.drawLine(QPointF(x, plot().top()), QPointF(x, plot().bottom()));
+}
+
+void TraceView::mousePressEvent(QMouseEvent* event) {
+  if (const scene::Playback* playback = viewport_.playback())
+    viewport_.set_time(time_at(*playback, (event->position().x() - plot().left()) / plot().width()));
+}
+
+ActivityPanel::ActivityPanel(Viewport& viewport, std::function<void(double)> clamped, QWidget* parent)
+    : QWidget(parent), viewport_(viewport), clamped_(std::move(clamped)) {
+  setAccessibleName(tr("Activity"));
+  auto* column = new QVBoxLayout(this);
+  column->setContentsMargins(10, 4, 10, 8);
+  column->setSpacing(5);
+
+  auto* transport = new QHBoxLayout;
+  play_ = new QPushButton(tr("Play"), this);
+  play_->setAccessibleDescription(tr("Let the simulation go on, or stand still"));
+  play_->setToolTip(tr("Let the simulation go on, or stand still (Space)"));
+  play_->setFocusPolicy(Qt::TabFocus);
+  play_->setFixedWidth(70);
+  connect(play_, &QPushButton::clicked, this, [this] { viewport_.set_playing(!viewport_.playing()); });
+  slider_ = new QSlider(Qt::Horizontal, this);
+  slider_->setAccessibleName(tr("Time"));
+  slider_->setToolTip(tr("The moment that is shown (. and , go step by step)"));
+  slider_->setFocusPolicy(Qt::TabFocus);
+  connect(slider_, &QSlider::valueChanged, this, [this](int step) {
+    if (const auto* playback = viewport_.playback())
+      viewport_.set_time(playback->activity().facts().time(std::uint64_t(step)));
+  });
+  moment_ = new QLabel(this);
+  moment_->setMinimumWidth(130);
+  moment_->setAlignment(Qt::AlignRight | Qt::AlignVCenter);
+  rate_ = field("Speed", "ms/s", "Milliseconds of the simulation that are played in a second", .001, 1e6);
+  connect(rate_, &QDoubleSpinBox::valueChanged, this,
+          [this](double rate) { viewport_.set_rate(float(rate)); });
+  transport->addWidget(play_);
+  transport->addWidget(slider_, 1);
+  transport->addWidget(moment_);
+  transport->addWidget(rate_);
+  column->addLayout(transport);
+
+  auto* look = new QHBoxLayout;
+  map_ = new QComboBox(this);
+  map_->setAccessibleName(tr("Colour map"));
+  map_->setToolTip(tr("Colours of the values; but for cool-warm more is always lighter"));
+  map_->setFocusPolicy(Qt::TabFocus);
+  map_->setIconSize({72, 12});
+  for (const scene::ColourMap& map : scene::colour_maps()) {
+    QPixmap icon(72, 12);
+    QPainter painter(&icon);
+    for (int x = 0; x < 72; ++x) painter.fillRect(x, 0, 1, 12, colour_of(map.screen(float(x) / 71.f)));
+    map_->addItem(QIcon(icon), map.name);
+  }
+  connect(map_, &QComboBox::activated, this, [this] { edit(); });
+  low_ = field("From", "", "The value at the lower end of the colours", -1e6, 1e6);
+  high_ = field("to", "", "The value at the upper end of the colours", -1e6, 1e6);
+  has_threshold_ = new QCheckBox(tr("Threshold"), this);
+  has_threshold_->setToolTip(tr("What is less is dim and grey"));
+  has_threshold_->setFocusPolicy(Qt::TabFocus);
+  connect(has_threshold_, &QCheckBox::clicked, this, [this] { edit(); });
+  threshold_ = field("", "", "What is less is dim and grey", -1e6, 1e6);
+  speed_ = field("Spikes", "µm/ms", "Speed of spikes along axons; 0 for no flashes", 0., 1e6);
+  for (QDoubleSpinBox* box : {low_, high_, threshold_, speed_})
+    connect(box, &QDoubleSpinBox::valueChanged, this, [this] { edit(); });
+  look->addWidget(map_);
+  look->addWidget(low_);
+  look->addWidget(high_);
+  look->addWidget(has_threshold_);
+  look->addWidget(threshold_);
+  look->addWidget(speed_);
+  look->addStretch();
+  column->addLayout(look);
+
+  auto* views = new QHBoxLayout;
+  raster_ = new RasterView(viewport_, this);
+  plot_ = new TraceView(viewport_, traces_, this);
+  views->addWidget(raster_, 1);
+  views->addWidget(plot_, 1);
+  column->addLayout(views, 1);
+  follow();
+}
+
+QDoubleSpinBox* ActivityPanel::field(const char* name, const char* unit, const char* hint, double low,
+                                     double high) {
+  auto* box = new QDoubleSpinBox(this);
+  box->setAccessibleName(tr(*name ? name : hint));
+  box->setAccessibleDescription(tr(hint));
+  box->setToolTip(tr(hint));
+  if (*name) box->setPrefix(QString("%1 ").arg(name));
+  if (*unit) box->setSuffix(QString(" %1").arg(unit));
+  box->setRange(low, high);
+  box->setDecimals(low > 0. ? 3 : 1);
+  box->setButtonSymbols(QAbstractSpinBox::NoButtons);
+  box->setKeyboardTracking(false);
+  box->setFocusPolicy(Qt::ClickFocus);
+  box->setFixedWidth(*unit ? 140 : 90);
+  return box;
+}
+
+void ActivityPanel::edit() {
+  scene::ActivityView look = viewport_.activity();
+  look.map = &scene::colour_maps()[std::size_t(std::max(0, map_->currentIndex()))];
+  if (low_->value() < high_->value()) look.low = float(low_->value()), look.high = float(high_->value());
+  look.threshold = has_threshold_->isChecked() ? std::optional(float(threshold_->value())) : std::nullopt;
+  look.speed = float(speed_->value());
+  raster_->forget();
+  viewport_.change(look);
+  follow();
+}
+
+void ActivityPanel::follow() {
+  const scene::Playback* playback = viewport_.playback();
+  setEnabled(playback != nullptr);
+  if (!playback) return;
+  const auto step = playback->step_at(viewport_.time());
+  const QSignalBlocker quiet[] = {QSignalBlocker(slider_),    QSignalBlocker(rate_),
+                                  QSignalBlocker(low_),       QSignalBlocker(high_),
+                                  QSignalBlocker(threshold_), QSignalBlocker(speed_)};
+  slider_->setValue(int(step));
+  moment_->setText(tr("%1 of %2 ms").arg(viewport_.time(), 0, 'f', 1).arg(playback->end(), 0, 'f', 1));
+  play_->setText(viewport_.playing() ? tr("Pause") : tr("Play"));
+  const scene::ActivityView look = viewport_.activity();
+  map_->setCurrentIndex(int(look.map - scene::colour_maps().data()));
+  if (!rate_->hasFocus()) rate_->setValue(double(viewport_.rate()));
+  if (!low_->hasFocus()) low_->setValue(double(look.low));
+  if (!high_->hasFocus()) high_->setValue(double(look.high));
+  if (!speed_->hasFocus()) speed_->setValue(double(look.speed));
+  has_threshold_->setChecked(look.threshold.has_value());
+  if (look.threshold && !threshold_->hasFocus()) threshold_->setValue(double(*look.threshold));
+  raster_->update();
+  plot_->update();
+}
+
+void ActivityPanel::show_activity() {
+  traces_.clear();
+  const scene::Playback& playback = *viewport_.playback();
+  {
+    const QSignalBlocker quiet[] = {QSignalBlocker(slider_), QSignalBlocker(threshold_)};
+    const std::uint64_t last = playback.activity().facts().steps - 1;
+    slider_->setRange(0, int(std::min<std::uint64_t>(last, std::numeric_limits<int>::max())));
+    threshold_->setValue(double(.5f * (viewport_.activity().low + viewport_.activity().high)));
+  }
+  // All of it in some ten seconds.
+  viewport_.set_rate(float(std::max(.001, (playback.end() - playback.begin()) / 10.)));
+  raster_->forget();
+  plot_->forget();
+  follow();
+}
+
+void ActivityPanel::show_selection() {
+  raster_->update();
+  const auto& selection = viewport_.selection();
+  const scene::Playback* playback = viewport_.playback();
+  if (!selection || !playback) return;
+  const auto compartment = playback->compartment(selection->pick.instance, selection->pick.segment);
+  if (!compartment) return;
+  QElapsedTimer clock;
+  clock.start();
+  // Clicked again it becomes the newest.
+  std::erase_if(traces_, [&](const reports::Trace& t) {
+    return t.row == compartment->row && t.compartment == compartment->index;
+  });
+  if (traces_.size() == most) traces_.erase(traces_.begin());
+  traces_.push_back(reports::trace(playback->activity(), compartment->row, compartment->index));
+  plot_->forget();
+  clamped_(double(clock.nsecsElapsed()) * 1e-6);
+}
+
+void ActivityPanel::step(int steps) {
+  if (const scene::Playback* playback = viewport_.playback()) {
+    viewport_.set_playing(false);
+    viewport_.set_time(viewport_.time() + steps * playback->activity().facts().step);
+  }
+}
+
+void ActivityPanel::clear_traces() {
+  traces_.clear();
+  plot_->forget();
+  clamped_(0.);
+}
+
+}  // namespace forest::studio

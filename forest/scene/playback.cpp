@@ -1,0 +1,298 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/playback.h"
+
+#include <algorithm>
+#include <bit>
+#include <chrono>
+#include <cmath>
+#include <limits>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+
+namespace forest::scene {
+namespace {
+
+using reports::Level;
+
+constexpr std::uint32_t none = 0xffffffffu;
+constexpr float dimmest = 1.f / float(flash_steps);  // of a flash that is still drawn …
+constexpr float dimmest_over_value = .4f;            // … over a branch whose own value would be seen
+
+using Clock = std::chrono::steady_clock;
+double milliseconds_since(Clock::time_point start) {
+  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
+}
+
+// One past the last segment that the clusters of a neuron draw.
+std::uint32_t end_of(const Forest& forest, const Neuron& n) {
+  std::uint32_t end = n.first_segment + n.original_count;
+  for (const Cluster& c : forest.clusters().subspan(n.first_cluster, n.cluster_count))
+    end = std::max(end, c.first_segment + c.segment_count);
+  return end;
+}
+
+// Whether segments [first, first + count) are among `size` of a shape that begins at `begin`.
+bool within(std::uint32_t first, std::uint32_t count, std::uint32_t begin, std::size_t size) {
+  return first >= begin && std::size_t(first - begin) + count <= size;
+}
+
+std::array<std::uint8_t, 256> entries_of(const reports::Range& range, const ActivityView& view) {
+  std::array<std::uint8_t, 256> entries;
+  entries.fill(std::uint8_t(no_value_entry));
+  for (std::size_t code = 0; code < reports::no_value; ++code) {
+    const float value = range.value(reports::Code(code));
+    const float at = std::clamp((value - view.low) / (view.high - view.low), 0.f, 1.f);
+    entries[code] = std::uint8_t(view.threshold && value < *view.threshold
+                                     ? below_entry
+                                     : std::uint32_t(std::lround(at * float(map_steps - 1))));
+  }
+  return entries;
+}
+
+}  // namespace
+
+Playback::Playback(Forest forest, reports::Activity activity, const std::string& name)
+    : forest_(std::move(forest)), activity_(std::move(activity)) {
+  const auto refuse = [&](const std::string& what) {
+    throw InputError(name, 0, what + "; make the activity file and the forest file from the same circuit");
+  };
+  const auto neurons = forest_.neurons();
+  const auto& names = forest_.circuit().morphologies;
+  const reports::Facts& facts = activity_.facts();
+  if (facts.instances != forest_.instances().size())
+    refuse(fmt::format("is of the circuit '{}' with {} neurons and the forest has {}", facts.circuit,
+                       facts.instances, forest_.instances().size()));
+  row_of_.assign(forest_.instances().size(), none);
+  for (std::uint32_t r = 0; r < activity_.rows().size(); ++r) {
+    const reports::Row& row = activity_.rows()[r];
+    const std::uint32_t shape = activity_.layout(row.layout).morphology;
+    if (row.instance >= row_of_.size())
+      refuse(fmt::format("names neuron {} and the forest has {}", row.instance, row_of_.size()));
+    const std::uint32_t planted = forest_.instances()[row.instance].morphology;
+    if (shape != planted)
+      refuse(fmt::format("has shape {} for neuron {}, which in the forest has shape {}, '{}'", shape,
+                         row.instance, planted, names[planted]));
+    row_of_[row.instance] = r;
+  }
+  for (std::size_t l = 0; l < activity_.layout_count(); ++l) {
+    const auto layout = activity_.layout(std::uint32_t(l));
+    if (layout.morphology >= neurons.size())
+      refuse(fmt::format("names shape {} and the forest has {}", layout.morphology, neurons.size()));
+    for (const reports::SectionRun& run : layout.sections)
+      if (run.section != reports::soma_run && run.section >= neurons[layout.morphology].section_count)
+        refuse(fmt::format("names section {} of '{}', which has {} in the forest", run.section,
+                           names[layout.morphology], neurons[layout.morphology].section_count));
+  }
+
+  shapes_.resize(neurons.size());
+  parallel_for(shapes_.size(), 1, [&](std::size_t i) {
+    const Neuron& n = neurons[i];
+    Shape& shape = shapes_[i];
+    shape.first_segment = n.first_segment;
+    const std::uint32_t count = end_of(forest_, n) - n.first_segment;
+    shape.distance.assign(count, -1.f);
+    for (std::uint32_t s = 0; s < count; ++s) {
+      const reports::Place& place = forest_.places()[n.first_segment + s];
+      if (place.section == soma_section) shape.distance[s] = 0.f;
+      if (place.section >= n.section_count) continue;
+      const SectionFacts& section = forest_.sections()[n.first_section + place.section];
+      if (section.kind == std::uint32_t(SectionKind::axon))
+        shape.distance[s] = std::max(0.f, section.path_distance - (1.f - place.position) * section.length);
+    }
+  });
+  for (const Shape& shape : shapes_)
+    for (const float d : shape.distance) farthest_ = std::max(farthest_, d);
+
+  tables_.resize(activity_.layout_count());
+  parallel_for(tables_.size(), 1, [&](std::size_t l) {
+    const auto layout = activity_.layout(std::uint32_t(l));
+    const Neuron& n = neurons[layout.morphology];
+    const std::size_t count = shapes_[layout.morphology].distance.size();
+    const auto places = forest_.places().subspan(n.first_segment, count);
+    std::vector<std::uint32_t> parents;
+    for (const SectionFacts& s : forest_.sections().subspan(n.first_section, n.section_count))
+      parents.push_back(s.parent);
+    const auto runs = layout.runs(parents.size());
+    const bool soma_alone = std::ranges::all_of(runs, [](std::uint32_t run) { return run == none; });
+    Table& table = tables_[l];
+    table.value[0] = compartments_at(layout, parents, places);
+    for (std::size_t level = 1; level < levels; ++level) table.value[level].assign(count, none);
+    for (std::size_t s = 0; s < count; ++s) {
+      const std::uint32_t section = places[s].section;
+      std::uint32_t& compartment = table.value[0][s];
+      if (!soma_alone && section < parents.size() && runs[section] == none) {
+        compartment = none;  // it may do anything there
+        continue;
+      }
+      const auto run =
+          std::size_t(std::ranges::upper_bound(layout.sections, compartment, {}, &reports::SectionRun::end) -
+                      layout.sections.begin());
+      table.value[1][s] = std::uint32_t(run);
+      table.value[2][s] = layout.branch_of(run);
+      table.value[3][s] = section == soma_section;  // beside its mean a neuron has the value of its soma
+    }
+    double total = 0.;  // µm
+    for (const reports::Compartment& c : layout.compartments) total += .1 * double(c.weight);
+    const auto mean = [&](std::size_t values) {
+      return float(total / double(std::max<std::size_t>(1, values)));
+    };
+    table.length = {0.f, mean(layout.sections.size()), mean(layout.branches.size()), 0.f};
+    if (n.cluster_count) table.length[3] = 2.f * forest_.clusters()[n.first_cluster].radius;
+    for (std::size_t level = 1; level < levels; ++level)
+      table.length[level] = std::max(table.length[level], table.length[level - 1]);
+  });
+  shown_.resize(forest_.instances().size());
+}
+
+Playback Playback::open(const Forest& forest, const std::filesystem::path& path) {
+  return Playback(forest, reports::Activity::open(path), path.string());
+}
+
+ActivityView Playback::view() const {
+  ActivityView view;
+  const reports::Facts& facts = activity_.facts();
+  if (facts.units != "mV") view.low = facts.range.low, view.high = facts.range.high;
+  return view;
+}
+
+std::uint64_t Playback::step_at(double time) const {
+  const reports::Facts& facts = activity_.facts();
+  const double at = std::floor((time - facts.start) / facts.step + 1e-6);
+  return std::uint64_t(std::clamp(at, 0., double(facts.steps - 1)));
+}
+
+Level Playback::level(std::uint32_t row, float magnification, float pixels) const {
+  const Table& table = tables_[activity_.rows()[row].layout];
+  std::size_t level = levels - 1;
+  while (level > 0 && table.length[level] * magnification > pixels) --level;
+  return Level(level);
+}
+
+std::optional<Playback::Compartment> Playback::compartment(std::uint32_t instance,
+                                                           std::uint32_t segment) const {
+  if (instance >= row_of_.size() || row_of_[instance] == none) return std::nullopt;
+  const std::uint32_t row = row_of_[instance];
+  const auto& values = tables_[activity_.rows()[row].layout].value[0];
+  const std::uint32_t first = shapes_[forest_.instances()[instance].morphology].first_segment;
+  if (!within(segment, 1, first, values.size()) || values[segment - first] == none) return std::nullopt;
+  return Compartment{row, values[segment - first]};
+}
+
+void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const PlaybackOptions& options) {
+  auto start = Clock::now();
+  const double time = view.time.value_or(begin());
+  for (const std::uint32_t i : in_sight_) shown_[i] = {};
+  in_sight_.clear();
+  figures_ = {};
+  for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
+    for (const frame::Item& item : *list) {
+      figures_.segments += std::uint64_t(std::popcount(item.drawn));
+      if (Shown& s = shown_[item.instance]; !s.in_sight) {
+        s.in_sight = true;
+        in_sight_.push_back(item.instance);
+      }
+    }
+  read(eye, options, step_at(time));
+  find_spikes(time, view, options);
+  figures_.gather = milliseconds_since(start);
+
+  start = Clock::now();
+  const auto entry_of = entries_of(activity_.facts().range, view);
+  Cut::Entries& entries = cut.entries.emplace();
+  const auto paint_list = [&](std::span<const frame::Item> list, std::size_t each,
+                              std::vector<std::uint8_t>& out) {
+    out.assign(list.size() * each, std::uint8_t(no_value_entry));
+    parallel_ranges(list.size(), 512, [&](std::size_t from, std::size_t to) {
+      for (std::size_t i = from; i < to; ++i)
+        paint(list[i], entry_of, view, time, options.window, &out[i * each]);
+    });
+  };
+  paint_list(cut.dots, 1, entries.dots);
+  paint_list(cut.lines, frame::cluster_size, entries.lines);
+  paint_list(cut.capsules, frame::cluster_size, entries.capsules);
+  figures_.paint = milliseconds_since(start);
+}
+
+// Reads the values of what is in sight, each neuron's in its level: a matter of the eye and the neuron alone, so that what
+// hides parts of it changes no colour.
+void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step) {
+  wanted_.clear();
+  std::uint64_t values = 0;
+  const auto want = [&](std::uint32_t row, Level level) {
+    wanted_.push_back({row, level});
+    values += activity_.count(row, level);
+  };
+  for (const std::uint32_t i : in_sight_) {
+    const std::uint32_t row = row_of_[i];
+    if (row == none) continue;
+    Shown& s = shown_[i];
+    const frame::Instance& instance = forest_.instances()[i];
+    const Cluster& root = forest_.clusters()[forest_.neurons()[instance.morphology].first_cluster];
+    const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
+    const Vec3 middle = Vec3(instance.x, instance.y, instance.z) + turn * Vec3(root.x, root.y, root.z);
+    s.level = level(row, eye.magnification({middle, root.radius}), options.pixels);
+    s.first = values;
+    want(row, s.level);
+    if (s.level == Level::neuron) want(row, Level::soma);
+    ++figures_.neurons;
+  }
+  std::size_t time_level = 0;
+  for (double span = activity_.facts().step * double(reports::time_factor);
+       time_level + 1 < reports::time_level_count && span <= options.window;
+       span *= double(reports::time_factor))
+    ++time_level, step /= reports::time_factor;
+  codes_.resize(values);
+  activity_.gather(wanted_, time_level, step, codes_);
+  figures_.values = values;
+}
+
+// The spikes whose flashes are still on their way.
+void Playback::find_spikes(double time, const ActivityView& view, const PlaybackOptions& options) {
+  spikes_.clear();
+  if (!(view.speed > 0.f)) return;
+  const double under_way =
+      double(farthest_ / view.speed) + double(view.fade) * std::log(double(flash_steps)) + options.window;
+  for (const reports::Spike& s :
+       activity_.spikes(time - under_way, std::nextafter(time, std::numeric_limits<double>::infinity())))
+    if (s.instance < shown_.size() && shown_[s.instance].in_sight) spikes_.push_back(s);
+  std::ranges::stable_sort(spikes_, {}, &reports::Spike::instance);
+  for (std::uint32_t i = 0; i < spikes_.size(); ++i) {
+    Shown& s = shown_[spikes_[i].instance];
+    if (s.spikes_end == 0) s.spikes = i;
+    s.spikes_end = i + 1;
+  }
+  figures_.flashes = spikes_.size();
+}
+
+void Playback::paint(const frame::Item& item, const std::array<std::uint8_t, 256>& entry_of,
+                     const ActivityView& view, double time, double window, std::uint8_t* out) const {
+  const Shown& s = shown_[item.instance];
+  const Shape& shape = shapes_[forest_.instances()[item.instance].morphology];
+  const auto count =
+      std::uint32_t(std::bit_width(item.drawn));  // those between that are not drawn have entries, too
+  if (!within(item.first_segment, count, shape.first_segment, shape.distance.size())) return;
+  const std::size_t first = item.first_segment - shape.first_segment;
+  if (const std::uint32_t row = row_of_[item.instance]; row != none) {
+    const auto& value = tables_[activity_.rows()[row].layout].value[std::size_t(s.level)];
+    for (std::uint32_t i = 0; i < count; ++i)
+      if (const std::uint32_t v = value[first + i]; v != none) out[i] = entry_of[codes_[s.first + v]];
+  }
+  for (std::uint32_t k = s.spikes; k < s.spikes_end; ++k)
+    for (std::uint32_t i = 0; i < count; ++i) {
+      const float distance = shape.distance[first + i];
+      if (distance < 0.f) continue;
+      const double age = time - spikes_[k].time - double(distance / view.speed);  // since it arrived there
+      if (age < 0.) continue;
+      const float bright = std::exp(-float(std::max(0., age - window)) / view.fade);
+      const bool lit = out[i] >= flash_entry && out[i] < flash_entry + flash_steps;
+      if (bright < (lit || out[i] == no_value_entry ? dimmest : dimmest_over_value)) continue;
+      const auto step = std::min(std::uint32_t(bright * float(flash_steps)), flash_steps);
+      const auto entry = std::uint8_t(flash_entry + step - 1);
+      out[i] = lit ? std::max(out[i], entry) : entry;
+    }
+}
+
+}  // namespace forest::scene
