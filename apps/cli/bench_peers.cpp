@@ -385,16 +385,12 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_peers(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  const auto whole = [&](const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
-                         std::uint64_t high) {
-    must_be_whole(*command.add_option(name, value, help)->capture_default_str(), low, high);
-  };
-  whole("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000", 10,
-        10'000'000);
-  whole("--frames", options->frames, "Cameras of the dolly that are measured", 1, 250);
-  whole("--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
-  whole("--quick-samples", options->quick_samples, "Pictures averaged by ours; moving, the studio draws one",
-        1, 1024);
+  add_whole(command, "--neurons", options->neurons,
+            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_whole(command, "--frames", options->frames, "Cameras of the dolly that are measured", 1, 250);
+  add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
+  add_whole(command, "--quick-samples", options->quick_samples,
+            "Pictures averaged by ours; moving, the studio draws one", 1, 1024);
   must_be_within(*command
                       .add_option("--budget", options->budget,
                                   "Milliseconds a picture of ours may take before less detail is chosen")

@@ -339,19 +339,15 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_seam(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  const auto whole = [&](const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
-                         std::uint64_t high) {
-    must_be_whole(*command.add_option(name, value, help)->capture_default_str(), low, high);
-  };
-  whole("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000", 10,
-        10'000'000);
-  whole("--frames", options->frames,
-        "Pictures compared with the reference, in pairs of neighbours spread over the dolly; 0: all", 0,
-        100'000);
-  whole("--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
-  whole("--quick-samples", options->quick_samples,
-        "Pictures averaged by the product; moving, the studio draws one", 1, 1024);
-  whole("--rate", options->rate, "Pictures a second", 1, 1000);
+  add_whole(command, "--neurons", options->neurons,
+            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_whole(command, "--frames", options->frames,
+            "Pictures compared with the reference, in pairs of neighbours spread over the dolly; 0: all", 0,
+            100'000);
+  add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
+  add_whole(command, "--quick-samples", options->quick_samples,
+            "Pictures averaged by the product; moving, the studio draws one", 1, 1024);
+  add_whole(command, "--rate", options->rate, "Pictures a second", 1, 1000);
   const auto within = [&](CLI::Option* option, double low, double high) {
     must_be_within(*option, low, high);
   };

@@ -26,6 +26,11 @@ void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high) {
   });
 }
 
+void add_whole(CLI::App& command, const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
+               std::uint64_t high) {
+  must_be_whole(*command.add_option(name, value, help)->capture_default_str(), low, high);
+}
+
 void must_be_within(CLI::Option& option, double low, double high) {
   option.check([low, high](const std::string& text) {
     double value = 0.;

@@ -28,6 +28,10 @@ void add_size(CLI::App& command, std::string& size, bool even = false);
 /// --force, for verbs that refuse to replace files (Overwrites, files.h).
 void add_force(CLI::App& command, bool& force);
 
+/// An option for a whole number in a range, with its default.
+void add_whole(CLI::App& command, const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
+               std::uint64_t high);
+
 /// An option's value must be a whole number in this range. Said in one short sentence, and never rounded or cut to fit.
 void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high);
 /// The same for any number; what is not a number is refused too.

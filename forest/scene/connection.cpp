@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
@@ -26,10 +27,6 @@ bool holds(const std::vector<Vec3>& places, const Vec3& place) {
 Vec3 begin_of(const frame::Segment& s) { return {s.ax, s.ay, s.az}; }
 Vec3 end_of(const frame::Segment& s) { return {s.bx, s.by, s.bz}; }
 
-float half_to_float(std::uint32_t bits) {
-  return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-}
-
 struct Place {
   Vec3 at;
   Quat turn;
@@ -50,14 +47,14 @@ bool draws(const frame::Segment& segment, const frame::Instance& instance, const
   const Vec3 a = seen(begin_of(segment)), b = seen(end_of(segment));
   if (a.z() < camera.near && b.z() < camera.near) return false;
   const float za = std::max(a.z(), camera.near), zb = std::max(b.z(), camera.near);
-  const float ra = half_to_float(segment.radii & 0xffff), rb = half_to_float(segment.radii >> 16);
+  const float ra = from_half(segment.radii), rb = from_half(segment.radii >> 16);
   const float la = camera.orthographic() ? 1.f : za, lb = camera.orthographic() ? 1.f : zb;
   if (!as_line && focal * std::max(ra / la, rb / lb) >= .75f) return true;
   if (subframes != 1) return subframes > 0;  // drawn where pixels' centres meet it
   const Vec2 d = (b.head<2>() / lb - a.head<2>() / la).cwiseAbs();
   const float stretch = d.maxCoeff() > 0.f ? d.norm() / d.maxCoeff() : 1.f;
   float width = focal * (ra / la + rb / lb) * stretch;
-  const float mean = half_to_float(segment.meta >> 16);
+  const float mean = from_half(segment.meta >> 16);
   if (width < 1.f && mean > 0.f)
     width = std::min(focal * mean * (1.f / la + 1.f / lb) * float(FOREST_MEAN_STRETCH), 1.f);
   return int(width + 1.f - float(segment.meta >> 8 & 255u) / 256.f - 1.f / 512.f) >= 1;

@@ -9,14 +9,11 @@
 #include <tuple>
 #include <utility>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
 namespace {
-
-float half_to_float(std::uint32_t bits) {
-  return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-}
 
 // What a place of the picture asks of the forest.
 struct Probe {
@@ -136,8 +133,8 @@ RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t s
   const frame::Segment& s = forest.segments()[segment];
   const Quat turn(i.qw, i.qx, i.qy, i.qz);
   const Vec3 at(i.x, i.y, i.z);
-  return {at + turn * Vec3(s.ax, s.ay, s.az), at + turn * Vec3(s.bx, s.by, s.bz),
-          half_to_float(s.radii & 0xffff), half_to_float(s.radii >> 16)};
+  return {at + turn * Vec3(s.ax, s.ay, s.az), at + turn * Vec3(s.bx, s.by, s.bz), from_half(s.radii),
+          from_half(s.radii >> 16)};
 }
 
 std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, const frame::Viewport& viewport,

@@ -3,16 +3,13 @@
 
 #include <algorithm>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
 namespace {
 
 constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
-
-float from_half(std::uint32_t bits) {
-  return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-}
 
 struct Knife {
   Plane plane;
@@ -48,7 +45,7 @@ void cut_neuron(const Forest& forest, std::uint32_t index, const Knife& knife, s
     }
     for (std::uint32_t k = c.first_segment; k < c.first_segment + c.segment_count; ++k) {
       const frame::Segment& s = forest.segments()[k];
-      const RoundConed cone{world(s.ax, s.ay, s.az), world(s.bx, s.by, s.bz), from_half(s.radii & 0xffff),
+      const RoundConed cone{world(s.ax, s.ay, s.az), world(s.bx, s.by, s.bz), from_half(s.radii),
                             from_half(s.radii >> 16)};
       if (auto shape = CrossSection::of(cone, knife.plane))
         out.push_back({index, k, s.meta & 7u, std::move(*shape)});

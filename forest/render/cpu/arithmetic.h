@@ -35,11 +35,6 @@ namespace forest::render::cpu {
 /// exp(x)
 [[gnu::always_inline]] inline float exp_of(float x) { return exp2_of(1.44269504f * x); }
 
-/// A half-precision number that is not negative, not infinite.
-[[gnu::always_inline]] inline float from_half(std::uint32_t bits) {
-  return std::bit_cast<float>((bits & 0x7fff) << 13) * 0x1p112f;
-}
-
 [[gnu::always_inline]] inline float fraction(float x) { return x - std::floor(x); }
 
 inline constexpr float golden = .61803399f;

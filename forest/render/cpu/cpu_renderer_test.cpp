@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/render/cpu/cpu_renderer.h"
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/render/cpu/arithmetic.h"
@@ -25,7 +26,7 @@ TEST(Arithmetic, IsAsExactAsItSays) {
     before = cpu::log2_of(x);
   }
   for (std::uint32_t half = 0; half < 0x7c00; ++half)
-    EXPECT_EQ(cpu::from_half(half), float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(half))));
+    EXPECT_EQ(from_half(half), float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(half))));
 }
 
 TEST(CpuRenderer, TheNumberOfThreadsChangesNoPixel) {

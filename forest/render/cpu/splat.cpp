@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
 

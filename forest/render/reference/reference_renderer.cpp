@@ -9,6 +9,7 @@
 #include <numeric>
 
 #include "forest/core/error.h"
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
 
@@ -55,10 +56,6 @@ struct Capsule {
   std::uint8_t entry;
   std::uint32_t opacity, key;  // 0–255, of a screen door; see frame/layout.h
 };
-
-float half_to_float(std::uint32_t bits) {
-  return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-}
 
 // One picture's camera.
 struct Eye {
@@ -452,7 +449,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     const Vec3 at(i.x, i.y, i.z);
     c.a = eye.seen(at + turn * Vec3(s.ax, s.ay, s.az));
     c.b = eye.seen(at + turn * Vec3(s.bx, s.by, s.bz));
-    c.ra = half_to_float(s.radii & 0xffff), c.rb = half_to_float(s.radii >> 16);
+    c.ra = from_half(s.radii), c.rb = from_half(s.radii >> 16);
     const frame::State state = item.state ? frame::unpacked(item.state) : f.states[item.instance];
     c.entry = std::uint8_t(state.colour_class * 8u + (s.meta & 7u));
     c.opacity = (state.opacity * f.opacities[c.entry] + 127u) / 255u;
