@@ -18,7 +18,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
                                    const scene::Colouring& colouring,
                                    std::span<const frame::Overlay> overlays,
                                    const std::optional<frame::Glass>& glass, std::uint32_t first,
-                                   std::uint32_t last) {
+                                   std::uint32_t last, const scene::Chooser::Painter& painter) {
   const std::vector<scene::Layer> plan = scene::layers_of(view, width, height);
   while (layers_.size() < plan.size()) {
     layers_.push_back(std::make_unique<Drawn>(Drawn{scene::Chooser(forest_), make_(), {}}));
@@ -33,7 +33,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     if (first == 0) {
       const frame::Viewport viewport{float(layer.width), float(layer.height)};
       drawn.chooser.choose(scene::Eye(view.camera, viewport, scene::detail_for(view, layer, width, height)),
-                           viewport, colouring.shown());
+                           viewport, colouring.shown(), painter);
     }
     figures_.cull += milliseconds_since(start);
     frame::Frame frame =

@@ -30,7 +30,7 @@ class Foveated {
   const frame::Image& draw(const scene::View& view, std::uint32_t width, std::uint32_t height,
                            const scene::Colouring& colouring, std::span<const frame::Overlay> overlays = {},
                            const std::optional<frame::Glass>& glass = {}, std::uint32_t first = 0,
-                           std::uint32_t last = 1024);
+                           std::uint32_t last = 1024, const scene::Chooser::Painter& painter = {});
   const Figures& figures() const { return figures_; }
 
  private:

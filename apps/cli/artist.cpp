@@ -42,9 +42,15 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   Drawn drawn;
   const auto lines =
       with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
+  scene::Chooser::Painter painter;
+  if (playback_)
+    painter = [this, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
+                                                                       const scene::Eye& from) {
+      playback_->colour(cut, from, look, {.window = window_});
+    };
   auto start = Clock::now();
   if (view.detail.gaze) {
-    drawn.image = foveated_.draw(view, width, height, *colouring_, lines);
+    drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.resolve = f.resolve, drawn.read = f.unite;
@@ -53,12 +59,6 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  scene::Chooser::Painter painter;
-  if (playback_)
-    painter = [this, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
-                                                                       const scene::Eye& from) {
-      playback_->colour(cut, from, look, {.window = window_});
-    };
   const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown(), painter);
   if (playback_) drawn.activity = playback_->figures();
   drawn.cull = milliseconds_since(start);

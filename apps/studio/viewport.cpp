@@ -240,15 +240,14 @@ void Viewport::advance(float seconds) {
 void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
-  if (first == 0 && !layered()) {
-    scene::Chooser::Painter painter;
-    if (playback_)
-      painter = [this, shown = activity(), window = window_](scene::Cut& cut, const scene::Eye& eye) {
-        playback_->colour(cut, eye, shown, {.window = window});
-      };
+  scene::Chooser::Painter painter;
+  if (playback_)
+    painter = [this, shown = activity(), window = window_](scene::Cut& cut, const scene::Eye& eye) {
+      playback_->colour(cut, eye, shown, {.window = window});
+    };
+  if (first == 0 && !layered())
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
                     {float(w), float(h)}, colouring_.shown(), painter);
-  }
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
   if (playback_) std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != section_entry; });
@@ -270,7 +269,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   }
   if (layered()) {
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
-    united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last);
+    united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter);
     figures_.segments = foveated_->figures().segments, figures_.neurons = foveated_->figures().neurons;
     figures_.samples = last, figures_.error = view.detail.error;
     return;

@@ -191,6 +191,7 @@ draw at30 "" --time 30
 draw dim ',"threshold":49' --time 30
 draw still ',"threshold":49,"time":30'
 draw opengl "" --time 10 --renderer opengl
+draw gazed "" --time 10 --gaze .5 .5
 cmp dim.png still.png
 "$program" render few.forest --view "$view}}" --size 240x200 -o plain.png --json >plain.json
 "$program" render few.forest --view "$view}}" --activity odd.activity --time 3.5 --size 240x200 -o odd.png --json >nan.json
@@ -220,7 +221,7 @@ def pixels(name):
     return out
 def saturation(picture):
     return sum(max(p) - min(p) for p in picture)
-first, later, dim, plain, opengl = (pixels(n + ".png") for n in ("at10", "at30", "dim", "plain", "opengl"))
+first, later, dim, plain, opengl, gazed = (pixels(n + ".png") for n in ("at10", "at30", "dim", "plain", "opengl", "gazed"))
 changed = sum(a != b for a, b in zip(first, later))
 covered = json.load(open("at10.json"))["covered"] * len(first)
 assert changed > .3 * covered, (changed, covered)
@@ -228,6 +229,10 @@ assert saturation(later) > 1.2 * saturation(dim), (saturation(later), saturation
 assert sum(a != b for a, b in zip(first, plain)) > .3 * covered
 mean = sum(abs(a - b) for p, q in zip(first, opengl) for a, b in zip(p, q)) / len(first) / 3
 assert mean < 1, mean
+# Looked at in the middle, the middle is the same, and all around it plays, too.
+fovea = [240 * y + x for y in range(94, 106) for x in range(114, 126)]
+assert all(gazed[i] == first[i] for i in fovea)
+assert sum(a != b for a, b in zip(gazed, plain)) > .3 * covered
 told = json.load(open("at30.json"))
 assert told["activity"]["neurons"] == 7 and told["activity"]["flashes"] >= 1, told
 assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))["activity"] is None

@@ -539,7 +539,6 @@ TEST_F(Playing, AClickShowsTheWholeHistoryOfTheCompartmentAndTracesAreSaved) {
     const Json clamped = studio_->wait_for("clamped");
     ASSERT_EQ(clamped.at("traces").size(), wanted.size());
     EXPECT_EQ(clamped.at("traces").back(), trace.name());
-    EXPECT_LT(clamped.at("milliseconds").get<double>(), 200.);
     finish();
   }
   const auto path = folder / "traces.csv";
