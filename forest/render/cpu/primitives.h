@@ -19,13 +19,14 @@ struct Box {
 
 /// A line.
 struct Stroke {
-  float y, slope, z, rise;   // at the first step, along the axis of the screen that it runs along more
-  float half;                // of its width, across
-  float begin, length;       // as Run's
-  float shade, rank;         // 0–31; in [0, 1)
-  float nearest, farthest;   // codes of its depths
-  std::int16_t first, last;  // steps, within the picture
-  std::uint8_t entry, opacity, steep, unused;
+  float y, slope, z, rise;    // at the first step, along the axis of the screen that it runs along more
+  float half;                 // of its width, across
+  float begin, length;        // as Run's
+  float rank;                 // in [0, 1)
+  float lit_side, lit_front;  // as Run's
+  std::int16_t first, last;   // steps, within the picture
+  std::uint16_t payload;      // entry << 5 | its mean shade
+  std::uint8_t opacity, steep;
   std::uint32_t key;  // of its door
 
   Stroke(const Run& r, std::size_t i)
@@ -36,16 +37,14 @@ struct Stroke {
         half(.5f * r.line_width[i]),
         begin(r.begin[i]),
         length(r.length[i]),
-        shade(r.shade[i]),
         rank(r.rank[i]),
-        nearest(r.nearest[i]),
-        farthest(larger(r.code_a[i], r.code_b[i])),
+        lit_side(r.lit_side[i]),
+        lit_front(r.lit_front[i]),
         first(std::int16_t(r.first[i])),
         last(std::int16_t(r.last[i])),
-        entry(std::uint8_t(r.entry[i])),
+        payload(std::uint16_t(r.payload[i])),
         opacity(std::uint8_t(r.opacity[i])),
         steep(std::uint8_t(r.steep[i])),
-        unused(0),
         key(r.key[i]) {}
   Box box(float spread) const {
     const float end = y + slope * float(last - first - 1),
@@ -53,7 +52,10 @@ struct Stroke {
     const float low = smaller(y, end) - reach, high = larger(y, end) + reach;
     return steep ? Box{low, float(first), high, float(last)} : Box{float(first), low, float(last), high};
   }
-  float nearest_code() const { return nearest; }
+  // Codes of the depths of its ends.
+  float code_a() const { return z - begin * rise; }
+  float code_b() const { return z + (length - begin) * rise; }
+  float nearest_code() const { return larger(smaller(code_a(), code_b()), 0.f); }
 };
 
 /// A capsule whose surface is seen.
@@ -142,44 +144,43 @@ template <int S>
   const float half = r.half, slope = r.slope, rise = r.rise;
   const std::int32_t first = r.first, begin = std::max(first, edges.first),
                      end = std::min(std::int32_t(r.last), edges.last);
-  const float nearest = r.nearest, farthest = r.farthest;
+  const float nearest = r.nearest_code(),
+              farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
   if constexpr (S == 1) {
-    const std::uint32_t payload =
-        std::uint32_t(r.entry) << 5 | std::uint32_t(std::int32_t(r.shade + fraction(r.rank * 7.f)));
     for (std::int32_t x = begin; x < end; ++x) {
       const float steps = float(x - first), y = r.y + steps * slope;
       const std::int32_t low = clipped(std::ceil(y - half), edges.low, edges.high),
                          high = clipped(std::ceil(y + half), edges.low, edges.high);
-      const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), payload);
+      const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), r.payload);
       for (std::int32_t across = low; across < high; ++across)
         steep ? window.put(across, x, {key}) : window.put(x, across, {key});
     }
   } else {
     const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
-    const float shade = std::floor(r.shade), rest = r.shade - shade, rank = r.rank * 7.f;
-    const std::uint32_t payload = std::uint32_t(r.entry) << 5 | std::uint32_t(std::int32_t(shade));
-    float beside[S];           // its middle, at each sample
-    std::uint32_t rounded[S];  // 1 where the shade is rounded up
+    const float rank = r.rank * 7.f, per_half = 1.f / half, lit_side = r.lit_side, lit_front = r.lit_front;
+    const std::uint32_t entry = r.payload >> 5;
+    float beside[S], noise[S];  // its middle, at each sample
     FOREST_LANES
     for (int k = 0; k < S; ++k) {
       beside[k] = across[k] - slope * along[k];
-      rounded[k] = fraction(rank + samples.turn[k]) + rest >= 1.f;
+      noise[k] = fraction(rank + samples.turn[k]);
     }
     const float reach = half + .5f * (1.f + std::abs(slope)), length = r.length;
     for (std::int32_t x = begin; x < end; ++x) {
       const float steps = float(x - first), y = r.y + steps * slope, at = r.begin + steps;
       const std::int32_t low = clipped(std::ceil(y - reach), edges.low, edges.high),
                          high = clipped(std::ceil(y + reach), edges.low, edges.high);
-      const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), payload);
+      const std::uint32_t depth = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), 0);
       const float past = at - length;
       for (std::int32_t row = low; row < high; ++row) {
         const float from_middle = float(row) - y;
         Keys<S> keys;
         FOREST_LANES
         for (int k = 0; k < S; ++k) {
-          const float t = from_middle - beside[k];
-          const bool covered = (t >= -half) & (t < half) & (at >= along[k]) & (past < along[k]);
-          keys[k] = covered ? key + rounded[k] : FOREST_KEY_EMPTY;
+          const float t = (from_middle - beside[k]) * per_half;
+          const bool covered = (t >= -1.f) & (t < 1.f) & (at >= along[k]) & (past < along[k]);
+          const float shade = .5f + t * lit_side + std::sqrt(larger(1.f - t * t, 0.f)) * lit_front;
+          keys[k] = covered ? depth | payload_of(entry, shade, noise[k]) : FOREST_KEY_EMPTY;
         }
         steep ? window.put(row, x, keys) : window.put(x, row, keys);
       }

@@ -107,7 +107,13 @@ FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Ve
     const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
     const float rank = fraction(r.rank[i]);
     r.rank[i] = rank;
-    r.shade[i] = smaller(shade * 31.f, 31.f);
+    r.lit_front[i] = .5f * b;
+    // Across its axis and the way to the eye.
+    const float sx = dy * ez - dz * ey, sy = dz * ex - dx * ez, sz = dx * ey - dy * ex;
+    const float lit_side =
+        .5f * (sx * lx + sy * ly + sz * lz) / std::sqrt(larger(sx * sx + sy * sy + sz * sz, 1e-30f));
+    const float downwards = std::abs(r.qy[i] - r.py[i]) > std::abs(r.qx[i] - r.px[i]) ? sx : -sy;
+    r.lit_side[i] = downwards < 0.f ? -lit_side : lit_side;
     r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
   }
 }

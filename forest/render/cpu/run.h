@@ -41,8 +41,9 @@ struct Run {
   float first[run], last[run], y[run], slope[run], z[run], rise[run];  // y and z at the first step
   float begin[run], length[run];  // from its end to the middle of the first step, to its other end
   std::uint32_t steep[run], payload[run];
-  float shade[run];                  // 0–31, for which `payload` is one way to round
-  float width[run];                  // pixels; below 0: nothing of it lies before the eye
+  float lit_side[run],
+      lit_front[run];  // half the light on what faces across, downwards or to the right, and to the eye
+  float width[run];    // pixels; below 0: nothing of it lies before the eye
   float mean_width[run], rank[run];  // of its branch; in [0, 1)
   std::uint32_t entry[run];          // of the palette
   std::uint32_t meta[run];           // as frame::Segment's

@@ -222,10 +222,11 @@ template <int S>
   std::size_t drawn = 0;
   for (std::size_t n = 0; n < things.size(); ++n) {
     if (n + things_ahead < things.size())
-      with(chunks, things[n + things_ahead], [](const auto& t) __attribute__((always_inline)) {
-        __builtin_prefetch(&t);
-        __builtin_prefetch(reinterpret_cast<const char*>(&t) + sizeof t - 1);
-      });
+      with(
+          chunks, things[n + things_ahead], [](const auto& t) __attribute__((always_inline)) {
+            __builtin_prefetch(&t);
+            __builtin_prefetch(reinterpret_cast<const char*>(&t) + sizeof t - 1);
+          });
     with(
         chunks, things[n], [&](const auto& t) __attribute__((always_inline)) {
           const Box b = t.box(picture.spread);
