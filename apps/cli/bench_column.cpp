@@ -65,7 +65,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     const auto start = Clock::now();
     scene::View view = view_at(float(i) / float(options.frames));
     view.samples = options.samples.value_or(budget.samples());
-    view.detail.error = budget.error();
+    view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
     std::uint64_t touched = 0;
     if (const scene::Playback* playback = artist.playback()) {
       view.activity = playback->view();

@@ -92,7 +92,8 @@ class Walk {
     Quick quick;
     quick.error = options_.error.value_or(budget_.error());
     quick.samples = options_.quick_samples.value_or(budget_.samples());
-    const scene::View view = view_at(picture, quick.error, quick.samples);
+    const scene::View view =
+        view_at(picture, quick.error, quick.samples, options_.error ? 0.f : budget_.thinnest());
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
     budget_.took(quick.milliseconds);
@@ -100,15 +101,15 @@ class Walk {
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
     quick.image = std::move(drawn.image);
-    quick.drawn = connectedness_(cut(view), view.camera, viewport_, view.samples);
+    quick.drawn = connectedness_(cut(view), view.camera, viewport_, scene::thinnest_of(view));
     scene::View full = view;
-    full.samples = 2;  // nothing is left out for being thin
-    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0);
+    full.samples = 2, full.detail.thinnest = 0.f;  // nothing is left out for being thin
+    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0.f);
     return quick;
   }
 
   Moment compare(std::uint32_t picture, Quick& quick) {
-    const scene::View view = view_at(picture, quick.error, options_.samples);
+    const scene::View view = view_at(picture, quick.error, options_.samples, 0.f);
     const scene::Cut all = scene::whole(artist_.forest(), view.camera, viewport_);
     const scene::Colouring colouring = scene::colour(artist_.forest(), view.colour_by, view.background);
     const frame::Frame frame =
@@ -133,9 +134,9 @@ class Walk {
   const scene::Forest& forest() const { return artist_.forest(); }
 
  private:
-  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples) const {
+  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples, float thinnest) const {
     scene::View view = dolly_.at(float(picture) / float(pictures_ - 1));
-    view.detail.error = error;
+    view.detail.error = error, view.detail.thinnest = thinnest;
     view.samples = samples;
     return view;
   }
