@@ -30,7 +30,7 @@ struct Options {
   std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
-  double budget = 33.;  // milliseconds a picture
+  double budget = 31.;  // milliseconds a picture
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;

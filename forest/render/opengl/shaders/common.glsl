@@ -214,14 +214,25 @@ void draw_line(Capsule c) {
   float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
   float a2 = max(0.0, 1.0 - along * along - b * b);
   float shade = 0.5 * sqrt(max(0.0, 1.0 + 1.5707963 * b + (a2 + 2.0 * b * b) / 3.0));
-  uint payload = payload_of(c.entry, shade, fract(c.rank * 7.0));
+  float noise = fract(c.rank * 7.0);
+  uint payload = payload_of(c.entry, shade, noise);
+  // Of several subframes each meets the cylinder somewhere.
+  vec3 beside = cross(c.b - c.a, eye);
+  if ((steep ? beside.x : -beside.y) < 0.0) beside = -beside;
+  float lit_side = 0.5 * dot(beside, light()) * inversesqrt(max(dot(beside, beside), 1e-30)), lit_front = 0.5 * b;
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5, half_width = 0.5 * width;
   float z = za + (float(first) + 0.5 - p.x) * rise;
   // One loop over the pixels of all scan lines, tested at its end (see hidden).
   int x = first, across = clipped(y - half_width, limit_y), end = clipped(y + half_width, limit_y);
   do {
-    if (across < end) put(steep ? across : x, steep ? x : across, z, payload);
+    if (across < end) {
+      if (!single) {
+        float t = (float(across) - y) / half_width;
+        payload = payload_of(c.entry, 0.5 + t * lit_side + sqrt(max(0.0, 1.0 - t * t)) * lit_front, noise);
+      }
+      put(steep ? across : x, steep ? x : across, z, payload);
+    }
     if (++across >= end) {
       ++x;
       y += slope;
