@@ -50,7 +50,7 @@ constexpr std::uint32_t settling = 15;         // pictures in which the budget f
 struct Options {
   std::uint32_t neurons = 1000, frames = 6, samples = 16;
   std::optional<std::uint32_t> quick_samples;
-  double budget = 85.;
+  double budget = 100.;
   std::uint64_t seed = 1;
   std::string size = "1280x720", python = "/usr/bin/python3";
   std::vector<std::string> modes{"lines", "impostors", "tubes"};

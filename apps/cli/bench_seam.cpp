@@ -32,7 +32,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
   double seconds = 10., budget = 85.;
-  std::optional<float> error;
+  std::optional<float> error, thinnest;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;
   std::string size = "640x360";
@@ -92,8 +92,8 @@ class Walk {
     Quick quick;
     quick.error = options_.error.value_or(budget_.error());
     quick.samples = options_.quick_samples.value_or(budget_.samples());
-    const scene::View view =
-        view_at(picture, quick.error, quick.samples, options_.error ? 0.f : budget_.thinnest());
+    const scene::View view = view_at(picture, quick.error, quick.samples,
+                                     options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
     budget_.took(quick.milliseconds);
@@ -374,6 +374,9 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   within(command.add_option("--error", options->error,
                             "Pixels of acceptable error, instead of what the budget says"),
          .05, 100.);
+  within(command.add_option("--thinnest", options->thinnest,
+                            "Pixels that the thinnest lines measure, instead of what the budget says"),
+         0., 64.);
   command.add_flag(
       "--causes", options->causes,
       "Compare, too, what the product would draw with more samples, and without levels of detail");

@@ -89,7 +89,7 @@ TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   EXPECT_EQ(budget.thinnest(), 0.f);
   EXPECT_EQ(watch(budget, 20., 60), 0u);  // less detail, as many samples
   EXPECT_NEAR(budget.error(), 2.f, .1f);
-  EXPECT_NEAR(budget.thinnest(), .5f, .1f);
+  EXPECT_NEAR(budget.thinnest(), .25f, .05f);
   EXPECT_EQ(watch(budget, 40., 60), 1u);
   EXPECT_EQ(budget.samples(), 1u);
   EXPECT_EQ(watch(budget, 20., 60), 0u);  // many would take too long again

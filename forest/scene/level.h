@@ -99,12 +99,14 @@ class Budget {
   std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.
-  float thinnest() const { return samples_ == 1 ? error_ : std::max(0.f, .5f * (error_ - 1.f)); }
+  float thinnest() const { return samples_ == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
   /// To be told of every picture that was drawn so.
   void took(double milliseconds);
 
  private:
   double milliseconds_;
+  double longer_ =
+      1.8;  // times the one sample's that many are taken to need; more where they were tried in vain
   float worst_, error_ = 1.f;
   std::uint32_t samples_ = 1, agreed_ = 0;  // pictures that have asked for the other number of samples
 };
