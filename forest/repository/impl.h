@@ -161,8 +161,8 @@ struct Repository::Impl {
   /// Links a version to its distributions, if it has none yet.
   void keep_distributions(int model, const std::string& name, const TextsByName& distributions);
 
-  std::vector<NeuronRow> rows(const std::string& where, const std::string& text1, const std::string& text2,
-                              int id) const;
+  /// The neurons for which a condition on the view `neuron`, called v, holds; more tables may be joined to it.
+  std::vector<NeuronRow> rows(const std::string& where, const std::string& joins = "") const;
   /// The rows of one neuron; `points` and `from` tell where its sections stand, which differs between versions.
   Rows stored(NeuronId id, const char* points, const std::string& from) const;
   /// What is wrong with these neurons, at most a sentence each.

@@ -11,7 +11,7 @@ namespace forest::repository {
 void Repository::Impl::refill(Database& database, int from) {
   Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
   if (from < 3) impl.refill_shapes();
-  impl.refill_grammars();
+  if (from < 4) impl.refill_grammars();
 }
 
 /// Before version 3 a section was named by two numbers, before version 2 points were not packed.

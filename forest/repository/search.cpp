@@ -1,12 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Which neurons there are: lists, conditions, questions.
 #include <algorithm>
-#include <array>
 #include <bit>
+#include <span>
 #include <utility>
 
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
@@ -32,60 +31,74 @@ std::vector<PopulationRow> Repository::populations() const {
   });
 }
 
-/// `where` may use :name and :population (texts) and :id, each of them once.
-std::vector<NeuronRow> Repository::Impl::rows(const std::string& where, const std::string& text1,
-                                              const std::string& text2, int id) const {
-  return read([&] {
-    const std::string from =
-        " from neurons n join populations p on p.id = n.population left join provenance o on o.neuron = n.id "
-        "left join grammars g on g.id = o.grammar where " +
-        where;
-    const std::size_t count = std::size_t(ask<int>("select count(*)" + from, text1, text2, id).value_or(0));
-    Ints ids(room(count)), stems(room(count)), sections(room(count)), points(room(count)),
-        spines(room(count));
-    std::vector<long long> seed(room(count)), index(room(count));
-    Reals length(room(count));
-    std::array<std::vector<std::string>, 12> t;
-    for (auto& column : t) column.resize(room(count));
-    sql << "select n.id, n.name, p.name, n.species, n.region, n.layer, n.type, n.stems, n.sections, "
-           "n.points, n.spines, n.length, "
-           "coalesce(o.origin, ''), coalesce(o.source_file, ''), coalesce(o.source_hash, ''), "
-           "coalesce(g.name, ''), "
-           "coalesce(g.hash, ''), coalesce(o.seed, 0), coalesce(o.number, 0), coalesce(o.program, '')" +
-               from + " order by n.id",
-        into(ids), into(t[0]), into(t[1]), into(t[2]), into(t[3]), into(t[4]), into(t[5]), into(stems),
-        into(sections), into(points), into(spines), into(length), into(t[6]), into(t[7]), into(t[8]),
-        into(t[9]), into(t[10]), into(seed), into(index), into(t[11]), use(text1), use(text2), use(id);
-    std::vector<NeuronRow> rows(ids.size());
-    for (std::size_t i = 0; i < rows.size(); ++i) {
-      NeuronRow& row = rows[i];
-      row = {.id = NeuronId(std::size_t(ids[i])),
-             .name = std::move(t[0][i]),
-             .population = std::move(t[1][i]),
-             .species = unescaped(t[2][i]),
-             .region = unescaped(t[3][i]),
-             .layer = unescaped(t[4][i]),
-             .type = unescaped(t[5][i]),
-             .stems = std::size_t(stems[i]),
-             .sections = std::size_t(sections[i]),
-             .points = std::size_t(points[i]),
-             .spines = std::size_t(spines[i]),
-             .length = length[i],
-             .provenance = {},
-             .program = std::move(t[11][i])};
-      if (t[6][i] == "grown")
-        row.provenance = Grown{t[9][i], t[10][i], std::bit_cast<std::uint64_t>(seed[i]),
-                               std::bit_cast<std::uint64_t>(index[i])};
-      else
-        row.provenance = Traced{unescaped(t[7][i]), unescaped(t[8][i])};
+std::vector<NeuronRow> Repository::Impl::rows(const std::string& where, const std::string& joins) const {
+  std::vector<NeuronRow> rows;
+  const auto keep = [&](std::span<Answer::Value> row) {
+    std::size_t column = 0;
+    const auto text = [&] {
+      auto* value = std::get_if<std::string>(&row[column++]);
+      return value ? std::move(*value) : std::string();
+    };
+    const auto number = [&] { return number_in(row[column++]); };
+    const auto count = [&] { return std::size_t(number()); };
+    const auto real = [&] {
+      const double* value = std::get_if<double>(&row[column++]);
+      return value ? *value : 0.;
+    };
+    // In the order in which they are asked for: members of a list in braces are worked out from first to last.
+    NeuronRow& neuron = rows.emplace_back(NeuronRow{.id = NeuronId(count()),
+                                                    .name = text(),
+                                                    .population = text(),
+                                                    .species = unescaped(text()),
+                                                    .region = unescaped(text()),
+                                                    .layer = unescaped(text()),
+                                                    .type = unescaped(text()),
+                                                    .stems = count(),
+                                                    .sections = count(),
+                                                    .points = count(),
+                                                    .spines = count(),
+                                                    .length = real(),
+                                                    .provenance = {},
+                                                    .program = text()});
+    if (text() == "grown") {
+      neuron.provenance = Grown{text(), text(), std::bit_cast<std::uint64_t>(number()),
+                                std::bit_cast<std::uint64_t>(number())};
+    } else {
+      column += 4;
+      neuron.provenance = Traced{unescaped(text()), unescaped(text())};
     }
-    return rows;
+  };
+  read([&] {
+    database->each(
+        fmt::format(
+            "select v.id, v.name, v.population, v.species, v.region, v.layer, v.type, v.stems, v.sections, "
+            "v.points, v.spines, v.length, v.program, v.origin, v.grammar, (select g.hash from provenance o "
+            "join grammars g on g.id = o.grammar where o.neuron = v.id), v.seed, v.number, v.source_file, "
+            "v.source_hash from neuron v{} where {} order by v.id",
+            joins, where),
+        keep);
   });
+  return rows;
 }
 
+namespace {
+
+/// A column that is a name; nothing has one that is none.
+std::string is_called(const char* column, std::string_view name) {
+  if (!is_name(name)) return "1 = 0";
+  std::string quoted;
+  for (const char c : name) quoted.append(c == '\'' ? 2 : 1, c);
+  return fmt::format("{} = '{}'", column, quoted);
+}
+
+std::string in_population(std::string_view population) {
+  return population.empty() ? "1 = 1" : is_called("v.population", population);
+}
+
+}  // namespace
+
 std::vector<NeuronRow> Repository::neurons(std::string_view population) const {
-  const std::string name(population);
-  return impl_->rows("(p.name = :population or :every = '') and :unused = 0", name, name, 0);
+  return impl_->rows(in_population(population));
 }
 
 namespace {
@@ -135,23 +148,7 @@ Condition condition_of(std::string_view text) {
 
 std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::string_view population) const {
   const Condition condition = condition_of(text);
-  // Asked alone first: what is wrong with it is the person's, not the database's.
-  const std::string ids =
-      fmt::format("select v.id from neuron v{} where ({})", condition.joins, condition.text);
-  const Answer found = impl_->read([&] { return impl_->database->ask(ids); });
-  std::vector<NeuronRow> rows;
-  if (found.rows.empty()) return rows;
-  std::vector<std::int64_t> chosen;
-  for (const auto& row : found.rows) chosen.push_back(std::get<std::int64_t>(row[0]));
-  std::ranges::sort(chosen);
-  constexpr std::size_t many = 10'000;  // more are not asked for one by one
-  const std::string in =
-      chosen.size() < many ? fmt::format("n.id in ({})", fmt::join(chosen, ", ")) : "1 = 1";
-  const std::string name(population);
-  for (NeuronRow& row :
-       impl_->rows("(p.name = :population or :every = '') and :unused = 0 and " + in, name, name, 0))
-    if (std::ranges::binary_search(chosen, std::int64_t(row.id.value()))) rows.push_back(std::move(row));
-  return rows;
+  return impl_->rows(fmt::format("({}) and {}", condition.text, in_population(population)), condition.joins);
 }
 
 Answer Repository::query(const std::string& question) {
@@ -162,13 +159,11 @@ Answer Repository::query(const std::string& question) {
 }
 
 std::vector<NeuronRow> Repository::find(std::string_view name, std::string_view population) const {
-  const std::string where =
-      population.empty() ? "n.name = :name and :population = ''" : "n.name = :name and p.name = :population";
-  return impl_->rows(where + " and :unused = 0", std::string(name), std::string(population), 0);
+  return impl_->rows(is_called("v.name", name) + " and " + in_population(population));
 }
 
 std::optional<NeuronRow> Repository::neuron(NeuronId id) const {
-  auto rows = impl_->rows(":one = '' and :two = '' and n.id = :id", "", "", number_of(id));
+  auto rows = impl_->rows(fmt::format("v.id = {}", id.value()));
   return rows.empty() ? std::nullopt : std::optional(std::move(rows[0]));
 }
 
