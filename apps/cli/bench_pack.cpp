@@ -76,8 +76,12 @@ class Neurons {
 };
 
 circuit::Circuit planted(const Options& options) {
-  circuit::Circuit c{.name = "made-up", .layers = {{"tissue", 0.f, 2000.f}}, .types = {{"made-up", "made-up"}},
-                     .morphologies = {}, .instances = {}, .radius = 1000.f};
+  circuit::Circuit c{.name = "made-up",
+                     .layers = {{"tissue", 0.f, 2000.f}},
+                     .types = {{"made-up", "made-up"}},
+                     .morphologies = {},
+                     .instances = {},
+                     .radius = 1000.f};
   Random random(options.seed, 0, 32);
   for (std::uint32_t i = 0; i < options.neurons; ++i) {
     c.morphologies.push_back(fmt::format("neuron-{}", i));
@@ -105,7 +109,8 @@ void compare(const scene::Forest& forest, std::size_t number, const Morphology& 
     const auto points = m.points(SectionId(sections[i]));
     const std::uint32_t at = next[sections[i]]++;
     const frame::Segment& s = segments[i];
-    good = at + 1 < points.size() && same(points[at], s.ax, s.ay, s.az) && same(points[at + 1], s.bx, s.by, s.bz);
+    good = at + 1 < points.size() && same(points[at], s.ax, s.ay, s.az) &&
+           same(points[at + 1], s.bx, s.by, s.bz);
   }
   for (std::size_t s = 0; good && s < next.size(); ++s) good = next[s] + 1 == m.points(SectionId(s)).size();
   if (!good) throw Error(fmt::format("neuron {} of the file is not the one that was packed", number));
@@ -139,8 +144,8 @@ void run(const Options& options, Console& console) {
   });
   if (found != given || forest.neurons().size() != options.neurons || forest.bytes() != packed.bytes ||
       forest.section_of_segment().size() != packed.segments)
-    throw Error(fmt::format("{} segments of {} neurons were packed and {} of {} are in the file", given.load(),
-                            options.neurons, found.load(), forest.neurons().size()));
+    throw Error(fmt::format("{} segments of {} neurons were packed and {} of {} are in the file",
+                            given.load(), options.neurons, found.load(), forest.neurons().size()));
   Random random(options.seed, 1, 32);
   for (int i = 0; i < 200; ++i) {
     const std::uint32_t any = random.below(options.neurons);
@@ -156,21 +161,23 @@ void run(const Options& options, Console& console) {
                  {"bytes", packed.bytes},
                  {"peak_bytes", peak},
                  {"open_seconds", opening}});
-  console.table({"neurons", "segments", "segments/s", "seconds", "of which core-seconds of making up", "MB of the file",
-                 "peak MB", "opened in"},
-                {{fmt::format("{}", options.neurons), fmt::format("{}", packed.segments), fmt::format("{:.0f}", rate),
-                  fmt::format("{:.2f}", seconds), fmt::format("{:.2f}", double(making) / 1e9),
-                  fmt::format("{:.0f}", double(packed.bytes) / 1e6), fmt::format("{:.0f}", double(peak) / 1e6),
-                  fmt::format("{:.2f} s", opening)}});
+  console.table(
+      {"neurons", "segments", "segments/s", "seconds", "of which core-seconds of making up", "MB of the file",
+       "peak MB", "opened in"},
+      {{fmt::format("{}", options.neurons), fmt::format("{}", packed.segments), fmt::format("{:.0f}", rate),
+        fmt::format("{:.2f}", seconds), fmt::format("{:.2f}", double(making) / 1e9),
+        fmt::format("{:.0f}", double(packed.bytes) / 1e6), fmt::format("{:.0f}", double(peak) / 1e6),
+        fmt::format("{:.2f} s", opening)}});
 }
 
 }  // namespace
 
 std::function<void()> bench_pack(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons, "Distinct neurons, each planted once; 10,000 take some 2 GB of disk",
-            1, 10'000'000);
-  command.add_option("--folder", options->folder, "Where the file is made, and removed")->capture_default_str();
+  add_whole(command, "--neurons", options->neurons,
+            "Distinct neurons, each planted once; 10,000 take some 2 GB of disk", 1, 10'000'000);
+  command.add_option("--folder", options->folder, "Where the file is made, and removed")
+      ->capture_default_str();
   add_seed(command, options->seed, "Of the neurons and their places");
   return [options, &console] { run(*options, console); };
 }

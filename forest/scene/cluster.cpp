@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
 #include <numbers>
 #include <numeric>
@@ -79,10 +80,12 @@ Sphere around(std::span<const Vec4> vertices) {
   return sphere;
 }
 
-// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays; a node of the
-// neuron has a number of its own here.
+// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays and sets of
+// bits; a node of the neuron has a number of its own here.
 class Sketch {
  public:
+  static constexpr std::uint8_t unnumbered = 255;
+
   // `outside(node)`: whether anything else of the neuron touches it. `numbers`: of the neuron's nodes, scratch.
   template <class Outside>
   Sketch(const Drawing& drawing, const Draft& a, const Draft& b, Outside&& outside,
@@ -91,46 +94,39 @@ class Sketch {
       for (const Strip& s : drawing.strips_of(*d)) {
         Line& line = lines_[line_count_++];
         static_cast<Strip&>(line) = s;
-        line.first = vertex_count_;
-        for (std::uint32_t i = s.first; i < s.first + s.count; ++i) {
-          const Vec4& v = drawing.vertices[i];
-          x_[vertex_count_] = v.x(), y_[vertex_count_] = v.y(), z_[vertex_count_] = v.z();
-          radius_[vertex_count_] = v.w();
-          places_[vertex_count_++] = drawing.places[i];
-        }
         for (std::uint32_t* node : {&line.begin, &line.end}) {
           std::uint8_t& number = numbers[*node];
           if (number == unnumbered) {
             number = std::uint8_t(node_count_);
-            nodes_[node_count_] = *node;
-            outside_[node_count_++] = outside(*node);
+            if (outside(*node)) outside_.add(node_count_);
+            nodes_[node_count_++] = *node;
           }
           *node = number;
         }
       }
     for (std::uint32_t i = 0; i < node_count_; ++i) numbers[nodes_[i]] = unnumbered;
-    join();
+    Links links;
+    link(links);
+    gather(links, [&](std::uint32_t from) {
+      const Vec4& v = drawing.vertices[from];
+      x_[vertex_count_] = v.x(), y_[vertex_count_] = v.y(), z_[vertex_count_] = v.z();
+      radius_[vertex_count_] = v.w();
+      places_[vertex_count_++] = drawing.places[from];
+    });
   }
-
-  static constexpr std::uint8_t unnumbered = 255;
 
   std::uint32_t segment_count() const { return vertex_count_ - line_count_; }
 
   // Fewer and fewer segments until they are `limit` at most.
   void coarsen(float tolerance) {
     const float before = area();
-    std::ranges::fill(dropped_reach_, -1.f);
-    for (std::uint32_t i = 0; i < line_count_; ++i) measure(lines_[i]);
-    for (;; tolerance *= tolerance_step) {
-      drop_tips(tolerance);
-      const float squared = tolerance * tolerance;
-      const auto kept = std::uint32_t(std::count_if(weight_.begin(), weight_.begin() + vertex_count_,
-                                                    [&](float weight) { return weight > squared; }));
-      if (kept - line_count_ <= limit || tolerance > hopeless) {
-        keep_heavier(squared);
-        break;
-      }
+    std::fill_n(dropped_reach_.begin(), node_count_, -1.f);
+    for (std::uint32_t i = 0; i < line_count_; ++i) measure(lines_[i], tolerance * tolerance);
+    for (float next_tip = 0.f;; tolerance *= tolerance_step) {
+      if (tolerance >= next_tip) next_tip = drop_tips(tolerance);
+      if (heavier(tolerance * tolerance) - line_count_ <= limit || tolerance > hopeless) break;
     }
+    keep([&, least = tolerance * tolerance](std::uint32_t, std::uint32_t v) { return weight_[v] > least; });
     if (segment_count() > limit) keep_largest();
     const float after = area();
     const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
@@ -163,38 +159,59 @@ class Sketch {
   // since the sum of the tolerances of all levels would be several times too large; they follow one another along the
   // branches, so that most find what is near enough where the one before did.
   float measured_error(std::span<const Vec4> points, float worst) const {
-    struct Group {
+    struct Group {  // four segments
       Four x, y, z, dx, dy, dz, inverse;
+
+      [[gnu::always_inline]] Four squared_distance(const Vec4& point) const {
+        const Four px = point.x() - x, py = point.y() - y, pz = point.z() - z;
+        const Four at = ((px * dx + py * dy + pz * dz) * inverse).max(0.f).min(1.f);
+        return (px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square();
+      }
     };
-    std::array<Group, limit / 4 + 1> groups;
+    std::array<Group, limit / 4> groups;
     std::uint32_t count = 0;
     const auto set = [&](std::uint32_t a, std::uint32_t b) {
       Group& g = groups[count / 4];
       const std::uint32_t i = count++ % 4;
       g.x[i] = x_[a], g.y[i] = y_[a], g.z[i] = z_[a];
       g.dx[i] = x_[b] - x_[a], g.dy[i] = y_[b] - y_[a], g.dz[i] = z_[b] - z_[a];
-      const float squared = g.dx[i] * g.dx[i] + g.dy[i] * g.dy[i] + g.dz[i] * g.dz[i];
-      g.inverse[i] = squared > 0.f ? 1.f / squared : 0.f;
     };
     for (std::uint32_t i = 0; i < line_count_; ++i)
       for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v) set(v - 1, v);
-    const std::uint32_t last = vertex_count_ - 1;
-    while (count % 4) set(last, last);
+    while (count % 4) set(vertex_count_ - 1, vertex_count_ - 1);
     const std::uint32_t group_count = count / 4;
-    const auto squared_distance = [](const Vec4& point, const Group& g) {
-      const Four x = point.x() - g.x, y = point.y() - g.y, z = point.z() - g.z;
-      const Four at = ((x * g.dx + y * g.dy + z * g.dz) * g.inverse).max(0.f).min(1.f);
-      return Four((x - at * g.dx).square() + (y - at * g.dy).square() + (z - at * g.dz).square()).minCoeff();
-    };
+    for (Group& g : std::span(groups).first(group_count)) {
+      const Four squared = g.dx.square() + g.dy.square() + g.dz.square();
+      g.inverse = (squared > 0.f).select(squared.inverse(), 0.f);
+    }
     float worst_squared = worst * worst;
-    std::uint32_t near = 0;
-    for (const Vec4& point : points) {
-      float nearest = squared_distance(point, groups[near]);
-      if (nearest <= worst_squared) continue;
-      for (std::uint32_t g = 0; g < group_count && nearest > worst_squared; ++g)
-        if (const float squared = squared_distance(point, groups[g]); squared < nearest)
-          nearest = squared, near = g;
-      worst_squared = std::max(worst_squared, nearest);
+    std::uint32_t near = 0;  // the segment that is asked first
+    for (std::size_t i = 0; i < points.size();) {
+      const std::size_t end = std::min(i + 4, points.size());
+      if (end == i + 4) {  // four points to one segment
+        Mat4 four = Eigen::Map<const Mat4>(points[i].data());
+        four.transposeInPlace();
+        const Group& g = groups[near / 4];
+        const std::uint32_t n = near % 4;
+        const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
+        const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
+                   pz = four.col(2).array() - g.z[n];
+        const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
+        if (((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square() <= worst_squared)
+                .all()) {
+          i = end;
+          continue;
+        }
+      }
+      for (; i < end; ++i) {  // one point to four segments
+        std::uint32_t lane = 0;
+        float nearest = groups[near / 4].squared_distance(points[i]).minCoeff(&lane);
+        near = near / 4 * 4 + lane;
+        for (std::uint32_t g = 0; g < group_count && nearest > worst_squared; ++g)
+          if (const float squared = groups[g].squared_distance(points[i]).minCoeff(&lane); squared < nearest)
+            nearest = squared, near = 4 * g + lane;
+        worst_squared = std::max(worst_squared, nearest);
+      }
     }
     return std::sqrt(worst_squared);
   }
@@ -202,11 +219,24 @@ class Sketch {
  private:
   static constexpr std::uint32_t most_lines = 2 * limit, most_vertices = 2 * most_lines,
                                  most_nodes = 2 * most_lines;
+  static_assert(most_lines <= 64 && most_nodes < unnumbered);
   struct Line : Strip {
     float reach = 0.f;  // the greatest distance of a vertex from the first
   };
   template <class T>
   using OfVertices = std::array<T, most_vertices + 4>;  // read in fours
+
+  struct Nodes {  // a set of them
+    std::array<std::uint64_t, most_nodes / 64> bits{};
+
+    bool has(std::uint32_t node) const { return bits[node / 64] >> node % 64 & 1; }
+    void add(std::uint32_t node) { bits[node / 64] |= 1ull << node % 64; }
+  };
+  struct Links {
+    std::uint64_t swallowed = 0;                // lines that follow another
+    std::array<std::uint8_t, most_lines> next;  // the line that follows, or none
+  };
+  static constexpr std::uint8_t none = 255;
 
   float distance(std::uint32_t a, std::uint32_t b) const {
     const float x = x_[a] - x_[b], y = y_[a] - y_[b], z = z_[a] - z_[b];
@@ -225,62 +255,84 @@ class Sketch {
     return sum;
   }
 
-  // Joins lines that follow one another through a node at which nothing else begins or ends, here or outside.
-  void join() {
-    std::array<std::uint8_t, most_nodes> begins{}, ends{}, beginner;
+  // Which lines follow one another through a node at which nothing else begins or ends, here or outside.
+  void link(Links& links) const {
+    Nodes begun, begun_again, ended, ended_again;
+    std::array<std::uint8_t, most_nodes> beginner;
     for (std::uint32_t i = 0; i < line_count_; ++i) {
-      ++begins[lines_[i].begin], ++ends[lines_[i].end];
-      beginner[lines_[i].begin] = std::uint8_t(i);
+      const Line& line = lines_[i];
+      (begun.has(line.begin) ? begun_again : begun).add(line.begin);
+      (ended.has(line.end) ? ended_again : ended).add(line.end);
+      beginner[line.begin] = std::uint8_t(i);
     }
-    constexpr std::uint8_t none = 255;
-    std::array<std::uint8_t, most_lines> next;
-    std::array<bool, most_lines> swallowed{};
-    bool any = false;
     for (std::uint32_t i = 0; i < line_count_; ++i) {
       const std::uint32_t node = lines_[i].end;
-      next[i] = none;
-      if (outside_[node] || begins[node] != 1 || ends[node] != 1) continue;
+      links.next[i] = none;
+      if (!begun.has(node) || begun_again.has(node) || ended_again.has(node) || outside_.has(node)) continue;
       const std::uint8_t follower = beginner[node];
       if (follower == i || lines_[follower].kind != lines_[i].kind) continue;
-      next[i] = follower;
-      any = swallowed[follower] = true;
-    }
-    if (!any) return;
-    const Sketch old = *this;
-    line_count_ = vertex_count_ = 0;
-    for (std::uint32_t i = 0; i < old.line_count_; ++i) {
-      if (swallowed[i]) continue;
-      Line line = old.lines_[i];
-      line.first = vertex_count_;
-      copy(old, old.lines_[i], 0);
-      for (std::uint8_t n = next[i]; n != none; n = next[n]) {
-        const Line& more = old.lines_[n];
-        copy(old, more, 1);
-        line.end = more.end;
-        if (more.rank < line.rank) line.rank = more.rank, line.mean = more.mean;
-      }
-      line.count = vertex_count_ - line.first;
-      if (next[i] != none) measure(line);
-      lines_[line_count_++] = line;
+      links.next[i] = follower;
+      links.swallowed |= 1ull << follower;
     }
   }
 
-  void copy(const Sketch& from, const Line& line, std::uint32_t without) {
-    for (std::uint32_t v = line.first + without; v < line.first + line.count; ++v, ++vertex_count_) {
-      x_[vertex_count_] = from.x_[v], y_[vertex_count_] = from.y_[v], z_[vertex_count_] = from.z_[v];
-      radius_[vertex_count_] = from.radius_[v];
-      places_[vertex_count_] = from.places_[v];
-      weight_[vertex_count_] = from.weight_[v];
+  // Sets the lines anew, joined; add(v) puts in what was vertex v.
+  template <class Add>
+  void gather(const Links& links, Add&& add) {
+    std::array<Line, most_lines> old;
+    const std::uint32_t count = line_count_;
+    std::copy_n(lines_.begin(), count, old.begin());
+    line_count_ = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (links.swallowed >> i & 1) continue;
+      Line& line = lines_[line_count_++];
+      line = old[i];
+      line.first = vertex_count_;
+      for (std::uint32_t v = old[i].first; v < old[i].first + old[i].count; ++v) add(v);
+      for (std::uint8_t n = links.next[i]; n != none; n = links.next[n]) {
+        const Line& more = old[n];
+        for (std::uint32_t v = more.first + 1; v < more.first + more.count; ++v) add(v);
+        line.end = more.end;
+        if (more.rank < line.rank) line.rank = more.rank, line.mean = more.mean;
+      }
+      if (links.next[i] != none) line.reach = -1.f;  // not known
+      line.count = vertex_count_ - line.first;
     }
+  }
+
+  void join(float least_weight) {
+    Links links;
+    link(links);
+    if (!links.swallowed) return;
+    const auto old = [count = vertex_count_](const auto& list) {
+      std::remove_cvref_t<decltype(list)> copy;
+      std::copy_n(list.begin(), count, copy.begin());
+      return copy;
+    };
+    const auto x = old(x_), y = old(y_), z = old(z_), radius = old(radius_), weight = old(weight_);
+    const auto places = old(places_);
+    vertex_count_ = 0;
+    gather(links, [&](std::uint32_t from) {
+      x_[vertex_count_] = x[from], y_[vertex_count_] = y[from], z_[vertex_count_] = z[from];
+      radius_[vertex_count_] = radius[from];
+      weight_[vertex_count_] = weight[from];
+      places_[vertex_count_++] = places[from];
+    });
+    for (std::uint32_t i = 0; i < line_count_; ++i)
+      if (lines_[i].reach < 0.f) measure(lines_[i], least_weight);
   }
 
   // How far its vertices reach, and their weights: the tolerances (squared) below which Douglas & Peucker (1973) keep them.
   // Where they split does not depend on the tolerance, so that once is enough for all: a vertex stays when it and all at
-  // which was split before deviate by more.
-  void measure(Line& line) {
+  // which was split before deviate by more. What weighs no more than `least` counts as nothing.
+  void measure(Line& line, float least) {
     const std::uint32_t begin = line.first, end = line.first + line.count - 1;
-    line.reach = 0.f;
-    for (std::uint32_t v = begin + 1; v <= end; ++v) line.reach = std::max(line.reach, distance(v, begin));
+    float reach = 0.f;
+    for (std::uint32_t v = begin + 1; v <= end; ++v) {
+      const float x = x_[v] - x_[begin], y = y_[v] - y_[begin], z = z_[v] - z_[begin];
+      reach = std::max(reach, x * x + y * y + z * z);
+    }
+    line.reach = std::sqrt(reach);
     weight_[begin] = weight_[end] = INFINITY;
     std::array<std::pair<std::uint32_t, std::uint32_t>, most_vertices> open;
     std::size_t waiting = 0;
@@ -304,58 +356,65 @@ class Sketch {
       }
       const std::uint32_t split =
           std::uint32_t(std::max_element(&deviation[a + 1], &deviation[b]) - deviation.data());
-      weight_[split] = std::min({deviation[split], weight_of_range(a, b)});
+      // The lighter end of the range is the one at which was split to come to it.
+      const float weight = std::min({deviation[split], weight_[a], weight_[b]});
+      if (!(weight > least)) {
+        std::fill(&weight_[a + 1], &weight_[b], 0.f);
+        continue;
+      }
+      weight_[split] = weight;
       open[waiting++] = {a, split};
       open[waiting++] = {split, b};
     }
   }
-  // What was split to come to this range: the lighter of its ends.
-  float weight_of_range(std::uint32_t a, std::uint32_t b) const { return std::min(weight_[a], weight_[b]); }
+
+  std::uint32_t heavier(float weight) const {
+    std::int32_t count = 0;
+    for (std::uint32_t v = 0; v < vertex_count_; ++v) count += weight_[v] > weight;
+    return std::uint32_t(count);
+  }
 
   // Drops what nothing follows, here or outside, and what reaches no further than the tolerance, whatever was dropped at
-  // its end before included.
-  void drop_tips(float tolerance) {
+  // its end before included. Returns the tolerance up to which nothing more can be dropped.
+  float drop_tips(float tolerance) {
     while (line_count_ > 1) {
-      std::array<bool, most_nodes> begun{};
-      for (std::uint32_t i = 0; i < line_count_; ++i) begun[lines_[i].begin] = true;
-      std::array<bool, most_lines> dropped{};
-      std::uint32_t count = 0;
+      Nodes open = outside_;  // where something goes on
+      for (std::uint32_t i = 0; i < line_count_; ++i) open.add(lines_[i].begin);
+      std::uint64_t dropped = 0;
+      float next = INFINITY;
       for (std::uint32_t i = 0; i < line_count_; ++i) {
         const Line& line = lines_[i];
-        if (line.kind == 1 || line.reach > tolerance || outside_[line.end] || begun[line.end]) continue;
+        if (line.kind == 1 || open.has(line.end)) continue;
         float reach = line.reach;
         if (const float below = dropped_reach_[line.end]; below >= 0.f)
           reach = std::max(reach, below + distance(line.first + line.count - 1, line.first));
-        if (reach > tolerance) continue;
-        dropped[i] = true;
-        ++count;
+        if (reach > tolerance) {
+          next = std::min(next, reach);
+          continue;
+        }
+        dropped |= 1ull << i;
         dropped_reach_[line.begin] = std::max(dropped_reach_[line.begin], reach);
       }
-      if (count == line_count_) dropped[0] = false, --count;
-      if (!count) return;
-      keep([&](std::uint32_t i, std::uint32_t) { return !dropped[i]; });
-      join();
+      if (std::uint32_t(std::popcount(dropped)) == line_count_) dropped &= ~1ull;
+      if (!dropped) return next;
+      keep([&](std::uint32_t i, std::uint32_t) { return !(dropped >> i & 1); });
+      join(tolerance * tolerance);
     }
-  }
-
-  void keep_heavier(float weight) {
-    keep([&](std::uint32_t, std::uint32_t v) { return weight_[v] > weight; });
+    return INFINITY;
   }
 
   // A soma with very many stems: what joins two clusters cannot be simplified away. The largest lines stay.
   void keep_largest() {
-    std::array<float, most_lines> areas;
-    std::array<std::uint32_t, most_lines> order;
-    for (std::uint32_t i = 0; i < line_count_; ++i) areas[i] = area(lines_[i]), order[i] = i;
-    std::stable_sort(order.begin(), order.begin() + line_count_,
-                     [&](std::uint32_t a, std::uint32_t b) { return areas[a] > areas[b]; });
-    std::array<bool, most_lines> stays{};
-    for (std::uint32_t i = 0, room = limit; i < line_count_; ++i) {
-      if (lines_[order[i]].count - 1 > room) break;
-      room -= lines_[order[i]].count - 1;
-      stays[order[i]] = true;
+    std::array<std::pair<float, std::uint32_t>, most_lines> order;
+    for (std::uint32_t i = 0; i < line_count_; ++i) order[i] = {-area(lines_[i]), i};
+    std::sort(order.begin(), order.begin() + line_count_);
+    std::uint64_t stays = 0;
+    std::uint32_t room = limit;
+    for (std::uint32_t i = 0; i < line_count_ && lines_[order[i].second].count - 1 <= room; ++i) {
+      room -= lines_[order[i].second].count - 1;
+      stays |= 1ull << order[i].second;
     }
-    keep([&](std::uint32_t i, std::uint32_t) { return stays[i]; });
+    keep([&](std::uint32_t i, std::uint32_t) { return stays >> i & 1; });
   }
 
   // Leaves the vertices of lines for which stays(line, vertex); lines that lose all of them go.
@@ -383,7 +442,7 @@ class Sketch {
   OfVertices<float> x_, y_, z_, radius_, weight_;
   OfVertices<reports::Place> places_;
   std::array<std::uint32_t, most_nodes> nodes_;  // the neuron's numbers of them
-  std::array<bool, most_nodes> outside_;
+  Nodes outside_;
   std::array<float, most_nodes>
       dropped_reach_;  // how far what was dropped there reached; negative where nothing was
 };
@@ -448,7 +507,7 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
       const Vec4& b = drawing.vertices[i];
       const std::uint32_t next_radius = half(b.w());
       out.segments.push_back({a->x(), a->y(), a->z(), radius | next_radius << 16, b.x(), b.y(), b.z(), meta});
-      out.places.push_back(middle(drawing.places[i - 1], drawing.places[i]));
+      out.places[out.segments.size() - 1] = middle(drawing.places[i - 1], drawing.places[i]);
       const float thickest = std::max(a->w(), b.w());
       if (*a != b) drawn.thickness = std::max(drawn.thickness, thickest);  // the soma itself is chosen apart
       const float from = appears_at(s.rank, thickest, s.mean > 0.f ? s.mean : std::min(a->w(), b.w()));
@@ -591,7 +650,7 @@ ClusterTree build_clusters(const Morphology& m) {
   };
   const auto put = [&](const Vec4& v, const reports::Place& place) {
     drawing.vertices.push_back(v);
-    drawing.places.push_back(place);
+    drawing.places.emplace_back(place);
   };
   const auto here = [&] { return std::uint32_t(drawing.vertices.size()); };
   if (soma.radius > 0.f) {
@@ -699,7 +758,7 @@ ClusterTree build_clusters(const Morphology& m) {
   const Middle middle{m.sections(), std::move(ways)};
   std::size_t segments = 0;
   for (const Draft& d : drafts) segments += drawing.segment_count(d);
-  tree.segments.reserve(segments), tree.places.reserve(segments);
+  tree.segments.reserve(segments), tree.places.resize(segments);
   std::vector<Drawn> drawn(drafts.size());
   std::vector<std::uint32_t> first(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {

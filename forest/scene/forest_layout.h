@@ -31,9 +31,16 @@ enum Part : std::uint32_t {
   places,
   part_count
 };
-inline constexpr std::array<std::uint32_t, part_count> element_sizes{
-    sizeof(frame::Segment), sizeof(frame::Instance), sizeof(Cluster), sizeof(Neuron), 4, sizeof(SectionFacts),
-    4,                      4,                       1,               sizeof(reports::Place)};
+inline constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment),
+                                                                     sizeof(frame::Instance),
+                                                                     sizeof(Cluster),
+                                                                     sizeof(Neuron),
+                                                                     4,
+                                                                     sizeof(SectionFacts),
+                                                                     4,
+                                                                     4,
+                                                                     1,
+                                                                     sizeof(reports::Place)};
 
 struct Entry {
   std::uint32_t part, element_size;

@@ -37,15 +37,19 @@ std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes)
 
 std::vector<SectionFacts> facts_of(const Morphology& m) {
   std::vector<SectionFacts> facts;
-  const auto distances = path_distances(m);
+  std::vector<double> distances;  // from the soma to the ends, as path_distances has them
+  distances.reserve(m.sections().size());
+  facts.reserve(m.sections().size());
   for (std::size_t i = 0; i < m.sections().size(); ++i) {
     const SectionId id(i);
     const auto points = m.points(id);
     const Section& s = m.section(id);
+    const double length = section_length(m, id);
+    const double before = s.parent.valid() ? distances[s.parent.value()] : 0.;
+    distances.push_back(before + length);
     facts.push_back({s.parent.valid() ? s.parent.value() : 0xffffffffu, std::uint32_t(s.kind),
-                     std::uint32_t(m.order(id)), std::uint32_t(m.children(id).size()),
-                     float(section_length(m, id)), 2.f * points.front().radius, 2.f * points.back().radius,
-                     float(distances[i])});
+                     std::uint32_t(m.order(id)), std::uint32_t(m.children(id).size()), float(length),
+                     2.f * points.front().radius, 2.f * points.back().radius, float(distances.back())});
   }
   return facts;
 }
@@ -151,8 +155,8 @@ class Packer {
     for (const std::uint32_t count : originals_) figures.segments += count;
     for (const circuit::Instance& i : c.instances) {
       const Quat q = i.orientation;
-      const frame::Instance instance{
-          i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()};
+      const frame::Instance instance{i.position.x(), i.position.y(), i.position.z(), i.morphology,
+                                     q.x(),          q.y(),          q.z(),          q.w()};
       add(Part::instances, instance);
       add(Part::types, i.type);
       add(Part::layers, i.layer);
@@ -163,7 +167,7 @@ class Packer {
     for (std::uint32_t p = 0; p < part_count; ++p) {
       if (p != Part::segments) {
         begin(Part(p));
-        waiting_[p].pour([&](Bytes bytes) { write(Part(p), bytes); });
+        waiting_[p].pour([&](Bytes bytes) { out_.write(bytes); });
       }
       header_.table[p] = {p, element_sizes[p], offsets_[p], counts_[p], hashes_[p].value()};
     }
@@ -190,16 +194,12 @@ class Packer {
     if ((counts_[part] += bytes.size() / element_sizes[part]) > 0xffffffffull)
       throw LimitError(
           "a forest file holds at most 4,294,967,295 distinct segments; plant fewer distinct neurons");
+    hashes_[part].add(bytes);
     if (part == Part::segments)
-      write(part, bytes);
+      out_.write(bytes);
     else
       waiting_[part].add(bytes, out_.file());
   }
-  void write(Part part, Bytes bytes) {
-    hashes_[part].add(bytes);
-    out_.write(bytes);
-  }
-
   Output& out_;
   Header header_{
       .magic = magic, .version = version, .parts = part_count, .file_size = 0, .table_hash = 0, .table = {}};
@@ -237,7 +237,8 @@ std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morpholog
     throw Error(fmt::format("the circuit names {} morphologies and {} came with it", c.morphologies.size(),
                             morphologies.size()));
   Output out(nullptr);
-  pack_into(out, c, [&](std::size_t i) { return morphologies[i]; }, progress, nodes);
+  pack_into(
+      out, c, [&](std::size_t i) { return morphologies[i]; }, progress, nodes);
   return out.memory();
 }
 

@@ -48,7 +48,7 @@ TEST(ForestFile, IsTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(all, pack(circuit, neurons));
 }
 
-class PackedFile : public testing::Test {
+class PackedFile : public ::testing::Test {
  protected:
   void SetUp() override { std::filesystem::create_directories(folder_); }
   void TearDown() override { std::filesystem::remove_all(folder_); }
