@@ -118,6 +118,9 @@ struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  // Lines thinner than this are drawn as wide or not at all, by the rank of their branch, so that they cover their area on
+  // the mean; pixels, and 1 for a picture of a single subframe.
+  float thinnest = 0.f;
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
   std::optional<Area> hole;  // of them these are not wanted either
   // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.
@@ -131,8 +134,8 @@ struct Frame : Lists {
   std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
   std::optional<Glass> glass;
-  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
-  /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
+  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, or once for those that are
+  /// drawn together, when the lists are drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
   std::function<Lists(const DepthMap&)> rest;
 };
 
@@ -155,6 +158,12 @@ Vec3 light_direction();
 /// Where subframe number `subframe` looks through each pixel: x and y from its middle, in pixels, within ±½ (the 2, 3
 /// sequence of Halton); a picture of one subframe looks through the middle. The centre of the picture moves by as much.
 Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes);
+
+/// Subframes that the processor draws together, in groups that begin at multiples of it: a part of a picture is drawn soonest
+/// in whole groups.
+inline std::uint32_t drawn_together(std::uint32_t subframes) {
+  return subframes == 1 ? 1 : subframes <= 4 ? 4 : 16;
+}
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);

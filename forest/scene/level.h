@@ -2,6 +2,7 @@
 // How much detail a place in the picture deserves: pure functions of bounds, error, camera and gaze.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "forest/frame/camera.h"
@@ -20,8 +21,10 @@ struct Detail {
       0.f;  // degrees that the picture's height takes in the viewer's sight; 0: as many as the field of view
   std::optional<frame::Area> area = {};  // only these pixels are wanted; none: all
   float surface_width =
-      3.f;            // branches wider than this many pixels are drawn as capsules, thinner ones as lines
-  bool thin = false;  // leave out runs whose branches are all too thin for their rank: right for one subframe
+      3.f;  // branches wider than this many pixels are drawn as capsules, thinner ones as lines
+  // Branches thinner than this many pixels are drawn as wide, as many of them as cover the same area: whole branches stand
+  // for their like. 0: all are drawn as they are. A picture of one sample cannot draw less than a pixel.
+  float thinnest = 0.f;
 };
 
 /// Where somebody looks on a flat screen, and how far beside it things are seen. Degrees are those of the viewer, whose sight
@@ -86,17 +89,24 @@ class Eye {
   Gaze gaze_;
 };
 
-/// A frame-time budget that moves the acceptable error: pictures that took too long make it larger, quick ones smaller,
-/// between a pixel and `worst`.
+/// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as stills have
+/// where there is time for them, else one; and the acceptable error, which pictures that took too long make larger and quick
+/// ones smaller.
 class Budget {
  public:
+  /// @param worst  error that is accepted at most, pixels
   explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
+  std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
+  /// As Detail::thinnest: what is smaller than the error need not be there one by one.
+  float thinnest() const { return samples_ == 1 ? error_ : std::max(0.f, .5f * (error_ - 1.f)); }
+  /// To be told of every picture that was drawn so.
   void took(double milliseconds);
 
  private:
   double milliseconds_;
   float worst_, error_ = 1.f;
+  std::uint32_t samples_ = 1, agreed_ = 0;  // pictures that have asked for the other number of samples
 };
 
 }  // namespace forest::scene
