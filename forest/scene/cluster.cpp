@@ -327,13 +327,17 @@ class Sketch {
   // which was split before deviate by more. What weighs no more than `least` counts as nothing.
   void measure(Line& line, float least) {
     const std::uint32_t begin = line.first, end = line.first + line.count - 1;
+    weight_[begin] = weight_[end] = INFINITY;
+    if (line.count == 2) {
+      line.reach = distance(begin, end);
+      return;
+    }
     float reach = 0.f;
     for (std::uint32_t v = begin + 1; v <= end; ++v) {
       const float x = x_[v] - x_[begin], y = y_[v] - y_[begin], z = z_[v] - z_[begin];
       reach = std::max(reach, x * x + y * y + z * z);
     }
     line.reach = std::sqrt(reach);
-    weight_[begin] = weight_[end] = INFINITY;
     std::array<std::pair<std::uint32_t, std::uint32_t>, most_vertices> open;
     std::size_t waiting = 0;
     open[waiting++] = {begin, end};
@@ -525,8 +529,12 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
   for (const Strip& s : drawing.strips_of(draft))
     for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
       Sphere& sphere = drawn.groups[count / size];
-      for (const Vec4* v : {&drawing.vertices[i - 1], &drawing.vertices[i]})
-        sphere.radius = std::max(sphere.radius, (v->head<3>() - sphere.centre).norm() + v->w());
+      const auto reach = [&](const Vec4& v) {
+        sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
+      };
+      if (i == s.first + 1 || count % size == 0)
+        reach(drawing.vertices[i - 1]);  // else it was the last one's end
+      reach(drawing.vertices[i]);
     }
   return drawn;
 }
@@ -546,10 +554,26 @@ std::uint32_t packed(const Sphere& sphere, const Sphere& of_cluster) {
   return bits | std::uint32_t(std::clamp(std::ceil(radius * 1.0001f / unit), 0.f, 255.f)) << 24;
 }
 
-std::vector<double> section_lengths(const Morphology& m) {
-  std::vector<double> lengths(m.sections().size());
-  for (std::size_t i = 0; i < lengths.size(); ++i) lengths[i] = section_length(m, SectionId(i));
-  return lengths;
+// Of every section, as section_length and section_area have them, found together.
+struct Sizes {
+  std::vector<double> lengths, areas;
+};
+
+Sizes sizes_of(const Morphology& m) {
+  Sizes sizes;
+  for (const Section& s : m.sections()) {
+    const auto points = m.points().subspan(s.first_point, s.point_count);
+    double length = 0., area = 0.;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const double along = segment_length(points[i - 1], points[i]);
+      const double taper = double(points[i].radius) - points[i - 1].radius;
+      length += along;
+      area += std::numbers::pi * (double(points[i - 1].radius) + points[i].radius) *
+              std::sqrt(along * along + taper * taper);
+    }
+    sizes.lengths.push_back(length), sizes.areas.push_back(area);
+  }
+  return sizes;
 }
 
 std::vector<std::uint32_t> branch_numbers(const Morphology& m, std::span<const double> lengths) {
@@ -581,7 +605,7 @@ std::vector<std::uint32_t> branch_numbers(const Morphology& m, std::span<const d
 }  // namespace
 
 std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
-  return branch_numbers(m, section_lengths(m));
+  return branch_numbers(m, sizes_of(m).lengths);
 }
 
 ClusterTree build_clusters(const Morphology& m) {
@@ -597,13 +621,12 @@ ClusterTree build_clusters(const Morphology& m) {
   tree.soma_radius = soma.radius;
 
   // Ranks: the share of the neuron's length that lies in branches of smaller number.
-  const std::vector<double> own_lengths = section_lengths(m);
-  const std::vector<std::uint32_t> numbers = branch_numbers(m, own_lengths);
+  const Sizes sizes = sizes_of(m);
+  const std::vector<std::uint32_t> numbers = branch_numbers(m, sizes.lengths);
   std::vector<double> lengths(sections + 1);
-  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += own_lengths[i];
+  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += sizes.lengths[i];
   std::vector<double> means(sections);  // of the radius along each branch
-  for (std::size_t i = 0; i < sections; ++i)
-    means[numbers[i]] += section_area(m, SectionId(i)) / (2. * std::numbers::pi);
+  for (std::size_t i = 0; i < sections; ++i) means[numbers[i]] += sizes.areas[i] / (2. * std::numbers::pi);
   for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
   // A branch that is thicker than the one it leaves must not be seen without it.
   for (std::size_t i = 0; i < sections; ++i)
@@ -681,16 +704,16 @@ ClusterTree build_clusters(const Morphology& m) {
       }
     }
     const std::uint32_t begin = here();
+    drawing.vertices.resize(begin + points.size()), drawing.places.resize(begin + points.size());
+    const auto vertices = std::span(drawing.vertices).subspan(begin);
+    const auto places = std::span(drawing.places).subspan(begin);
     float way = 0.f;
-    for (const Point& p : points) {
-      const Vec4 v = vertex(p);
-      if (here() > begin) way += (v - drawing.vertices.back()).head<3>().norm();
-      put(v, {id.value(), way});
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      vertices[i] = vertex(points[i]);
+      if (i) way += (vertices[i] - vertices[i - 1]).head<3>().norm();
+      places[i] = {id.value(), way};
     }
-    for (std::uint32_t i = begin; i < here(); ++i) {
-      float& position = drawing.places[i].position;
-      position = way > 0.f ? position / way : .5f;
-    }
+    for (reports::Place& place : places) place.position = way > 0.f ? place.position / way : .5f;
     ways[id.value()] = way;
     if (points.size() >= 2)
       add({.first = begin,
