@@ -13,6 +13,7 @@
 
 #include "forest/frame/camera.h"
 #include "forest/frame/layout.h"
+#include "forest/geometry/mesh.h"
 #include "forest/geometry/plane.h"
 
 namespace forest::frame {
@@ -79,6 +80,26 @@ struct Overlay {
   std::uint32_t colour = 0;  // palette entry
 };
 
+/// Triangles with smooth shading: the surface of a cortex, the skin of a neuron. Both sides are seen.
+struct Surface {
+  static constexpr std::uint32_t in_world = 0xffffffffu;
+
+  std::span<const Vec3> positions;  // µm, in the world or of a neuron
+  std::span<const Vec3>
+      normals;  // unit, one a position; of the side from which triangles run counter-clockwise
+  std::span<const std::uint8_t>
+      entries;  // of the palette, one a position. Between them triangles are dithered
+  std::span<const std::uint8_t>
+      openness;  // one a position: the share of light that gets there, in 255ths; none: all of it
+  std::span<const std::uint8_t> presence;  // one a position: times the opacity, in 255ths; none: all is there
+  std::span<const Triangle> triangles;     // into positions
+  std::uint32_t instance = in_world;       // whose coordinates these are
+  std::uint8_t opacity = 255;              // 255: opaque
+  // What a renderer has seen under this number, entries, presence and opacity aside, it need not take again; 0: it may have
+  // changed.
+  std::uint64_t version = 0;
+};
+
 /// Where a band of a frame's lists ends. Bands follow one another from near to far; what the earlier ones hide
 /// is not drawn in the later ones.
 struct Band {
@@ -130,6 +151,7 @@ struct Frame : Lists {
   Opacities opacities = opaque();
   std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
+  std::span<const Surface> surfaces;
   std::optional<Glass> glass;
   /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
   /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
@@ -158,7 +180,8 @@ Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes);
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);
-/// Whether anything in it may be transparent.
+void check(const Surface& surface, const Geometry& geometry);
+/// Whether any segment in it may be transparent.
 bool transparent(const Frame& frame);
 void check(const Lists& lists, const Geometry& geometry);
 

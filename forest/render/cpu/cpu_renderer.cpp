@@ -6,6 +6,7 @@
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/resolve.h"
 #include "forest/render/cpu/splat.h"
+#include "forest/render/cpu/triangles.h"
 
 namespace forest::render {
 namespace {
@@ -70,6 +71,10 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
     s.canvas.clear(f.width, f.height, area, f.hole.value_or(frame::Area{}), f.gaps);
+    if (!f.surfaces.empty()) {  // they hide much
+      cpu::splat(s.picture, f.surfaces, s.canvas);
+      s.canvas.look();
+    }
     timing.drawn = s.draw(f);
     if (f.rest) {
       s.canvas.look();
