@@ -26,7 +26,7 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::uint32_t neurons = 10000, frames = 60;
+  std::uint32_t neurons = 10000, frames = 60, samples = 1;
   std::uint64_t seed = 1;
   double budget = 85.;  // milliseconds a picture
   std::string size = "1280x720";
@@ -61,7 +61,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
   for (std::uint32_t i = 0; i < options.frames; ++i) {
     const auto start = Clock::now();
     scene::View view = view_at(float(i) / float(options.frames));
-    view.samples = 1;
+    view.samples = options.samples;
     view.detail.error = budget.error();
     std::uint64_t touched = 0;
     if (const scene::Playback* playback = artist.playback()) {
@@ -172,6 +172,7 @@ void run(const Options& options, Console& console) {
                {"forest_bytes", forest.bytes()},
                {"inside", json_of(inside)},
                {"size", options.size},
+               {"samples", options.samples},
                {"renderer", artist.renderer()}});
   if (options.activity) {
     json["pixels_changing"] = changes;
@@ -216,13 +217,10 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_column(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command
-      .add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
-      ->check(CLI::Range(10, 10'000'000))
-      ->capture_default_str();
-  command.add_option("--frames", options->frames, "Pictures drawn outside, and as many inside")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
+  add_whole(command, "--neurons", options->neurons,
+            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_whole(command, "--frames", options->frames, "Pictures drawn outside, and as many inside", 2, 100'000);
+  add_whole(command, "--samples", options->samples, "Samples a pixel", 1, 1024);
   command
       .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
       ->check(CLI::Range(1., 10000.))

@@ -19,7 +19,8 @@ namespace {
 
 std::string map_names() {
   std::string names;
-  for (const scene::ColourMap& map : scene::colour_maps()) names += (names.empty() ? "" : ", ") + std::string(map.name);
+  for (const scene::ColourMap& map : scene::colour_maps())
+    names += (names.empty() ? "" : ", ") + std::string(map.name);
   return names;
 }
 
@@ -34,9 +35,10 @@ std::pair<float, float> parse_range(const std::string& text) {
   const float low = number(text.substr(0, colon)),
               high = colon == text.npos ? NAN : number(text.substr(colon + 1));
   if (!(std::isfinite(low) && std::isfinite(high) && low < high))
-    throw Error(fmt::format("'{}' is no range; give the values at both ends of the colour map, the lower one "
-                            "first, for example --range 1.5:4",
-                            text));
+    throw Error(
+        fmt::format("'{}' is no range; give the values at both ends of the colour map, the lower one "
+                    "first, for example --range 1.5:4",
+                    text));
   return {low, high};
 }
 
@@ -47,8 +49,9 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
   each(command.add_option(
       "--surface", options.files,
       "Surface of a cortex to show, too: GIFTI (.surf.gii) or FreeSurfer (lh.pial), in mm"));
-  each(command.add_option("--surface-opacity", options.opacities,
-                          "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow"))
+  each(command.add_option(
+           "--surface-opacity", options.opacities,
+           "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow"))
       ->check(CLI::Range(0., 1.));
   each(command.add_option(
       "--overlay", options.overlays,
@@ -70,8 +73,9 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
   }
   if (!options.range.empty()) surfaces.range = parse_range(options.range);
   if (options.overlays.size() > options.files.size())
-    throw Error(fmt::format("{} overlays are given and {} surfaces; an overlay colours the surface in its place",
-                            options.overlays.size(), options.files.size()));
+    throw Error(
+        fmt::format("{} overlays are given and {} surfaces; an overlay colours the surface in its place",
+                    options.overlays.size(), options.files.size()));
   for (std::size_t i = 0; i < options.files.size(); ++i) {
     const float opacity =
         options.opacities.empty() ? 1.f : options.opacities[std::min(i, options.opacities.size() - 1)];
@@ -96,7 +100,8 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
     }
   }
   if (options.opacities.size() > options.files.size())
-    console.warn(fmt::format("{} of the opacities belong to no surface", options.opacities.size() - options.files.size()));
+    console.warn(fmt::format("{} of the opacities belong to no surface",
+                             options.opacities.size() - options.files.size()));
   return surfaces;
 }
 

@@ -100,6 +100,11 @@ struct Surface {
   std::uint64_t version = 0;
 };
 
+/// What tells its screen door from others: surfaces in the world are things of their own, those of one instance pieces of one.
+inline std::uint32_t door_number(std::span<const Surface> surfaces, std::size_t which) {
+  return surfaces[which].instance == Surface::in_world ? std::uint32_t(which) : 0u;
+}
+
 /// Where a band of a frame's lists ends. Bands follow one another from near to far; what the earlier ones hide
 /// is not drawn in the later ones.
 struct Band {

@@ -54,7 +54,8 @@ std::optional<std::string> base64(std::string_view text) {
     std::array<std::int8_t, 256> table{};
     table.fill(-1);
     for (int i = 0; i < 64; ++i)
-      table[std::size_t("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"[i])] = std::int8_t(i);
+      table[std::size_t("ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/"[i])] =
+          std::int8_t(i);
     return table;
   }();
   std::string bytes;
@@ -107,9 +108,12 @@ class Reader {
         const float value = label.attribute(of).as_float(otherwise);
         return std::isfinite(value) ? std::clamp(value, 0.f, 1.f) : otherwise;
       };
-      const pugi::xml_attribute key = label.attribute("Key") ? label.attribute("Key") : label.attribute("Index");
-      result.push_back({key.as_int(), label.child_value(),
-                        {share("Red", .7f), share("Green", .7f), share("Blue", .7f)}, share("Alpha", 1.f)});
+      const pugi::xml_attribute key =
+          label.attribute("Key") ? label.attribute("Key") : label.attribute("Index");
+      result.push_back({key.as_int(),
+                        label.child_value(),
+                        {share("Red", .7f), share("Green", .7f), share("Blue", .7f)},
+                        share("Alpha", 1.f)});
     }
     return result;
   }
@@ -120,7 +124,8 @@ class Reader {
     const std::string_view type_name = element.attribute("DataType").value();
     const auto type = std::ranges::find(types, type_name, &TypeRow::name);
     if (type == types.end())
-      fail(intent, fmt::format("has the type '{}', which is not read; write it as NIFTI_TYPE_FLOAT32", printable(type_name)));
+      fail(intent, fmt::format("has the type '{}', which is not read; write it as NIFTI_TYPE_FLOAT32",
+                               printable(type_name)));
     const std::uint64_t dimensions = whole(element.attribute("Dimensionality").value()).value_or(1);
     std::uint64_t count = 1;
     for (std::uint64_t i = 0; i < std::min<std::uint64_t>(dimensions, 6); ++i) {
@@ -131,7 +136,8 @@ class Reader {
       else
         array.columns *= *size;
       count *= *size;
-      if (count > (1u << 28)) fail(intent, "says that it has more than 268,435,456 numbers; get the file again");
+      if (count > (1u << 28))
+        fail(intent, "says that it has more than 268,435,456 numbers; get the file again");
     }
     if (dimensions == 0) fail(intent, "has no dimension; get the file again");
     const pugi::xml_node data = element.child("Data");
@@ -185,7 +191,8 @@ class Reader {
     }
     if (numbers.size() != count)
       fail(intent, fmt::format("should have {} numbers and has {}{}; get the whole file", count,
-                               numbers.size() > count ? "more than " : "", std::min<std::size_t>(numbers.size(), count)));
+                               numbers.size() > count ? "more than " : "",
+                               std::min<std::size_t>(numbers.size(), count)));
     return numbers;
   }
 
@@ -226,7 +233,8 @@ class Reader {
   pugi::xml_node root_;
 };
 
-constexpr std::string_view points_intent = "NIFTI_INTENT_POINTSET", triangles_intent = "NIFTI_INTENT_TRIANGLE";
+constexpr std::string_view points_intent = "NIFTI_INTENT_POINTSET",
+                           triangles_intent = "NIFTI_INTENT_TRIANGLE";
 
 }  // namespace
 
@@ -240,21 +248,23 @@ Mesh read_gifti_surface(std::string_view text, const std::string& name) {
                                  points ? triangles_intent : points_intent));
   for (const Array& array : {std::cref(*points), std::cref(*triangles)})
     if (array.columns != 3)
-      throw InputError(name, 0, fmt::format("the array {} should have rows of 3 numbers and has {}; get the file again", array.intent, array.columns));
+      throw InputError(
+          name, 0,
+          fmt::format("the array {} should have rows of 3 numbers and has {}; get the file again",
+                      array.intent, array.columns));
   Mesh mesh;
   mesh.positions.reserve(points->rows), mesh.triangles.reserve(triangles->rows);
   for (std::size_t i = 0; i < points->rows; ++i)
-    mesh.positions.push_back(micrometres(
-        Eigen::Vector3d::Map(&points->numbers[3 * i]).cast<float>(), name));
+    mesh.positions.push_back(micrometres(Eigen::Vector3d::Map(&points->numbers[3 * i]).cast<float>(), name));
   mesh.labels.assign(points->rows, 0);
   for (std::size_t i = 0; i < triangles->rows; ++i) {
     Triangle& corners = mesh.triangles.emplace_back();
     for (std::size_t k = 0; k < 3; ++k) {
       const double corner = triangles->numbers[3 * i + k];
       if (!(corner >= 0. && corner < double(points->rows)) || corner != std::floor(corner))
-        throw InputError(name, 0,
-                         fmt::format("triangle {} names vertex {} of {}; get the whole file", i, corner,
-                                     points->rows));
+        throw InputError(
+            name, 0,
+            fmt::format("triangle {} names vertex {} of {}; get the whole file", i, corner, points->rows));
       corners[k] = std::uint32_t(corner);
     }
   }

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-
 #include <zlib.h>
 
 #include "forest/core/error.h"

@@ -86,7 +86,8 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
     result = read_gifti_values(content, name);
   else
     result = read_lines(content, name);
-  if (result.values.empty()) throw InputError(name, 0, "holds no value; give a file with one for every vertex");
+  if (result.values.empty())
+    throw InputError(name, 0, "holds no value; give a file with one for every vertex");
   for (float& value : result.values)
     if (!std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
   return result;
@@ -100,7 +101,7 @@ std::string printable(std::string_view word) {
 }
 
 Vec3 micrometres(const Vec3& millimetres, const std::string& name) {
-  constexpr float farthest = 1e5f;  // mm
+  constexpr float farthest = 1e5f;                       // mm
   if (!(millimetres.cwiseAbs().maxCoeff() <= farthest))  // also where one is not a number
     throw InputError(name, 0, "has a vertex that is nowhere (not a number, or farther than 100 m); mend it");
   return millimetres * 1000.f;

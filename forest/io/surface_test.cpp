@@ -4,13 +4,14 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <zlib.h>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
-#include <zlib.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+
 #include "tests/real_data.h"
 
 namespace forest::io {
@@ -27,7 +28,10 @@ constexpr float places[4][3] = {{0, 0, 0}, {30, 0, 0}, {0, -20.5, 0}, {0, 0, 1e-
 constexpr std::uint32_t corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
 
 std::string freesurfer_surface() {
-  std::string bytes = "\xff\xff\xfe" "created by nobody on no day\n\n" + big_endian(4u) + big_endian(4u);
+  std::string bytes =
+      "\xff\xff\xfe"
+      "created by nobody on no day\n\n" +
+      big_endian(4u) + big_endian(4u);
   for (const auto& place : places)
     for (const float x : place) bytes += big_endian(x);
   for (const auto& triangle : corners)
@@ -36,7 +40,8 @@ std::string freesurfer_surface() {
 }
 
 std::string freesurfer_values(std::initializer_list<float> values) {
-  std::string bytes = "\xff\xff\xff" + big_endian(std::uint32_t(values.size())) + big_endian(4u) + big_endian(1u);
+  std::string bytes =
+      "\xff\xff\xff" + big_endian(std::uint32_t(values.size())) + big_endian(4u) + big_endian(1u);
   for (const float value : values) bytes += big_endian(value);
   return bytes;
 }
@@ -48,7 +53,8 @@ std::string base64(const std::string& bytes) {
     std::uint32_t bits = 0;
     for (std::size_t k = 0; k < 3; ++k)
       bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
-    for (std::size_t k = 0; k < 4; ++k) text += i + k < bytes.size() + 1 ? signs[bits >> (18 - 6 * k) & 63] : '=';
+    for (std::size_t k = 0; k < 4; ++k)
+      text += i + k < bytes.size() + 1 ? signs[bits >> (18 - 6 * k) & 63] : '=';
   }
   return text;
 }
@@ -73,12 +79,14 @@ std::string raw(const T* values, std::size_t count, bool big) {
   std::memcpy(bytes.data(), values, bytes.size());
   if (big)
     for (std::size_t i = 0; i < count; ++i)
-      std::reverse(bytes.begin() + std::ptrdiff_t(i * sizeof(T)), bytes.begin() + std::ptrdiff_t((i + 1) * sizeof(T)));
+      std::reverse(bytes.begin() + std::ptrdiff_t(i * sizeof(T)),
+                   bytes.begin() + std::ptrdiff_t((i + 1) * sizeof(T)));
   return bytes;
 }
 
 std::string array(const std::string& intent, const std::string& type, const std::string& sizes,
-                  const std::string& encoding, const std::string& data, const std::string& more = "Endian=\"LittleEndian\"") {
+                  const std::string& encoding, const std::string& data,
+                  const std::string& more = "Endian=\"LittleEndian\"") {
   return fmt::format(
       "<DataArray Intent=\"NIFTI_INTENT_{}\" DataType=\"NIFTI_TYPE_{}\" {} Encoding=\"{}\" {}>\n<MetaData/>"
       "<Data>{}</Data></DataArray>\n",
@@ -146,10 +154,10 @@ TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {
     for (const float x : place) points += fmt::format(" {}\n", x);
   for (std::size_t k = 0; k < 3; ++k)
     for (const auto& triangle : corners) columns += fmt::format("{} ", triangle[k]);
-  expect_tetrahedron(read_surface(
-      gifti(array("POINTSET", "FLOAT64", point_sizes, "ASCII", points) +
-            array("TRIANGLE", "UINT8", point_sizes, "ASCII", columns, "ArrayIndexingOrder=\"ColumnMajorOrder\"")),
-      "g"));
+  expect_tetrahedron(read_surface(gifti(array("POINTSET", "FLOAT64", point_sizes, "ASCII", points) +
+                                        array("TRIANGLE", "UINT8", point_sizes, "ASCII", columns,
+                                              "ArrayIndexingOrder=\"ColumnMajorOrder\"")),
+                                  "g"));
 }
 
 TEST(Surface, ValuesAreReadFromEveryFormat) {
@@ -171,7 +179,8 @@ TEST(Surface, ValuesAreReadFromEveryFormat) {
   const std::int32_t keys[] = {0, 7, 7, 2};
   const SurfaceValues labels = read_surface_values(
       gifti("<LabelTable><Label Key=\"0\" Red=\"1\" Green=\"1\" Blue=\"1\" Alpha=\"0\">none</Label>"
-            "<Label Key=\"7\" Red=\".5\" Green=\"0\" Blue=\"x\" Alpha=\"1\"><![CDATA[V1 & V2]]></Label></LabelTable>" +
+            "<Label Key=\"7\" Red=\".5\" Green=\"0\" Blue=\"x\" Alpha=\"1\"><![CDATA[V1 & "
+            "V2]]></Label></LabelTable>" +
             array("LABEL", "INT32", value_sizes, "Base64Binary", base64(raw(keys, 4, false)))),
       "g");
   EXPECT_EQ(labels.values, (std::vector<float>{0, 7, 7, 2}));
@@ -183,24 +192,33 @@ TEST(Surface, ValuesAreReadFromEveryFormat) {
 }
 
 TEST(Surface, EveryFileThatIsCutOffIsAnErrorOrWhole) {
-  for (const std::string& whole : {freesurfer_surface(), gzipped(freesurfer_surface()), gifti_surface("Base64Binary"),
-                                   gifti_surface("GZipBase64Binary"), gzipped(gifti_surface("GZipBase64Binary"))})
+  for (const std::string& whole :
+       {freesurfer_surface(), gzipped(freesurfer_surface()), gifti_surface("Base64Binary"),
+        gifti_surface("GZipBase64Binary"), gzipped(gifti_surface("GZipBase64Binary"))})
     for (std::size_t size = 0; size + 1 < whole.size(); ++size) {
       const std::string part = whole.substr(0, size);
       // A gzip file without its sum, and XML without its last line end, hold everything.
       if (surface_error(part).empty()) expect_tetrahedron(read_surface(part, "part"));
     }
   const std::string values = freesurfer_values({1, 2, 3});
-  for (std::size_t size = 4; size < values.size(); ++size) EXPECT_NE(values_error(values.substr(0, size)), "") << size;
+  for (std::size_t size = 4; size < values.size(); ++size)
+    EXPECT_NE(values_error(values.substr(0, size)), "") << size;
 }
 
 TEST(Surface, SizesThatLieCostNoMemory) {
-  std::string bytes = "\xff\xff\xfe" "a\n\n" + big_endian(0x7fffffffu) + big_endian(0x7fffffffu);
+  std::string bytes =
+      "\xff\xff\xfe"
+      "a\n\n" +
+      big_endian(0x7fffffffu) + big_endian(0x7fffffffu);
   EXPECT_NE(surface_error(bytes).find("cut off"), std::string::npos);
-  bytes = "\xff\xff\xfe" "a\n\n" + big_endian(0x80000000u) + big_endian(1u);
+  bytes =
+      "\xff\xff\xfe"
+      "a\n\n" +
+      big_endian(0x80000000u) + big_endian(1u);
   EXPECT_NE(surface_error(bytes).find("-2147483648 vertices"), std::string::npos);
   EXPECT_NE(values_error("\xff\xff\xff" + big_endian(0x7fffffffu) + big_endian(1u) + big_endian(1u)), "");
-  EXPECT_NE(values_error("\xff\xff\xff" + big_endian(1u) + big_endian(1u) + big_endian(3u)).find("3 values"), std::string::npos);
+  EXPECT_NE(values_error("\xff\xff\xff" + big_endian(1u) + big_endian(1u) + big_endian(3u)).find("3 values"),
+            std::string::npos);
   const std::string data = base64(deflated(std::string(48, 'a')));
   for (const auto& [sizes, what] :
        {std::pair("Dimensionality=\"2\" Dim0=\"200000000\" Dim1=\"3\"", "268,435,456"),
@@ -208,7 +226,9 @@ TEST(Surface, SizesThatLieCostNoMemory) {
         std::pair("Dimensionality=\"2\" Dim0=\"99999999999999999999\" Dim1=\"3\"", "Dim0"),
         std::pair("Dimensionality=\"2\" Dim0=\"-4\" Dim1=\"3\"", "Dim0"),
         std::pair("Dimensionality=\"2\" Dim0=\"4\"", "Dim1"), std::pair("Dimensionality=\"0\"", "dimension"),
-        std::pair("Dimensionality=\"6\" Dim0=\"4\" Dim1=\"100000\" Dim2=\"100000\" Dim3=\"1\" Dim4=\"1\" Dim5=\"1\"", "268")})
+        std::pair("Dimensionality=\"6\" Dim0=\"4\" Dim1=\"100000\" Dim2=\"100000\" Dim3=\"1\" Dim4=\"1\" "
+                  "Dim5=\"1\"",
+                  "268")})
     for (const char* encoding : {"GZipBase64Binary", "Base64Binary", "ASCII"}) {
       const std::string error = values_error(gifti(array("SHAPE", "FLOAT32", sizes, encoding, data)));
       EXPECT_NE(error, "") << sizes;
@@ -234,21 +254,34 @@ TEST(Surface, WhatCannotBeIsRefusedWithOneSentence) {
     bytes.replace(3 + 28 + 8 + 1, 4, big_endian(wrong));
     EXPECT_NE(surface_error(bytes), "") << wrong;
   }
-  EXPECT_NE(surface_error("\xff\xff\xfe" "a\n\n" + big_endian(0u) + big_endian(0u)), "");
+  EXPECT_NE(surface_error("\xff\xff\xfe"
+                          "a\n\n" +
+                          big_endian(0u) + big_endian(0u)),
+            "");
   const std::string points = array("POINTSET", "FLOAT32", point_sizes, "ASCII", "0 0 0 1 0 0 0 1 0 0 0 1");
-  for (const char* triangles : {"0 1 2 0 1 3 0 2 3 1 2 4", "0 1 2 0 1 3 0 2 3 1 2 -1", "0 1 2 0 1 3 0 2 3 1 2 nan",
-                                "0 1 2 0 1 3 0 2 3 1 2 1e30", "0 1 2 0 1 3 0 2 3 1 2", "0 1 2 0 1 3 0 2 3 1 2 3 3",
-                                "0 1 2 0 1 3 0 2 3 1 2 x", ""})
-    EXPECT_NE(surface_error(gifti(points + array("TRIANGLE", "INT32", point_sizes, "ASCII", triangles))), "") << triangles;
+  for (const char* triangles :
+       {"0 1 2 0 1 3 0 2 3 1 2 4", "0 1 2 0 1 3 0 2 3 1 2 -1", "0 1 2 0 1 3 0 2 3 1 2 nan",
+        "0 1 2 0 1 3 0 2 3 1 2 1e30", "0 1 2 0 1 3 0 2 3 1 2", "0 1 2 0 1 3 0 2 3 1 2 3 3",
+        "0 1 2 0 1 3 0 2 3 1 2 x", ""})
+    EXPECT_NE(surface_error(gifti(points + array("TRIANGLE", "INT32", point_sizes, "ASCII", triangles))), "")
+        << triangles;
   EXPECT_NE(surface_error(gifti(points)).find("TRIANGLE"), std::string::npos);
   EXPECT_NE(surface_error(gifti("")).find("POINTSET"), std::string::npos);
   EXPECT_NE(values_error(gifti(points)).find("no values"), std::string::npos);
-  EXPECT_NE(surface_error(gifti(array("POINTSET", "COMPLEX64", point_sizes, "ASCII", "0"))).find("COMPLEX64"), std::string::npos);
-  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "ExternalFileBinary", ""))).find("another file"), std::string::npos);
-  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "Base64Binary", "????"))).find("base64"), std::string::npos);
-  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", point_sizes, "ASCII", "0 0 0 1 0 0 0 1 0 0 0 1"))).find("3 values"), std::string::npos);
+  EXPECT_NE(surface_error(gifti(array("POINTSET", "COMPLEX64", point_sizes, "ASCII", "0"))).find("COMPLEX64"),
+            std::string::npos);
+  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "ExternalFileBinary", "")))
+                .find("another file"),
+            std::string::npos);
+  EXPECT_NE(
+      values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "Base64Binary", "????"))).find("base64"),
+      std::string::npos);
+  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", point_sizes, "ASCII", "0 0 0 1 0 0 0 1 0 0 0 1")))
+                .find("3 values"),
+            std::string::npos);
   EXPECT_NE(surface_error("<GIFTI><DataArray>").find("XML"), std::string::npos);
-  for (const char* other : {"", "1 2 3", "# vtk DataFile", "\x1f\x8bnothing", "\xff\xff\xfd"}) EXPECT_NE(surface_error(other), "") << other;
+  for (const char* other : {"", "1 2 3", "# vtk DataFile", "\x1f\x8bnothing", "\xff\xff\xfd"})
+    EXPECT_NE(surface_error(other), "") << other;
   for (const char* other : {"", "a\n", "1 2\n"}) EXPECT_NE(values_error(other), "") << other;
   EXPECT_EQ(values_error("1\ntwo\x1b[2J\n").find('\x1b'), std::string::npos);
   // Elements within one another cost no stack.
@@ -260,7 +293,8 @@ TEST(Surface, WhatCannotBeIsRefusedWithOneSentence) {
 TEST(Surface, RealFilesAreWhatTheirAtlasesSay) {
   FOREST_REAL_DATA(folder, "cortex");
   const auto read = [&](const char* file) { return MappedFile(folder / file); };
-  const MappedFile pial_file = read("fsaverage5/pial_left.gii.gz"), white_file = read("fsaverage5/white_left.gii.gz");
+  const MappedFile pial_file = read("fsaverage5/pial_left.gii.gz"),
+                   white_file = read("fsaverage5/white_left.gii.gz");
   const Mesh pial = read_surface(pial_file.text(), "pial"), white = read_surface(white_file.text(), "white");
   EXPECT_EQ(pial.positions.size(), 10242u);
   EXPECT_EQ(pial.triangles.size(), 20480u);
@@ -271,16 +305,23 @@ TEST(Surface, RealFilesAreWhatTheirAtlasesSay) {
   EXPECT_GT(volume(pial) / 1e12, 400.);
   EXPECT_LT(volume(pial) / 1e12, 650.);
   EXPECT_LT(volume(white), volume(pial));
-  const SurfaceValues thickness = read_surface_values(read("fsaverage5/thick_left.gii.gz").text(), "thickness");
+  const SurfaceValues thickness =
+      read_surface_values(read("fsaverage5/thick_left.gii.gz").text(), "thickness");
   ASSERT_EQ(thickness.values.size(), 10242u);
   double sum = 0.;
-  for (std::size_t i = 0; i < 10242; ++i) sum += double((pial.positions[i] - white.positions[i]).norm()) / 1000. - double(thickness.values[i]);
+  for (std::size_t i = 0; i < 10242; ++i)
+    sum += double((pial.positions[i] - white.positions[i]).norm()) / 1000. - double(thickness.values[i]);
   EXPECT_NEAR(sum / 10242., 0., .5);  // mm
-  for (const char* file : {"fs_LR_left/fs_LR.32k.L.pial.surf.gii", "bigbrain_left/tpl-bigbrain_hemi-L_desc-pial.surf.gii.gz", "fsaverage5/flat_left.gii.gz"}) {
+  for (const char* file :
+       {"fs_LR_left/fs_LR.32k.L.pial.surf.gii", "bigbrain_left/tpl-bigbrain_hemi-L_desc-pial.surf.gii.gz",
+        "fsaverage5/flat_left.gii.gz"}) {
     const MappedFile one = read(file);
     EXPECT_GT(read_surface(one.text(), file).triangles.size(), 18000u) << file;
   }
-  EXPECT_EQ(read_surface_values(read("bigbrain_left/tpl-bigbrain_hemi-L_desc-layer1_thickness.txt.gz").text(), "t").values.size(), 163842u);
+  EXPECT_EQ(
+      read_surface_values(read("bigbrain_left/tpl-bigbrain_hemi-L_desc-layer1_thickness.txt.gz").text(), "t")
+          .values.size(),
+      163842u);
 }
 
 }  // namespace

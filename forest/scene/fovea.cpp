@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/clones.h"
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
@@ -84,12 +85,11 @@ struct Between {
 using Colour = Eigen::Array4f;
 
 // a + share × (b - a), byte by byte; and back to bytes. Flat loops become vector instructions.
-[[gnu::target_clones("default", "arch=haswell")]] void mix(const std::uint8_t* a, const std::uint8_t* b,
-                                                           float share, std::size_t count, float* out) {
+FOREST_CLONES void mix(const std::uint8_t* a, const std::uint8_t* b, float share, std::size_t count,
+                       float* out) {
   for (std::size_t i = 0; i < count; ++i) out[i] = float(a[i]) + share * (float(b[i]) - float(a[i]));
 }
-[[gnu::target_clones("default", "arch=haswell")]] void to_bytes(const float* from, std::size_t count,
-                                                                std::uint8_t* out) {
+FOREST_CLONES void to_bytes(const float* from, std::size_t count, std::uint8_t* out) {
   for (std::size_t i = 0; i < count; ++i) out[i] = std::uint8_t(std::int32_t(from[i] + .5f));
 }
 

@@ -106,8 +106,9 @@ void Surfaces::add(Mesh mesh, float opacity) {
 void Surfaces::colour(std::span<const float> values) {
   One& one = list_.back();
   if (values.size() != one.mesh.positions.size())
-    throw Error(fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
-                            values.size(), one.mesh.positions.size()));
+    throw Error(
+        fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
+                    values.size(), one.mesh.positions.size()));
   one.values.assign(values.begin(), values.end());
 }
 
@@ -124,8 +125,10 @@ void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> a
   }
   std::ranges::sort(places);
   for (const float key : keys) {
-    const auto found = std::ranges::lower_bound(places, key, {}, [](const auto& p) { return float(p.first); });
-    one.areas.push_back(found != places.end() && float(found->first) == key ? found->second : std::uint16_t(0));
+    const auto found =
+        std::ranges::lower_bound(places, key, {}, [](const auto& p) { return float(p.first); });
+    one.areas.push_back(found != places.end() && float(found->first) == key ? found->second
+                                                                            : std::uint16_t(0));
   }
 }
 
@@ -145,7 +148,7 @@ Side Surfaces::outside() const {
 frame::Camera Surfaces::camera(Side side, float aspect) const {
   static constexpr struct {
     float from[3], up[3];
-  } sides[] = {{{-1, 0, 0}, {0, 0, 1}},  {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}},
+  } sides[] = {{{-1, 0, 0}, {0, 0, 1}}, {{1, 0, 0}, {0, 0, 1}}, {{0, 1, 0}, {0, 0, 1}},
                {{0, -1, 0}, {0, 0, 1}}, {{0, 0, 1}, {0, 1, 0}}, {{0, 0, -1}, {0, 1, 0}}};
   frame::Camera camera;
   if (bounds_.empty()) return camera;
@@ -160,8 +163,8 @@ frame::Camera Surfaces::camera(Side side, float aspect) const {
   for (const One& one : list_)
     for (const Vec3& position : one.mesh.positions) {
       const Vec3 at = position - centre;
-      distance = std::max(
-          distance, out.dot(at) + std::max(std::abs(right.dot(at)) / wide, std::abs(camera.up.dot(at)) / high));
+      distance = std::max(distance, out.dot(at) + std::max(std::abs(right.dot(at)) / wide,
+                                                           std::abs(camera.up.dot(at)) / high));
     }
   camera.target = centre;
   camera.eye = centre + std::max(distance, 1.f) * out;
@@ -192,9 +195,10 @@ void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playin
   const bool mapped = std::ranges::any_of(list_, [](const One& one) { return !one.values.empty(); });
   const std::size_t areas = area_colours_.size();
   if (free.size() < 1 + areas + (mapped ? 2 : 0))
-    throw Error(fmt::format("the areas of the surfaces have {} colours and {} are left beside those of the neurons; show "
-                            "fewer areas, or colour the neurons alike",
-                            areas, free.size() - 1));
+    throw Error(fmt::format(
+        "the areas of the surfaces have {} colours and {} are left beside those of the neurons; show "
+        "fewer areas, or colour the neurons alike",
+        areas, free.size() - 1));
   const std::size_t steps = std::min(map_colours, free.size() - 1 - areas);
   frame.palette[free[0]] = plain;
   for (std::size_t i = 0; i < areas; ++i) frame.palette[free[1 + i]] = area_colours_[i];

@@ -82,7 +82,8 @@ TEST(Surfaces, ValuesAreColouredFromEndToEndAndWhatHasNoneIsPlain) {
   // Without neurons there is a map of many steps.
   frame::Frame frame;
   surfaces.show(frame, Colouring{}, false);
-  EXPECT_GT(std::set<std::uint8_t>(frame.surfaces[0].entries.begin(), frame.surfaces[0].entries.end()).size(), 40u);
+  EXPECT_GT(std::set<std::uint8_t>(frame.surfaces[0].entries.begin(), frame.surfaces[0].entries.end()).size(),
+            40u);
 }
 
 TEST(Surfaces, AreasHaveTheirColours) {
@@ -128,7 +129,8 @@ TEST(Surfaces, AViewFromAnySideShowsAllOfIt) {
         for (const Vec3& p : mesh.positions) {
           const Vec3 at = frame::project(camera, viewport, p);
           EXPECT_GT(at.z(), camera.near);
-          most = std::max({most, std::abs(at.x() / viewport.width - .5f), std::abs(at.y() / viewport.height - .5f)});
+          most = std::max(
+              {most, std::abs(at.x() / viewport.width - .5f), std::abs(at.y() / viewport.height - .5f)});
         }
         EXPECT_NEAR(most, .47f, .002f);
       }

@@ -8,14 +8,7 @@ if ! $python -c 'import h5py' 2>/dev/null; then
   exit 77
 fi
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-  [ "$(wc -l <err.txt)" = 1 ] || [ "$status" = 2 ] || { echo "more than a sentence from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 program=$BRAINFOREST
 
 # Cells with an axon (2), a basal (3) and a forked apical dendrite (4): sections 1 axon, 2 basal, 3 to 5 apical.
@@ -104,7 +97,7 @@ grep -q '^149.5,' out.txt
 "$program" clamp run.activity --neuron 2 >out.txt
 grep -q '^ *2 *0' out.txt
 
-fails_with 1 'traces.csv' "$program" clamp run.activity --neuron 2 --csv traces.csv  # another table is not replaced unasked
+refuses 'traces.csv' "$program" clamp run.activity --neuron 2 --csv traces.csv  # another table is not replaced unasked
 "$program" clamp run.activity --neuron 2 --csv traces.csv --force >/dev/null
 
 # What is no number stays so, what is beyond the range is told.
@@ -121,30 +114,30 @@ grep -qE ' (69.[6-9]|70.[0-4]) ' out.txt
 # Mismatches are named, and leave what was there.
 cp run.activity kept.activity
 $python report.py other.h5 40 population=other
-fails_with 1 'other.h5: population other is not in the circuit, which has few_cells' "$program" activity other.h5 --circuit column --out run.activity
+refuses 'other.h5: population other is not in the circuit, which has few_cells' "$program" activity other.h5 --circuit column --out run.activity
 $python report.py other.h5 40 first=1
-fails_with 1 'node 7 of population few_cells is not in the circuit, where 7 neurons of it have a shape, the last of them node 6' "$program" activity other.h5 --circuit column --out run.activity
+refuses 'node 7 of population few_cells is not in the circuit, where 7 neurons of it have a shape, the last of them node 6' "$program" activity other.h5 --circuit column --out run.activity
 $python report.py other.h5 40 element=1
-fails_with 1 'has a compartment in section 6, but its morphology cell-' "$program" activity other.h5 --circuit column --out run.activity
+refuses 'has a compartment in section 6, but its morphology cell-' "$program" activity other.h5 --circuit column --out run.activity
 $python report.py other.h5 40 spiking=1
-fails_with 1 'node 7 of population few_cells spikes and is not in the circuit' "$program" activity other.h5 --circuit column --spikes other.h5 --out run.activity
+refuses 'node 7 of population few_cells spikes and is not in the circuit' "$program" activity other.h5 --circuit column --spikes other.h5 --out run.activity
 $python report.py other.h5 40 units=nA
-fails_with 1 'holds values in nA; say from where to where they reach, with --range' "$program" activity other.h5 --circuit column --out run.activity
-fails_with 1 'there are few_cells' "$program" activity run.h5 --circuit column --population cortex --out run.activity
-fails_with 1 'is what is read' "$program" activity run.h5 --circuit column --out run.h5
+refuses 'holds values in nA; say from where to where they reach, with --range' "$program" activity other.h5 --circuit column --out run.activity
+refuses 'there are few_cells' "$program" activity run.h5 --circuit column --population cortex --out run.activity
+refuses 'is what is read' "$program" activity run.h5 --circuit column --out run.h5
 for size in 0 7 100 2000 20000; do
   head -c $size run.h5 >short.h5
-  fails_with 1 'is not an HDF5 file, or was cut off' "$program" activity short.h5 --circuit column --out run.activity
+  refuses 'is not an HDF5 file, or was cut off' "$program" activity short.h5 --circuit column --out run.activity
 done
-fails_with 1 'there is no group /report' "$program" activity column/nodes.h5 --circuit column --out run.activity
+refuses 'there is no group /report' "$program" activity column/nodes.h5 --circuit column --out run.activity
 cmp run.activity kept.activity
 
 # Activity files that are cut off or damaged are refused, the rest of their values is not shown.
 size=$(stat -c %s run.activity)
 for part in 0 10 40 $((size / 2)) $((size - 1)); do
   head -c $part run.activity >short.activity
-  fails_with 1 'short.activity' "$program" clamp short.activity --neuron 0
-  fails_with 1 'short.activity' "$program" raster short.activity --out no.png
+  refuses 'short.activity' "$program" clamp short.activity --neuron 0
+  refuses 'short.activity' "$program" raster short.activity --out no.png
 done
 "$program" raster run.activity --out right.png >/dev/null
 refused=0
@@ -162,14 +155,14 @@ open('damaged.activity', 'wb').write(data)"
   fi
 done
 [ $refused -gt 3 ]
-fails_with 1 'is not an activity file' "$program" clamp run.h5 --neuron 0
+refuses 'is not an activity file' "$program" clamp run.h5 --neuron 0
 [ ! -e no.png ]
 
-fails_with 1 'node 7 was not reported; there are 7 neurons' "$program" clamp run.activity --neuron 7
-fails_with 1 'section 9 of node 0 was not reported; 6 of its sections were, the last of them 5' "$program" clamp run.activity --neuron 0 --section 9
-fails_with 1 '--section has 2 values and 3 traces are asked for' "$program" clamp run.activity --neuron 0 1 2 --section 0 1
-fails_with 1 'holds no step' "$program" raster run.activity --out no.png --from 1000
-fails_with 1 'give the lower end first' "$program" raster run.activity --out no.png --range 5 5
+refuses 'node 7 was not reported; there are 7 neurons' "$program" clamp run.activity --neuron 7
+refuses 'section 9 of node 0 was not reported; 6 of its sections were, the last of them 5' "$program" clamp run.activity --neuron 0 --section 9
+refuses '--section has 2 values and 3 traces are asked for' "$program" clamp run.activity --neuron 0 1 2 --section 0 1
+refuses 'holds no step' "$program" raster run.activity --out no.png --from 1000
+refuses 'give the lower end first' "$program" raster run.activity --out no.png --range 5 5
 fails_with 2 '--neuron' "$program" clamp run.activity
 fails_with 2 '--circuit' "$program" activity run.h5 --out x.activity
 [ -z "$(find . -name '*.activity.??????')" ]  # nothing half written is left
@@ -239,19 +232,19 @@ assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))[
 film = [pixels(f"film/{i:05}.png") for i in range(4)]
 assert all(a != b for a, b in zip(film, film[1:]))
 PY
-fails_with 1 'run.activity: holds no time 400 ms; it runs from 0 to 149.5 ms' "$program" render few.forest --activity run.activity --time 400 -o no.png
+refuses 'run.activity: holds no time 400 ms; it runs from 0 to 149.5 ms' "$program" render few.forest --activity run.activity --time 400 -o no.png
 "$program" plant --recipe few.toml --repo cells.db --seed 3 --out turned >/dev/null
 "$program" pack turned -o turned.forest >/dev/null
-fails_with 1 'make the activity file and the forest file from the same circuit' "$program" render turned.forest --activity run.activity -o no.png
+refuses 'make the activity file and the forest file from the same circuit' "$program" render turned.forest --activity run.activity -o no.png
 sed 's/count = 7/count = 5/' few.toml >fewer.toml
 "$program" plant --recipe fewer.toml --repo cells.db --seed 2 --out fewer >/dev/null
 "$program" pack fewer -o fewer.forest >/dev/null
-fails_with 1 'with 7 neurons and the forest has 5' "$program" render fewer.forest --activity run.activity -o no.png
-fails_with 1 "'map' must be one of: plasma" "$program" render few.forest --view "$view,\"map\":\"jet\"}}" --activity run.activity -o no.png
-fails_with 1 'is not an activity file' "$program" render few.forest --activity few.forest -o no.png
-fails_with 1 'short.activity' "$program" render few.forest --activity short.activity -o no.png
+refuses 'with 7 neurons and the forest has 5' "$program" render fewer.forest --activity run.activity -o no.png
+refuses "'map' must be one of: plasma" "$program" render few.forest --view "$view,\"map\":\"jet\"}}" --activity run.activity -o no.png
+refuses 'is not an activity file' "$program" render few.forest --activity few.forest -o no.png
+refuses 'short.activity' "$program" render few.forest --activity short.activity -o no.png
 fails_with 2 '--activity' "$program" render few.forest --time 3 -o no.png
-fails_with 1 'give another --view' "$program" movie few.forest --view "$view}}" -o no.mp4
+refuses 'give another --view' "$program" movie few.forest --view "$view}}" -o no.mp4
 [ ! -e no.png ] && [ ! -e no.mp4 ]
 
 # Killed in the middle: the old file is whole. (Its unfinished neighbour stays, as with every program that is killed.)

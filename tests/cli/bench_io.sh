@@ -15,13 +15,7 @@ assert out["reading"]["swc"]["files"] == 1 and out["reading"]["swc"]["points"] =
 PY
 "$BRAINFOREST" bench io cells/stem.swc | grep -q '^swc '
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 fails_with 1 'known are .swc' "$BRAINFOREST" bench io cells/notes.txt
 fails_with 2 nowhere "$BRAINFOREST" bench io nowhere
 fails_with 2 "say which benchmark" "$BRAINFOREST" bench

@@ -2,23 +2,16 @@
 # brainforest bench peers: what it prints and refuses; the part with VTK only where VTK is.
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  timeout 60 "$@" >said.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  [ "$(wc -l <err.txt)" = 1 ] || [ "$status" = 2 ] || { echo "more than a sentence from: $*"; cat err.txt; exit 1; }
-  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 small=(--neurons 20 --size 96x64 --frames 2 --samples 4)
 fails_with 2 modes "$BRAINFOREST" bench peers --modes spheres
-fails_with 1 'nowhere/python cannot be started' "$BRAINFOREST" bench peers "${small[@]}" --python nowhere/python
+refuses 'nowhere/python cannot be started' "$BRAINFOREST" bench peers "${small[@]}" --python nowhere/python
 
 # A Python without VTK: told which package to install.
 mkdir bare
 printf '#!/bin/sh\nexec /usr/bin/python3 -S -I "$@"\n' >bare/python
 chmod +x bare/python
-fails_with 1 'install python3-vtk9' "$BRAINFOREST" bench peers "${small[@]}" --python bare/python
+refuses 'install python3-vtk9' "$BRAINFOREST" bench peers "${small[@]}" --python bare/python
 
 /usr/bin/python3 -c 'import vtkmodules.vtkRenderingOpenGL2' 2>/dev/null && command -v xvfb-run >/dev/null ||
   { echo "VTK for Python (python3-vtk9) or xvfb-run is missing: not compared"; exit 77; }

@@ -28,13 +28,7 @@ done
 cmp 1.json 2.json
 "$BRAINFOREST" bench seam "${small[@]}" --frames 2 | grep -q 'disconnected branches: '
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  timeout 60 "$@" >said.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 fails_with 2 neurons "$BRAINFOREST" bench seam --neurons 1
 fails_with 2 size "$BRAINFOREST" bench seam --size 0x5
 fails_with 2 error "$BRAINFOREST" bench seam --error nan

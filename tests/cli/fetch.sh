@@ -5,14 +5,9 @@ for name in http_proxy https_proxy all_proxy HTTPS_PROXY ALL_PROXY; do unset "$n
 export XDG_CACHE_HOME=$PWD/cache_home
 service=$FOREST_SOURCE_DIR/tests/cell_service.py
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 json() { /usr/bin/python3 -c "import json,sys; d=json.load(sys.stdin); print($1)"; }
+told_of() { grep -qE "^$1: .*$2" err.txt || { echo "no '$2' of $1"; cat err.txt; exit 1; }; }
 requests() { grep -c "$1" log.jsonl || true; }
 
 # Cells that we grew, under names that tell the service how to behave.
@@ -109,18 +104,17 @@ fetch gone-1 page-1 nonsense-1 file-1 circle-1 short-1 huge-1 liar-1 no-such ../
 [ "$got" = 1 ]
 grep -q '^1 fetched (1 of them from the cache), 11 failed$' said.txt && cmp bad/plain-3.swc cells/plain-3.swc
 [ "$(ls bad)" = $'plain-3.json\nplain-3.swc' ]
-told() { grep -qE "^$1: .*$2" err.txt || { echo "no '$2' of $1"; cat err.txt; exit 1; }; }
-told gone-1 'does not have it \(status 404\)'
-told page-1 'is a web page and no SWC file'
-told nonsense-1 'holds no point'
-told file-1 'cannot be had \(Protocol "file"'
-told circle-1 'Maximum \(5\) redirects'
-told short-1 'broke off after 2 attempts with [0-9]+ bytes there'
-told huge-1 'larger than 200000000 bytes; raise --max-size'
-told liar-1 "another neuron, 'other'"
-told no-such 'check the name'
-told '../../etc/passwd' 'no single piece of an address'
-told 'a%2fb' 'no single piece of an address'
+told_of gone-1 'does not have it \(status 404\)'
+told_of page-1 'is a web page and no SWC file'
+told_of nonsense-1 'holds no point'
+told_of file-1 'cannot be had \(Protocol "file"'
+told_of circle-1 'Maximum \(5\) redirects'
+told_of short-1 'broke off after 2 attempts with [0-9]+ bytes there'
+told_of huge-1 'larger than 200000000 bytes; raise --max-size'
+told_of liar-1 "another neuron, 'other'"
+told_of no-such 'check the name'
+told_of '../../etc/passwd' 'no single piece of an address'
+told_of 'a%2fb' 'no single piece of an address'
 grep -q '11 of 12 cells could not be fetched' err.txt
 fails_with 1 'larger than 1000000 bytes' fetch flood-1 --out bad --max-size 1 --retries 0
 fails_with 1 'broke off' fetch silent-1 --out bad --timeout 1 --retries 0

@@ -1,19 +1,9 @@
 #!/usr/bin/env bash
 # From grown neurons to pictures: pack, render, movie.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "forest.sh: $*" >&2; exit 1; }
-refuses() {  # a command that must fail with status 1 and one sentence that holds the words
-  local words=$1 said status=0
-  shift
-  said=$("$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == 1 ]] || fail "status $status instead of 1: $*"
-  [[ $said == *"$words"* && $(wc -l <<<"$said") == 1 ]] || fail "said '$said' instead of one sentence with '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
-for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 3 --seed 1 --repo r.db >/dev/null; done
-"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
-"$program" pack circuit -o a.forest --threads 1 >/dev/null
+small_forest 3
 "$program" pack circuit -o b.forest --threads 2 >/dev/null
 cmp a.forest b.forest || fail "the forest file depends on the number of threads"
 

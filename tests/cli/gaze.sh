@@ -2,19 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # A gaze: render --gaze, movie --scanpath and --path, orthographic views, bench gaze small; what they refuse.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "gaze.sh: $*" >&2; exit 1; }
-refuses() {  # status, words, command…
-  local wanted=$1 words=$2 said status=0
-  shift 2
-  said=$(timeout 60 "$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == "$wanted" ]] || fail "status $status instead of $wanted: $*"
-  [[ $said == *"$words"* ]] || fail "said '$said' without '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
-for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 2 --seed 1 --repo r.db >/dev/null; done
-"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
-"$program" pack circuit -o a.forest >/dev/null
+small_forest 2
 
 cpu=(--renderer cpu --size 320x180)
 "$program" render a.forest "${cpu[@]}" --gaze .4 .5 -o a.png --json >a.json
@@ -41,8 +31,8 @@ assert len(out["parts"]) == 3 and all(p["fovea_pixels"] > 100 and p["ratio"] > 0
 PY
 
 printf '0,.5,.5\nsoon,.5,.5\n' >bad.csv
-refuses 1 "bad.csv:2: 'soon' is no time" "$program" movie a.forest --scanpath bad.csv -o x.mp4
+fails_with 1 "bad.csv:2: 'soon' is no time" "$program" movie a.forest --scanpath bad.csv -o x.mp4
 printf '%s\n{"eye":[1,2,3]}\n' "$view" >bad.jsonl
-refuses 1 "bad.jsonl:2: the view lacks 'target'" "$program" movie a.forest --path bad.jsonl -o x.mp4
-refuses 2 "gaze" "$program" render a.forest --gaze 2 .5 -o x.png
-refuses 1 "projection" "$program" render a.forest --view '{"eye":[1,2,3],"target":[0,0,0],"projection":"fish"}' -o x.png
+fails_with 1 "bad.jsonl:2: the view lacks 'target'" "$program" movie a.forest --path bad.jsonl -o x.mp4
+fails_with 2 "gaze" "$program" render a.forest --gaze 2 .5 -o x.png
+fails_with 1 "projection" "$program" render a.forest --view '{"eye":[1,2,3],"target":[0,0,0],"projection":"fish"}' -o x.png

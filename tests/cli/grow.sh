@@ -2,13 +2,7 @@
 # brainforest grow: into a repository and into a folder, the same every time, and what it refuses.
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 for grammar in motoneuron purkinje pyramidal; do
   $BRAINFOREST grow --help | grep -q $grammar

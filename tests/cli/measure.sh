@@ -2,13 +2,7 @@
 # brainforest measure: what it prints and writes, what it refuses, and that threads change nothing.
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -q -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 # A stem of 10 µm that forks at a right angle into two terminals of 10 µm.
 cat >fork.swc <<'SWC'

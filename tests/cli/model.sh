@@ -3,13 +3,10 @@
 set -E
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-  [ "$(wc -l <err.txt)" -le 2 ] || { echo "not a sentence: $*"; cat err.txt; exit 1; }
+source "$FOREST_SOURCE_DIR/tests/words.sh"
+short() {  # as fails_with, in two lines at most
+  fails_with "$@"
+  [ "$(wc -l <err.txt)" -le 2 ] || { echo "not a sentence: ${*:3}"; cat err.txt; exit 1; }
 }
 json() { python3 -c "import json,sys; d=json.load(sys.stdin); print($1)"; }
 
@@ -44,8 +41,8 @@ TEXT
   [ "$($model show bush@2 --repo "$repo" --json | json '[(x["name"], x["version"]) for x in d[0]["distributions"]]')" = "[('bush.ratio', 1), ('bush.turn', 2)]" ]
   [ "$($model show bush.turn@1 --repo "$repo")" = 'distribution turn = uniform(20, 40)' ]
   [ "$($BRAINFOREST query "select text from distribution where name = 'bush.turn' and version = 2" --repo "$repo" --json | json 'd["rows"][0][0]')" = 'distribution turn = uniform(10, 50)\x0A' ]
-  fails_with 1 "there is no model 'shrub'; those that are there: bush, pyramidal" $model show shrub --repo "$repo"
-  fails_with 1 "model 'bush' has no version 3; its newest is 2" $model show bush@3 --repo "$repo"
+  short 1 "there is no model 'shrub'; those that are there: bush, pyramidal" $model show shrub --repo "$repo"
+  short 1 "model 'bush' has no version 3; its newest is 2" $model show bush@3 --repo "$repo"
 
   # edit: what the editor leaves is the next version; as it was, no grammar, or an editor that fails: nothing.
   EDITOR="sed -i 's/^steps:.*/steps: 7/'" $model edit bush@1 --repo "$repo" >out.txt
@@ -53,12 +50,12 @@ TEXT
   [ "$($model show bush --repo "$repo")" = "$(sed 's/^steps:.*/steps: 7/; s/uniform(10, 50)/uniform(20, 40)/' second.lsys)" ]
   [ "$($model list --repo "$repo" --json | json '[(m["origin"], m["population"]) for m in d if m["name"] == "bush"]')" = "[('edited from version 1', 'L5')]" ]
   EDITOR=true $model edit bush --repo "$repo" | grep -q 'bush@3 is as it was; nothing is stored'
-  fails_with 1 'the editor ended with an error, so nothing is stored' env EDITOR=false $BRAINFOREST model edit bush --repo "$repo"
+  short 1 'the editor ended with an error, so nothing is stored' env EDITOR=false $BRAINFOREST model edit bush --repo "$repo"
   EDITOR=true $model edit bush --repo "$repo" --population L6 --json | grep -q '"version": 4'
   EDITOR='sed -i "1s/.*/# A bush of layer 5/"' $model edit bush@3 --repo "$repo" >out.txt
   [ "$($model list --repo "$repo" --all --json | json '[m["population"] for m in d if m["name"] == "bush"]')" = "['L5', 'L5', 'L5', 'L6', 'L5']" ]
   mkdir -p passing
-  fails_with 1 'nothing is stored and the text is kept' env TMPDIR="$PWD/passing" EDITOR='sed -i s/^axiom/axion/' $BRAINFOREST model edit bush --repo "$repo"
+  short 1 'nothing is stored and the text is kept' env TMPDIR="$PWD/passing" EDITOR='sed -i s/^axiom/axion/' $BRAINFOREST model edit bush --repo "$repo"
   grep -q 'bush.lsys:6' err.txt
   grep -q '^axion' passing/*/bush.lsys
   [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 6 ]
@@ -78,7 +75,7 @@ TEXT
   [ "$(grep -c '^[-+][^-+]' step.txt)" = 4 ]
   $model diff bush@4 bush@3 --repo "$repo" | grep -q 'are the same text'
   [ "$($model diff bush --repo "$repo" --json | json 'd["from"]["version"], d["to"]["version"], d["diff"][:10]')" = '4 5 --- bush@4' ]
-  fails_with 1 'pyramidal@1 has no version before it' $model diff pyramidal --repo "$repo"
+  short 1 'pyramidal@1 has no version before it' $model diff pyramidal --repo "$repo"
 
   # export, and back: nothing new. A file that holds something else stays.
   $model export --repo "$repo" --out models >out.txt
@@ -87,7 +84,7 @@ TEXT
   cmp models/bush@2.lsys second.lsys
   [ "$($model import models/bush.lsys models/pyramidal.lsys --repo "$repo" --json | json '[m["already_there"] for m in d["models"]]')" = '[True, True]' ]
   echo '# mine' >>models/bush.lsys
-  fails_with 1 'is there and holds something else' $model export --repo "$repo" --out models
+  short 1 'is there and holds something else' $model export --repo "$repo" --out models
   tail -1 models/bush.lsys | grep -q mine
   $model export --repo "$repo" --out models --force >out.txt
   ! grep -q mine models/bush.lsys
@@ -95,11 +92,11 @@ TEXT
   # One that is no grammar among good ones: none is stored, and its line is told.
   printf 'axiom: A\ngrow: A -> B(\n' >bad.lsys
   sed 's/uniform(20, 40)/uniform(0, 1)/' models/bush.lsys >good.lsys
-  fails_with 1 'bad.lsys:2' $model import good.lsys bad.lsys --repo "$repo"
-  fails_with 1 'missing.lsys: there is no such grammar' $model import good.lsys missing.lsys --repo "$repo"
+  short 1 'bad.lsys:2' $model import good.lsys bad.lsys --repo "$repo"
+  short 1 'missing.lsys: there is no such grammar' $model import good.lsys missing.lsys --repo "$repo"
   head -c 2000 /dev/urandom >noise.lsys
-  fails_with 1 'noise.lsys' $model import noise.lsys --repo "$repo"
-  fails_with 2 '--name is for one file' $model import good.lsys bush.lsys --name other --repo "$repo"
+  short 1 'noise.lsys' $model import noise.lsys --repo "$repo"
+  short 2 '--name is for one file' $model import good.lsys bush.lsys --name other --repo "$repo"
   [ "$($model list --repo "$repo" --all --json | json 'len(d)')" = 6 ]
 
   # What neurons are grown from is a model as if it had been imported.
@@ -112,8 +109,8 @@ TEXT
   $BRAINFOREST grow --grammar second.lsys --count 3 --seed 1 --out same >out.txt
   cmp <(grep -v '^#' grown/bush-1-00002.swc) <(grep -v '^#' same/second-1-00002.swc)
   [ "$($model list --repo "$repo" --all --json | json '[m["neurons"] for m in d if m["name"] == "bush"]')" = '[0, 3, 0, 0, 0]' ]
-  fails_with 1 "there is no model 'shrub'" $BRAINFOREST grow --model shrub --repo "$repo"
-  fails_with 2 '--repo' $BRAINFOREST grow --model bush --out x
+  short 1 "there is no model 'shrub'" $BRAINFOREST grow --model shrub --repo "$repo"
+  short 2 '--repo' $BRAINFOREST grow --model bush --out x
   $BRAINFOREST check --repo "$repo" | grep -q 'all is well'
 
   # The questions of the page are answered.
@@ -140,8 +137,8 @@ PY
 
 mkdir file && cd file
 check_verbs cells.db
-fails_with 1 'no such repository' $BRAINFOREST model list --repo none.db
-fails_with 1 'no such repository' $BRAINFOREST model edit bush --repo none.db
+short 1 'no such repository' $BRAINFOREST model list --repo none.db
+short 1 'no such repository' $BRAINFOREST model edit bush --repo none.db
 [ ! -e none.db ]
 cd ..
 

@@ -3,13 +3,7 @@
 # same bytes.
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 json() { python3 -c "import json,sys; d=json.load(sys.stdin); print($1)"; }
 
 # Forty cells of 20 to 300 sections, two folders deep, and one with oddities.

@@ -2,19 +2,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # brainforest section: pictures, contours, areas and films of a plane; what it refuses. And brainforest bench pick, small.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "section.sh: $*" >&2; exit 1; }
-refuses() {  # status, words, command…
-  local wanted=$1 words=$2 said status=0
-  shift 2
-  said=$(timeout 60 "$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == "$wanted" ]] || fail "status $status instead of $wanted: $*"
-  [[ $said == *"$words"* ]] || fail "said '$said' without '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
-for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 2 --seed 1 --repo r.db >/dev/null; done
-"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
-"$program" pack circuit -o a.forest >/dev/null
+small_forest 2
 
 "$program" section a.forest -o areas.csv --json >all.json
 "$program" section a.forest -o again.csv --threads 1 >/dev/null
@@ -39,12 +29,12 @@ svg = tree.parse("a.svg").getroot()
 assert svg.tag.endswith("svg") and any(g.get("id", "").startswith("neuron-") for g in svg), "no contours"
 PY
 
-refuses 1 "no direction" "$program" section a.forest --plane 0,0,0,0,0,0 -o x.png
-refuses 1 "nan" "$program" section a.forest --plane 0,0,0,nan,0,1 -o x.png
-refuses 1 "x,y,z,nx,ny,nz" "$program" section a.forest --plane 1,2,3 -o x.png
-refuses 1 ".mp4" "$program" section a.forest --through 5 -o x.png
-refuses 2 ".png" "$program" section a.forest -o x.bmp
-refuses 2 "height" "$program" section a.forest --height 0 -o x.png
+fails_with 1 "no direction" "$program" section a.forest --plane 0,0,0,0,0,0 -o x.png
+fails_with 1 "nan" "$program" section a.forest --plane 0,0,0,nan,0,1 -o x.png
+fails_with 1 "x,y,z,nx,ny,nz" "$program" section a.forest --plane 1,2,3 -o x.png
+fails_with 1 ".mp4" "$program" section a.forest --through 5 -o x.png
+fails_with 2 ".png" "$program" section a.forest -o x.bmp
+fails_with 2 "height" "$program" section a.forest --height 0 -o x.png
 
 "$program" bench pick --neurons 30 --pixels 2000 --size 320x200 --json >pick.json
 /usr/bin/python3 -c 'import json; d = json.load(open("pick.json")); assert d["right"] == 1 and d["pixels"] == 2000 and d["something"] > .02, d'

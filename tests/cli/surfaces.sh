@@ -2,15 +2,7 @@
 # SPDX-License-Identifier: Apache-2.0
 # brainforest render with surfaces of a cortex: alone, beside a forest, coloured by values; what it refuses.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "surfaces.sh: $*" >&2; exit 1; }
-refuses() {  # status, words, command…
-  local wanted=$1 words=$2 said status=0
-  shift 2
-  said=$(timeout 60 "$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == "$wanted" ]] || fail "status $status instead of $wanted: $*"
-  [[ $said == *"$words"* ]] || fail "said '$said' without '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 # A ball with waves of 60 mm around (-40, 0, 0), FreeSurfer's way; a value a vertex, both ways of text and binary.
 /usr/bin/python3 - <<'PY'
@@ -61,9 +53,7 @@ assert b["surfaces"]["range"] == [-50, 50] and b["surfaces"]["colour_map"] == "v
 assert -60 < d["surfaces"]["range"][0] < -50 and 50 < d["surfaces"]["range"][1] < 60, d["surfaces"]'
 
 # Around a forest, which lies within: what is opaque hides it, and what is not lets it through.
-for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 2 --seed 1 --repo r.db >/dev/null; done
-"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
-"$program" pack circuit -o a.forest >/dev/null
+small_forest 2
 view='{"eye":[-300000,0,0],"target":[-40000,0,0],"up":[0,0,1],"field_of_view":40,"fog":0}'
 for opacity in 0 .3 1; do
   "$program" render a.forest --surface lh.pial --surface-opacity $opacity --view "$view" -o x$opacity.png --size 320x240 --renderer cpu --json >x$opacity.json
@@ -75,13 +65,13 @@ assert a < .02 and .1 < c < .8 and .25 * c < b < .65 * c, (a, b, c)  # two sides
 "$program" movie a.forest --surface lh.pial --surface-opacity .3 --seconds .2 --size 160x120 -o a.mp4 >/dev/null
 [[ $(head -c 8 a.mp4 | tail -c 4) == ftyp ]] || fail "a.mp4 is no MP4 file"
 
-refuses 1 "cut off" "$program" render lh.short -o x.png
-refuses 1 "2 values and the surface has" "$program" render lh.pial --overlay few.txt -o x.png
-refuses 1 "2 overlays are given and 1" "$program" render lh.pial --overlay few.txt --overlay few.txt -o x.png
-refuses 1 "no surface that is known" "$program" render a.forest --surface a.forest -o x.png
-refuses 1 "no range" "$program" render lh.pial --range 3 -o x.png
-refuses 1 "no range" "$program" render lh.pial --range 3:nan -o x.png
-refuses 1 "no range" "$program" render lh.pial --range 3:2 -o x.png
-refuses 1 "no colour map 'jet'" "$program" render lh.pial --colour-map jet -o x.png
-refuses 2 "surface-opacity" "$program" render lh.pial --surface-opacity 2 -o x.png
-refuses 2 "from" "$program" render lh.pial --from inside -o x.png
+refuses "cut off" "$program" render lh.short -o x.png
+refuses "2 values and the surface has" "$program" render lh.pial --overlay few.txt -o x.png
+refuses "2 overlays are given and 1" "$program" render lh.pial --overlay few.txt --overlay few.txt -o x.png
+refuses "no surface that is known" "$program" render a.forest --surface a.forest -o x.png
+refuses "no range" "$program" render lh.pial --range 3 -o x.png
+refuses "no range" "$program" render lh.pial --range 3:nan -o x.png
+refuses "no range" "$program" render lh.pial --range 3:2 -o x.png
+refuses "no colour map 'jet'" "$program" render lh.pial --colour-map jet -o x.png
+fails_with 2 "surface-opacity" "$program" render lh.pial --surface-opacity 2 -o x.png
+fails_with 2 "from" "$program" render lh.pial --from inside -o x.png

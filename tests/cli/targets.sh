@@ -1,20 +1,9 @@
 #!/usr/bin/env bash
 # Targets: listed, defined, written as SONATA's node sets, shown and hidden in pictures.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "targets.sh: $*" >&2; exit 1; }
-refuses() {  # a command that must fail with status 1 and one sentence that holds the words
-  local words=$1 said status=0
-  shift
-  said=$("$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == 1 ]] || fail "status $status instead of 1: $*"
-  [[ $said == *"$words"* && $(wc -l <<<"$said") == 1 ]] || fail "said '$said' instead of one sentence with '$words'"
-}
-told() { /usr/bin/python3 -c "import json, sys; d = json.load(open('$1')); sys.exit(not ($2))" || fail "$1: not so: $2"; }
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
-for grammar in pyramidal purkinje motoneuron; do "$program" grow --grammar $grammar --count 3 --seed 1 --repo r.db >/dev/null; done
-"$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
-"$program" pack circuit -o a.forest >/dev/null
+small_forest 3
 
 "$program" targets a.forest --json >list.json
 told list.json '{t["name"]: t["neurons"] for t in d["targets"]}["all"] == d["neurons"] == 1000'

@@ -2,15 +2,7 @@
 # Bad usage ends with status 2 and a short sentence that says what would be good; one bad file among good ones with status 1.
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
-fails_with() {  # status, words of the sentence, command…
-  local status=$1 words=$2 got=0
-  shift 2
-  "$@" >out.txt 2>err.txt || got=$?
-  [ "$got" = "$status" ] || { echo "status $got, not $status: $*"; cat err.txt; exit 1; }
-  grep -qF -- "$words" err.txt || { echo "no '$words' from: $*"; cat err.txt; exit 1; }
-  ! grep -qE 'json\.exception|[0-9]{30}' err.txt || { echo "not our own words: $*"; cat err.txt; exit 1; }
-}
-program=$BRAINFOREST
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 fails_with 2 "no verb 'frob'; there are: demo, import, fetch, list" $program frob
 fails_with 2 'say which verb, one of: demo' $program

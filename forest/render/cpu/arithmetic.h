@@ -6,6 +6,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "forest/core/clones.h"
+
 namespace forest::render::cpu {
 
 // As single instructions, which std::min and std::fmin are not within loops.

@@ -2,49 +2,117 @@
 #include "forest/render/cpu/canvas.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
-#include "forest/core/parallel.h"
+#include "forest/core/clones.h"
 #include "forest/frame/constants.h"
 
 namespace forest::render::cpu {
 namespace {
 
-constexpr std::int32_t tile = std::int32_t(FOREST_TILE);
+constexpr std::int32_t tile = std::int32_t(FOREST_TILE), tile_of_tiles = tile * tile;
 constexpr std::int32_t most = 6;  // tiles of a level that a rectangle may cover
 
-std::int32_t tiles_over(std::int32_t pixels) { return (pixels + tile - 1) / tile; }
+std::int32_t parts(std::int32_t pixels, std::int32_t of) { return (pixels + of - 1) / of; }
+
+// A square's keys stay within the second cache: 64 KiB with one sample, 256 KiB with more.
+std::int32_t side_for(int samples) { return samples <= 4 ? 128 : 64; }
+
+FOREST_CLONES std::uint32_t farthest(const std::uint32_t* keys, std::size_t count) {
+  std::uint32_t far = 0;
+  for (std::size_t i = 0; i < count; ++i) far = keys[i] > far ? keys[i] : far;
+  return far;
+}
 
 }  // namespace
 
-void Canvas::clear(std::uint32_t width, std::uint32_t height, const frame::Area& area,
-                   const frame::Area& hole, float gaps) {
+void Canvas::resize(std::uint32_t width, std::uint32_t height, int samples, std::uint32_t wanted,
+                    const frame::Area& area, const frame::Area& hole, float gaps) {
   area_ = area, hole_ = hole, gaps_ = gaps;
+  samples_ = samples, wanted_ = wanted;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
-  fine_.width = tiles_over(width_), fine_.height = tiles_over(height_);
-  const std::size_t tiles_wide = std::size_t(fine_.width);
-  keys_.resize(tiles_wide * std::size_t(fine_.height) * tile * tile);
-  const std::size_t top = area.top / tile, rows = std::size_t(tiles_over(std::int32_t(area.bottom))) - top,
-                    left = area.left / tile,
-                    columns = std::size_t(tiles_over(std::int32_t(area.right))) - left;
-  parallel_for(rows, 16, [&](std::size_t row) {
-    const std::size_t ty = top + row;
-    std::uint32_t* keys = &keys_[(ty * tiles_wide + left) * tile * tile];
-    std::fill(keys, keys + columns * tile * tile, FOREST_KEY_EMPTY);
-    for (std::int32_t y = std::int32_t(ty) * tile; y < std::int32_t(ty + 1) * tile; ++y)
-      for (std::int32_t x = y < height_ ? width_ : 0; x < fine_.width * tile; ++x) keys_[place(x, y)] = 0;
-  });
-  looked_ = false;
+  fine_.width = parts(width_, tile), fine_.height = parts(height_, tile);
+  coarse_.width = parts(fine_.width, tile), coarse_.height = parts(fine_.height, tile);
+  const std::size_t tiles = std::size_t(fine_.width) * std::size_t(fine_.height);
+  keys_.resize(tiles * tile * tile * std::size_t(samples));
+  // Squares that are never cleared are beside the area.
+  fine_.farthest.assign(tiles, 0u);
+  coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
+  side_ = side_for(samples);
+  squares_left_ = std::int32_t(area.left) / side_, squares_top_ = std::int32_t(area.top) / side_;
+  squares_wide_ = parts(std::int32_t(area.right), side_) - squares_left_;
+  squares_high_ = parts(std::int32_t(area.bottom), side_) - squares_top_;
 }
 
-void Canvas::read_row(std::int32_t y, std::uint32_t* keys) const {
-  const std::uint32_t* from = &keys_[place(0, y)];
-  for (std::int32_t x = 0; x < width_; x += tile, from += tile * tile)
-    std::copy(from, from + std::min(tile, width_ - x), keys + x);
+Square Canvas::square(std::size_t number) const {
+  const std::int32_t left = (squares_left_ + std::int32_t(number) % squares_wide_) * side_,
+                     top = (squares_top_ + std::int32_t(number) / squares_wide_) * side_;
+  const auto up = [](std::uint32_t x, std::int32_t limit) {
+    return std::min(parts(std::int32_t(x), tile) * tile, limit);
+  };
+  const auto down = [](std::uint32_t x) { return std::int32_t(x) / tile * tile; };
+  return {std::max(left, down(area_.left)), std::max(top, down(area_.top)),
+          std::min(left + side_, up(area_.right, width_)), std::min(top + side_, up(area_.bottom, height_))};
 }
 
-// The farthest key of a tile's wanted pixels but for the share of gaps; 0 when there are none.
+Square Canvas::touched(float left, float top, float right, float bottom) const {
+  const auto part = [&](float x, std::int32_t first) {
+    return std::int32_t(std::floor(smaller(larger(x, -1e6f), 1e6f) / float(side_))) - first;
+  };
+  return {std::max(part(left, squares_left_), 0), std::max(part(top, squares_top_), 0),
+          std::min(part(right, squares_left_), squares_wide_ - 1),
+          std::min(part(bottom, squares_top_), squares_high_ - 1)};
+}
+
+void Canvas::clear(const Square& s) {
+  std::array<std::uint32_t, most_samples> none{};
+  for (int k = 0; k < samples_; ++k) none[std::size_t(k)] = wanted_ >> k & 1 ? FOREST_KEY_EMPTY : 0u;
+  const auto samples = std::size_t(samples_);
+  const auto fill = [&](std::uint32_t* keys, std::size_t pixels) {
+    if (wanted_ == (1ull << samples_) - 1)
+      std::fill(keys, keys + pixels * samples, FOREST_KEY_EMPTY);
+    else
+      for (std::size_t i = 0; i < pixels; ++i)
+        std::copy(none.begin(), none.begin() + samples_, keys + i * samples);
+  };
+  for (std::int32_t y = s.top; y < s.bottom; y += tile) {
+    fill(at(s.left, y), std::size_t(parts(s.right - s.left, tile)) * tile * tile);
+    // Beyond the picture's edges.
+    for (std::int32_t row = y; row < y + tile; ++row)
+      for (std::int32_t x = row < height_ ? std::max(s.left, width_) : s.left;
+           x < parts(s.right, tile) * tile; ++x)
+        std::fill(at(x, row), at(x, row) + samples, 0u);
+  }
+  for (std::int32_t ty = s.top / tile; ty < parts(s.bottom, tile); ++ty)
+    for (std::int32_t tx = s.left / tile; tx < parts(s.right, tile); ++tx)
+      fine_.farthest[std::size_t(ty * fine_.width + tx)] = FOREST_KEY_EMPTY;
+  for (std::int32_t y = s.top / tile_of_tiles; y < parts(s.bottom, tile_of_tiles); ++y)
+    for (std::int32_t x = s.left / tile_of_tiles; x < parts(s.right, tile_of_tiles); ++x)
+      coarse_.farthest[std::size_t(y * coarse_.width + x)] = FOREST_KEY_EMPTY;
+}
+
+void Canvas::read_row(std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys) const {
+  for (std::int32_t x = from; x < to;) {
+    const std::int32_t next = std::min((x | (tile - 1)) + 1, to);
+    const std::uint32_t* pixel = at(x, y);
+    keys = std::copy(pixel, pixel + std::size_t(next - x) * std::size_t(samples_), keys);
+    x = next;
+  }
+}
+
+// Whether all of a tile's pixels are wanted.
+bool Canvas::whole(std::int32_t tx, std::int32_t ty) const {
+  const auto left = std::uint32_t(tx * tile), top = std::uint32_t(ty * tile), right = left + FOREST_TILE,
+             bottom = top + FOREST_TILE;
+  const bool in_area = left >= area_.left && top >= area_.top &&
+                       (right <= area_.right || std::int32_t(area_.right) == width_) &&
+                       (bottom <= area_.bottom || std::int32_t(area_.bottom) == height_);
+  const bool in_hole =
+      left >= hole_.left && right <= hole_.right && top >= hole_.top && bottom <= hole_.bottom;
+  return in_area && !in_hole && gaps_ == 0.f;
+}
+
+// The farthest key of a tile's wanted samples but for the share of gaps; 0 when there are none.
 std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   const auto within = [&](std::int32_t low, std::uint32_t from, std::uint32_t to) {
     return std::pair(std::max(low, std::int32_t(from)), std::min(low + tile, std::int32_t(to)));
@@ -55,51 +123,47 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
       top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
     return 0;
-  std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile)> keys;
+  std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile) * most_samples> keys;
   std::size_t count = 0;
   for (std::int32_t y = top; y < bottom; ++y)
-    for (std::int32_t x = left; x < right; ++x) keys[count++] = keys_[place(x, y)];
+    for (std::int32_t x = left; x < right; ++x)
+      for (int k = 0; k < samples_; ++k)
+        if (wanted_ >> k & 1) keys[count++] = at(x, y)[k];
   const auto nth = keys.begin() + std::ptrdiff_t(float(count - 1) * (1.f - gaps_));
   std::nth_element(keys.begin(), nth, keys.begin() + std::ptrdiff_t(count));
   return *nth;
 }
 
-void Canvas::look() {
-  fine_.farthest.resize(keys_.size() / (tile * tile));
-  const frame::Area& a = area_;
-  const bool partly = a.left > 0 || a.top > 0 || a.right < std::uint32_t(width_) ||
-                      a.bottom < std::uint32_t(height_) || gaps_ > 0.f || hole_.right > hole_.left;
-  parallel_for(fine_.farthest.size(), 512, [&](std::size_t t) {
-    if (partly) {
-      fine_.farthest[t] = far_in_tile(std::int32_t(t) % fine_.width, std::int32_t(t) / fine_.width);
-      return;
+void Canvas::look(const Square& s) {
+  const std::int32_t right = parts(s.right, tile), bottom = parts(s.bottom, tile);
+  for (std::int32_t cy = s.top / tile_of_tiles; cy < parts(s.bottom, tile_of_tiles); ++cy)
+    for (std::int32_t cx = s.left / tile_of_tiles; cx < parts(s.right, tile_of_tiles); ++cx) {
+      std::uint32_t far_of_all = 0;
+      for (std::int32_t ty = std::max(cy * tile, s.top / tile); ty < std::min((cy + 1) * tile, bottom); ++ty)
+        for (std::int32_t tx = std::max(cx * tile, s.left / tile); tx < std::min((cx + 1) * tile, right);
+             ++tx) {
+          const std::uint32_t far = whole(tx, ty) ? farthest(at(tx * tile, ty * tile),
+                                                             std::size_t(tile * tile) * std::size_t(samples_))
+                                                  : far_in_tile(tx, ty);
+          fine_.farthest[std::size_t(ty * fine_.width + tx)] = far;
+          far_of_all = std::max(far_of_all, far);
+        }
+      coarse_.farthest[std::size_t(cy * coarse_.width + cx)] = far_of_all;
     }
-    const std::uint32_t* keys = &keys_[t * tile * tile];
-    std::uint32_t far = 0;
-    for (std::int32_t i = 0; i < tile * tile; ++i) far = std::max(far, keys[i]);
-    fine_.farthest[t] = far;
-  });
-  coarse_.width = tiles_over(fine_.width), coarse_.height = tiles_over(fine_.height);
-  coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
-  for (std::int32_t y = 0; y < fine_.height; ++y)
-    for (std::int32_t x = 0; x < fine_.width; ++x) {
-      std::uint32_t& far = coarse_.farthest[std::size_t(y / tile * coarse_.width + x / tile)];
-      far = std::max(far, fine_.farthest[std::size_t(y * fine_.width + x)]);
-    }
-  looked_ = true;
 }
 
-bool Canvas::hidden(float left, float top, float right, float bottom, float nearest_code) const {
-  if (!(left < float(width_) && top < float(height_) && right >= 0.f && bottom >= 0.f)) return true;
-  if (!looked_) return false;
-  std::int32_t x0 = std::int32_t(std::max(left, 0.f)) / tile, y0 = std::int32_t(std::max(top, 0.f)) / tile;
-  std::int32_t x1 = std::int32_t(std::min(right, float(width_ - 1))) / tile,
-               y1 = std::int32_t(std::min(bottom, float(height_ - 1))) / tile;
+bool Canvas::hidden(const Square& s, float left, float top, float right, float bottom,
+                    float nearest_code) const {
+  if (!(left < float(s.right) && top < float(s.bottom) && right >= float(s.left) && bottom >= float(s.top)))
+    return true;
+  std::int32_t x0 = std::int32_t(larger(left, float(s.left))) / tile,
+               y0 = std::int32_t(larger(top, float(s.top))) / tile;
+  std::int32_t x1 = std::int32_t(smaller(right, float(s.right - 1))) / tile,
+               y1 = std::int32_t(smaller(bottom, float(s.bottom - 1))) / tile;
   const Level* level = &fine_;
   if ((x1 - x0 + 1) * (y1 - y0 + 1) > most) {
     level = &coarse_;
     x0 /= tile, y0 /= tile, x1 /= tile, y1 /= tile;
-    if ((x1 - x0 + 1) * (y1 - y0 + 1) > 4 * most) return false;
   }
   const std::uint32_t key = key_of(nearest_code, 0);
   for (std::int32_t y = y0; y <= y1; ++y)

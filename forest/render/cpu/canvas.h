@@ -1,9 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// The keys of all pixels (frame/layout.h) and how far one sees through them.
+// The keys of all samples of all pixels (frame/layout.h) and how far one sees through them.
 #pragma once
 
 #include <algorithm>
-#include <atomic>
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -21,44 +21,59 @@ namespace forest::render::cpu {
   return std::uint32_t(std::int32_t(code)) << 12 | payload;
 }
 
-/// Shade 0–1 in five bits, the rounding moved by `noise` so that the mean over subframes is smooth.
+/// Shade 0–1 in five bits, the rounding moved by `noise` so that the mean over samples is smooth.
 [[gnu::always_inline]] inline std::uint32_t payload_of(std::uint32_t entry, float shade, float noise) {
   return entry << 5 | std::uint32_t(std::int32_t(smaller(larger(shade * 31.f + noise, 0.f), 31.f)));
 }
 
+/// Subframes that are drawn together: so many samples of every pixel. As the subframes of a picture are taken in groups of
+/// as many, a picture drawn in parts is that drawn at once.
+inline int samples_at_once(std::uint32_t subframes) { return subframes == 1 ? 1 : subframes <= 4 ? 4 : 16; }
+inline constexpr int most_samples = 16;
+
+/// Pixels of one square of the picture: all that a thread draws into is its own.
+struct Square {
+  std::int32_t left = 0, top = 0, right = 0, bottom = 0;
+};
+
 class Canvas {
  public:
-  /// All pixels empty.
-  /// Those beside the area may hold anything, and with those of the hole count as hidden.
-  /// @param gaps  share of a tile's pixels that may be farther than what `hidden` goes by
-  void clear(std::uint32_t width, std::uint32_t height, const frame::Area& area, const frame::Area& hole = {},
-             float gaps = 0.f);
+  /// Sets the size; what the squares hold is undefined until each is cleared.
+  /// Pixels beside the area may hold anything, and with those of the hole count as hidden.
+  /// @param samples  of a pixel
+  /// @param wanted   bit k: sample k is drawn; the others count as hidden
+  /// @param gaps     share of a tile's samples that may be farther than what `hidden` goes by
+  void resize(std::uint32_t width, std::uint32_t height, int samples, std::uint32_t wanted,
+              const frame::Area& area, const frame::Area& hole = {}, float gaps = 0.f);
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
-  /// The keys of one row, from the left.
-  void read_row(std::int32_t y, std::uint32_t* keys) const;
+  int samples() const { return samples_; }
+  std::uint32_t wanted() const { return wanted_; }
 
-  /// The nearest key wins, whichever thread comes first.
-  void put(std::int32_t x, std::int32_t y, std::uint32_t key) {
-    const std::atomic_ref<std::uint32_t> pixel(keys_[place(x, y)]);
-    std::uint32_t seen = pixel.load(std::memory_order_relaxed);
-    while (key < seen && !pixel.compare_exchange_weak(seen, key, std::memory_order_relaxed)) {
-    }
-  }
-  /// Whether all of the FOREST_TILE pixels from `x`, a multiple of as many, on have a key before this one.
-  bool before(std::int32_t x, std::int32_t y, std::uint32_t key) {
-    std::uint32_t farthest = 0;
-    for (std::uint32_t *pixel = &keys_[place(x, y)], *end = pixel + FOREST_TILE; pixel != end; ++pixel)
-      farthest = std::max(farthest, std::atomic_ref(*pixel).load(std::memory_order_relaxed));
-    return farthest < key;
-  }
+  /// The squares that cover the area, in rows: whole tiles, but for the picture's edges.
+  std::int32_t squares_wide() const { return squares_wide_; }
+  std::size_t squares() const { return std::size_t(squares_wide_) * std::size_t(squares_high_); }
+  Square square(std::size_t number) const;
+  /// Which squares a rectangle of pixels touches: columns and rows, the last ones included; nothing when left > right.
+  Square touched(float left, float top, float right, float bottom) const;
 
-  /// Finds the farthest key of every tile: from now on `hidden` knows what has been drawn.
-  void look();
-  /// Whether all that lies within a rectangle of pixels, at a depth code or behind it, is hidden or beside the picture. Looks at
+  /// All samples empty.
+  void clear(const Square& square);
+  /// Finds the farthest key of the square's tiles: from now on `hidden` knows what has been drawn.
+  void look(const Square& square);
+  /// Whether all that lies within a rectangle of pixels, at a depth code or behind it, is hidden or beside the square. Looks at
   /// few tiles; a rectangle that needs more is not hidden.
-  bool hidden(float left, float top, float right, float bottom, float nearest_code) const;
+  bool hidden(const Square& square, float left, float top, float right, float bottom,
+              float nearest_code) const;
+
+  /// The samples of a pixel; those of the pixels to the right follow, up to the next multiple of FOREST_TILE.
+  std::uint32_t* at(std::int32_t x, std::int32_t y) { return &keys_[place(x, y) * std::size_t(samples_)]; }
+  const std::uint32_t* at(std::int32_t x, std::int32_t y) const {
+    return &keys_[place(x, y) * std::size_t(samples_)];
+  }
+  /// The keys of pixels of one row, sample by sample.
+  void read_row(std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys) const;
   frame::DepthMap depth_map() const;
 
  private:
@@ -73,12 +88,15 @@ class Canvas {
   }
 
   std::int32_t width_ = 0, height_ = 0;
+  int samples_ = 1;
+  std::uint32_t wanted_ = 1;
   frame::Area area_, hole_;
   float gaps_ = 0.f;
+  std::int32_t side_ = 64, squares_left_ = 0, squares_top_ = 0, squares_wide_ = 0, squares_high_ = 0;
   std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
   Level fine_, coarse_;              // tiles, and tiles of tiles
-  bool looked_ = false;
 
+  bool whole(std::int32_t tx, std::int32_t ty) const;
   std::uint32_t far_in_tile(std::int32_t tx, std::int32_t ty) const;
 };
 

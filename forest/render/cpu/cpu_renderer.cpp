@@ -3,6 +3,7 @@
 
 #include <chrono>
 
+#include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/resolve.h"
 #include "forest/render/cpu/splat.h"
@@ -22,31 +23,11 @@ double milliseconds_since(Clock::time_point start) {
 struct CpuRenderer::State {
   cpu::Picture picture;
   cpu::Canvas canvas;
+  cpu::Splatter splatter;
+  cpu::SurfaceDrawer surfaces;
   frame::DepthMap seen;
-  std::vector<float> sums;
+  cpu::Sums sums;
   frame::Image image;
-
-  // Returns how many segments there were to draw.
-  std::uint64_t draw(const frame::Lists& lists) {
-    std::uint64_t drawn = 0;
-    const frame::Band whole{std::uint32_t(lists.dots.size()), std::uint32_t(lists.lines.size()),
-                            std::uint32_t(lists.capsules.size())};
-    frame::Band from;
-    for (const frame::Band& to : lists.bands.empty() ? std::span(&whole, 1) : lists.bands) {
-      if (from.dots || from.lines || from.capsules) canvas.look();
-      const auto draw = [&](std::span<const frame::Item> list, std::span<const std::uint8_t> entries,
-                            std::size_t begin, std::size_t end, cpu::Kind kind) {
-        const std::size_t each = kind == cpu::Kind::dots ? 1 : frame::cluster_size;
-        if (!entries.empty()) entries = entries.subspan(begin * each, (end - begin) * each);
-        drawn += cpu::splat(picture, list.subspan(begin, end - begin), entries, kind, canvas);
-      };
-      draw(lists.capsules, lists.entries.capsules, from.capsules, to.capsules, cpu::Kind::capsules);
-      draw(lists.dots, lists.entries.dots, from.dots, to.dots, cpu::Kind::dots);
-      draw(lists.lines, lists.entries.lines, from.lines, to.lines, cpu::Kind::lines);
-      from = to;
-    }
-    return drawn;
-  }
 };
 
 CpuRenderer::CpuRenderer() : state_(std::make_unique<State>()) {}
@@ -62,31 +43,37 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   s.picture.transparent = frame::transparent(f);
   const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
   frame::Timing timing;
-  for (std::uint32_t subframe = f.first_subframe; subframe < std::min(f.last_subframe, f.subframes);
-       ++subframe) {
+  const std::uint32_t end = std::min(f.last_subframe, f.subframes),
+                      at_once = std::uint32_t(cpu::samples_at_once(f.subframes));
+  for (std::uint32_t next = f.first_subframe; next < end;) {
     auto start = Clock::now();
-    const frame::Constants c = s.picture.constants = frame::constants_of(f, subframe);
+    const std::uint32_t begin = next / at_once * at_once, until = std::min(begin + at_once, end);
+    const std::uint32_t wanted = ((1u << (until - begin)) - 1u) & ~((1u << (next - begin)) - 1u);
+    next = until;
+    frame::Constants& c = s.picture.constants;
+    c = frame::constants_of(f, begin);
+    c.centre_x = .5f * float(f.width), c.centre_y = .5f * float(f.height);
+    s.picture.spread = f.subframes > 1 ? .5f : 0.f;
     s.picture.to_camera << c.right_x, c.right_y, c.right_z, c.up_x, c.up_y, c.up_z, c.forward_x, c.forward_y,
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
-    s.canvas.clear(f.width, f.height, area, f.hole.value_or(frame::Area{}), f.gaps);
-    if (!f.surfaces.empty()) {  // they hide much
-      cpu::splat(s.picture, f.surfaces, s.canvas);
-      s.canvas.look();
+    s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.hole.value_or(frame::Area{}), f.gaps);
+    if (!f.surfaces.empty()) {  // first, for they hide much
+      parallel_for(s.canvas.squares(), 1, [&](std::size_t n) { s.canvas.clear(s.canvas.square(n)); });
+      s.surfaces.draw(s.picture, f.surfaces, s.canvas);
     }
-    timing.drawn = s.draw(f);
+    timing.drawn = s.splatter.draw(s.picture, f, s.canvas, f.surfaces.empty());
     if (f.rest) {
-      s.canvas.look();
       s.seen = s.canvas.depth_map();
       const frame::Lists more = f.rest(s.seen);
       frame::check(more, s.picture.geometry);
-      timing.drawn += s.draw(more);
+      timing.drawn += s.splatter.draw(s.picture, more, s.canvas, false);
     }
-    cpu::splat(s.picture, f.overlays, s.canvas);
+    s.splatter.draw(s.picture, f.overlays, s.canvas);
     timing.draw += milliseconds_since(start);
     start = Clock::now();
-    cpu::resolve(s.canvas, c, f.palette, area, s.sums, s.image);
+    cpu::resolve(s.canvas, s.picture, f.palette, area, until, until == end, s.sums, s.image);
     timing.resolve += milliseconds_since(start);
   }
   return timing;

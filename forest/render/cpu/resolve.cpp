@@ -5,15 +5,20 @@
 #include <atomic>
 #include <cmath>
 
+#include "forest/core/clones.h"
 #include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
+#include "forest/render/cpu/window.h"
 
 namespace forest::render::cpu {
 namespace {
 
-constexpr std::size_t beside = 2;  // pixels that the rim reaches
-constexpr std::size_t rows_at_once = 24;
-constexpr std::size_t steps = 4096;  // of the table from light to sRGB
+constexpr std::int32_t beside = 2;  // pixels that the rim reaches
+constexpr std::int32_t rows_at_once = 24;
+constexpr std::int32_t row_at_once = 1024;  // of a row
+constexpr std::size_t steps = 4096;         // of the table from light to sRGB
+constexpr float unit = float(1 << 17);      // of fixed point: 1,024 samples of a light of 8 fit
+constexpr float brightest = 8.f;
 
 double srgb(double light) {
   return light <= .0031308 ? 12.92 * light : 1.055 * std::pow(light, 1. / 2.4) - .055;
@@ -32,127 +37,243 @@ float encoded(float light) {
   return table[i] + (at - float(i)) * (table[i + 1] - table[i]);
 }
 
-// Depths of a row in octaves, `beside` pixels more at both ends.
-[[gnu::target_clones("default", "arch=haswell")]] void octaves_of(const std::uint32_t* keys,
-                                                                  std::size_t width, float* octaves) {
-  for (std::size_t x = 0; x < width; ++x)
-    octaves[x + beside] = float(std::int32_t(keys[x] >> 12)) * (1.f / float(FOREST_DEPTH_STEPS));
-  for (std::size_t i = 0; i < beside; ++i)
-    octaves[i] = octaves[beside], octaves[width + beside + i] = octaves[width + beside - 1];
+FOREST_CLONES void octaves_of(const std::uint32_t* keys, std::size_t count, float* octaves) {
+  for (std::size_t i = 0; i < count; ++i)
+    octaves[i] = float(std::int32_t(keys[i] >> 12)) * (1.f / float(FOREST_DEPTH_STEPS));
 }
 
 [[gnu::always_inline]] inline float nearer(float octave, float other) {
   return smaller(larger((octave - other) * 40.f, 0.f), 1.f);
 }
 
-// Of a row: how much light it keeps, and how much fog lies before it.
+// Of samples that follow one another: how much light each keeps, and how much fog lies before it.
 struct Shading {
   const float* rows[5];  // octaves of the rows around
   const std::uint32_t* keys;
+  std::ptrdiff_t pixel;  // samples
   float halo, fog_start, fog_length;
 };
 
-[[gnu::target_clones("default", "arch=haswell")]] void shade(const Shading& s, std::size_t begin,
-                                                             std::size_t end, float* __restrict lit,
-                                                             float* __restrict fog) {
-  const float *up2 = s.rows[0] + beside, *up = s.rows[1] + beside, *here = s.rows[2] + beside,
-              *down = s.rows[3] + beside, *down2 = s.rows[4] + beside;
+FOREST_CLONES void shade(const Shading& s, std::size_t begin, std::size_t end, float* __restrict lit,
+                         float* __restrict fog) {
+  const float *up2 = s.rows[0], *up = s.rows[1], *here = s.rows[2], *down = s.rows[3], *down2 = s.rows[4];
   const float strength = -1.1f * s.halo / 8.f * 1.44269504f, per_length = -1.44269504f / s.fog_length,
               fog_start = s.fog_start;
-  for (std::size_t x = begin; x < end; ++x) {
-    const float o = here[x];
-    const float rim = nearer(o, here[x + 1]) + nearer(o, *(here + x - 1)) + nearer(o, down[x]) +
-                      nearer(o, up[x]) + nearer(o, down2[x + 2]) + nearer(o, *(down2 + x - 2)) +
-                      nearer(o, up2[x + 2]) + nearer(o, *(up2 + x - 2));
-    const float light = float(std::int32_t(s.keys[x] & 31)) * (1.f / 31.f);
+  const std::ptrdiff_t p = s.pixel, p2 = 2 * p;
+  for (std::size_t i = begin; i < end; ++i) {
+    const float o = here[i];
+    const float rim = nearer(o, *(here + i + p)) + nearer(o, *(here + i - p)) + nearer(o, down[i]) +
+                      nearer(o, up[i]) + nearer(o, *(down2 + i + p2)) + nearer(o, *(down2 + i - p2)) +
+                      nearer(o, *(up2 + i + p2)) + nearer(o, *(up2 + i - p2));
+    const float light = float(std::int32_t(s.keys[i] & 31)) * (1.f / 31.f);
     const float z = exp2_of(o - float(FOREST_DEPTH_BASE));
-    lit[x] = (.16f + 1.05f * light * light) * exp2_of(strength * rim);
-    fog[x] = 1.f - exp2_of(larger(0.f, z - fog_start) * per_length);
+    lit[i] = (.16f + 1.05f * light * light) * exp2_of(strength * rim);
+    fog[i] = 1.f - exp2_of(larger(0.f, z - fog_start) * per_length);
+  }
+}
+
+using Channels = std::array<std::array<float, 128>, 3>;  // of the palette
+
+[[gnu::always_inline]] inline std::int32_t fixed(float light) {
+  return std::int32_t(smaller(light, brightest) * unit + .5f);
+}
+
+// The sums of a pixel's samples.
+template <int S>
+[[gnu::always_inline]] inline void add_samples(const std::uint32_t* keys, std::uint32_t wanted,
+                                               const float* lit, const float* fog, const Channels& palette,
+                                               const Vec3& mist, const Vec3& sky, std::int32_t (&sums)[4]) {
+  std::int32_t covered[S];
+  std::uint32_t entry[S];
+  FOREST_LANES
+  for (int k = 0; k < S; ++k) {
+    covered[k] = keys[k] != FOREST_KEY_EMPTY;
+    entry[k] = keys[k] >> 5 & 127;
+  }
+  std::int32_t mask[S];
+  FOREST_LANES
+  for (int k = 0; k < S; ++k) mask[k] = wanted >> k & 1 ? -1 : 0;
+  for (int i = 0; i < 3; ++i) {
+    const float* of = palette[std::size_t(i)].data();
+    const float mist_i = mist[i], sky_i = sky[i];
+    std::int32_t sum = 0;
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) {
+      const float base = of[entry[k]] * lit[k];
+      const float colour = covered[k] ? base + fog[k] * (mist_i - base) : sky_i;
+      sum += fixed(colour) & mask[k];
+    }
+    sums[i] += sum;
+  }
+  std::int32_t sum = 0;
+  FOREST_LANES
+  for (int k = 0; k < S; ++k) sum += covered[k] & mask[k];
+  sums[3] += sum;
+}
+
+struct Row {
+  std::size_t pixels;
+  const std::uint32_t* keys;
+  const float *lit, *fog;
+  std::int32_t* sums;  // four a pixel
+};
+
+template <int S>
+[[gnu::always_inline]] inline void add_row(const Row& row, std::uint32_t wanted, const Channels& palette,
+                                           const Vec3& mist, const Vec3& sky) {
+  for (std::size_t x = 0; x < row.pixels; ++x) {
+    std::int32_t sums[4] = {};
+    add_samples<S>(row.keys + x * S, wanted, row.lit + x * S, row.fog + x * S, palette, mist, sky, sums);
+    for (std::size_t i = 0; i < 4; ++i) row.sums[4 * x + i] += sums[i];
+  }
+}
+
+FOREST_CLONES void add_1(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+                         const Vec3& sky) {
+  add_row<1>(row, wanted, palette, mist, sky);
+}
+FOREST_CLONES void add_4(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+                         const Vec3& sky) {
+  add_row<4>(row, wanted, palette, mist, sky);
+}
+FOREST_CLONES void add_16(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+                          const Vec3& sky) {
+  add_row<16>(row, wanted, palette, mist, sky);
+}
+
+// Adds to a pixel's sums what glass before its samples changes, sample by sample.
+void tint(const frame::Constants& c, const std::uint32_t* keys, std::uint32_t wanted, int samples,
+          std::int32_t x, std::int32_t y, const float* lit, const float* fog, const Channels& palette,
+          const Vec3& mist, const Vec3& sky, std::int32_t* sums) {
+  const Vec3 glass(c.glass_red, c.glass_green, c.glass_blue);
+  FOREST_LANES
+  for (int k = 0; k < samples; ++k) {
+    if (!(wanted >> k & 1)) continue;
+    const Vec2 place = frame::sample_place(c.subframe + std::uint32_t(k), c.subframes);
+    const bool empty = keys[k] == FOREST_KEY_EMPTY;
+    const float z = frame::glass_depth(c, float(x) + .5f - place.x(), float(y) + .5f - place.y());
+    if (!(empty ? std::isfinite(z) : z < frame::depth_of_code(keys[k] >> 12))) continue;
+    for (int i = 0; i < 3; ++i) {
+      const float base = palette[std::size_t(i)][keys[k] >> 5 & 127] * lit[k];
+      const float colour = empty ? sky[i] : base + fog[k] * (mist[i] - base);
+      sums[i] += fixed(colour + c.glass_opacity * (glass[i] - colour)) - fixed(colour);
+    }
   }
 }
 
 }  // namespace
 
-void resolve(const Canvas& canvas, const frame::Constants& c, const frame::Palette& palette,
-             const frame::Area& area, std::vector<float>& sums, frame::Image& image) {
-  const auto width = std::size_t(canvas.width()), height = std::size_t(canvas.height());
-  const bool first = c.subframe == 0, keep = c.subframe + 1 < c.subframes,
-             show = c.subframe + 1 >= c.last_subframe;
-  if (c.subframes > 1) sums.resize(width * height * 4);
+void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette& palette,
+             const frame::Area& area, std::uint32_t so_far, bool last, Sums& sums, frame::Image& image) {
+  const frame::Constants& c = picture.constants;
+  const std::int32_t width = canvas.width(), height = canvas.height(), samples = canvas.samples();
+  const std::uint32_t wanted = canvas.wanted();
+  const bool first = so_far <= std::uint32_t(std::popcount(wanted)), at_once = so_far == c.subframes && first;
+  if (!at_once) sums.resize(std::size_t(width) * std::size_t(height) * 4);
   image.width = c.width, image.height = c.height;
-  image.pixels.resize(width * height * 4);
-  const float share = 1.f / float(c.subframe + 1), exposure = c.exposure * share;
+  image.pixels.resize(std::size_t(width) * std::size_t(height) * 4);
   const Vec3 top(c.top_red, c.top_green, c.top_blue), bottom(c.bottom_red, c.bottom_green, c.bottom_blue),
       mist(c.fog_red, c.fog_green, c.fog_blue);
-  const Vec3 glass(c.glass_red, c.glass_green, c.glass_blue);
+  Channels channels{};
+  for (std::size_t i = 0; i < 3; ++i)
+    for (std::size_t e = 0; e < palette.size(); ++e) channels[i][e] = palette[e][Eigen::Index(i)];
   const bool tinted = c.glass_opacity > 0.f;
+  const float share = 1.f / float(so_far), exposure = c.exposure * share / unit;
+  const std::int32_t left = std::int32_t(area.left), right = std::int32_t(area.right),
+                     high = std::int32_t(area.bottom - area.top),
+                     columns = std::max(row_at_once / samples, 64),
+                     blocks_high = (high + rows_at_once - 1) / rows_at_once,
+                     blocks_wide = (right - left + columns - 1) / columns;
   std::atomic<std::uint64_t> covered = 0;
-  const std::size_t high = area.bottom - area.top, chunks = (high + rows_at_once - 1) / rows_at_once,
-                    padded = width + 2 * beside;
-  parallel_for(chunks, 1, [&](std::size_t chunk) {
-    const std::size_t begin = area.top + chunk * rows_at_once,
-                      end = std::min<std::size_t>(area.bottom, begin + rows_at_once);
-    std::vector<float> octaves((rows_at_once + 2 * beside) * padded), lit(width), fog(width);
-    std::vector<std::uint32_t> all_keys((rows_at_once + 2 * beside) * width);
-    const auto row_of = [&](std::size_t y) {
-      return &octaves[(y + beside - begin) * padded];
-    };  // y may be `beside` outside
-    for (std::size_t k = 0; k < end - begin + 2 * beside; ++k) {
-      const std::size_t y = std::min(std::max(begin + k, beside) - beside, height - 1);
-      canvas.read_row(std::int32_t(y), &all_keys[k * width]);
-      octaves_of(&all_keys[k * width], width, &octaves[k * padded]);
+  parallel_for(std::size_t(blocks_high) * std::size_t(blocks_wide), 1, [&](std::size_t block) {
+    const std::int32_t begin_y = std::int32_t(area.top) + std::int32_t(block) / blocks_wide * rows_at_once,
+                       end_y = std::min(std::int32_t(area.bottom), begin_y + rows_at_once),
+                       begin_x = left + std::int32_t(block) % blocks_wide * columns,
+                       end_x = std::min(right, begin_x + columns);
+    const auto S = std::size_t(samples), pixels = std::size_t(end_x - begin_x),
+               row_size = (pixels + 2 * beside) * S;
+    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S);
+    std::vector<std::uint32_t> keys((rows_at_once + 2 * beside) * row_size);
+    std::vector<std::int32_t> row_sums(4 * pixels);
+    // Rows and columns around the block; the picture's edges are repeated.
+    const std::int32_t low = std::max(begin_x - beside, 0), up = std::min(end_x + beside, width);
+    for (std::int32_t k = 0; k < end_y - begin_y + 2 * beside; ++k) {
+      const std::int32_t y = std::clamp(begin_y + k - beside, 0, height - 1);
+      std::uint32_t* row = &keys[std::size_t(k) * row_size];
+      const auto at = [&](std::int32_t x) { return row + std::size_t(x - begin_x + beside) * S; };
+      canvas.read_row(y, low, up, at(low));
+      for (std::int32_t x = begin_x - beside; x < low; ++x) std::copy(at(low), at(low) + S, at(x));
+      for (std::int32_t x = up; x < end_x + beside; ++x) std::copy(at(up - 1), at(up - 1) + S, at(x));
+      octaves_of(row, row_size, &octaves[std::size_t(k) * row_size]);
     }
     std::uint64_t alpha = 0;
-    for (std::size_t y = begin; y < end; ++y) {
-      const std::uint32_t* keys = &all_keys[(y + beside - begin) * width];
-      Shading shading{{}, keys, c.halo, c.fog_start, c.fog_length};
-      for (std::size_t k = 0; k < 5; ++k) shading.rows[k] = row_of(y + k - beside);
-      // Only where something is drawn.
-      for (std::size_t x = area.left; x < area.right;) {
-        while (x < area.right && keys[x] == FOREST_KEY_EMPTY) ++x;
-        const std::size_t from = x;
-        std::size_t gap = 0;
-        for (; x < area.right && gap < 16; ++x) gap = keys[x] == FOREST_KEY_EMPTY ? gap + 1 : 0;
-        shade(shading, from, x, lit.data(), fog.data());
-      }
+    for (std::int32_t y = begin_y; y < end_y; ++y) {
+      const auto k = std::size_t(y - begin_y);
+      const std::uint32_t* row_keys = &keys[(k + beside) * row_size + beside * S];
+      Shading shading{{}, row_keys, samples, c.halo, c.fog_start, c.fog_length};
+      for (std::size_t i = 0; i < 5; ++i) shading.rows[i] = &octaves[(k + i) * row_size + beside * S];
+      const auto empty = [&](std::size_t x) {
+        std::uint32_t all = FOREST_KEY_EMPTY;
+        for (std::size_t i = x * S; i < (x + 1) * S; ++i)
+          all &= row_keys[i] | (wanted >> (i - x * S) & 1 ? 0u : ~0u);
+        return all == FOREST_KEY_EMPTY;
+      };
       const Vec3 sky = top + (float(y) + .5f) / float(height) * (bottom - top);
-      Vec3 sky_code;
-      for (int i = 0; i < 3; ++i) sky_code[i] = encoded(sky[i] * c.exposure);
-      for (std::size_t x = area.left; x < area.right; ++x) {
-        const std::size_t at = y * width + x;
-        const bool empty = keys[x] == FOREST_KEY_EMPTY;
-        const float noise = noise_at(std::int32_t(x), std::int32_t(y), c.subframe);
-        std::uint8_t* pixel = &image.pixels[4 * at];
-        if (empty && c.subframes == 1 && !tinted) {
-          for (int i = 0; i < 3; ++i) pixel[i] = std::uint8_t(smaller(sky_code[i] + noise, 255.f));
-          pixel[3] = 0;
+      std::int32_t sky_sum[3];
+      for (int i = 0; i < 3; ++i) sky_sum[i] = fixed(sky[i]) * std::popcount(wanted);
+      float sky_code[3];
+      for (int i = 0; i < 3; ++i) sky_code[i] = encoded(float(sky_sum[i]) * exposure);
+      const auto row_at = std::size_t(y) * std::size_t(width) + std::size_t(begin_x);
+      const auto show = [&](std::size_t x, const std::int32_t* sum) {
+        std::uint8_t* pixel = &image.pixels[4 * (row_at + x)];
+        const float noise = noise_at(begin_x + std::int32_t(x), y, so_far - 1);
+        for (std::size_t i = 0; i < 3; ++i)
+          pixel[i] = std::uint8_t(smaller(encoded(float(sum[i]) * exposure) + noise, 255.f));
+        pixel[3] = std::uint8_t(255.f * float(sum[3]) * share + .5f);
+        alpha += pixel[3];
+      };
+      // Runs of pixels in which something is drawn, and what lies between.
+      for (std::size_t x = 0; x < pixels;) {
+        const std::size_t from = x;
+        const bool nothing = empty(x);
+        std::size_t gap = 0;
+        if (nothing)
+          while (x < pixels && empty(x)) ++x;
+        else
+          for (; x < pixels && gap < 16; ++x) gap = empty(x) ? gap + 1 : 0;
+        if (nothing && at_once && !tinted) {
+          for (std::size_t i = from; i < x; ++i) {
+            std::uint8_t* pixel = &image.pixels[4 * (row_at + i)];
+            const float noise = noise_at(begin_x + std::int32_t(i), y, so_far - 1);
+            for (std::size_t j = 0; j < 3; ++j) pixel[j] = std::uint8_t(smaller(sky_code[j] + noise, 255.f));
+            pixel[3] = 0;
+          }
           continue;
         }
-        Vec3 colour = sky;
-        if (!empty) {
-          const Vec3& base = palette[keys[x] >> 5 & 127];
-          colour = base * lit[x] + fog[x] * (mist - base * lit[x]);
+        std::int32_t* to = row_sums.data();
+        std::fill(to, to + 4 * (x - from), 0);
+        if (nothing && !tinted) {
+          for (std::size_t i = 0; i < x - from; ++i) std::copy(sky_sum, sky_sum + 3, to + 4 * i);
+        } else {
+          shade(shading, from * S, x * S, lit.data(), fog.data());
+          const Row row{x - from, row_keys + from * S, &lit[from * S], &fog[from * S], to};
+          (samples == 1 ? add_1 : samples == 4 ? add_4 : add_16)(row, wanted, channels, mist, sky);
+          for (std::size_t i = from; tinted && i < x; ++i)
+            tint(c, row_keys + i * S, wanted, samples, begin_x + std::int32_t(i), y, &lit[i * S], &fog[i * S],
+                 channels, mist, sky, to + 4 * (i - from));
         }
-        if (tinted) {
-          const float z = frame::glass_depth(c, float(x) + .5f, float(y) + .5f);
-          if (empty ? std::isfinite(z) : z < frame::depth_of_code(keys[x] >> 12))
-            colour += c.glass_opacity * (glass - colour);
+        if (!at_once) {
+          std::int32_t* before = &sums[4 * (row_at + from)];
+          for (std::size_t i = 0; i < 4 * (x - from); ++i)
+            to[i] = before[i] = (first ? 0 : before[i]) + to[i];
         }
-        float sum[4] = {colour.x(), colour.y(), colour.z(), empty ? 0.f : 1.f};
-        if (!first)
-          for (std::size_t i = 0; i < 4; ++i) sum[i] += sums[4 * at + i];
-        if (keep)
-          for (std::size_t i = 0; i < 4; ++i) sums[4 * at + i] = sum[i];
-        if (!show) continue;
-        for (int i = 0; i < 3; ++i)
-          pixel[i] = std::uint8_t(smaller(encoded(sum[i] * exposure) + noise, 255.f));
-        pixel[3] = std::uint8_t(255.f * sum[3] * share + .5f);
-        alpha += pixel[3];
+        if (last)
+          for (std::size_t i = from; i < x; ++i) show(i, to + 4 * (i - from));
       }
     }
     covered += alpha;
   });
-  image.covered = double(covered) / 255. / double(std::max<std::size_t>(1, high * (area.right - area.left)));
+  image.covered = double(covered) / 255. / double(std::max(1, high * (right - left)));
 }
 
 }  // namespace forest::render::cpu

@@ -286,7 +286,7 @@ struct OpenGLRenderer::Device {
       glNamedBufferSubData(large_queue.name(), 0, sizeof nothing, nothing);
       constants.item_count = std::uint32_t(surface.triangles.size());
       constants.instance = surface.instance, constants.opacity = surface.opacity;
-      constants.door = frame::forest_surface_key(std::uint32_t(k), surface.instance);
+      constants.door = frame::forest_surface_key(frame::door_number(f.surfaces, k), surface.instance);
       set_constants();
       mesh->vertices.bind_texels(0, GL_RGBA32UI);
       mesh->triangles.bind_texels(2, GL_R32UI);

@@ -575,7 +575,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
                            (surface.presence.empty() ? 1.f : float(surface.presence[vertex]) / 255.f);
         facet.entry[i] = surface.entries[vertex];
       }
-      facet.key = frame::forest_surface_key(std::uint32_t(k), surface.instance);
+      facet.key = frame::forest_surface_key(frame::door_number(f.surfaces, k), surface.instance);
       if (surface.opacity > 0 && project(eye, facet)) facets.push_back(facet);
     }
   }

@@ -1,0 +1,371 @@
+// SPDX-License-Identifier: Apache-2.0
+// Lines, tubes, capsules and dots: what a window shows of segments that lie on the picture already. They are the same as the
+// shaders of render/opengl draw.
+#pragma once
+
+#include <algorithm>
+#include <cmath>
+
+#include "forest/render/cpu/capsule.h"
+#include "forest/render/cpu/run.h"
+#include "forest/render/cpu/window.h"
+
+namespace forest::render::cpu {
+
+/// A rectangle of pixels.
+struct Box {
+  float left, top, right, bottom;
+};
+
+/// A line.
+struct Stroke {
+  float y, slope, z, rise;    // at the first step, along the axis of the screen that it runs along more
+  float half;                 // of its width, across
+  float begin, length;        // as Run's
+  float rank;                 // in [0, 1)
+  float lit_side, lit_front;  // as Run's
+  std::int16_t first, last;   // steps, within the picture
+  std::uint16_t payload;      // entry << 5 | its mean shade
+  std::uint8_t opacity, steep;
+  std::uint32_t key;  // of its door
+
+  Stroke(const Run& r, std::size_t i)
+      : y(r.y[i]),
+        slope(r.slope[i]),
+        z(r.z[i]),
+        rise(r.rise[i]),
+        half(.5f * r.line_width[i]),
+        begin(r.begin[i]),
+        length(r.length[i]),
+        rank(r.rank[i]),
+        lit_side(r.lit_side[i]),
+        lit_front(r.lit_front[i]),
+        first(std::int16_t(r.first[i])),
+        last(std::int16_t(r.last[i])),
+        payload(std::uint16_t(r.payload[i])),
+        opacity(std::uint8_t(r.opacity[i])),
+        steep(std::uint8_t(r.steep[i])),
+        key(r.key[i]) {}
+  Box box(float spread) const {
+    const float end = y + slope * float(last - first - 1),
+                reach = half + spread * (1.f + std::abs(slope)) + 1.f;
+    const float low = smaller(y, end) - reach, high = larger(y, end) + reach;
+    return steep ? Box{low, float(first), high, float(last)} : Box{float(first), low, float(last), high};
+  }
+  // Codes of the depths of its ends.
+  float code_a() const { return z - begin * rise; }
+  float code_b() const { return z + (length - begin) * rise; }
+  float nearest_code() const { return larger(smaller(code_a(), code_b()), 0.f); }
+};
+
+/// A capsule whose surface is seen.
+struct Solid {
+  Vec3 a, b;  // in camera coordinates
+  float ra, rb, px, py, qx, qy, code_a, code_b;
+  float reach,
+      nearest;  // pixels around both ends; code of its nearest depth, 0 where it may reach before the near distance
+  std::uint8_t entry, opacity;
+  std::uint32_t key;
+
+  Solid(const frame::Constants& c, const Run& r, std::size_t i, float width)
+      : a(r.ax[i], r.ay[i], r.az[i]),
+        b(r.bx[i], r.by[i], r.bz[i]),
+        ra(r.ra[i]),
+        rb(r.rb[i]),
+        px(r.px[i]),
+        py(r.py[i]),
+        qx(r.qx[i]),
+        qy(r.qy[i]),
+        code_a(r.code_a[i]),
+        code_b(r.code_b[i]),
+        reach(1.f + 1.05f * width),
+        entry(std::uint8_t(r.entry[i])),
+        opacity(std::uint8_t(r.opacity[i])),
+        key(r.key[i]) {
+    const float depth = std::min(a.z() - ra, b.z() - rb);
+    nearest = depth > c.near ? depth_code(depth) : 0.f;
+  }
+  Box box(float spread) const {
+    if (nearest == 0.f) return {-INFINITY, -INFINITY, INFINITY, INFINITY};
+    const float all = reach + spread;
+    return {std::min(px, qx) - all, std::min(py, qy) - all, std::max(px, qx) + all, std::max(py, qy) + all};
+  }
+  float nearest_code() const { return nearest; }
+};
+
+/// A small sphere.
+struct Dot {
+  float px, py, z, radius, pixels, code, rank;  // its radius in µm and in pixels
+  std::uint8_t entry, opacity;
+  std::uint32_t key;
+
+  Dot(const frame::Constants& c, const Run& r, float first_rank)
+      : px(r.px[0]),
+        py(r.py[0]),
+        z(r.az[0]),
+        radius(r.ra[0]),
+        pixels(c.focal * r.ra[0] / lens(c, r.az[0])),
+        code(r.code_a[0]),
+        rank(first_rank),
+        entry(std::uint8_t(r.entry[0])),
+        opacity(std::uint8_t(r.opacity[0])),
+        key(r.key[0]) {}
+  Box box(float spread) const {
+    const float reach = std::max(pixels, 1.f) + spread;
+    return {px - reach, py - reach, px + reach, py + reach};
+  }
+  float nearest_code() const { return 0.f; }
+};
+
+inline constexpr float tube_width =
+    7.f;  // pixels; below, a capsule is shaded by its distance from the axis on screen
+
+// The whole number of `x`, cut at the edges of a window: what stands right before the eye reaches far beyond all of them.
+inline std::int32_t clipped(float x, std::int32_t low, std::int32_t high) {
+  return std::int32_t(smaller(larger(x, float(low)), float(high)));
+}
+
+// The edges of a window along and across the axis of the screen that something runs along more.
+struct Edges {
+  std::int32_t first, last, low, high;
+  Edges(const Square& s, bool steep)
+      : first(steep ? s.top : s.left),
+        last(steep ? s.bottom : s.right),
+        low(steep ? s.left : s.top),
+        high(steep ? s.right : s.bottom) {}
+};
+
+// As draw_line in render/opengl/shaders/common.glsl.
+template <int S>
+[[gnu::always_inline]] inline void draw(const Picture&, const Samples<S>& samples, const Stroke& r,
+                                        auto& window) {
+  const bool steep = r.steep;
+  const Edges edges(window.square(), steep);
+  const float half = r.half, slope = r.slope, rise = r.rise;
+  const std::int32_t first = r.first, begin = std::max(first, edges.first),
+                     end = std::min(std::int32_t(r.last), edges.last);
+  const float nearest = r.nearest_code(),
+              farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
+  if constexpr (S == 1) {
+    for (std::int32_t x = begin; x < end; ++x) {
+      const float steps = float(x - first), y = r.y + steps * slope;
+      const std::int32_t low = clipped(std::ceil(y - half), edges.low, edges.high),
+                         high = clipped(std::ceil(y + half), edges.low, edges.high);
+      const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), r.payload);
+      for (std::int32_t across = low; across < high; ++across)
+        steep ? window.put(across, x, {key}) : window.put(x, across, {key});
+    }
+  } else {
+    const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
+    const float rank = r.rank * 7.f, per_half = 1.f / half, lit_side = r.lit_side, lit_front = r.lit_front;
+    const std::uint32_t entry = r.payload >> 5;
+    float beside[S], noise[S];  // its middle, at each sample
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) {
+      beside[k] = across[k] - slope * along[k];
+      noise[k] = fraction(rank + samples.turn[k]);
+    }
+    const float reach = half + .5f * (1.f + std::abs(slope)), length = r.length;
+    for (std::int32_t x = begin; x < end; ++x) {
+      const float steps = float(x - first), y = r.y + steps * slope, at = r.begin + steps;
+      const std::int32_t low = clipped(std::ceil(y - reach), edges.low, edges.high),
+                         high = clipped(std::ceil(y + reach), edges.low, edges.high);
+      const std::uint32_t depth = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), 0);
+      const float past = at - length;
+      for (std::int32_t row = low; row < high; ++row) {
+        const float from_middle = float(row) - y;
+        Keys<S> keys;
+        FOREST_LANES
+        for (int k = 0; k < S; ++k) {
+          const float t = (from_middle - beside[k]) * per_half;
+          const bool covered = (t >= -1.f) & (t < 1.f) & (at >= along[k]) & (past < along[k]);
+          const float shade = .5f + t * lit_side + std::sqrt(larger(1.f - t * t, 0.f)) * lit_front;
+          keys[k] = covered ? depth | payload_of(entry, shade, noise[k]) : FOREST_KEY_EMPTY;
+        }
+        steep ? window.put(row, x, keys) : window.put(x, row, keys);
+      }
+    }
+  }
+}
+
+// A thin capsule by its distance from the axis on screen: as draw_tube in render/opengl/shaders/capsule.glsl.
+template <int S>
+[[gnu::always_inline]] inline void draw_tube(const Picture& picture, const Samples<S>& samples,
+                                             const Solid& r, auto& window) {
+  const frame::Constants& c = picture.constants;
+  float px = r.px, py = r.py, qx = r.qx, qy = r.qy;
+  float wp = c.focal * r.ra / lens(c, r.a.z()), wq = c.focal * r.rb / lens(c, r.b.z()), za = r.code_a,
+        zb = r.code_b;
+  constexpr float octave = 1.442695f * float(FOREST_DEPTH_STEPS);
+  const float bulge = octave * std::max(r.ra / r.a.z(), r.rb / r.b.z());
+  const bool steep = std::abs(qy - py) > std::abs(qx - px);
+  if (steep) std::swap(px, py), std::swap(qx, qy);
+  if (px > qx) std::swap(px, qx), std::swap(py, qy), std::swap(wp, wq), std::swap(za, zb);
+  const float dx = qx - px, per_dx = 1.f / dx, slope = (qy - py) / dx,
+              stretch = std::sqrt(1.f + slope * slope);
+  const Edges edges(window.square(), steep);
+  const float over = .4f * std::min(wp, wq), spread = picture.spread;
+  const std::int32_t first = clipped(std::ceil(px - over - .5f - spread), edges.first, edges.last),
+                     last = clipped(std::ceil(qx + over - .5f + spread), edges.first, edges.last);
+  const Vec3 &a = r.a, &b = r.b;
+  const Vec3 tangent = (b - a).normalized(),
+             eye = -(a + b).cwiseProduct(Vec3(c.converge, c.converge, 1.f)).normalized();
+  const Vec3 facing = (eye - eye.dot(tangent) * tangent).normalized();
+  Vec3 side = tangent.cross(facing);
+  if ((steep ? side.x() : -side.y()) < 0.f) side = -side;
+  const float lit_side = .5f * side.dot(picture.light), lit_front = .5f * facing.dot(picture.light);
+  const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
+  const float reach = std::max(wp, wq) * stretch + spread * (1.f + std::abs(slope));
+  const std::uint32_t entry = r.entry, subframe = c.subframe;
+  for (std::int32_t x = first; x < last; ++x) {
+    float centre[S], inverse[S], depth[S];
+    std::uint32_t within[S];
+    const float column = float(x) + .5f - px;
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) {
+      const float step = column - along[k], share = smaller(larger(step * per_dx, 0.f), 1.f);
+      centre[k] = py + across[k] + slope * step;
+      inverse[k] = 1.f / ((wp + share * (wq - wp)) * stretch);
+      depth[k] = za + share * (zb - za);
+      within[k] = (step >= -over) & (step < dx + over);
+    }
+    const float middle = py + slope * column;
+    const std::int32_t low = clipped(std::ceil(middle - reach - .5f), edges.low, edges.high),
+                       high = clipped(std::ceil(middle + reach - .5f), edges.low, edges.high);
+    for (std::int32_t y = low; y < high; ++y) {
+      const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
+      const float noise = noise_at(at_x, at_y, subframe);
+      Keys<S> keys;
+      FOREST_LANES
+      for (int k = 0; k < S; ++k) {
+        const float t = (float(y) + .5f - centre[k]) * inverse[k], h = std::sqrt(larger(1.f - t * t, 0.f));
+        const bool covered = (within[k] != 0) & (t >= -1.f) & (t < 1.f);
+        const std::uint32_t payload =
+            payload_of(entry, .5f + t * lit_side + h * lit_front, fraction(noise + samples.turn[k]));
+        keys[k] = covered ? key_of(larger(depth[k] - bulge * h, 0.f), payload) : FOREST_KEY_EMPTY;
+      }
+      window.put(at_x, at_y, keys);
+    }
+  }
+}
+
+template <int S>
+[[gnu::always_inline]] inline void draw_capsule(const Picture& picture, const Samples<S>& samples,
+                                                const Solid& r, auto& window) {
+  constexpr std::int32_t lanes = std::int32_t(FOREST_TILE);
+  const frame::Constants& c = picture.constants;
+  const Body body(r.a, r.b, r.ra, r.rb);
+  const Vec2 p(r.px, r.py), q(r.qx, r.qy);
+  const Outline outline = outline_of(c, picture.spread, p, q, body), inner = inner_outline_of(c, p, q, body);
+  const Square& s = window.square();
+  const std::int32_t first = clipped(std::floor(outline.top()), s.top, s.bottom),
+                     last = clipped(std::ceil(outline.bottom()), s.top, s.bottom);
+  const float thickest = std::max(body.ra, body.rb), from = 1.f / body.a.z(), to = 1.f / body.b.z();
+  const std::uint32_t entry = r.entry, subframe = c.subframe;
+  for (std::int32_t y = first; y < last; ++y) {
+    const float at = float(y) + .5f;
+    const auto [left, right] = outline.across(at);
+    if (!(left < right)) continue;
+    const auto [begin, end] = outline.part(at);
+    const float depth = c.parallel > 0.f
+                            ? std::min(body.a.z(), body.b.z())
+                            : 1.f / std::max(from + begin * (to - from), from + end * (to - from));
+    const std::uint32_t nearest = key_of(depth_code(std::max(depth * .9999f - thickest, c.near)), 0);
+    const std::int32_t low = clipped(std::floor(left), s.left, s.right),
+                       high = clipped(std::ceil(right), s.left, s.right);
+    const auto [inner_left, inner_right] = S > 1 ? inner.across(at) : std::pair(0.f, 0.f);
+    for (std::int32_t x = low & -lanes; x < high; x += lanes) {
+      if (window.before(x, y, nearest)) continue;
+      float px[lanes], py[lanes];
+      FOREST_LANES
+      for (int k = 0; k < lanes; ++k) px[k] = float(x + k) + .5f, py[k] = at;
+      Hits<lanes> hits;
+      const bool single = S == 1 || (px[lanes - 1] >= inner_left && px[0] <= inner_right);
+      if (single) meet<lanes>(c, picture.light, body, px, py, hits);
+      for (std::int32_t n = std::max(low - x, 0); n < std::min(lanes, high - x); ++n) {
+        const float noise = noise_at(x + n, y, subframe);
+        Keys<S> keys;
+        if (S == 1 || (px[n] >= inner_left && px[n] <= inner_right)) {
+          const std::uint32_t hit = hits.hit[n];
+          FOREST_LANES
+          for (int k = 0; k < S; ++k) {
+            const std::uint32_t key =
+                key_of(hits.code[n], payload_of(entry, hits.shade[n], fraction(noise + samples.turn[k])));
+            keys[k] = hit ? key : FOREST_KEY_EMPTY;
+          }
+        } else {
+          float sx[S], sy[S];
+          FOREST_LANES
+          for (int k = 0; k < S; ++k) sx[k] = px[n] - samples.x[k], sy[k] = py[n] - samples.y[k];
+          Hits<S> seen;
+          meet<S>(c, picture.light, body, sx, sy, seen);
+          FOREST_LANES
+          for (int k = 0; k < S; ++k) {
+            const std::uint32_t key =
+                key_of(seen.code[k], payload_of(entry, seen.shade[k], fraction(noise + samples.turn[k])));
+            keys[k] = seen.hit[k] ? key : FOREST_KEY_EMPTY;
+          }
+        }
+        window.put(x + n, y, keys);
+      }
+    }
+  }
+}
+
+template <int S>
+[[gnu::always_inline]] inline void draw(const Picture& picture, const Samples<S>& samples, const Solid& r,
+                                        auto& window) {
+  const frame::Constants& c = picture.constants;
+  const float width = c.focal * std::max(r.ra / lens(c, r.a.z()), r.rb / lens(c, r.b.z()));
+  const float distance = std::hypot(r.qx - r.px, r.qy - r.py);
+  if (2.f * width < tube_width && distance > .5f * width)
+    draw_tube<S>(picture, samples, r, window);
+  else
+    draw_capsule<S>(picture, samples, r, window);
+}
+
+// Small spheres: as render/opengl/shaders/dots.glsl. Their ranks are those of the first of the samples.
+template <int S>
+[[gnu::always_inline]] inline void draw(const Picture& picture, const Samples<S>& samples, const Dot& r,
+                                        auto& window) {
+  const frame::Constants& c = picture.constants;
+  const float px = r.px, py = r.py, z = r.z, radius = r.pixels, rank = r.rank, spread = picture.spread;
+  const Square& s = window.square();
+  const std::uint32_t entry = r.entry, subframe = c.subframe;
+  const bool small = radius < .6f;  // less than a pixel: drawn for its share of samples
+  const float share = 3.14159f * radius * radius, reach = small ? .5f : radius;
+  const std::int32_t top = clipped(std::ceil(py - reach - spread - .5f), s.top, s.bottom),
+                     bottom = clipped(std::floor(py + reach + spread + .5f), s.top, s.bottom),
+                     left = clipped(std::ceil(px - reach - spread - .5f), s.left, s.right),
+                     right = clipped(std::floor(px + reach + spread + .5f), s.left, s.right);
+  const float per_radius = 1.f / radius;
+  const Vec3& light = picture.light;
+  for (std::int32_t y = top; y < bottom; ++y)
+    for (std::int32_t x = left; x < right; ++x) {
+      const float noise = noise_at(x, y, subframe);
+      Keys<S> keys;
+      if (small) {
+        FOREST_LANES
+        for (int k = 0; k < S; ++k) {
+          const float turned = fraction(rank + samples.turn[k]);
+          const float dx = px + samples.x[k] - float(x), dy = py + samples.y[k] - float(y);
+          const bool covered = (share > turned) & (dx >= 0.f) & (dx < 1.f) & (dy >= 0.f) & (dy < 1.f);
+          keys[k] = covered ? key_of(r.code, payload_of(entry, .8f, turned)) : FOREST_KEY_EMPTY;
+        }
+      } else {
+        FOREST_LANES
+        for (int k = 0; k < S; ++k) {
+          const float dx = (float(x) + .5f - px - samples.x[k]) * per_radius,
+                      dy = (float(y) + .5f - py - samples.y[k]) * per_radius, h = 1.f - dx * dx - dy * dy,
+                      nz = -std::sqrt(larger(h, 0.f));
+          const float shade = .5f + .5f * (dx * light.x() - dy * light.y() + nz * light.z());
+          const std::uint32_t payload = payload_of(entry, shade, fraction(noise + samples.turn[k]));
+          const std::uint32_t key = key_of(depth_code(larger(z + r.radius * nz, c.near)), payload);
+          keys[k] = h > 0.f ? key : FOREST_KEY_EMPTY;
+        }
+      }
+      window.put(x, y, keys);
+    }
+}
+
+}  // namespace forest::render::cpu

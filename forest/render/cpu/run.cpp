@@ -1,0 +1,172 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/render/cpu/run.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+#include "forest/core/clones.h"
+#include "forest/core/half.h"
+#include "forest/frame/constants.h"
+#include "forest/render/cpu/arithmetic.h"
+#include "forest/render/cpu/canvas.h"
+
+namespace forest::render::cpu {
+namespace {
+
+// Of a run that is loaded, what is transparent.
+void mark_transparent(const Picture& picture, const frame::Item& item, const frame::State& state, Run& r) {
+  for (std::size_t i = 0; i < r.count; ++i) {
+    r.opacity[i] = (state.opacity * picture.opacities[r.entry[i]] + 127u) / 255u;
+    if (r.opacity[i] < 255) r.key[i] = frame::forest_branch_key(item.instance, r.meta[i]);
+  }
+}
+
+}  // namespace
+
+void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r) {
+  const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
+  const frame::State state = picture.state_of(item);
+  const std::uint32_t colour = state.colour_class * 8u;
+  const float turn = golden * float(picture.constants.subframe);
+  r.count = 0;
+  for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
+    const frame::Segment& s = segments[std::countr_zero(drawn)];
+    const std::size_t i = r.count++;
+    r.ax[i] = s.ax, r.ay[i] = s.ay, r.az[i] = s.az;
+    r.bx[i] = s.bx, r.by[i] = s.by, r.bz[i] = s.bz;
+    r.ra[i] = from_half(s.radii), r.rb[i] = from_half(s.radii >> 16);
+    r.mean_width[i] = from_half(s.meta >> 16);
+    r.rank[i] = float(s.meta >> 8 & 255) * (1.f / 256.f) + turn;
+    r.entry[i] = colour + (s.meta & 7);
+    r.meta[i] = s.meta;
+    r.opacity[i] = 255;
+  }
+  if (picture.transparent) mark_transparent(picture, item, state, r);
+  if (entries) {
+    std::size_t i = 0;
+    for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1)
+      r.entry[i++] = entries[std::countr_zero(drawn)];
+  }
+}
+
+void load(const frame::Overlay& o, const Picture& picture, Run& r) {
+  const frame::Constants& c = picture.constants;
+  r.count = 1;
+  r.ax[0] = o.a.x(), r.ay[0] = o.a.y(), r.az[0] = o.a.z(), r.bx[0] = o.b.x(), r.by[0] = o.b.y(),
+  r.bz[0] = o.b.z();
+  r.rank[0] = r.mean_width[0] = 0.f;
+  r.entry[0] = o.colour;
+  r.opacity[0] = 255;
+  const auto least = [&](const Vec3& p) {
+    return std::max(o.radius, lens(c, picture.to_camera.row(2).dot(p - picture.eye)) / c.focal);
+  };
+  r.ra[0] = least(o.a), r.rb[0] = least(o.b);
+}
+
+FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light,
+                           Run& r) {
+  const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
+              m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
+  const float tx = at.x(), ty = at.y(), tz = at.z(), lx = light.x(), ly = light.y(), lz = light.z();
+  const float near = c.near, focal = c.focal, converge = c.converge, parallel = c.parallel,
+              centre_x = c.centre_x, centre_y = c.centre_y;
+  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  for (std::size_t i = 0; i < count; ++i) {
+    float ax = m00 * r.ax[i] + m01 * r.ay[i] + m02 * r.az[i] + tx;
+    float ay = m10 * r.ax[i] + m11 * r.ay[i] + m12 * r.az[i] + ty;
+    float az = m20 * r.ax[i] + m21 * r.ay[i] + m22 * r.az[i] + tz;
+    float bx = m00 * r.bx[i] + m01 * r.by[i] + m02 * r.bz[i] + tx;
+    float by = m10 * r.bx[i] + m11 * r.by[i] + m12 * r.bz[i] + ty;
+    float bz = m20 * r.bx[i] + m21 * r.by[i] + m22 * r.bz[i] + tz;
+    // The part of it before the near distance.
+    const float dx = bx - ax, dy = by - ay, dz = bz - az, dr = r.rb[i] - r.ra[i];
+    const float step = (near - az) / dz;  // used where the ends differ
+    const bool seen = larger(az, bz) >= near;
+    const float from = az < near ? step : 0.f, to = bz < near ? step - 1.f : 0.f;
+    ax += from * dx, ay += from * dy, az = larger(az + from * dz, near);
+    bx += to * dx, by += to * dy, bz = larger(bz + to * dz, near);
+    const float ra = r.ra[i] + from * dr, rb = r.rb[i] + to * dr;
+    const float fa = focal / (converge * az + parallel), fb = focal / (converge * bz + parallel);
+    r.ax[i] = ax, r.ay[i] = ay, r.az[i] = az, r.ra[i] = ra;
+    r.bx[i] = bx, r.by[i] = by, r.bz[i] = bz, r.rb[i] = rb;
+    r.px[i] = centre_x + fa * ax, r.py[i] = centre_y - fa * ay;
+    r.qx[i] = centre_x + fb * bx, r.qy[i] = centre_y - fb * by;
+    r.code_a[i] = depth_code(az), r.code_b[i] = depth_code(bz);
+    r.width[i] = seen ? fa * ra + fb * rb : -1.f;
+    r.mean_width[i] = r.mean_width[i] * (fa + fb);
+    // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
+    const float ex = -converge * (ax + bx), ey = -converge * (ay + by), ez = -(az + bz);
+    const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
+                per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
+    const float along = (dx * lx + dy * ly + dz * lz) * per_length,
+                end_on = (dx * ex + dy * ey + dz * ez) * per_length * per_distance,
+                towards = (ex * lx + ey * ly + ez * lz) * per_distance;
+    const float b = (towards - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
+    const float a2 = larger(0.f, 1.f - along * along - b * b);
+    const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
+    const float rank = fraction(r.rank[i]);
+    r.rank[i] = rank;
+    r.lit_front[i] = .5f * b;
+    // Across its axis and the way to the eye.
+    const float sx = dy * ez - dz * ey, sy = dz * ex - dx * ez, sz = dx * ey - dy * ex;
+    const float lit_side =
+        .5f * (sx * lx + sy * ly + sz * lz) / std::sqrt(larger(sx * sx + sy * sy + sz * sz, 1e-30f));
+    const float downwards = std::abs(r.qy[i] - r.py[i]) > std::abs(r.qx[i] - r.px[i]) ? sx : -sy;
+    r.lit_side[i] = downwards < 0.f ? -lit_side : lit_side;
+    r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
+  }
+}
+
+FOREST_CLONES void prepare_lines(const frame::Constants& c, float spread, Run& r) {
+  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const float width = float(c.width), height = float(c.height);
+  const bool single = c.subframes == 1;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
+    const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
+    const bool steep = high > wide;
+    const float major = steep ? high : wide;
+    const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
+    const float of_branch = smaller(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
+    const float fair = across < 1.f && r.mean_width[i] > 0.f ? of_branch : across;
+    const float whole = std::floor(fair + 1.f - r.rank[i] - 1.f / 512.f);
+    const float line = single ? whole : across;
+    // From the end of the smaller coordinate to the other.
+    const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
+    const bool turned = ax > bx;
+    const float x0 = turned ? bx : ax, y0 = turned ? by : ay, z0 = turned ? zb : za;
+    const float x1 = turned ? ax : bx, y1 = turned ? ay : by, z1 = turned ? za : zb;
+    const float limit = steep ? height : width;
+    const float first = smaller(larger(std::ceil(x0 - .5f - spread), 0.f), limit),
+                last = smaller(larger(std::ceil(x1 - .5f + spread), 0.f), limit);
+    const float inverse = 1.f / (x1 - x0), slope = (y1 - y0) * inverse, rise = (z1 - z0) * inverse;
+    const float begin = first + .5f - x0, half = .5f * line + spread;
+    r.line_width[i] = r.width[i] >= 0.f && first < last && x0 < x1 ? line : 0.f;
+    r.left[i] = smaller(px, qx) - half, r.right[i] = larger(px, qx) + half;
+    r.top[i] = smaller(py, qy) - half, r.bottom[i] = larger(py, qy) + half;
+    r.nearest[i] = smaller(za, zb);
+    r.first[i] = first, r.last[i] = last;
+    r.y[i] = y0 + begin * slope - .5f, r.slope[i] = slope;
+    r.z[i] = z0 + begin * rise, r.rise[i] = rise;
+    r.begin[i] = begin, r.length[i] = x1 - x0;
+    r.steep[i] = steep;
+  }
+}
+
+Beads::Beads(const Run& r, float pixels_a_unit)
+    : a(r.ax[0], r.ay[0], r.az[0]), b(r.bx[0], r.by[0], r.bz[0]), count(1), radius(r.ra[0]) {
+  const float length = (b - a).norm(), width = r.ra[0] + r.rb[0];
+  if (!(length > 0.f)) return;
+  const float most = std::min({.5f * length / std::max(width, 1e-6f), .5f * length * pixels_a_unit, 16.f});
+  count = std::uint32_t(std::max(most, 1.f));
+  radius = std::sqrt(length * width / (3.14159f * float(count)));
+}
+
+void Beads::put(std::uint32_t k, Run& r) const {
+  const Vec3 at = a + (float(k) + .5f) / float(count) * (b - a);
+  r.ra[0] = r.rb[0] = radius;
+  r.ax[0] = r.bx[0] = at.x(), r.ay[0] = r.by[0] = at.y(), r.az[0] = r.bz[0] = at.z();
+}
+
+}  // namespace forest::render::cpu

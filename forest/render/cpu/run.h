@@ -1,0 +1,80 @@
+// SPDX-License-Identifier: Apache-2.0
+// The segments of one item on their way to pixels, in arrays that the compiler makes vector instructions of.
+#pragma once
+
+#include <span>
+
+#include "forest/frame/frame.h"
+
+namespace forest::render::cpu {
+
+/// One picture's constants in the form that drawing needs.
+struct Picture {
+  frame::Geometry geometry;
+  std::span<const frame::State> states;
+  frame::Opacities opacities;
+  bool transparent = false;  // something may be
+  /// Of the first of the subframes that are drawn together, but that `centre` is where the view meets the picture with
+  /// none of their offsets (Samples).
+  frame::Constants constants;
+  float spread = 0.f;  // pixels that samples lie beside the middle of theirs at most
+  Mat3 to_camera;      // rows: right, up, forward
+  Vec3 eye, light;
+
+  frame::State state_of(const frame::Item& item) const {
+    return item.state ? frame::unpacked(item.state) : states[item.instance];
+  }
+};
+
+inline constexpr std::size_t run = FOREST_CLUSTER_SIZE;
+
+/// The segments of an item in camera coordinates (x right, y up, z depth), cut at the near distance, and in pixels.
+struct Run {
+  std::size_t count = 0;
+  float ax[run], ay[run], az[run], ra[run], bx[run], by[run], bz[run], rb[run];
+  float px[run], py[run], qx[run], qy[run];  // pixels of both ends
+  float code_a[run], code_b[run];            // of their depths
+  // As a line: along the axis of the screen that it runs along more, from `first` to before `last`, where there is one.
+  float left[run], right[run], top[run], bottom[run],
+      nearest[run];       // pixels around it; code of its nearest depth
+  float line_width[run];  // across the axis; 0: nothing to draw
+  float first[run], last[run], y[run], slope[run], z[run], rise[run];  // y and z at the first step
+  float begin[run], length[run];  // from its end to the middle of the first step, to its other end
+  std::uint32_t steep[run], payload[run];
+  float lit_side[run],
+      lit_front[run];  // half the light on what faces across, downwards or to the right, and to the eye
+  float width[run];    // pixels; below 0: nothing of it lies before the eye
+  float mean_width[run], rank[run];  // of its branch; in [0, 1)
+  std::uint32_t entry[run];          // of the palette
+  std::uint32_t meta[run];           // as frame::Segment's
+  std::uint32_t opacity[run],
+      key[run];  // 0: left out; below 255: a screen door with this key (frame/layout.h)
+};
+
+/// What is drawn of an item.
+/// @param entries  of its segments; null: the colour class says
+void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r);
+void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
+
+/// From the coordinates of their neuron to pixels: camera = turn · p + at.
+void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light, Run& r);
+
+/// What lines need, after draw_line in render/opengl/shaders/common.glsl.
+void prepare_lines(const frame::Constants& c, float spread, Run& r);
+
+/// What a length at this depth is divided by to be seen.
+inline float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }
+
+/// A segment of a branch as a string of beads: spheres that cover as much of the picture together, a bead for two
+/// diameters of its length, none shorter than two pixels. A soma is one already.
+struct Beads {
+  Vec3 a, b;
+  std::uint32_t count;
+  float radius;
+
+  Beads(const Run& r, float pixels_a_unit);
+  /// Bead `k` as the one segment of a run.
+  void put(std::uint32_t k, Run& r) const;
+};
+
+}  // namespace forest::render::cpu
