@@ -19,8 +19,8 @@ class Foveated {
   /// @param make  a renderer for a layer; called once for each
   Foveated(scene::Forest forest, Maker make) : forest_(std::move(forest)), make_(std::move(make)) {}
 
-  /// Adds to the frame of every layer what is no neuron.
-  using Dresser = std::function<void(frame::Frame&)>;
+  /// Adds surfaces to the frame of every layer, which is composed of that cut.
+  using Dresser = std::function<void(frame::Frame&, const scene::Cut&, const scene::Eye&)>;
 
   struct Figures {
     double cull = 0., draw = 0., resolve = 0., unite = 0.;  // milliseconds

@@ -97,6 +97,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
+    artist.give_skin();
     play(artist, options->activity, view);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
@@ -107,15 +108,18 @@ std::function<void()> render(CLI::App& command, Console& console) {
                   {"flashes", drawn.activity.flashes},
                   {"touched", artist.playback()->activity().touched()},
                   {"milliseconds", drawn.activity.gather + drawn.activity.paint}};
-    console.print({{"file", options->out.string()},
-                   {"activity", activity},
-                   {"surfaces", of_surfaces},
-                   {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
-                   {"neurons", drawn.neurons},
-                   {"segments", drawn.segments},
-                   {"covered", drawn.image.covered},
-                   {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
-                   {"renderer", artist.renderer()}});
+    console.print(
+        {{"file", options->out.string()},
+         {"activity", activity},
+         {"surfaces", of_surfaces},
+         {"skin",
+          {{"pieces", artist.skin()->figures().pieces}, {"triangles", artist.skin()->figures().triangles}}},
+         {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
+         {"neurons", drawn.neurons},
+         {"segments", drawn.segments},
+         {"covered", drawn.image.covered},
+         {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
+         {"renderer", artist.renderer()}});
     console.table({"picture", "neurons in sight", "segments drawn", "pixels covered", "seconds"},
                   {{options->out.string(), fmt::format("{}", drawn.neurons),
                     fmt::format("{}", drawn.segments), fmt::format("{:.1f} %", 100. * drawn.image.covered),
@@ -187,6 +191,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
+    artist.give_skin();
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();

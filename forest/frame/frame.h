@@ -25,7 +25,7 @@ struct Geometry {
 };
 
 /// Primitives that a neuron may be drawn with, however large it is in the picture.
-enum class Kind : std::uint8_t { any, dots, lines, capsules, somata };
+enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin };
 
 /// How a neuron is shown, or a branch of it: 4 bytes, so that changing thousands costs nothing. Renderers read the colour
 /// class and the opacity; the rest has been obeyed by whoever made the lists.

@@ -45,11 +45,6 @@ float mean_edge(const Mesh& mesh) {
   return float(sum / (3. * double(std::max<std::size_t>(mesh.triangles.size(), 1))));
 }
 
-std::uint64_t next_version() {
-  static std::atomic<std::uint64_t> last = 0;  // a number for each surface that ever was
-  return ++last;
-}
-
 // What no neuron is drawn with.
 std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing) {
   std::vector<std::uint8_t> list;
@@ -62,6 +57,11 @@ std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing)
 }
 
 }  // namespace
+
+std::uint64_t next_version() {
+  static std::atomic<std::uint64_t> last = 0;  // a number for each surface that ever was
+  return ++last;
+}
 
 std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width) {
   const Neighbours near(mesh);

@@ -32,6 +32,9 @@ struct AreaColour {
 /// movement during one (Fischl, Sereno & Dale 1999, NeuroImage 9:195).
 std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width);
 
+/// Of arrays that a frame::Surface is made of: a number that none had before.
+std::uint64_t next_version();
+
 class Surfaces {
  public:
   /// @param opacity  0–1
