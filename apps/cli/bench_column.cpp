@@ -4,6 +4,7 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <optional>
 #include <unistd.h>
 
 #include <CLI/CLI.hpp>
@@ -26,9 +27,10 @@ namespace {
 using Clock = std::chrono::steady_clock;
 
 struct Options {
-  std::uint32_t neurons = 10000, frames = 60, samples = 1;
+  std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
-  double budget = 85.;  // milliseconds a picture
+  std::optional<std::uint32_t> samples;
+  double budget = 33.;  // milliseconds a picture
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;
@@ -47,7 +49,8 @@ scene::View around(const scene::Forest& forest, float turn) {
 
 struct Part {
   double values = 0., segments = 0., gather = 0., paint = 0., touched = 0.;  // of activity, means a picture
-  double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., covered = 0., error = 0.;
+  double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., covered = 0., error = 0.,
+         samples = 0.;
   double per_second() const { return frames / seconds; }
 };
 
@@ -61,7 +64,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
   for (std::uint32_t i = 0; i < options.frames; ++i) {
     const auto start = Clock::now();
     scene::View view = view_at(float(i) / float(options.frames));
-    view.samples = options.samples;
+    view.samples = options.samples.value_or(budget.samples());
     view.detail.error = budget.error();
     std::uint64_t touched = 0;
     if (const scene::Playback* playback = artist.playback()) {
@@ -84,7 +87,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
           part.paint += drawn.activity.paint / options.frames;
       part.touched += double(artist.playback()->activity().touched() - touched) / options.frames;
     }
-    part.error += double(budget.error()) / options.frames;
+    part.error += double(budget.error()) / options.frames,
+        part.samples += double(view.samples) / options.frames;
     budget.took(1000. * seconds);
     console.progress().advance();
   }
@@ -159,6 +163,7 @@ void run(const Options& options, Console& console) {
     nlohmann::ordered_json of{{"frames_per_second", p.per_second()},
                               {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}}},
                               {"covered", p.covered},
+                              {"samples", p.samples},
                               {"error_pixels", p.error}};
     if (options.activity)
       of["activity"] = {{"segments", p.segments}, {"values", p.values},   {"bytes_touched", p.touched},
@@ -172,7 +177,6 @@ void run(const Options& options, Console& console) {
                {"forest_bytes", forest.bytes()},
                {"inside", json_of(inside)},
                {"size", options.size},
-               {"samples", options.samples},
                {"renderer", artist.renderer()}});
   if (options.activity) {
     json["pixels_changing"] = changes;
@@ -186,11 +190,12 @@ void run(const Options& options, Console& console) {
                                     fmt::format("{:.1f}", p.draw),
                                     fmt::format("{:.1f}", p.resolve),
                                     fmt::format("{:.0f} %", 100. * p.covered),
+                                    fmt::format("{:.0f}", p.samples),
                                     fmt::format("{:.1f}", p.error)};
   };
   console.say(fmt::format("{} neurons, {} segments, {}, {}", forest.instances().size(),
                           forest.segment_total(), options.size, artist.renderer()));
-  console.table({"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "error px"},
+  console.table({"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "samples", "error px"},
                 {row("around the column", outside), row("inside it", inside)});
   if (options.activity) {
     const auto of = [](const char* name, const Part& p) {
@@ -220,7 +225,9 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
   add_whole(command, "--neurons", options->neurons,
             "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
   add_whole(command, "--frames", options->frames, "Pictures drawn outside, and as many inside", 2, 100'000);
-  add_whole(command, "--samples", options->samples, "Samples a pixel", 1, 1024);
+  must_be_whole(
+      *command.add_option("--samples", options->samples, "Samples a pixel, instead of what the budget says"),
+      1, 1024);
   command
       .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
       ->check(CLI::Range(1., 10000.))

@@ -296,9 +296,9 @@ bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
-  view.samples = 1;
+  view.samples = layered() ? 1 : budget_.samples();
   view.detail.error *= budget_.error();
-  draw_part(view, 0, 1);
+  draw_part(view, 0, view.samples);
 }
 
 void Viewport::draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last) {
@@ -311,8 +311,10 @@ void Viewport::refine() {
   QElapsedTimer clock;
   clock.start();
   const std::uint32_t samples = settings_.view.samples;
-  const auto affordable = std::uint32_t(std::max(1.f, slice_milliseconds / sample_milliseconds_));
-  const std::uint32_t until = std::min(samples, refined_ + affordable);
+  const std::uint32_t group = processor_ ? frame::drawn_together(samples) : 1;
+  const auto affordable =
+      std::uint32_t(std::max(1.f, slice_milliseconds / sample_milliseconds_ / float(group)));
+  const std::uint32_t until = std::min(samples, (refined_ / group + affordable) * group);
   draw_still(samples, refined_, until);
   sample_milliseconds_ = std::max(.5f, float(clock.nsecsElapsed()) * 1e-6f / float(until - refined_));
   refined_ = until;

@@ -158,8 +158,8 @@ struct Frame : Lists {
   std::span<const Overlay> overlays;
   std::span<const Surface> surfaces;
   std::optional<Glass> glass;
-  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, once the lists are
-  /// drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
+  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, or once for those that are
+  /// drawn together, when the lists are drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
   std::function<Lists(const DepthMap&)> rest;
 };
 
@@ -182,6 +182,12 @@ Vec3 light_direction();
 /// Where subframe number `subframe` looks through each pixel: x and y from its middle, in pixels, within ±½ (the 2, 3
 /// sequence of Halton); a picture of one subframe looks through the middle. The centre of the picture moves by as much.
 Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes);
+
+/// Subframes that the processor draws together, in groups that begin at multiples of it: a part of a picture is drawn soonest
+/// in whole groups.
+inline std::uint32_t drawn_together(std::uint32_t subframes) {
+  return subframes == 1 ? 1 : subframes <= 4 ? 4 : 16;
+}
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);

@@ -71,8 +71,20 @@ float Eye::acceptable(const Sphere& sphere) const {
 }
 
 void Budget::took(double milliseconds) {
+  // Many samples take up to eight times as long as one. Changing back and forth would be seen, so several pictures must agree.
+  constexpr std::uint32_t many = 16;
+  constexpr double longer = 8.;
+  const bool one = samples_ == 1;
+  const float least = one ? 1.f : .5f, most = one ? worst_ : std::min(1.5f, worst_);
+  const bool other = one ? error_ <= least && longer * milliseconds < milliseconds_
+                         : error_ >= most && milliseconds > 1.1 * milliseconds_;
+  agreed_ = other ? agreed_ + 1 : 0;
+  if (agreed_ == 3) {
+    samples_ = one ? many : 1, error_ = 1.f, agreed_ = 0;
+    return;
+  }
   const double ratio = std::clamp(milliseconds / milliseconds_, .5, 2.);
-  error_ = std::clamp(error_ * float(std::sqrt(ratio)), 1.f, worst_);
+  error_ = std::clamp(error_ * float(std::sqrt(ratio)), least, most);
 }
 
 }  // namespace forest::scene

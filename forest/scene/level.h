@@ -86,17 +86,22 @@ class Eye {
   Gaze gaze_;
 };
 
-/// A frame-time budget that moves the acceptable error: pictures that took too long make it larger, quick ones smaller,
-/// between a pixel and `worst`.
+/// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as stills have
+/// where there is time for them, else one; and the acceptable error, which pictures that took too long make larger and quick
+/// ones smaller.
 class Budget {
  public:
+  /// @param worst  error that is accepted at most, pixels
   explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
+  std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
+  /// To be told of every picture that was drawn so.
   void took(double milliseconds);
 
  private:
   double milliseconds_;
   float worst_, error_ = 1.f;
+  std::uint32_t samples_ = 1, agreed_ = 0;  // pictures that have asked for the other number of samples
 };
 
 }  // namespace forest::scene

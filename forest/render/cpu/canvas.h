@@ -26,9 +26,6 @@ namespace forest::render::cpu {
   return entry << 5 | std::uint32_t(std::int32_t(smaller(larger(shade * 31.f + noise, 0.f), 31.f)));
 }
 
-/// Subframes that are drawn together: so many samples of every pixel. As the subframes of a picture are taken in groups of
-/// as many, a picture drawn in parts is that drawn at once.
-inline int samples_at_once(std::uint32_t subframes) { return subframes == 1 ? 1 : subframes <= 4 ? 4 : 16; }
 inline constexpr int most_samples = 16;
 
 /// Pixels of one square of the picture: all that a thread draws into is its own.

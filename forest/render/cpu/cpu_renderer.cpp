@@ -44,7 +44,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
   frame::Timing timing;
   const std::uint32_t end = std::min(f.last_subframe, f.subframes),
-                      at_once = std::uint32_t(cpu::samples_at_once(f.subframes));
+                      at_once = frame::drawn_together(f.subframes);
   for (std::uint32_t next = f.first_subframe; next < end;) {
     auto start = Clock::now();
     const std::uint32_t begin = next / at_once * at_once, until = std::min(begin + at_once, end);
