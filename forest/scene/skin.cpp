@@ -16,7 +16,7 @@ namespace forest::scene {
 namespace {
 
 constexpr int coarsest = -2, finest = 6;      // levels: voxels of 4 µm to 1/64 µm
-constexpr float thickest_voxels = 3.f;        // a section is in the skin from a radius of so many voxels on
+constexpr float thickest_voxels = 2.f;        // a section is in the skin from a radius of so many voxels on
 constexpr float gap_voxels = .1f;             // further out than the cones, for triangles cut corners
 constexpr float spine_voxel = .25f;           // µm: coarser pieces have none
 constexpr float thinnest_voxels = .75f;       // thinner branches would break (geometry/polygonise.h)
@@ -52,16 +52,17 @@ bool meet(const Sphere& a, const Sphere& b) { return (a.centre - b.centre).norm(
 
 // A distinct neuron as it is needed for pieces.
 struct Skin::Shape {
-  std::vector<BranchCone> cones;  // the original segments; branch 0 the soma, section s branch s + 1, label its kind
-  std::vector<float> widths;      // of branches: the largest diameter, µm
+  std::vector<BranchCone>
+      cones;  // the original segments; branch 0 the soma, section s branch s + 1, label its kind
+  std::vector<float> widths;  // of branches: the largest diameter, µm
   struct BranchPoint {
     Joint joint;
     float width = 0.f;  // of its thinnest branch
   };
   std::vector<BranchPoint> joints;
   std::vector<Spine> spines;
+  bool grown = false;  // they are
   Vec3 origin = Vec3::Zero();
-  float widest = 0.f;  // section, µm
 
   Shape(const Forest& forest, std::uint32_t which) {
     const Neuron& neuron = forest.neurons()[which];
@@ -80,16 +81,24 @@ struct Skin::Shape {
       // A stem is fastened by a cone within the soma, which says nothing of its width.
       const bool inside = cone.branch && cone.shape.a.norm() < .5f * neuron.soma_radius;
       float& width = widths[cone.branch];
-      width = std::max(width, 2.f * (inside ? cone.shape.radius_b
-                                            : std::max(cone.shape.radius_a, cone.shape.radius_b)));
+      width = std::max(
+          width, 2.f * (inside ? cone.shape.radius_b : std::max(cone.shape.radius_a, cone.shape.radius_b)));
       if (first[cone.branch] == 0xffffffffu) first[cone.branch] = i;
       last[cone.branch] = i;
     }
-    for (const float width : widths) widest = std::max(widest, width);
-    origin = bounds.empty() ? Vec3::Zero()
-                            : Vec3(bounds.low - Vec3::Constant(PieceLattice::margin_voxels * voxel_of(coarsest)));
+    origin = bounds.empty()
+                 ? Vec3::Zero()
+                 : Vec3(bounds.low - Vec3::Constant(PieceLattice::margin_voxels * voxel_of(coarsest)));
     add_joints(sections, first, last, neuron.soma_radius);
-    if (spiny(forest, which)) add_spines(sections, which);
+  }
+
+  // Once pieces are so fine that they have some.
+  void grow_spines(const Forest& forest, std::uint32_t which) {
+    if (grown) return;
+    grown = true;
+    const Neuron& neuron = forest.neurons()[which];
+    if (spiny(forest, which))
+      add_spines(forest.sections().subspan(neuron.first_section, neuron.section_count), which);
   }
 
  private:
@@ -110,7 +119,8 @@ struct Skin::Shape {
       if (sections[s].parent < sections.size()) children[sections[s].parent].push_back(s);
     const auto add = [&](const Vec3& centre, float radius, std::vector<std::uint32_t> branches) {
       BranchPoint point{{centre, 3.f * radius, .5f * radius, std::move(branches)}, INFINITY};
-      for (const std::uint32_t branch : point.joint.branches) point.width = std::min(point.width, widths[branch]);
+      for (const std::uint32_t branch : point.joint.branches)
+        point.width = std::min(point.width, widths[branch]);
       if (radius > 0.f) joints.push_back(std::move(point));
     };
     for (std::uint32_t s = 0; s < sections.size(); ++s) {
@@ -120,7 +130,8 @@ struct Skin::Shape {
         const RoundCone& end = cones[last[s + 1]].shape;
         add(end.b, end.radius_b, std::move(branches));
       }
-      if (sections[s].parent < sections.size() || !(soma_radius > 0.f) || first[s + 1] >= cones.size()) continue;
+      if (sections[s].parent < sections.size() || !(soma_radius > 0.f) || first[s + 1] >= cones.size())
+        continue;
       const RoundCone& stem = cones[first[s + 1]].shape;
       const Vec3 out = stem.b - stem.a;
       if (stem.a.norm() < 1.5f * soma_radius && out.norm() > 0.f)
@@ -159,8 +170,8 @@ struct Skin::Shape {
         spine.head = spread(.19, .06, .11, .36);
         spine.neck = std::min(spread(.08, .03, .05, .16), .7f * spine.head);
         const float reach = shaft + std::max(spread(.85, .3, .35, 1.9) - spine.head, .5f * spine.head);
-        const Vec3 out = std::cos(turn) * side + std::sin(turn) * other + spread(0., .25, -.6, .6) * along;
-        spine.tip = spine.base + reach * out.normalized();
+        const float lean = spread(0., .25, -.6, .6);
+        spine.tip = spine.base + reach * (std::cos(turn) * side + std::sin(turn) * other + lean * along);
         spine.segment = i;
         spines.push_back(spine);
       }
@@ -173,15 +184,33 @@ Skin::~Skin() = default;
 Skin::Skin(Skin&&) noexcept = default;
 Skin& Skin::operator=(Skin&&) noexcept = default;
 
-const Skin::Shape& Skin::shape(std::uint32_t neuron) {
+// Of a section, or of half the soma, whose skin begins at twice the width; µm.
+float Skin::widest(std::uint32_t which) {
+  if (widest_.empty()) widest_.assign(forest_.neurons().size(), -1.f);
+  float& known = widest_[which];
+  if (known < 0.f) {
+    const Neuron& neuron = forest_.neurons()[which];
+    known = neuron.soma_radius;
+    for (const SectionFacts& s : forest_.sections().subspan(neuron.first_section, neuron.section_count))
+      known = std::max({known, s.diameter_start, s.diameter_end});
+  }
+  return known;
+}
+
+Skin::Shape& Skin::shape(std::uint32_t neuron) {
   auto& known = shapes_[neuron];
   if (!known) known = std::make_unique<Shape>(forest_, neuron);
   return *known;
 }
 
-const std::vector<Spine>& Skin::spines(std::uint32_t neuron) { return shape(neuron).spines; }
+const std::vector<Spine>& Skin::spines(std::uint32_t neuron) {
+  shape(neuron).grow_spines(forest_, neuron);
+  return shape(neuron).spines;
+}
 
-PieceLattice Skin::lattice(std::uint32_t neuron, int level) { return {shape(neuron).origin, voxel_of(level)}; }
+PieceLattice Skin::lattice(std::uint32_t neuron, int level) {
+  return {shape(neuron).origin, voxel_of(level)};
+}
 
 std::unique_ptr<Skin::Made> Skin::make(const Shape& shape, const PieceLattice& lattice, const Key& key) {
   const auto& [neuron, level, cell] = key;
@@ -242,10 +271,17 @@ std::unique_ptr<Skin::Made> Skin::make(const Shape& shape, const PieceLattice& l
   return made;
 }
 
+const Skin::Shape& Skin::prepared(const Key& key) {
+  const auto& [neuron, level, cell] = key;
+  Shape& of = shape(neuron);
+  if (voxel_of(level) <= spine_voxel) of.grow_spines(forest_, neuron);
+  return of;
+}
+
 const Skin::Made& Skin::piece(const Key& key) {
-  const Shape& of = shape(std::get<0>(key));
   auto& known = made_[key];
   if (!known) {
+    const Shape& of = prepared(key);
     known = make(of, lattice(std::get<0>(key), std::get<1>(key)), key);
     kept_ += known->piece.mesh.triangles.size();
   }
@@ -257,8 +293,8 @@ namespace {
 // A neuron near the eye.
 struct Near {
   std::uint32_t instance = 0;
-  float share = 1.f;                     // of the widths from which it has a skin
-  std::vector<std::uint32_t> segments;   // wide enough, among the neuron's original ones
+  float share = 1.f;                       // of the widths from which it has a skin
+  std::vector<std::uint32_t> segments;     // wide enough, among the neuron's original ones
   std::vector<const frame::State*> parts;  // of its sections; null: its own
 };
 
@@ -296,13 +332,13 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     if (share == 0.f) continue;
     const Sphere sphere{{item.x, item.y, item.z}, item.radius};
     const float magnification = eye.magnification(sphere);
-    if (magnification * 4.f < skin_begins * share) continue;  // no branch is thicker, somata aside
     const std::uint32_t which = instances[item.instance].morphology;
+    if (1.5f * magnification * widest(which) < skin_begins * share)
+      continue;  // between its ends a section may be wider
     const Neuron& neuron = forest_.neurons()[which];
     const std::uint32_t first = item.first_segment - neuron.first_segment;
     if (first >= neuron.original_count) continue;
     const Shape& of = shape(which);
-    if (magnification * of.widest < skin_begins * share) continue;
     const Place place(instances[item.instance]);
     std::optional<std::size_t> at;
     for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
@@ -327,20 +363,45 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   const auto level_at = [](float magnification, float coarser) {
     return std::clamp(int(std::ceil(std::log2(magnification / (voxel_pixels * coarser)))), coarsest, finest);
   };
-  float coarser = 1.f;
-  for (int step = 0; step < 4; ++step) {
-    double expected = 0.;
-    for (const Near& near : list) {
-      const Shape& of = shape(instances[near.instance].morphology);
-      const Place place(instances[near.instance]);
-      for (const std::uint32_t segment : near.segments) {
-        const float magnification = eye.magnification(place(around(of.cones[segment])));
-        if (of.widths[of.cones[segment].branch] * magnification < skin_begins * near.share * coarser) continue;
-        expected += expected_triangles({of.cones[segment]}, voxel_of(level_at(magnification, coarser * near.share)));
+  // Somewhere along a segment, which may be long: its parts that are in sight, as long as they are wide.
+  struct Stretch {
+    RoundCone cone;
+    float magnification, width, share;
+  };
+  std::vector<Stretch> parts;
+  for (const Near& near : list) {
+    const Shape& of = shape(instances[near.instance].morphology);
+    const Place place(instances[near.instance]);
+    for (const std::uint32_t segment : near.segments) {
+      const BranchCone& whole = of.cones[segment];
+      const RoundCone& c = whole.shape;
+      const float thick = c.radius_a + c.radius_b;
+      const int count = std::clamp(int((c.b - c.a).norm() / std::max(thick, 1e-3f)), 1, 32);
+      for (int k = 0; k < count; ++k) {
+        const float from = float(k) / float(count), to = float(k + 1) / float(count);
+        const auto radius = [&](float t) { return c.radius_a + t * (c.radius_b - c.radius_a); };
+        const BranchCone one{
+            {c.a + from * (c.b - c.a), c.a + to * (c.b - c.a), radius(from), radius(to)}, 0, 0};
+        const Sphere ball = place(around(one));
+        if (eye.frustum().may_see(ball))
+          parts.push_back({one.shape, eye.magnification(ball), of.widths[whole.branch], near.share});
       }
     }
+  }
+  const double pixels = double(frame.width) * double(frame.height);
+  float coarser = 1.f;
+  for (int step = 0; step < 6; ++step) {
+    double expected = 0.;
+    for (const Stretch& part : parts) {
+      if (part.width * part.magnification < skin_begins * part.share * coarser) continue;
+      // Not more than fill the picture.
+      const double voxel = double(voxel_pixels * coarser * part.share);
+      expected += std::min(expected_triangles({{part.cone, 0, 0}},
+                                              voxel_of(level_at(part.magnification, coarser * part.share))),
+                           25. * pixels / (voxel * voxel));
+    }
     if (expected <= double(limits.triangles)) break;
-    coarser *= float(std::sqrt(expected / double(limits.triangles))) * 1.05f;
+    coarser *= float(std::clamp(std::sqrt(expected / double(limits.triangles)), 1.05, 2.));
   }
 
   // Which cells, each as fine as its nearest place asks for.
@@ -380,18 +441,19 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     const auto [first, last] = PieceLattice{of.origin, voxel_of(coarsest)}.cells(box);
     for (std::int64_t z = first[2]; z <= last[2]; ++z)
       for (std::int64_t y = first[1]; y <= last[1]; ++y)
-        for (std::int64_t x = first[0]; x <= last[0]; ++x)
-          look(look, coarsest, {x, y, z}, list[n].segments);
+        for (std::int64_t x = first[0]; x <= last[0]; ++x) look(look, coarsest, {x, y, z}, list[n].segments);
   }
   std::sort(wanted.begin(), wanted.end());
 
   // Those that are not there are made, the nearest first.
   std::vector<Key> missing;
   for (const Wanted& one : wanted)
-    if (!made_.contains(one.key) && std::ranges::find(missing, one.key) == missing.end()) missing.push_back(one.key);
+    if (!made_.contains(one.key) && std::ranges::find(missing, one.key) == missing.end())
+      missing.push_back(one.key);
   figures_.made = std::min(missing.size(), limits.new_pieces);
   figures_.missing = missing.size() - figures_.made;
   missing.resize(figures_.made);
+  for (const Key& key : missing) prepared(key);
   std::vector<std::unique_ptr<Made>> fresh(missing.size());
   parallel_for(missing.size(), 1, [&](std::size_t i) {
     const auto& [neuron, level, cell] = missing[i];
@@ -408,12 +470,14 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
   std::vector<std::pair<const Wanted*, Made*>> used;
   for (const Wanted& one : wanted)
-    if (const auto found = made_.find(one.key); found != made_.end() && !found->second->piece.mesh.triangles.empty()) {
+    if (const auto found = made_.find(one.key);
+        found != made_.end() && !found->second->piece.mesh.triangles.empty()) {
       found->second->used = picture_;
       used.emplace_back(&one, found->second.get());
     }
   for (Near& near : list)
-    if (state_of(near.instance).is(frame::State::parted)) near.parts = section_states(forest_, shown, near.instance);
+    if (state_of(near.instance).is(frame::State::parted))
+      near.parts = section_states(forest_, shown, near.instance);
 
   // Activity colours segments: those that vertices are nearest to, in runs as a list has them.
   Cut runs;
@@ -460,7 +524,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
                            ? smooth_step(skin_begins * share, skin_complete * share,
                                          std::abs(made->width[v]) * magnification)
                            : 0.f;
-      if (made->width[v] < 0.f) presence *= smooth_step(spines_begin, spines_complete, magnification);
+      if (made->width[v] < 0.f)
+        presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
       entries_[k][v] = std::uint8_t(entry);
       presence_[k][v] = std::uint8_t(std::lround(presence * float(opacity)));
       seen[k] |= char(presence_[k][v] > 0);
@@ -483,7 +548,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   while (kept_ > most_kept) {
     auto oldest = made_.end();
     for (auto it = made_.begin(); it != made_.end(); ++it)
-      if (it->second->used < picture_ && (oldest == made_.end() || it->second->used < oldest->second->used)) oldest = it;
+      if (it->second->used < picture_ && (oldest == made_.end() || it->second->used < oldest->second->used))
+        oldest = it;
     if (oldest == made_.end()) break;
     kept_ -= oldest->second->piece.mesh.triangles.size();
     made_.erase(oldest);

@@ -3,9 +3,9 @@
 // where branches meet, with spines on dendrites. It is made in pieces (geometry/polygonise.h), cells of a lattice in the
 // coordinates of a distinct neuron, when they are first seen, and kept; all neurons of that form share them.
 //
-// Capsules are drawn all the same, and the skin lies around them, never further out than `skin_gap` pixels and a tenth of a
-// pixel's worth more: so it may fade in (its presence grows with the width of the branch), a piece may be missing, or finer
-// than the one beside it, and no hole is seen. Nothing jumps: what a vertex shows depends on its own size in the picture.
+// Capsules are drawn all the same, and the skin lies around them, but for what is rounded never further out than `skin_gap`
+// pixels: so it may fade in (its presence grows with the width of the branch), a piece may be missing, or finer than the
+// one beside it, and no hole is seen. Nothing jumps: what a vertex shows depends on its own size in the picture.
 #pragma once
 
 #include <cstdint>
@@ -29,12 +29,14 @@ namespace forest::scene {
 inline constexpr float skin_begins = 24.f, skin_complete = 40.f;
 // Pixels a µm from which spines are there, in full from the second on.
 inline constexpr float spines_begin = 18.f, spines_complete = 30.f;
-inline constexpr float voxel_pixels = 4.f;            // a voxel is at most as large, and at least half of it
+inline constexpr float voxel_pixels = 6.f;  // a voxel is at most so large, and at least half of that
 inline constexpr float skin_gap = .1f * voxel_pixels;  // pixels
 
 struct SkinLimits {
-  std::size_t triangles = 400'000;  // of a picture, about: where more are needed, voxels and the widths above grow
-  std::size_t new_pieces = 1u << 20;  // made for one picture, the nearest first; others are left out until the next
+  std::size_t triangles =
+      400'000;  // of a picture, about: where more are needed, voxels and the widths above grow
+  std::size_t new_pieces =
+      1u << 20;  // made for one picture, the nearest first; others are left out until the next
 };
 
 /// A spine of the shaft: neck and head. Real ones are not kept in a forest file, so that these are made up: see Skin::spines.
@@ -78,17 +80,21 @@ class Skin {
     std::vector<std::uint8_t> kind;      // its section's
     std::uint64_t version = 0, used = 0;
   };
-  using Key = std::tuple<std::uint32_t, int, PieceLattice::Cell>;  // neuron, level (voxels of 2^-level µm), cell
+  using Key =
+      std::tuple<std::uint32_t, int, PieceLattice::Cell>;  // neuron, level (voxels of 2^-level µm), cell
   const Made& piece(const Key& key);
   PieceLattice lattice(std::uint32_t neuron, int level);
 
  private:
   struct Shape;
-  const Shape& shape(std::uint32_t neuron);
+  Shape& shape(std::uint32_t neuron);
+  const Shape& prepared(const Key& key);  // with all that its piece needs
+  float widest(std::uint32_t neuron);
   static std::unique_ptr<Made> make(const Shape& shape, const PieceLattice& lattice, const Key& key);
 
   Forest forest_;
   std::map<std::uint32_t, std::unique_ptr<Shape>> shapes_;
+  std::vector<float> widest_;  // of distinct neurons; below 0: not known yet
   std::map<Key, std::unique_ptr<Made>> made_;
   std::uint64_t picture_ = 0;
   std::size_t kept_ = 0;  // triangles
