@@ -1,12 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // What the skin of neurons near the eye changes in pictures: much when one is near, nothing at once.
+#include "forest/scene/skin.h"
+
 #include <cmath>
 
 #include <gtest/gtest.h>
 
 #include "forest/frame/similarity.h"
 #include "forest/render/cpu/cpu_renderer.h"
-#include "forest/scene/skin.h"
 #include "forest/scene/view.h"
 
 #include "tests/sample_forest.h"

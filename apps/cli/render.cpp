@@ -53,6 +53,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::vector<float> gaze;
     bool outline = false;
     SurfaceOptions surfaces;
+    bool skin = false;
     std::optional<scene::Side> side;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
@@ -62,6 +63,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
   command.add_option("forest", options->forest, "Forest file, or the surface of a cortex")->required();
   auto* one_view = command.add_option("--view", options->view, view_help);
   add_surfaces(command, options->surfaces);
+  command.add_flag("--skin", options->skin,
+                   "Neurons near the eye have a smooth skin and spines (takes seconds)");
   command.add_option("--from", options->side, "Show all of the surfaces, from this side of the brain")
       ->transform(CLI::CheckedTransformer(sides))
       ->option_text("left|right|front|back|above|below")
@@ -97,7 +100,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
-    artist.give_skin();
+    if (options->skin) artist.give_skin();
     play(artist, options->activity, view);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
@@ -108,18 +111,16 @@ std::function<void()> render(CLI::App& command, Console& console) {
                   {"flashes", drawn.activity.flashes},
                   {"touched", artist.playback()->activity().touched()},
                   {"milliseconds", drawn.activity.gather + drawn.activity.paint}};
-    console.print(
-        {{"file", options->out.string()},
-         {"activity", activity},
-         {"surfaces", of_surfaces},
-         {"skin",
-          {{"pieces", artist.skin()->figures().pieces}, {"triangles", artist.skin()->figures().triangles}}},
-         {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
-         {"neurons", drawn.neurons},
-         {"segments", drawn.segments},
-         {"covered", drawn.image.covered},
-         {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
-         {"renderer", artist.renderer()}});
+    console.print({{"file", options->out.string()},
+                   {"activity", activity},
+                   {"surfaces", of_surfaces},
+                   {"skin_triangles", artist.skin() ? artist.skin()->figures().triangles : 0},
+                   {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
+                   {"neurons", drawn.neurons},
+                   {"segments", drawn.segments},
+                   {"covered", drawn.image.covered},
+                   {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
+                   {"renderer", artist.renderer()}});
     console.table({"picture", "neurons in sight", "segments drawn", "pixels covered", "seconds"},
                   {{options->out.string(), fmt::format("{}", drawn.neurons),
                     fmt::format("{}", drawn.segments), fmt::format("{:.1f} %", 100. * drawn.image.covered),
@@ -136,6 +137,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     FilmPlan plan;
     TargetOptions targets;
     SurfaceOptions surfaces;
+    bool skin = false;
     Drawer drawer = Drawer::automatic;
     ActivityOptions activity;
     std::optional<double> rate;
@@ -154,6 +156,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       1e-6, 1e9);
   add_targets(command, options->targets);
   add_surfaces(command, options->surfaces);
+  command.add_flag("--skin", options->skin,
+                   "Neurons near the eye have a smooth skin and spines (takes seconds)");
   command
       .add_option("--path", options->path,
                   "Key views from a file, one on each line, as the studio records them")
@@ -191,7 +195,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
-    artist.give_skin();
+    if (options->skin) artist.give_skin();
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();

@@ -60,7 +60,6 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       forest_(std::move(forest)),
       targets_(forest_, std::move(sets)),
       chooser_(forest_),
-      skin_(forest_),
       settings_{.view = view},
       colouring_(scene::colour(targets_, view)),
       outline_(scene::outline(forest_)) {
@@ -279,12 +278,6 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
   frame.glass = glass;
   chooser_.complete(frame);
-  if (view.skin) {  // while moving a little of it is made for each picture, and parts of one picture show the same
-    const std::size_t pieces = first > 0 ? 0 : view.samples == 1 ? 2 : 16;
-    skin_.show(frame, chooser_.cut(),
-               scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)), colouring,
-               painter, {.triangles = 150'000, .new_pieces = pieces});
-  }
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen());

@@ -16,7 +16,6 @@
 #include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
-#include "forest/scene/skin.h"
 
 #include "apps/foveated.h"
 #include "apps/studio/selection.h"
@@ -126,7 +125,6 @@ class Viewport final : public QOpenGLWidget {
   scene::Forest forest_;
   scene::Targets targets_;
   scene::Chooser chooser_;
-  scene::Skin skin_;
   std::optional<Foveated> foveated_;      // on the processor; a card draws one picture, with detail by gaze
   const frame::Image* united_ = nullptr;  // its last picture, while that is what is shown
   Settings settings_;

@@ -445,36 +445,44 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   }
   std::sort(wanted.begin(), wanted.end());
 
-  // Those that are not there are made, the nearest first.
-  std::vector<Key> missing;
-  for (const Wanted& one : wanted)
-    if (!made_.contains(one.key) && std::ranges::find(missing, one.key) == missing.end())
-      missing.push_back(one.key);
-  figures_.made = std::min(missing.size(), limits.new_pieces);
-  figures_.missing = missing.size() - figures_.made;
-  missing.resize(figures_.made);
-  for (const Key& key : missing) prepared(key);
-  std::vector<std::unique_ptr<Made>> fresh(missing.size());
-  parallel_for(missing.size(), 1, [&](std::size_t i) {
-    const auto& [neuron, level, cell] = missing[i];
-    const Shape& of = *shapes_.at(neuron);
-    fresh[i] = make(of, {of.origin, voxel_of(level)}, missing[i]);
-  });
-  for (std::size_t i = 0; i < missing.size(); ++i) {
-    fresh[i]->version = next_version();
-    kept_ += fresh[i]->piece.mesh.triangles.size();
-    made_[missing[i]] = std::move(fresh[i]);
+  // The nearest of them, as many as the limit allows. Those that are not there are made, a few at once.
+  constexpr std::size_t at_once = 8;
+  shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
+  std::vector<std::pair<const Wanted*, Made*>> used;
+  std::size_t triangles = 0;
+  for (auto one = wanted.begin(); one != wanted.end(); ++one) {
+    if (!made_.contains(one->key)) {
+      std::vector<Key> next;
+      for (auto k = one;
+           k != wanted.end() && next.size() < std::min(at_once, limits.new_pieces - figures_.made); ++k)
+        if (!made_.contains(k->key) && std::ranges::find(next, k->key) == next.end()) next.push_back(k->key);
+      for (const Key& key : next) prepared(key);
+      std::vector<std::unique_ptr<Made>> fresh(next.size());
+      parallel_for(next.size(), 1, [&](std::size_t k) {
+        const auto& [neuron, level, cell] = next[k];
+        const Shape& of = *shapes_.at(neuron);
+        fresh[k] = make(of, {of.origin, voxel_of(level)}, next[k]);
+      });
+      for (std::size_t k = 0; k < next.size(); ++k) {
+        kept_ += fresh[k]->piece.mesh.triangles.size();
+        made_[next[k]] = std::move(fresh[k]);
+      }
+      figures_.made += next.size();
+    }
+    const auto found = made_.find(one->key);
+    if (found == made_.end()) {
+      ++figures_.missing;
+      continue;
+    }
+    const std::size_t more = found->second->piece.mesh.triangles.size();
+    if (more == 0) continue;
+    if (triangles + more > limits.triangles) break;
+    triangles += more;
+    found->second->used = picture_;
+    used.emplace_back(&*one, found->second.get());
   }
 
   // What each shows.
-  shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
-  std::vector<std::pair<const Wanted*, Made*>> used;
-  for (const Wanted& one : wanted)
-    if (const auto found = made_.find(one.key);
-        found != made_.end() && !found->second->piece.mesh.triangles.empty()) {
-      found->second->used = picture_;
-      used.emplace_back(&one, found->second.get());
-    }
   for (Near& near : list)
     if (state_of(near.instance).is(frame::State::parted))
       near.parts = section_states(forest_, shown, near.instance);

@@ -233,7 +233,7 @@ TEST(Skin, IsTheSameAtAnyNumberOfThreads) {
   for (const unsigned threads : {1u, 4u}) {
     const ThreadLimit limit(threads);
     Close close(30.f);
-    for (const frame::Surface& s : close.show()) {
+    for (const frame::Surface& s : close.show({.triangles = 60'000})) {
       std::vector<float>& list = seen[threads > 1].emplace_back();
       for (const Vec3& p : s.positions) list.insert(list.end(), {p.x(), p.y(), p.z()});
       for (const Vec3& n : s.normals) list.insert(list.end(), {n.x(), n.y(), n.z()});
@@ -247,14 +247,14 @@ TEST(Skin, IsTheSameAtAnyNumberOfThreads) {
 }
 
 TEST(Skin, KeepsItsLimits) {
-  Close close(40.f);
+  Close close(80.f);
   close.show({.triangles = 1u << 30});
   const std::size_t all = close.skin.figures().triangles;
-  Close less(40.f);
-  less.show({.triangles = all / 8});
-  EXPECT_LT(less.skin.figures().triangles, all / 3);
+  Close less(80.f);
+  less.show({.triangles = all / 2});
+  EXPECT_LE(less.skin.figures().triangles, all / 2);
   EXPECT_GT(less.skin.figures().triangles, 0u);
-  Close slow(40.f);
+  Close slow(80.f);
   std::size_t pictures = 0, missing = 1;
   for (; missing && pictures < 2000; ++pictures) {
     slow.show({.new_pieces = 3});
@@ -262,7 +262,7 @@ TEST(Skin, KeepsItsLimits) {
     missing = slow.skin.figures().missing;
   }
   EXPECT_GT(pictures, 1u);
-  Close at_once(40.f);
+  Close at_once(80.f);
   at_once.show();
   EXPECT_EQ(at_once.skin.figures().triangles, slow.skin.figures().triangles);
   at_once.show();
