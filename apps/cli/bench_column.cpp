@@ -30,7 +30,7 @@ struct Options {
   std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
-  double budget = 33.;  // milliseconds a picture
+  double budget = 31.;  // milliseconds a picture
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;
@@ -65,7 +65,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     const auto start = Clock::now();
     scene::View view = view_at(float(i) / float(options.frames));
     view.samples = options.samples.value_or(budget.samples());
-    view.detail.error = budget.error();
+    view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
     std::uint64_t touched = 0;
     if (const scene::Playback* playback = artist.playback()) {
       view.activity = playback->view();

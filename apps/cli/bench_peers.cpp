@@ -48,8 +48,9 @@ constexpr std::uint32_t dolly_pictures = 250;  // ten seconds
 constexpr std::uint32_t settling = 15;         // pictures in which the budget finds its error
 
 struct Options {
-  std::uint32_t neurons = 1000, frames = 6, samples = 16, quick_samples = 1;
-  double budget = 85.;
+  std::uint32_t neurons = 1000, frames = 6, samples = 16;
+  std::optional<std::uint32_t> quick_samples;
+  double budget = 100.;
   std::uint64_t seed = 1;
   std::string size = "1280x720", python = "/usr/bin/python3";
   std::vector<std::string> modes{"lines", "impostors", "tubes"};
@@ -239,8 +240,8 @@ void draw_ours(const Options& options) {
     if (*std::ranges::lower_bound(measured, picture) > picture + settling) continue;
     const auto start = Clock::now();
     const std::clock_t core = std::clock();
-    scene::View view = view_at(dolly, picture, options.quick_samples);
-    view.detail.error = budget.error();
+    scene::View view = view_at(dolly, picture, options.quick_samples.value_or(budget.samples()));
+    view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
     const Drawn drawn = artist.draw(view, width, height);
     const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
     const double core_seconds = double(std::clock() - core) / CLOCKS_PER_SEC;
@@ -331,12 +332,22 @@ void run(const Options& options, Console& console) {
         run_process({options.python, script.string(), folder.path().string(), mode}, folder.path());
     console.progress().advance();
   }
-  printed["ours"] =
-      run_process({fs::read_symlink("/proc/self/exe").string(), "bench", "peers", "--draw",
-                   folder.path().string(), "--frames", std::to_string(options.frames), "--size", options.size,
-                   "--budget", fmt::format("{}", options.budget), "--quick-samples",
-                   std::to_string(options.quick_samples), "--threads", std::to_string(console.threads)},
-                  folder.path());
+  std::vector<std::string> words{fs::read_symlink("/proc/self/exe").string(),
+                                 "bench",
+                                 "peers",
+                                 "--draw",
+                                 folder.path().string(),
+                                 "--frames",
+                                 std::to_string(options.frames),
+                                 "--size",
+                                 options.size,
+                                 "--budget",
+                                 fmt::format("{}", options.budget),
+                                 "--threads",
+                                 std::to_string(console.threads)};
+  if (options.quick_samples)
+    words.insert(words.end(), {"--quick-samples", std::to_string(*options.quick_samples)});
+  printed["ours"] = run_process(words, folder.path());
   console.progress().end();
 
   const std::vector<frame::Image> reference = reference_pictures(*forest, options, folder.path(), console);
@@ -371,7 +382,6 @@ void run(const Options& options, Console& console) {
                  {"size", options.size},
                  {"frames", options.frames},
                  {"samples", options.samples},
-                 {"quick_samples", options.quick_samples},
                  {"vtk", printed[names.back()].value("version", "")}});
   console.say(fmt::format("{} neurons, {} segments, {}, {} cameras of a dolly; ours and VTK {} on {}",
                           forest->instances().size(), forest->segment_total(), options.size, options.frames,
@@ -389,8 +399,9 @@ std::function<void()> bench_peers(CLI::App& command, Console& console) {
             "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
   add_whole(command, "--frames", options->frames, "Cameras of the dolly that are measured", 1, 250);
   add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
-  add_whole(command, "--quick-samples", options->quick_samples,
-            "Pictures averaged by ours; moving, the studio draws one", 1, 1024);
+  must_be_whole(*command.add_option("--quick-samples", options->quick_samples,
+                                    "Samples a pixel of ours, instead of what the budget says"),
+                1, 1024);
   must_be_within(*command
                       .add_option("--budget", options->budget,
                                   "Milliseconds a picture of ours may take before less detail is chosen")

@@ -32,7 +32,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
   double seconds = 10., budget = 85.;
-  std::optional<float> error;
+  std::optional<float> error, thinnest;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;
   std::string size = "640x360";
@@ -92,7 +92,8 @@ class Walk {
     Quick quick;
     quick.error = options_.error.value_or(budget_.error());
     quick.samples = options_.quick_samples.value_or(budget_.samples());
-    const scene::View view = view_at(picture, quick.error, quick.samples);
+    const scene::View view = view_at(picture, quick.error, quick.samples,
+                                     options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
     budget_.took(quick.milliseconds);
@@ -100,15 +101,15 @@ class Walk {
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
     quick.image = std::move(drawn.image);
-    quick.drawn = connectedness_(cut(view), view.camera, viewport_, view.samples);
+    quick.drawn = connectedness_(cut(view), view.camera, viewport_, scene::thinnest_of(view));
     scene::View full = view;
-    full.samples = 2;  // nothing is left out for being thin
-    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0);
+    full.samples = 2, full.detail.thinnest = 0.f;  // nothing is left out for being thin
+    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0.f);
     return quick;
   }
 
   Moment compare(std::uint32_t picture, Quick& quick) {
-    const scene::View view = view_at(picture, quick.error, options_.samples);
+    const scene::View view = view_at(picture, quick.error, options_.samples, 0.f);
     const scene::Cut all = scene::whole(artist_.forest(), view.camera, viewport_);
     const scene::Colouring colouring = scene::colour(artist_.forest(), view.colour_by, view.background);
     const frame::Frame frame =
@@ -133,9 +134,9 @@ class Walk {
   const scene::Forest& forest() const { return artist_.forest(); }
 
  private:
-  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples) const {
+  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples, float thinnest) const {
     scene::View view = dolly_.at(float(picture) / float(pictures_ - 1));
-    view.detail.error = error;
+    view.detail.error = error, view.detail.thinnest = thinnest;
     view.samples = samples;
     return view;
   }
@@ -373,6 +374,9 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   within(command.add_option("--error", options->error,
                             "Pixels of acceptable error, instead of what the budget says"),
          .05, 100.);
+  within(command.add_option("--thinnest", options->thinnest,
+                            "Pixels that the thinnest lines measure, instead of what the budget says"),
+         0., 64.);
   command.add_flag(
       "--causes", options->causes,
       "Compare, too, what the product would draw with more samples, and without levels of detail");

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <mutex>
 #include <string>
@@ -51,6 +52,9 @@ class Console {
 
 /// "1 finding", "2 findings", "2 losses": an s where no plural is given.
 std::string counted(std::size_t count, std::string_view noun, std::string_view plural = {});
+
+/// The most memory that this program has had so far.
+std::uint64_t peak_bytes();
 
 /// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the
 /// installation.

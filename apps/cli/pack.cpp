@@ -1,12 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
-// brainforest pack: a circuit becomes a forest file.
+// brainforest pack: a circuit becomes a forest file. Its morphologies are read when their turn comes, so that they need not
+// fit into memory.
+#include <atomic>
+#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "forest/core/file.h"
 #include "forest/io/sonata.h"
 #include "forest/scene/forest.h"
 
@@ -43,24 +45,41 @@ std::function<void()> pack(CLI::App& command, Console& console) {
   command.add_option("-o,--out", options->out, "The forest file")->required();
   command.add_flag("--verbose", options->verbose, "Say every oddity of the circuit's files");
   return [options, &console] {
-    const io::SonataCircuit read = io::read_sonata(options->circuit, console.progress());
-    if (options->verbose)
-      for (const io::Warning& w : read.warnings) console.warn(w.sentence);
-    else if (!read.warnings.empty())
-      console.warn(fmt::format("{} oddities in {}; see them with --verbose", read.warnings.size(),
-                               options->circuit.string()));
-    const auto bytes = scene::pack(read.circuit, read.morphologies, console.progress(), names_of(read.nodes));
-    write_file(options->out, bytes);
-    const scene::Forest forest = scene::Forest::open(options->out);
+    const auto begin = std::chrono::steady_clock::now();
+    const io::SonataOutline outline = io::outline_sonata(options->circuit);
+    std::vector<std::vector<io::Warning>> oddities(outline.files.size());  // of their files
+    std::atomic<std::size_t> count = outline.warnings.size();
+    const auto read = [&](std::size_t index) {
+      io::ReadResult one = outline.morphology(index);
+      count += one.warnings.size();
+      if (options->verbose) oddities[index] = std::move(one.warnings);
+      return std::move(one.morphology);
+    };
+    const scene::PackFigures figures =
+        scene::pack(outline.circuit, read, options->out, console.progress(), names_of(outline.nodes));
+    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    if (options->verbose) {
+      for (const io::Warning& w : outline.warnings) console.warn(w.sentence);
+      for (const auto& list : oddities)
+        for (const io::Warning& w : list) console.warn(w.sentence);
+    } else if (count) {
+      console.warn(
+          fmt::format("{} oddities in {}; see them with --verbose", count.load(), options->circuit.string()));
+    }
     console.print({{"file", options->out.string()},
-                   {"neurons", forest.instances().size()},
-                   {"distinct", forest.neurons().size()},
-                   {"segments", forest.segment_total()},
-                   {"bytes", forest.bytes()}});
-    console.table({"file", "neurons", "distinct", "segments", "bytes"},
-                  {{options->out.string(), fmt::format("{}", forest.instances().size()),
-                    fmt::format("{}", forest.neurons().size()), fmt::format("{}", forest.segment_total()),
-                    fmt::format("{}", forest.bytes())}});
+                   {"neurons", outline.circuit.instances.size()},
+                   {"distinct", outline.files.size()},
+                   {"segments", figures.segments},
+                   {"planted_segments", figures.segment_total},
+                   {"bytes", figures.bytes},
+                   {"seconds", seconds},
+                   {"segments_per_second", double(figures.segments) / seconds},
+                   {"peak_bytes", peak_bytes()}});
+    console.table({"file", "neurons", "distinct", "segments", "planted", "bytes", "seconds"},
+                  {{options->out.string(), fmt::format("{}", outline.circuit.instances.size()),
+                    fmt::format("{}", outline.files.size()), fmt::format("{}", figures.segments),
+                    fmt::format("{}", figures.segment_total), fmt::format("{}", figures.bytes),
+                    fmt::format("{:.2f}", seconds)}});
   };
 }
 

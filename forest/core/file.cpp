@@ -5,6 +5,7 @@
 #include <charconv>
 #include <cstring>
 #include <fcntl.h>
+#include <random>
 #include <unistd.h>
 #include <utility>
 
@@ -31,13 +32,19 @@ bool write_all(int file, std::span<const std::byte> bytes) {
   return true;
 }
 
+constexpr std::string_view open_files = "/proc/self/fd/";
+
+/// A new file in a folder, without a name; -1 where that cannot be.
+int open_nameless(const std::filesystem::path& folder) {
+  return ::open(folder.c_str(), O_TMPFILE | O_RDWR | O_CLOEXEC, 0600);
+}
+
 /// The number of an open file of this program when the path is a name of one (/dev/stdout, /dev/fd/3), or -1.
 int open_file_at(const std::filesystem::path& place) {
-  constexpr std::string_view folder = "/proc/self/fd/";
   const std::string text = place.string();
   int number = -1;
-  if (text.starts_with(folder))
-    std::from_chars(text.data() + folder.size(), text.data() + text.size(), number);
+  if (text.starts_with(open_files))
+    std::from_chars(text.data() + open_files.size(), text.data() + text.size(), number);
   return number;
 }
 
@@ -98,11 +105,20 @@ NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(
   const bool there = ::stat(place_.c_str(), &status) == 0;
   if (there && S_ISDIR(status.st_mode)) throw Error(wanted_.string() + ": is a folder; name a file");
   stream_ = open_file_at(place_) >= 0 || (there && !S_ISREG(status.st_mode));
-  std::string part =
-      (stream_ ? std::filesystem::temp_directory_path() / "brainforest" : place_).string() + ".XXXXXX";
-  file_ = ::mkostemp(part.data(), O_CLOEXEC);
-  if (file_ < 0) fail("created");
-  part_ = part;
+  folder_ = stream_                    ? std::filesystem::temp_directory_path()
+            : place_.has_parent_path() ? place_.parent_path()
+                                       : std::filesystem::path(".");
+  file_ = open_nameless(folder_);
+  if (file_ >= 0 && ::access(own_name().c_str(), F_OK) != 0) {  // nothing it could be named by
+    ::close(file_);
+    file_ = -1;
+  }
+  if (file_ < 0) {
+    std::string part = (stream_ ? folder_ / "brainforest" : place_).string() + ".XXXXXX";
+    file_ = ::mkostemp(part.data(), O_CLOEXEC);
+    if (file_ < 0) fail("created");
+    part_ = part;
+  }
   ::fchmod(file_, there && !stream_ ? status.st_mode & 0777 : 0644);
 }
 
@@ -111,13 +127,44 @@ NewFile::~NewFile() {
   if (!part_.empty()) ::unlink(part_.c_str());
 }
 
+/// The open file as a path, for calls that take one.
+std::string NewFile::own_name() const { return fmt::format("{}{}", open_files, file_); }
+
+void NewFile::give_name() {
+  if (!part_.empty()) return;
+  for (std::random_device chance;;) {
+    const auto part =
+        fmt::format("{}.{:06x}", (stream_ ? folder_ / "brainforest" : place_).string(), chance() & 0xffffff);
+    if (::linkat(AT_FDCWD, own_name().c_str(), AT_FDCWD, part.c_str(), AT_SYMLINK_FOLLOW) == 0) {
+      part_ = part;
+      return;
+    }
+    if (errno != EEXIST) fail("created");
+  }
+}
+
+const std::filesystem::path& NewFile::path() {
+  give_name();
+  return part_;
+}
+
 void NewFile::write(std::span<const std::byte> bytes) {
   if (!write_all(file_, bytes)) fail("written");
 }
 
+void NewFile::overwrite(std::uint64_t at, std::span<const std::byte> bytes) {
+  while (!bytes.empty()) {
+    const ssize_t wrote = ::pwrite(file_, bytes.data(), bytes.size(), off_t(at));
+    if (wrote < 0 && errno == EINTR) continue;
+    if (wrote < 0) fail("written");
+    bytes = bytes.subspan(std::size_t(wrote));
+    at += std::uint64_t(wrote);
+  }
+}
+
 void NewFile::commit() {
   if (stream_) {
-    const MappedFile whole(part_);
+    const MappedFile whole(part_.empty() ? std::filesystem::path(own_name()) : part_);
     const int open = open_file_at(place_);
     const int stream = open >= 0 ? ::fcntl(open, F_DUPFD_CLOEXEC, 0)
                                  : ::open(place_.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);
@@ -130,6 +177,11 @@ void NewFile::commit() {
     return;
   }
   if (::fsync(file_) != 0 && errno != EINVAL) fail("written");
+  // Where nothing is to be replaced the file gets its name at once, else by way of a passing one.
+  if (part_.empty() &&
+      ::linkat(AT_FDCWD, own_name().c_str(), AT_FDCWD, place_.c_str(), AT_SYMLINK_FOLLOW) == 0)
+    return;
+  give_name();
   if (::rename(part_.c_str(), place_.c_str()) != 0) fail("renamed");
   part_.clear();
 }
@@ -137,6 +189,35 @@ void NewFile::commit() {
 void NewFile::fail(const char* what) const {
   throw Error(fmt::format("{}: cannot be {} ({}); check that the folder exists and the disk has room",
                           wanted_.string(), what, std::strerror(errno)));
+}
+
+ScratchFile::ScratchFile(const NewFile& of) : of_(of), file_(open_nameless(of.folder_)) {
+  if (file_ >= 0) return;
+  std::string part = (of_.folder_ / "brainforest.XXXXXX").string();
+  file_ = ::mkostemp(part.data(), O_CLOEXEC);
+  if (file_ < 0) of_.fail("created");
+  ::unlink(part.c_str());
+}
+
+ScratchFile::~ScratchFile() {
+  if (file_ >= 0) ::close(file_);
+}
+
+void ScratchFile::write(std::span<const std::byte> bytes) {
+  if (!write_all(file_, bytes)) of_.fail("written");
+}
+
+void ScratchFile::read(std::uint64_t at, std::span<std::byte> into) const {
+  while (!into.empty()) {
+    const ssize_t got = ::pread(file_, into.data(), into.size(), off_t(at));
+    if (got < 0 && errno == EINTR) continue;
+    if (got <= 0) {
+      if (got == 0) errno = EIO;
+      of_.fail("written");
+    }
+    into = into.subspan(std::size_t(got));
+    at += std::uint64_t(got);
+  }
 }
 
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <filesystem>
 #include <span>
 #include <string_view>
@@ -25,9 +26,11 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
-/// A file on its way: written under a passing name beside its place, put there by commit(), so that a killed program
-/// leaves the old file or the new one, never a part. Links are followed: what they point to is replaced, they stay. Where
-/// no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the bytes into what is there.
+/// A file on its way: written without a name on the disk of its place, put there by commit(), so that a killed program
+/// leaves the old file or the new one, and nothing else. (Where the file system knows no files without names, and after
+/// path(), it has a passing name beside its place until then, which a kill leaves behind.) Links are followed: what they
+/// point to is replaced, they stay. Where no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the
+/// bytes into what is there.
 class NewFile {
  public:
   /// Throws Error when the folder is missing or cannot be written.
@@ -36,16 +39,38 @@ class NewFile {
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
-  const std::filesystem::path& path() const { return part_; }  // where to write until then
+  const std::filesystem::path& path();  // where to write until then, for libraries that ask for a name
   /// Appends. Throws Error when the disk is full.
   void write(std::span<const std::byte> bytes);
+  /// Writes over what is there already; the next write() still appends.
+  void overwrite(std::uint64_t at, std::span<const std::byte> bytes);
   void commit();
 
  private:
+  friend class ScratchFile;
   [[noreturn]] void fail(const char* what) const;
+  std::string own_name() const;
+  void give_name();
 
-  std::filesystem::path wanted_, place_, part_;
+  std::filesystem::path wanted_, place_, folder_, part_;
   bool stream_ = false;  // the place takes bytes, not a file
+  int file_ = -1;
+};
+
+/// What does not fit into memory while a new file is made: a file without a name on the same disk, gone with the object and
+/// with the program, however that ends. Errors are those of the new file.
+class ScratchFile {
+ public:
+  explicit ScratchFile(const NewFile& of);
+  ~ScratchFile();
+  ScratchFile(const ScratchFile&) = delete;
+  ScratchFile& operator=(const ScratchFile&) = delete;
+
+  void write(std::span<const std::byte> bytes);                  // appends
+  void read(std::uint64_t at, std::span<std::byte> into) const;  // what was written
+
+ private:
+  const NewFile& of_;
   int file_ = -1;
 };
 

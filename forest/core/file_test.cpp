@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/file.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <fstream>
 #include <sstream>
@@ -89,6 +90,74 @@ TEST(File, ADeviceIsWrittenIntoAndNotReplaced) {
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/null"));
   EXPECT_THROW(write_file("/dev/full", "x"), Error);
   EXPECT_TRUE(std::filesystem::is_character_file("/dev/full"));
+}
+
+std::ptrdiff_t entries(const std::filesystem::path& folder) {
+  return std::distance(std::filesystem::directory_iterator(folder), {});
+}
+
+TEST_F(FileInAFolder, UntilItIsThereNothingIsToBeSeen) {
+  const auto place = folder_ / "later";
+  {
+    NewFile file(place);
+    file.write(std::as_bytes(std::span("lost", 4)));
+    EXPECT_EQ(entries(folder_), 0);
+  }
+  EXPECT_EQ(entries(folder_), 0);
+  for (const char* text : {"first", "and again"}) {
+    NewFile file(place);
+    file.write(std::as_bytes(std::span("????? ", 6)));
+    file.write(std::as_bytes(std::span(std::string_view(text))));
+    file.overwrite(0, std::as_bytes(std::span("hello", 5)));
+    file.commit();
+    EXPECT_EQ(MappedFile(place).text(), std::string("hello ") + text);
+    EXPECT_EQ(entries(folder_), 1);
+  }
+}
+
+TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
+  const auto place = folder_ / "film";
+  {
+    NewFile file(place);
+    std::ofstream(file.path()) << "moving";
+    EXPECT_EQ(entries(folder_), 1);
+    EXPECT_FALSE(std::filesystem::exists(place));
+    file.commit();
+  }
+  EXPECT_EQ(MappedFile(place).text(), "moving");
+  {
+    NewFile file(folder_ / "other");
+    EXPECT_TRUE(std::filesystem::exists(file.path()));
+  }
+  EXPECT_EQ(entries(folder_), 1);
+}
+
+TEST_F(FileInAFolder, AScratchFileHasNoNameAndGivesBackWhatWasWritten) {
+  const NewFile file(folder_ / "x");
+  ScratchFile scratch(file);
+  scratch.write(std::as_bytes(std::span("one two ", 8)));
+  scratch.write(std::as_bytes(std::span("three", 5)));
+  EXPECT_EQ(entries(folder_), 0);
+  std::string read(9, ' ');
+  scratch.read(4, std::as_writable_bytes(std::span(read)));
+  EXPECT_EQ(read, "two three");
+  EXPECT_THROW(scratch.read(5, std::as_writable_bytes(std::span(read))), Error);
+}
+
+TEST(File, TheHashOfBlocksIsTheSameHoweverTheyCome) {
+  std::string bytes(2 * BlockHash::block + 77, 'x');
+  for (std::size_t i = 0; i < bytes.size(); i += 61) bytes[i] = char(i);
+  const auto all = std::as_bytes(std::span(bytes));
+  for (const std::size_t size :
+       {std::size_t(0), std::size_t(5), BlockHash::block, BlockHash::block + 1, all.size()})
+    for (const std::size_t step : {std::size_t(99'991), BlockHash::block, all.size()}) {
+      BlockHash hash;
+      for (std::size_t at = 0; at < size; at += step) hash.add(all.subspan(at, std::min(step, size - at)));
+      EXPECT_EQ(hash.value(), block_hash(all.first(size))) << size << " in steps of " << step;
+    }
+  const auto before = block_hash(all);
+  bytes.back() ^= 1;
+  EXPECT_NE(block_hash(all), before);
 }
 
 TEST(File, HashTellsOneByte) {

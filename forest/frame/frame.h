@@ -144,6 +144,9 @@ struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
+  // Lines thinner than this are drawn as wide or not at all, by the rank of their branch, so that they cover their area on
+  // the mean; pixels, and 1 for a picture of a single subframe.
+  float thinnest = 0.f;
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
   std::optional<Area> hole;  // of them these are not wanted either
   // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.

@@ -60,16 +60,17 @@ struct Constants {
       last_subframe;  // the items first_item … first_item + item_count are drawn
   // A length at depth z covers focal × length / (converge × z + parallel) pixels: 1, 0 for a perspective camera, 0, 1 for an
   // orthographic one, whose focal is pixels a µm.
-  float converge, parallel, glass_opacity;
-  uint instance;  // of the surface drawn; all ones: it lies in the world
+  float converge, parallel, glass_opacity,
+      thinnest;  // pixels; lines that are thinner are drawn as wide, or not at all
   float glass_x, glass_y, glass_z,
       glass_at;  // glass: n · p = at, p in camera axes (z depth); opacity 0: none
   float glass_right_x, glass_right_y, glass_right_z,
       glass_left_edge;                                       // it reaches from here, along its right …
   float glass_up_x, glass_up_y, glass_up_z, glass_low_edge;  // … and its up
   float glass_right_edge, glass_high_edge;                   // … to here
-  uint opacity, door;  // 0–255, of the surface drawn, and the key of its screen door
-  float glass_red, glass_green, glass_blue, reserved;  // linear light
+  uint opacity, door;                        // 0–255, of the surface drawn, and the key of its screen door
+  float glass_red, glass_green, glass_blue;  // linear light
+  uint instance;                             // of the surface drawn; all ones: it lies in the world
 };
 
 // A pixel's key: depth (20 bits, logarithmic), palette entry (7 bits), shade (5 bits). The smallest key wins, so the

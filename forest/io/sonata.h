@@ -31,10 +31,23 @@ struct SonataCircuit {
   reports::Nodes nodes;                  // of each instance: what reports call it
 };
 
+/// A circuit whose morphologies are still in their files, for those that do not fit into memory.
+struct SonataOutline {
+  circuit::Circuit circuit;
+  std::vector<std::filesystem::path> files;  // of each of circuit.morphologies
+  std::vector<Warning> warnings;             // neurons left out
+  reports::Nodes nodes;                      // of each instance: what reports call it
+
+  /// Reads one of circuit.morphologies, centre at the origin; warnings name its file. May be called by several threads.
+  ReadResult morphology(std::size_t index) const;
+};
+
 /// Reads a circuit: one of ours comes back equal. Of others' circuits every population of neurons with a shape is read;
 /// virtual and point neurons are left out, and said so. Layers of such a circuit reach as far as their somata.
 /// @param place  the folder with circuit_config.json, or a configuration file of another name
 /// Throws InputError (file, line where there is one, remedy).
 SonataCircuit read_sonata(const std::filesystem::path& place, Progress& progress = Progress::none());
+/// The same but for the morphologies; of them only those are looked at whose centre says where their neurons stand.
+SonataOutline outline_sonata(const std::filesystem::path& place);
 
 }  // namespace forest::io

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <unordered_map>
 #include <unordered_set>
@@ -73,19 +74,19 @@ class Assembler {
       for (const std::string& name : file.members("/nodes")) add(name, Json::object());
   }
 
-  SonataCircuit finish(Progress& progress) {
+  SonataOutline finish() {
     if (circuit_.instances.empty() && !ours_)
       config_.refuse(
           "no neuron of the circuit has a shape and a place, so there is nothing to plant; name a circuit "
           "with morphologies");
     if (!ours_) bound_layers();
-    load_morphologies(progress);
+    place_not_centred();
     try {
       circuit::check(circuit_);
     } catch (const Error& error) {
       config_.refuse(error.what());
     }
-    return {std::move(circuit_), std::move(morphologies_), std::move(warnings_), std::move(nodes_)};
+    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_)};
   }
 
  private:
@@ -308,24 +309,14 @@ class Assembler {
         folders.empty() ? "any folder, as \"morphologies_dir\" is missing" : folders[0].string(), name));
   }
 
-  void load_morphologies(Progress& progress) {
-    std::vector<std::vector<Warning>> warnings(files_.size());
+  void place_not_centred() {
+    std::vector<std::uint32_t> asked;  // morphologies
+    for (const std::uint32_t i : not_centred_) asked.push_back(circuit_.instances[i].morphology);
+    std::ranges::sort(asked);
+    asked.erase(std::ranges::unique(asked).begin(), asked.end());
     std::vector<Vec3> centres(files_.size());
-    morphologies_.resize(files_.size());
-    progress.begin("reading", files_.size());
-    parallel_for(files_.size(), 1, [&](std::size_t i) {
-      ReadResult read = io::read(files_[i]);
-      centres[i] = centre(read.morphology);
-      morphologies_[i] = centred(read.morphology);
-      warnings[i] = std::move(read.warnings);
-      progress.advance();
-    });
-    progress.end();
-    for (std::size_t i = 0; i < files_.size(); ++i)
-      for (Warning& warning : warnings[i]) {
-        warning.sentence = fmt::format("{}:{}: {}", files_[i].string(), warning.line, warning.sentence);
-        warnings_.push_back(std::move(warning));
-      }
+    parallel_for(asked.size(), 1,
+                 [&](std::size_t i) { centres[asked[i]] = centre(io::read(files_[asked[i]]).morphology); });
     for (const std::uint32_t i : not_centred_) {
       Instance& instance = circuit_.instances[i];
       instance.position += instance.orientation * centres[instance.morphology];
@@ -335,7 +326,6 @@ class Assembler {
   const SonataConfig& config_;
   const Json* ours_;
   Circuit circuit_;
-  std::vector<Morphology> morphologies_;
   std::vector<Warning> warnings_;
   reports::Nodes nodes_;
   std::vector<fs::path> files_;  // by morphology
@@ -347,14 +337,40 @@ class Assembler {
 
 }  // namespace
 
-SonataCircuit read_sonata(const fs::path& place, Progress& progress) {
+ReadResult SonataOutline::morphology(std::size_t index) const {
+  ReadResult read = io::read(files[index]);
+  read.morphology = centred(read.morphology);
+  for (Warning& warning : read.warnings)
+    warning.sentence = fmt::format("{}:{}: {}", files[index].string(), warning.line, warning.sentence);
+  return read;
+}
+
+SonataOutline outline_sonata(const fs::path& place) {
   const SonataConfig config(place);
   Assembler assembler(config);
   const Json* nodes = SonataConfig::find(*SonataConfig::find(config.json(), "networks"), "nodes");
   if (!nodes || !nodes->is_array())
     config.refuse("\"networks\" has no list of \"nodes\"; add the file of the neurons");
   for (const Json& entry : *nodes) assembler.add_nodes(entry);
-  return assembler.finish(progress);
+  return assembler.finish();
+}
+
+SonataCircuit read_sonata(const fs::path& place, Progress& progress) {
+  SonataOutline outline = outline_sonata(place);
+  const std::size_t count = outline.files.size();
+  std::vector<ReadResult> read(count);
+  progress.begin("reading", count);
+  parallel_for(count, 1, [&](std::size_t i) {
+    read[i] = outline.morphology(i);
+    progress.advance();
+  });
+  progress.end();
+  SonataCircuit result{std::move(outline.circuit), {}, std::move(outline.warnings), std::move(outline.nodes)};
+  for (ReadResult& one : read) {
+    result.morphologies.push_back(std::move(one.morphology));
+    std::ranges::move(one.warnings, std::back_inserter(result.warnings));
+  }
+  return result;
 }
 
 }  // namespace forest::io

@@ -178,6 +178,22 @@ TEST_F(Sonata, WhatCannotBeWrittenLeavesTheOldCircuit) {
   EXPECT_THAT(complaint([&] { write_sonata(root_ / "no" / "where", {}, {}); }), HasSubstr("folder above"));
 }
 
+TEST_F(Sonata, AnOutlineReadsMorphologiesOneByOne) {
+  write();
+  const SonataCircuit whole = read_sonata(folder());
+  const SonataOutline outline = outline_sonata(folder());
+  EXPECT_EQ(outline.circuit, whole.circuit);
+  EXPECT_EQ(outline.nodes.of_instance, whole.nodes.of_instance);
+  ASSERT_EQ(outline.files.size(), whole.morphologies.size());
+  for (std::size_t i = outline.files.size(); i-- > 0;)
+    EXPECT_EQ(outline.morphology(i).morphology, whole.morphologies[i]);
+  write_file(outline.files[1], "1 1 0 0 0 five -1\n");
+  EXPECT_NO_THROW(outline_sonata(folder()));
+  EXPECT_THAT(complaint([&] { outline.morphology(1); }),
+              HasSubstr(outline.files[1].filename().string() + ":1"));
+  EXPECT_EQ(complaint([&] { outline.morphology(1); }), complaint([&] { read_sonata(folder()); }));
+}
+
 TEST_F(Sonata, MissingFilesAreNamed) {
   for (const char* name : {"circuit_config.json", "nodes.h5", "node_types.csv", "morphologies/tall-1.swc"}) {
     write();
@@ -338,6 +354,11 @@ TEST(PublishedCircuits, OfTheAllenInstituteHaveTheirTypesInATable) {
   const Vec3 east = first.orientation * Vec3::UnitX();  // turned by 5.4278 about y
   EXPECT_NEAR(std::atan2(-east.z(), east.x()), 5.427764850661566 - 2. * std::numbers::pi, 1e-5);
   for (const Morphology& m : read.morphologies) EXPECT_LT(centre(m).norm(), 2e-3f);
+  const SonataOutline outline = outline_sonata(folder);
+  EXPECT_EQ(outline.circuit, read.circuit);
+  std::size_t warnings = outline.warnings.size();
+  for (std::size_t i = 0; i < outline.files.size(); ++i) warnings += outline.morphology(i).warnings.size();
+  EXPECT_EQ(warnings, read.warnings.size());
   EXPECT_THAT(read.warnings,
               testing::Contains(testing::Field(&Warning::code, "not-biophysical")));  // the external spikes
 }

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/repository/database.h"
 
+#include <iterator>
+
 #include "forest/morphology/morphology.h"
 #include "forest/repository/schema.h"
 #include "forest/statistics/metric.h"
@@ -33,6 +35,14 @@ void fill_metrics(soci::session& sql) {
 }
 
 }  // namespace
+
+Answer Database::ask(const std::string& question) {
+  Answer answer;
+  answer.columns = each(question, [&](std::span<Answer::Value> row) {
+    answer.rows.emplace_back(std::make_move_iterator(row.begin()), std::make_move_iterator(row.end()));
+  });
+  return answer;
+}
 
 bool is_postgresql(std::string_view place) {
   return place.starts_with("postgresql://") || place.starts_with("postgres://");

@@ -3,6 +3,7 @@
 // database is one file and one row in database.cpp; no public header includes this one.
 #pragma once
 
+#include <functional>
 #include <memory>
 #include <span>
 #include <string>
@@ -40,8 +41,11 @@ class Database {
   virtual std::vector<std::string> examine_structure() { return {}; }
   /// From now on nothing can be written through this connection, whatever it is asked.
   virtual void forbid_writing() = 0;
-  /// One question of a person, in SQL. Throws Error that says what the database does not understand.
-  virtual Answer ask(const std::string& question) = 0;
+  /// One question of a person, in SQL: row after row, whose values may be taken. Returns the names of the columns. Throws
+  /// Error that says what the database does not understand.
+  using Take = std::function<void(std::span<Answer::Value> row)>;
+  virtual std::vector<std::string> each(const std::string& question, const Take& take) = 0;
+  Answer ask(const std::string& question);
   /// Inside a catch block: throws what is being handled again, errors of the database as InputError with a sentence.
   [[noreturn]] virtual void rethrow(const std::string& place) const = 0;
 

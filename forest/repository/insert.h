@@ -5,7 +5,7 @@
 //   insert.with("neuron", id).with("section", sections).with("shape", shapes);   // a column: a value or a vector of them
 //   insert.run(sections.size());                                                 // as often as one likes
 //
-// How rows travel best depends on the database: SQLite takes them one by one, a server as arrays, all in one message.
+// How rows travel best depends on the database: SQLite reads the columns as a table, a server gets arrays in one message.
 #pragma once
 
 #include <functional>

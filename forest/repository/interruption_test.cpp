@@ -157,6 +157,7 @@ const std::string grammar_text = "axiom: A\nA -> \\(90) F(1) A\n";
 
 /// What makes the tables those of an older version, in either database.
 std::string as_version(int version) {
+  if (version == 5) return "";  // whose points are not packed
   std::string sql =
       "drop view metric; alter table neuron_metrics rename to later_metrics; "
       "create table neuron_metrics (metric integer not null, neuron integer not null, value double precision "
@@ -210,7 +211,7 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
   const std::string script = (folder_ / "older.sql").string();
   Random random(3);
   std::size_t unfinished = 0;
-  for (const int version : {1, 2, 3, 4}) {
+  for (const int version : {1, 2, 3, 4, 5}) {
     std::string old_bytes, old_name;
     const std::string sql = as_version(version);
     if (is_file()) {

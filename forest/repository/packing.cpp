@@ -12,12 +12,24 @@ namespace forest::repository {
 namespace {
 
 constexpr std::array<double, 6> scales{1., 10., 100., 1e3, 1e4, 1e5};  // steps a micrometre
+constexpr std::size_t in_floats = scales.size();                       // instead of a number of decimals
 constexpr std::uint64_t minus_zero = 1ull << 63;                       // no difference is so large
 constexpr double most_steps = 1e15;  // whole numbers a double holds, and some room
 
 std::array<float, 4> numbers(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
 
 float number_of(std::int64_t steps, double scale) { return float(double(steps) / scale); }
+
+// Floats counted in their order: the next larger one is the next number, 0 is 0 and -0 is -1.
+std::int64_t order_of(float value) {
+  const auto bits = std::bit_cast<std::int32_t>(value);
+  return bits < 0 ? bits ^ 0x7fffffff : bits;
+}
+
+float at_order(std::int64_t order) {
+  const auto bits = std::int32_t(order);
+  return std::bit_cast<float>(bits < 0 ? bits ^ 0x7fffffff : bits);
+}
 
 bool is_minus_zero(float value) { return std::bit_cast<std::uint32_t>(value) == 0x80000000u; }
 
@@ -29,47 +41,55 @@ bool is_decimal(float value, double scale) {
              std::bit_cast<std::uint32_t>(value);
 }
 
-// The decimals that all numbers need; scales.size() when some needs more.
+// The decimals that all numbers need; in_floats when some needs more.
 std::size_t decimals(std::span<const Point> points) {
   std::size_t places = 0;
   for (const Point& p : points)
     for (const float value : numbers(p))
       while (places < scales.size() && !is_decimal(value, scales[places])) ++places;
-  if (places == scales.size()) return places;
+  if (places == in_floats) return places;
   // More places may not hold what fewer do: large numbers have no room for them.
   for (const Point& p : points)
     for (const float value : numbers(p))
-      if (!is_decimal(value, scales[places])) return scales.size();
+      if (!is_decimal(value, scales[places])) return in_floats;
   return places;
 }
 
 }  // namespace
 
 std::string packed(std::span<const Point> points) {
+  if (points.empty()) return {};
   const std::size_t places = decimals(points);
-  if (places == scales.size() || points.empty()) return {};
+  const bool decimal = places != in_floats;
+  const double scale = decimal ? scales[places] : 0.;
   std::string bytes(1, char(places));
-  bytes.reserve(8 * points.size());
+  bytes.reserve((decimal ? 8 : 14) * points.size());
   std::array<std::int64_t, 4> before{};
   for (const Point& p : points) {
     const std::array<float, 4> values = numbers(p);
+    std::array<char, 40> written;  // ten bytes a number at most
+    std::size_t count = 0;
     for (std::size_t k = 0; k < 4; ++k) {
-      const std::int64_t steps = std::int64_t(std::round(double(values[k]) * scales[places]));
+      const std::int64_t steps =
+          decimal ? std::int64_t(std::round(double(values[k]) * scale)) : order_of(values[k]);
       const std::int64_t difference = steps - before[k];
       before[k] = steps;
       std::uint64_t zigzag = (std::uint64_t(difference) << 1) ^ std::uint64_t(difference >> 63);
-      if (is_minus_zero(values[k])) zigzag = minus_zero;
-      for (; zigzag > 127; zigzag >>= 7) bytes += char(zigzag | 128);
-      bytes += char(zigzag);
+      if (decimal && is_minus_zero(values[k])) zigzag = minus_zero;
+      for (; zigzag > 127; zigzag >>= 7) written[count++] = char(zigzag | 128);
+      written[count++] = char(zigzag);
     }
+    bytes.append(written.data(), count);
   }
   return bytes.size() < points.size() * sizeof(Point) ? bytes : std::string();
 }
 
 std::vector<Point> unpacked(const std::string& bytes) {
   const auto damaged = [] { return Error("its packed points are damaged"); };
-  if (bytes.empty() || static_cast<unsigned char>(bytes[0]) >= scales.size()) throw damaged();
-  const double scale = scales[static_cast<unsigned char>(bytes[0])];
+  const std::size_t places = bytes.empty() ? in_floats + 1 : static_cast<unsigned char>(bytes[0]);
+  if (places > in_floats) throw damaged();
+  const bool decimal = places != in_floats;
+  const double scale = decimal ? scales[places] : 0.;
   std::vector<Point> points;
   points.reserve(bytes.size() / 6);
   std::array<std::int64_t, 4> before{};
@@ -83,13 +103,14 @@ std::vector<Point> unpacked(const std::string& bytes) {
         zigzag |= std::uint64_t(byte & 127) << shift;
         if (byte < 128) break;
       }
-      if (zigzag == minus_zero) {
+      if (decimal && zigzag == minus_zero) {
         before[k] = 0, values[k] = -0.f;
         continue;
       }
       const std::int64_t difference = std::int64_t(zigzag >> 1) ^ -std::int64_t(zigzag & 1);
       before[k] = std::int64_t(std::uint64_t(before[k]) + std::uint64_t(difference));
-      values[k] = number_of(before[k], scale);
+      if (!decimal && before[k] != std::int32_t(before[k])) throw damaged();
+      values[k] = decimal ? number_of(before[k], scale) : at_order(before[k]);
     }
     points.push_back({values[0], values[1], values[2], values[3]});
   }

@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Points in few bytes. A tracer writes decimals: places to a tenth, a hundredth or a thousandth of a micrometre. Then a
-// point is its difference from the one before in such steps, and takes five to eight bytes instead of sixteen; the
-// floats that come back are the very same. Neurons of other numbers are kept as they are.
+// point is its difference from the one before in such steps, and takes five to eight bytes instead of sixteen; of grown neurons
+// the steps are those from float to float, and a point takes eleven to fifteen. The floats that come back are the very same.
 //
-//   packed: decimals (a byte, 0–5), then x, y, z and radius of every point: difference from the point before in steps,
-//   zigzag (0, -1, 1, -2, …), seven bits a byte, the lowest first, the eighth bit set on all but the last;
-//   2⁶³ stands for the number -0, from which the next difference is that from 0
+//   packed: decimals (a byte, 0–5; 6: floats), then x, y, z and radius of every point: difference from the point before in
+//   steps, zigzag (0, -1, 1, -2, …), seven bits a byte, the lowest first, the eighth bit set on all but the last
+//   in decimals 2⁶³ stands for the number -0, from which the next difference is that from 0
+//   floats are counted in their order: 0 and above as their bits say, those with a sign from -0, which is -1, downwards
 #pragma once
 
 #include <span>
@@ -15,7 +16,7 @@
 
 namespace forest::repository {
 
-/// Empty when some number is no decimal of at most five places, or packing would not make it smaller.
+/// Empty when packing would not make it smaller.
 std::string packed(std::span<const Point> points);
 
 /// Throws Error when the bytes are damaged.

@@ -1,7 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/repository/packing.h"
 
+#include <array>
 #include <cmath>
+#include <cstring>
+#include <limits>
 
 #include <gtest/gtest.h>
 
@@ -44,27 +47,73 @@ TEST(Packing, MinusZeroStaysItself) {
   EXPECT_FALSE(std::signbit(back[5].x) != std::signbit(points[5].x));
 }
 
-TEST(Packing, NumbersThatAreNoDecimalsAreNotPacked) {
-  auto points = traced(2);
-  points[77].y = std::nextafter(points[77].y, 1e9f);
-  EXPECT_TRUE(packed(points).empty());
-  points = traced(1);
-  points[3].x = NAN;
-  EXPECT_TRUE(packed(points).empty());
-  points[3].x = 3e38f;
+/// A walk as neurons grow: floats of every last bit.
+std::vector<Point> grown(std::size_t count = 500) {
+  Random random(5, 1, 1);
+  std::vector<Point> points{{100.f, -50.f, 20.f, 2.f}};
+  for (std::size_t i = 1; i < count; ++i) {
+    const Point& p = points.back();
+    points.push_back({p.x + float(random.normal()), p.y + float(random.normal()),
+                      p.z + float(random.normal()), p.radius * .99f});
+  }
+  return points;
+}
+
+bool same_bits(const std::vector<Point>& a, const std::vector<Point>& b) {
+  return a.size() == b.size() && std::memcmp(a.data(), b.data(), a.size() * sizeof(Point)) == 0;
+}
+
+TEST(Packing, NumbersThatAreNoDecimalsGoFromFloatToFloat) {
+  const auto points = grown();
+  const std::string bytes = packed(points);
+  ASSERT_FALSE(bytes.empty());
+  EXPECT_TRUE(same_bits(unpacked(bytes), points));
+  EXPECT_LT(double(bytes.size()), 14. * double(points.size()));
+
+  auto nearly = traced(2);
+  nearly[77].y = std::nextafter(nearly[77].y, 1e9f);
+  EXPECT_TRUE(same_bits(unpacked(packed(nearly)), nearly));
+}
+
+TEST(Packing, NoFloatIsTooOdd) {
+  auto points = grown();
+  constexpr std::array odd{
+      0.f,     -0.f,    NAN,     -NAN, INFINITY, -INFINITY, std::numeric_limits<float>::denorm_min(),
+      -1e-45f, 3.4e38f, -3.4e38f};
+  for (std::size_t i = 0; i < odd.size(); ++i)
+    points[3 * i].x = points[3 * i + 1].radius = points[100 + i].z = odd[i];
+  const std::string bytes = packed(points);
+  ASSERT_FALSE(bytes.empty());
+  EXPECT_TRUE(same_bits(unpacked(bytes), points));
+}
+
+TEST(Packing, WhatWouldNotBeSmallerIsLeft) {
+  Random random(7, 1, 1);
+  std::vector<Point> points(100);
+  for (Point& p : points)
+    p = {float(random.normal()), float(random.normal()), float(random.normal()), float(random.normal())};
   EXPECT_TRUE(packed(points).empty());
   EXPECT_TRUE(packed({}).empty());
 }
 
 TEST(Packing, CutOrChangedBytesAreAnErrorOrPoints) {
-  const std::string bytes = packed(traced(2, 20));
-  for (std::size_t size = 0; size < bytes.size(); ++size) {
-    try {
-      EXPECT_LT(unpacked(bytes.substr(0, size)).size(), 20u);
-    } catch (const Error&) {
+  for (const std::string& bytes : {packed(traced(2, 20)), packed(grown(20))}) {
+    for (std::size_t size = 0; size < bytes.size(); ++size) {
+      try {
+        EXPECT_LT(unpacked(bytes.substr(0, size)).size(), 20u);
+      } catch (const Error&) {
+      }
+      std::string changed = bytes;
+      changed[size] = char(changed[size] ^ '\x85');
+      try {
+        EXPECT_LE(unpacked(changed).size(), 40u);
+      } catch (const Error&) {
+      }
     }
   }
   EXPECT_THROW(unpacked(std::string(40, '\xff')), Error);
+  EXPECT_THROW(unpacked("\x06\x80\x80\x80\x80\x40\1\1\1"), Error) << "beyond the last float";
+  EXPECT_THROW(unpacked("\x07\1\1\1\1"), Error);
 }
 
 }  // namespace

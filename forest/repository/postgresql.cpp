@@ -164,6 +164,7 @@ class Postgresql final : public Database {
     sql_ << "set client_encoding = 'UTF8'";
     sql_ << "set lock_timeout = '60s'";
     sql_ << "set extra_float_digits = 1";
+    sql_ << "set standard_conforming_strings = on";
   }
 
   void begin_reading() override { sql_ << "begin transaction isolation level repeatable read read only"; }
@@ -194,7 +195,7 @@ class Postgresql final : public Database {
 
   void forbid_writing() override { sql_ << "set session characteristics as transaction read only"; }
 
-  Answer ask(const std::string& question) override {
+  std::vector<std::string> each(const std::string& question, const Take& take) override {
     PGconn* connection = static_cast<soci::postgresql_session_backend&>(*sql_.get_backend()).conn_;
     using Result = std::unique_ptr<PGresult, void (*)(PGresult*)>;
     const auto send = [&](const std::string& text) {
@@ -228,11 +229,12 @@ class Postgresql final : public Database {
             "the question is not understood ({}); docs/repository/schema.md has the tables and views", why));
       throw Error(fmt::format("the question cannot be answered ({})", why));
     }
-    Answer answer;
+    std::vector<std::string> names;
+    std::vector<Answer::Value> row;
     const int columns = PQnfields(result.get());
-    for (int c = 0; c < columns; ++c) answer.columns.emplace_back(PQfname(result.get(), c));
+    for (int c = 0; c < columns; ++c) names.emplace_back(PQfname(result.get(), c));
     for (int r = 0; r < PQntuples(result.get()); ++r) {
-      auto& row = answer.rows.emplace_back();
+      row.clear();
       for (int c = 0; c < columns; ++c) {
         const std::string text(PQgetvalue(result.get(), r, c), std::size_t(PQgetlength(result.get(), r, c)));
         switch (PQgetisnull(result.get(), r, c) ? 0 : int(PQftype(result.get(), c))) {
@@ -253,8 +255,9 @@ class Postgresql final : public Database {
             row.emplace_back(text);
         }
       }
+      take(row);
     }
-    return answer;
+    return names;
   }
 
   void rethrow(const std::string& place) const override {

@@ -174,6 +174,8 @@ TEST_P(EveryDatabase, HostileNamesAreJustNames) {
     EXPECT_LT(sentence.size(), 500u);
     EXPECT_THAT(message([&] { repository.add(neuron(1), called("good", name)); }),
                 HasSubstr("is no name for a population"));
+    EXPECT_TRUE(repository.find(name).empty());
+    EXPECT_TRUE(name.empty() || repository.neurons(name).empty());
   }
   EXPECT_EQ(repository.neurons().size(), before);
   EXPECT_THAT(repository.check(), testing::IsEmpty());
@@ -198,6 +200,19 @@ TEST_P(EveryDatabase, ATransactionIsAllOrNothing) {
   EXPECT_THROW(repository.add(neuron(2), called("")), Error);
   transaction.commit();
   EXPECT_EQ(repository.neurons().size(), 1u) << "a refused neuron does not spoil the others";
+}
+
+TEST_P(EveryDatabase, WhatIsBeingStoredIsNoTableForQuestions) {
+  Repository repository = Repository::open(place_, Access::write);
+  repository.add(neuron(4), called("four"));
+  std::size_t answered = 0;
+  for (int number = 1; number < 12; ++number) try {
+      EXPECT_TRUE(repository.query(fmt::format("select * from rows_{}", number)).rows.empty());
+      ++answered;
+    } catch (const Error& error) {
+      EXPECT_THAT(error.what(), HasSubstr("not understood"));
+    }
+  EXPECT_EQ(answered > 0, is_file()) << "else this has tested nothing";
 }
 
 TEST_P(EveryDatabase, RemovingLeavesNothingOfANeuron) {

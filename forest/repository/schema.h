@@ -267,7 +267,9 @@ create view metric as
   select n.id as neuron, n.name as name, p.name as population, m.name as metric, v.value, m.unit
   from neurons n join populations p on p.id = n.population cross join metrics m
        join neuron_metrics v on v.metric = m.id and v.neuron = n.id;
-)sql"}};
+)sql"},
+    // Points that are no decimals are packed too (packing.h), which an older program does not read. What is there stays.
+    Migration{6, ""}};
 
 inline constexpr int section_bits = 24;                      // of sections.id
 inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository

@@ -5,13 +5,11 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 #include <cmath>
-#include <functional>
-#include <map>
 #include <numbers>
 #include <numeric>
 
-#include "forest/geometry/polyline.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::scene {
@@ -23,42 +21,45 @@ constexpr float tolerance_step = 1.3f;
 constexpr float hopeless = 1e4f;  // µm; no neuron needs a larger tolerance
 constexpr float widest = 3.f;     // a coarse segment is at most this many times as thick as the original
 
+using Four = Eigen::Array4f;  // computed side by side
+
 // A run of vertices of one section, or of several joined end to end where nothing else leaves.
 struct Strip {
-  std::vector<Vec4> vertices;          // x, y, z, radius
-  std::vector<reports::Place> places;  // of each; where sections join: the end of the first
+  std::uint32_t first = 0, count = 0;  // its vertices
   std::uint32_t kind = 0, rank = 0;
   float mean = 0.f;                  // radius of its branch
   std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
-  bool dropped = false;
-
-  float length() const {
-    float sum = 0.f;
-    for (std::size_t i = 1; i < vertices.size(); ++i) sum += (vertices[i] - vertices[i - 1]).head<3>().norm();
-    return sum;
-  }
-  float area() const {
-    float sum = 0.f;
-    for (std::size_t i = 1; i < vertices.size(); ++i)
-      sum += (vertices[i] - vertices[i - 1]).head<3>().norm() * (vertices[i].w() + vertices[i - 1].w());
-    return sum;
-  }
 };
-
-std::size_t segment_count(const std::vector<Strip>& strips) {
-  std::size_t count = 0;
-  for (const Strip& s : strips) count += s.vertices.size() - 1;
-  return count;
-}
 
 // A cluster while it is made: its strips and the sphere around all original points below it.
 struct Draft {
-  std::vector<Strip> strips;
+  std::uint32_t first_strip = 0, strip_count = 0;
   Sphere sphere;
   float error = 0.f;
   std::uint32_t leaf_first = 0, leaf_count = 0;  // original segments
-  std::size_t first_leaf = 0, last_leaf = 0;     // leaf drafts below, [first, last)
+  std::uint32_t first_leaf = 0, last_leaf = 0;   // leaf drafts below, [first, last)
   std::int64_t children[2] = {-1, -1};
+};
+
+// Everything drawn of a neuron: first that of the leaves, in their order, then the coarser.
+struct Drawing {
+  std::vector<Vec4> vertices;  // x, y, z, radius; where a leaf is cut off the next begins with the same one
+  std::vector<reports::Place> places;  // of each; where sections join: the end of the first
+  std::vector<Strip> strips;
+  std::vector<Draft> drafts;
+
+  std::span<const Strip> strips_of(const Draft& d) const {
+    return std::span(strips).subspan(d.first_strip, d.strip_count);
+  }
+  std::uint32_t segment_count(const Draft& d) const {
+    std::uint32_t count = 0;
+    for (const Strip& s : strips_of(d)) count += s.count - 1;
+    return count;
+  }
+  std::span<const Vec4> vertices_of(const Draft& first, const Draft& last) const {
+    const Strip &a = strips[first.first_strip], &b = strips[last.first_strip + last.strip_count - 1];
+    return std::span(vertices).subspan(a.first, b.first + b.count - a.first);
+  }
 };
 
 Sphere around(const Sphere& a, const Sphere& b) {
@@ -70,144 +71,387 @@ Sphere around(const Sphere& a, const Sphere& b) {
   return {a.centre + between * ((radius - a.radius) / distance), radius};
 }
 
-Sphere around(const std::vector<Strip>& strips) {
-  Bounds bounds;
-  for (const Strip& s : strips)
-    for (const Vec4& v : s.vertices) bounds.add(v.head<3>());
-  Sphere sphere{bounds.centre(), 0.f};
-  for (const Strip& s : strips)
-    for (const Vec4& v : s.vertices)
-      sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
+Sphere around(std::span<const Vec4> vertices) {
+  Vec4 low = vertices[0], high = low;
+  for (const Vec4& v : vertices) low = low.cwiseMin(v), high = high.cwiseMax(v);
+  Sphere sphere{.5f * (low + high).head<3>(), 0.f};
+  for (const Vec4& v : vertices)
+    sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
   return sphere;
 }
 
-// Joins strips that follow one another through a node at which nothing else begins or ends, neither among them nor
-// outside: `outside_degree` counts, for every node of the neuron, the strips of other drafts that touch it.
-void join(std::vector<Strip>& strips, const std::vector<std::uint32_t>& outside_degree) {
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> begins, ends;  // node, strip
-  for (std::uint32_t i = 0; i < strips.size(); ++i) {
-    begins.emplace_back(strips[i].begin, i);
-    ends.emplace_back(strips[i].end, i);
-  }
-  std::ranges::sort(begins);
-  std::ranges::sort(ends);
-  const auto only = [](const auto& list, std::uint32_t node) -> std::int64_t {
-    const auto first = std::ranges::lower_bound(list, std::pair(node, 0u));
-    const auto at_node = [&](auto place) { return place != list.end() && place->first == node; };
-    return at_node(first) && !at_node(first + 1) ? std::int64_t(first->second) : -1;
-  };
-  std::vector<std::uint32_t> into(strips.size());  // the strip that swallowed this one
-  std::iota(into.begin(), into.end(), 0u);
-  for (std::uint32_t i = 0; i < strips.size(); ++i) {
-    Strip& next = strips[i];
-    const std::int64_t before = only(ends, next.begin);
-    if (outside_degree[next.begin] || before < 0 || only(begins, next.begin) != std::int64_t(i)) continue;
-    std::uint32_t head = std::uint32_t(before);
-    while (into[head] != head) head = into[head];
-    Strip& previous = strips[head];
-    if (head == i || previous.end != next.begin || previous.kind != next.kind) continue;
-    previous.vertices.insert(previous.vertices.end(), next.vertices.begin() + 1, next.vertices.end());
-    previous.places.insert(previous.places.end(), next.places.begin() + 1, next.places.end());
-    previous.end = next.end;
-    if (next.rank < previous.rank) previous.rank = next.rank, previous.mean = next.mean;
-    next.dropped = true;
-    into[i] = head;
-  }
-  std::erase_if(strips, [](const Strip& s) { return s.dropped; });
-}
+// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays and sets of
+// bits; a node of the neuron has a number of its own here.
+class Sketch {
+ public:
+  static constexpr std::uint8_t unnumbered = 255;
 
-// One coarser version of `strips` within `tolerance` of them.
-std::vector<Strip> coarsened(std::vector<Strip> strips, const std::vector<std::uint32_t>& outside_degree,
-                             float tolerance) {
-  // Tips first: a strip that nothing follows, within the draft or outside, and that reaches no further than the
-  // tolerance, whatever was dropped at its end before included.
-  const auto area_of = [](float sum, const Strip& s) { return sum + s.area(); };
-  const float before = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
-  std::map<std::uint32_t, float> dropped_reach;  // at a node
-  for (bool again = true; again && strips.size() > 1;) {
-    std::vector<std::uint32_t> begun;
-    for (const Strip& s : strips) begun.push_back(s.begin);
-    std::ranges::sort(begun);
-    for (Strip& s : strips) {
-      if (s.kind == 1 || outside_degree[s.end] || std::ranges::binary_search(begun, s.end)) continue;
-      const Vec3 start = s.vertices.front().head<3>();
-      const auto below = dropped_reach.find(s.end);
-      float reach =
-          below == dropped_reach.end() ? 0.f : below->second + (s.vertices.back().head<3>() - start).norm();
-      for (const Vec4& v : s.vertices) reach = std::max(reach, (v.head<3>() - start).norm());
-      if (!(s.dropped = reach <= tolerance)) continue;
-      float& here = dropped_reach[s.begin];
-      here = std::max(here, reach);
-    }
-    if (std::ranges::all_of(strips, [](const Strip& s) { return s.dropped; })) strips.front().dropped = false;
-    again = std::erase_if(strips, [](const Strip& s) { return s.dropped; }) > 0;
-    if (again) join(strips, outside_degree);
-  }
-  for (Strip& s : strips) {
-    const auto kept = simplify(s.vertices, tolerance);
-    std::vector<Vec4> vertices;
-    std::vector<reports::Place> places;
-    for (const std::uint32_t i : kept) vertices.push_back(s.vertices[i]), places.push_back(s.places[i]);
-    s.vertices = std::move(vertices), s.places = std::move(places);
-  }
-  const float after = std::accumulate(strips.begin(), strips.end(), 0.f, area_of);
-  const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
-  for (Strip& s : strips)
-    if (s.kind != 1) {
-      for (Vec4& v : s.vertices) v.w() = std::min(v.w() * widening, v.w() + tolerance);
-      s.mean = std::min(s.mean * widening, s.mean + tolerance);
-    }
-  return strips;
-}
-
-// `outside_degree`: of what lies outside both drafts.
-Draft parent_of(const Draft& a, const Draft& b, const std::vector<std::uint32_t>& outside_degree) {
-  Draft parent;
-  parent.strips = a.strips;
-  parent.strips.insert(parent.strips.end(), b.strips.begin(), b.strips.end());
-  parent.sphere = around(a.sphere, b.sphere);
-  parent.leaf_first = a.leaf_first;
-  parent.leaf_count = a.leaf_count + b.leaf_count;
-  parent.first_leaf = a.first_leaf;
-  parent.last_leaf = b.last_leaf;
-  join(parent.strips, outside_degree);
-  for (float tolerance = std::max(first_tolerance, .5f * std::max(a.error, b.error));
-       segment_count(parent.strips) > limit; tolerance *= tolerance_step) {
-    std::vector<Strip> candidate = coarsened(parent.strips, outside_degree, tolerance);
-    if (tolerance > hopeless) {
-      // A soma with very many stems: what joins two clusters cannot be simplified away. The largest strips stay.
-      std::ranges::stable_sort(candidate, std::greater{}, &Strip::area);
-      while (segment_count(candidate) > limit) candidate.pop_back();
-    }
-    if (segment_count(candidate) <= limit) parent.strips = std::move(candidate);
-  }
-  return parent;
-}
-
-// The greatest distance of an original point below to what is drawn instead of it. Measured, since the sum of the
-// tolerances of all levels would be several times too large.
-float measured_error(const std::vector<Strip>& strips, std::span<const Draft> leaves) {
-  float worst = 0.f;
-  for (const Draft& leaf : leaves)
-    for (const Strip& original : leaf.strips)
-      for (const Vec4& v : original.vertices) {
-        const Vec3 point = v.head<3>();
-        float nearest = INFINITY;
-        for (const Strip& s : strips)
-          for (std::size_t i = 1; i < s.vertices.size() && nearest > worst; ++i)
-            nearest = std::min(
-                nearest, distance_to_segment(point, s.vertices[i - 1].head<3>(), s.vertices[i].head<3>()));
-        worst = std::max(worst, nearest);
+  // `outside(node)`: whether anything else of the neuron touches it. `numbers`: of the neuron's nodes, scratch.
+  template <class Outside>
+  Sketch(const Drawing& drawing, const Draft& a, const Draft& b, Outside&& outside,
+         std::vector<std::uint8_t>& numbers) {
+    for (const Draft* d : {&a, &b})
+      for (const Strip& s : drawing.strips_of(*d)) {
+        Line& line = lines_[line_count_++];
+        static_cast<Strip&>(line) = s;
+        for (std::uint32_t* node : {&line.begin, &line.end}) {
+          std::uint8_t& number = numbers[*node];
+          if (number == unnumbered) {
+            number = std::uint8_t(node_count_);
+            if (outside(*node)) outside_.add(node_count_);
+            nodes_[node_count_++] = *node;
+          }
+          *node = number;
+        }
       }
-  return worst;
-}
+    for (std::uint32_t i = 0; i < node_count_; ++i) numbers[nodes_[i]] = unnumbered;
+    Links links;
+    link(links);
+    gather(links, [&](std::uint32_t from) {
+      const Vec4& v = drawing.vertices[from];
+      x_[vertex_count_] = v.x(), y_[vertex_count_] = v.y(), z_[vertex_count_] = v.z();
+      radius_[vertex_count_] = v.w();
+      places_[vertex_count_++] = drawing.places[from];
+    });
+  }
 
-std::uint32_t half_pair(float a, float b) {
-  const auto half = [](float value) {
-    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
+  std::uint32_t segment_count() const { return vertex_count_ - line_count_; }
+
+  // Fewer and fewer segments until they are `limit` at most.
+  void coarsen(float tolerance) {
+    const float before = area();
+    std::fill_n(dropped_reach_.begin(), node_count_, -1.f);
+    for (std::uint32_t i = 0; i < line_count_; ++i) measure(lines_[i], tolerance * tolerance);
+    for (float next_tip = 0.f;; tolerance *= tolerance_step) {
+      if (tolerance >= next_tip) next_tip = drop_tips(tolerance);
+      if (heavier(tolerance * tolerance) - line_count_ <= limit || tolerance > hopeless) break;
+    }
+    keep([&, least = tolerance * tolerance](std::uint32_t, std::uint32_t v) { return weight_[v] > least; });
+    if (segment_count() > limit) keep_largest();
+    const float after = area();
+    const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      Line& line = lines_[i];
+      if (line.kind == 1) continue;
+      for (std::uint32_t v = line.first; v < line.first + line.count; ++v)
+        radius_[v] = std::min(radius_[v] * widening, radius_[v] + tolerance);
+      line.mean = std::min(line.mean * widening, line.mean + tolerance);
+    }
+  }
+
+  // Adds the strips to the drawing, and tells the draft which they are.
+  void write(Drawing& drawing, Draft& draft) const {
+    draft.first_strip = std::uint32_t(drawing.strips.size());
+    draft.strip_count = line_count_;
+    const auto first = std::uint32_t(drawing.vertices.size());
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      Strip strip = lines_[i];
+      strip.first += first;
+      strip.begin = nodes_[strip.begin], strip.end = nodes_[strip.end];
+      drawing.strips.push_back(strip);
+    }
+    for (std::uint32_t v = 0; v < vertex_count_; ++v)
+      drawing.vertices.emplace_back(x_[v], y_[v], z_[v], radius_[v]);
+    drawing.places.insert(drawing.places.end(), places_.begin(), places_.begin() + vertex_count_);
+  }
+
+  // The greatest distance of a point to what is drawn, if it is greater than `worst`. The original points below are asked,
+  // since the sum of the tolerances of all levels would be several times too large; they follow one another along the
+  // branches, so that most find what is near enough where the one before did.
+  float measured_error(std::span<const Vec4> points, float worst) const {
+    struct Group {  // four segments
+      Four x, y, z, dx, dy, dz, inverse;
+
+      [[gnu::always_inline]] Four squared_distance(const Vec4& point) const {
+        const Four px = point.x() - x, py = point.y() - y, pz = point.z() - z;
+        const Four at = ((px * dx + py * dy + pz * dz) * inverse).max(0.f).min(1.f);
+        return (px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square();
+      }
+    };
+    std::array<Group, limit / 4> groups;
+    std::uint32_t count = 0;
+    const auto set = [&](std::uint32_t a, std::uint32_t b) {
+      Group& g = groups[count / 4];
+      const std::uint32_t i = count++ % 4;
+      g.x[i] = x_[a], g.y[i] = y_[a], g.z[i] = z_[a];
+      g.dx[i] = x_[b] - x_[a], g.dy[i] = y_[b] - y_[a], g.dz[i] = z_[b] - z_[a];
+    };
+    for (std::uint32_t i = 0; i < line_count_; ++i)
+      for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v) set(v - 1, v);
+    while (count % 4) set(vertex_count_ - 1, vertex_count_ - 1);
+    const std::uint32_t group_count = count / 4;
+    for (Group& g : std::span(groups).first(group_count)) {
+      const Four squared = g.dx.square() + g.dy.square() + g.dz.square();
+      g.inverse = (squared > 0.f).select(squared.inverse(), 0.f);
+    }
+    float worst_squared = worst * worst;
+    std::uint32_t near = 0;  // the segment that is asked first
+    for (std::size_t i = 0; i < points.size();) {
+      const std::size_t end = std::min(i + 4, points.size());
+      if (end == i + 4) {  // four points to one segment
+        Mat4 four = Eigen::Map<const Mat4>(points[i].data());
+        four.transposeInPlace();
+        const Group& g = groups[near / 4];
+        const std::uint32_t n = near % 4;
+        const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
+        const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
+                   pz = four.col(2).array() - g.z[n];
+        const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
+        if (((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square() <= worst_squared)
+                .all()) {
+          i = end;
+          continue;
+        }
+      }
+      for (; i < end; ++i) {  // one point to four segments
+        std::uint32_t lane = 0;
+        float nearest = groups[near / 4].squared_distance(points[i]).minCoeff(&lane);
+        near = near / 4 * 4 + lane;
+        for (std::uint32_t g = 0; g < group_count && nearest > worst_squared; ++g)
+          if (const float squared = groups[g].squared_distance(points[i]).minCoeff(&lane); squared < nearest)
+            nearest = squared, near = 4 * g + lane;
+        worst_squared = std::max(worst_squared, nearest);
+      }
+    }
+    return std::sqrt(worst_squared);
+  }
+
+ private:
+  static constexpr std::uint32_t most_lines = 2 * limit, most_vertices = 2 * most_lines,
+                                 most_nodes = 2 * most_lines;
+  static_assert(most_lines <= 64 && most_nodes < unnumbered);
+  struct Line : Strip {
+    float reach = 0.f;  // the greatest distance of a vertex from the first
   };
-  return half(a) | half(b) << 16;
-}
+  template <class T>
+  using OfVertices = std::array<T, most_vertices + 4>;  // read in fours
+
+  struct Nodes {  // a set of them
+    std::array<std::uint64_t, most_nodes / 64> bits{};
+
+    bool has(std::uint32_t node) const { return bits[node / 64] >> node % 64 & 1; }
+    void add(std::uint32_t node) { bits[node / 64] |= 1ull << node % 64; }
+  };
+  struct Links {
+    std::uint64_t swallowed = 0;                // lines that follow another
+    std::array<std::uint8_t, most_lines> next;  // the line that follows, or none
+  };
+  static constexpr std::uint8_t none = 255;
+
+  float distance(std::uint32_t a, std::uint32_t b) const {
+    const float x = x_[a] - x_[b], y = y_[a] - y_[b], z = z_[a] - z_[b];
+    return std::sqrt(x * x + y * y + z * z);
+  }
+
+  float area() const {
+    float sum = 0.f;
+    for (std::uint32_t i = 0; i < line_count_; ++i) sum += area(lines_[i]);
+    return sum;
+  }
+  float area(const Line& line) const {
+    float sum = 0.f;
+    for (std::uint32_t v = line.first + 1; v < line.first + line.count; ++v)
+      sum += distance(v, v - 1) * (radius_[v] + radius_[v - 1]);
+    return sum;
+  }
+
+  // Which lines follow one another through a node at which nothing else begins or ends, here or outside.
+  void link(Links& links) const {
+    Nodes begun, begun_again, ended, ended_again;
+    std::array<std::uint8_t, most_nodes> beginner;
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      const Line& line = lines_[i];
+      (begun.has(line.begin) ? begun_again : begun).add(line.begin);
+      (ended.has(line.end) ? ended_again : ended).add(line.end);
+      beginner[line.begin] = std::uint8_t(i);
+    }
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      const std::uint32_t node = lines_[i].end;
+      links.next[i] = none;
+      if (!begun.has(node) || begun_again.has(node) || ended_again.has(node) || outside_.has(node)) continue;
+      const std::uint8_t follower = beginner[node];
+      if (follower == i || lines_[follower].kind != lines_[i].kind) continue;
+      links.next[i] = follower;
+      links.swallowed |= 1ull << follower;
+    }
+  }
+
+  // Sets the lines anew, joined; add(v) puts in what was vertex v.
+  template <class Add>
+  void gather(const Links& links, Add&& add) {
+    std::array<Line, most_lines> old;
+    const std::uint32_t count = line_count_;
+    std::copy_n(lines_.begin(), count, old.begin());
+    line_count_ = 0;
+    for (std::uint32_t i = 0; i < count; ++i) {
+      if (links.swallowed >> i & 1) continue;
+      Line& line = lines_[line_count_++];
+      line = old[i];
+      line.first = vertex_count_;
+      for (std::uint32_t v = old[i].first; v < old[i].first + old[i].count; ++v) add(v);
+      for (std::uint8_t n = links.next[i]; n != none; n = links.next[n]) {
+        const Line& more = old[n];
+        for (std::uint32_t v = more.first + 1; v < more.first + more.count; ++v) add(v);
+        line.end = more.end;
+        if (more.rank < line.rank) line.rank = more.rank, line.mean = more.mean;
+      }
+      if (links.next[i] != none) line.reach = -1.f;  // not known
+      line.count = vertex_count_ - line.first;
+    }
+  }
+
+  void join(float least_weight) {
+    Links links;
+    link(links);
+    if (!links.swallowed) return;
+    const auto old = [count = vertex_count_](const auto& list) {
+      std::remove_cvref_t<decltype(list)> copy;
+      std::copy_n(list.begin(), count, copy.begin());
+      return copy;
+    };
+    const auto x = old(x_), y = old(y_), z = old(z_), radius = old(radius_), weight = old(weight_);
+    const auto places = old(places_);
+    vertex_count_ = 0;
+    gather(links, [&](std::uint32_t from) {
+      x_[vertex_count_] = x[from], y_[vertex_count_] = y[from], z_[vertex_count_] = z[from];
+      radius_[vertex_count_] = radius[from];
+      weight_[vertex_count_] = weight[from];
+      places_[vertex_count_++] = places[from];
+    });
+    for (std::uint32_t i = 0; i < line_count_; ++i)
+      if (lines_[i].reach < 0.f) measure(lines_[i], least_weight);
+  }
+
+  // How far its vertices reach, and their weights: the tolerances (squared) below which Douglas & Peucker (1973) keep them.
+  // Where they split does not depend on the tolerance, so that once is enough for all: a vertex stays when it and all at
+  // which was split before deviate by more. What weighs no more than `least` counts as nothing.
+  void measure(Line& line, float least) {
+    const std::uint32_t begin = line.first, end = line.first + line.count - 1;
+    weight_[begin] = weight_[end] = INFINITY;
+    if (line.count == 2) {
+      line.reach = distance(begin, end);
+      return;
+    }
+    float reach = 0.f;
+    for (std::uint32_t v = begin + 1; v <= end; ++v) {
+      const float x = x_[v] - x_[begin], y = y_[v] - y_[begin], z = z_[v] - z_[begin];
+      reach = std::max(reach, x * x + y * y + z * z);
+    }
+    line.reach = std::sqrt(reach);
+    std::array<std::pair<std::uint32_t, std::uint32_t>, most_vertices> open;
+    std::size_t waiting = 0;
+    open[waiting++] = {begin, end};
+    OfVertices<float> deviation;
+    while (waiting) {
+      const auto [a, b] = open[--waiting];
+      if (b - a < 2) continue;
+      const float dx = x_[b] - x_[a], dy = y_[b] - y_[a], dz = z_[b] - z_[a], dr = radius_[b] - radius_[a];
+      const float squared = dx * dx + dy * dy + dz * dz, inverse = squared > 0.f ? 1.f / squared : 0.f;
+      for (std::uint32_t v = a + 1; v < b; v += 4) {
+        const auto four = [v](const OfVertices<float>& list) {
+          return Four(Eigen::Map<const Four>(&list[v]));
+        };
+        const Four x = four(x_) - x_[a], y = four(y_) - y_[a], z = four(z_) - z_[a],
+                   r = four(radius_) - radius_[a];
+        const Four at = ((x * dx + y * dy + z * dz) * inverse).max(0.f).min(1.f);
+        Eigen::Map<Four> out(&deviation[v]);
+        out = ((x - at * dx).square() + (y - at * dy).square() + (z - at * dz).square())
+                  .max((r - at * dr).square());
+      }
+      const std::uint32_t split =
+          std::uint32_t(std::max_element(&deviation[a + 1], &deviation[b]) - deviation.data());
+      // The lighter end of the range is the one at which was split to come to it.
+      const float weight = std::min({deviation[split], weight_[a], weight_[b]});
+      if (!(weight > least)) {
+        std::fill(&weight_[a + 1], &weight_[b], 0.f);
+        continue;
+      }
+      weight_[split] = weight;
+      open[waiting++] = {a, split};
+      open[waiting++] = {split, b};
+    }
+  }
+
+  std::uint32_t heavier(float weight) const {
+    std::int32_t count = 0;
+    for (std::uint32_t v = 0; v < vertex_count_; ++v) count += weight_[v] > weight;
+    return std::uint32_t(count);
+  }
+
+  // Drops what nothing follows, here or outside, and what reaches no further than the tolerance, whatever was dropped at
+  // its end before included. Returns the tolerance up to which nothing more can be dropped.
+  float drop_tips(float tolerance) {
+    while (line_count_ > 1) {
+      Nodes open = outside_;  // where something goes on
+      for (std::uint32_t i = 0; i < line_count_; ++i) open.add(lines_[i].begin);
+      std::uint64_t dropped = 0;
+      float next = INFINITY;
+      for (std::uint32_t i = 0; i < line_count_; ++i) {
+        const Line& line = lines_[i];
+        if (line.kind == 1 || open.has(line.end)) continue;
+        float reach = line.reach;
+        if (const float below = dropped_reach_[line.end]; below >= 0.f)
+          reach = std::max(reach, below + distance(line.first + line.count - 1, line.first));
+        if (reach > tolerance) {
+          next = std::min(next, reach);
+          continue;
+        }
+        dropped |= 1ull << i;
+        dropped_reach_[line.begin] = std::max(dropped_reach_[line.begin], reach);
+      }
+      if (std::uint32_t(std::popcount(dropped)) == line_count_) dropped &= ~1ull;
+      if (!dropped) return next;
+      keep([&](std::uint32_t i, std::uint32_t) { return !(dropped >> i & 1); });
+      join(tolerance * tolerance);
+    }
+    return INFINITY;
+  }
+
+  // A soma with very many stems: what joins two clusters cannot be simplified away. The largest lines stay.
+  void keep_largest() {
+    std::array<std::pair<float, std::uint32_t>, most_lines> order;
+    for (std::uint32_t i = 0; i < line_count_; ++i) order[i] = {-area(lines_[i]), i};
+    std::sort(order.begin(), order.begin() + line_count_);
+    std::uint64_t stays = 0;
+    std::uint32_t room = limit;
+    for (std::uint32_t i = 0; i < line_count_ && lines_[order[i].second].count - 1 <= room; ++i) {
+      room -= lines_[order[i].second].count - 1;
+      stays |= 1ull << order[i].second;
+    }
+    keep([&](std::uint32_t i, std::uint32_t) { return stays >> i & 1; });
+  }
+
+  // Leaves the vertices of lines for which stays(line, vertex); lines that lose all of them go.
+  template <class Stays>
+  void keep(Stays&& stays) {
+    std::uint32_t lines = 0, vertices = 0;
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      Line line = lines_[i];
+      const std::uint32_t first = vertices;
+      for (std::uint32_t v = line.first; v < line.first + line.count; ++v) {
+        if (!stays(i, v)) continue;
+        x_[vertices] = x_[v], y_[vertices] = y_[v], z_[vertices] = z_[v];
+        radius_[vertices] = radius_[v];
+        places_[vertices] = places_[v];
+        weight_[vertices++] = weight_[v];
+      }
+      line.first = first, line.count = vertices - first;
+      if (line.count) lines_[lines++] = line;
+    }
+    line_count_ = lines, vertex_count_ = vertices;
+  }
+
+  std::uint32_t line_count_ = 0, vertex_count_ = 0, node_count_ = 0;
+  std::array<Line, most_lines> lines_;
+  OfVertices<float> x_, y_, z_, radius_, weight_;
+  OfVertices<reports::Place> places_;
+  std::array<std::uint32_t, most_nodes> nodes_;  // the neuron's numbers of them
+  Nodes outside_;
+  std::array<float, most_nodes>
+      dropped_reach_;  // how far what was dropped there reached; negative where nothing was
+};
+
+std::uint32_t half(float value) { return Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)); }
 
 // What a cluster says of the segments it draws.
 struct Drawn {
@@ -218,22 +462,22 @@ struct Drawn {
 
 // The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
 // drawn when it is a pixel wide, a diagonal one 1.42 times as wide, or its branch is wider than its rank.
-float appears_at(const frame::Segment& s, float thickest, float mean) {
+float appears_at(std::uint32_t rank, float thickest, float mean) {
   constexpr float diagonal = 2.f * 1.42f;  // widths, of radii
   constexpr float on_the_mean = 2.f * float(FOREST_MEAN_STRETCH);
-  return std::min(float(s.meta >> 8 & 255) / 256.f / (on_the_mean * std::max(mean, 1e-6f)),
+  return std::min(float(rank) / 256.f / (on_the_mean * std::max(mean, 1e-6f)),
                   1.f / (diagonal * std::max(thickest, 1e-6f)));
 }
 
 // Half way along the branches from one place to another, which lies on the same section or grows out of it.
 struct Middle {
-  const Morphology& morphology;
+  std::span<const Section> sections;
   std::vector<float> lengths;  // of sections
 
   reports::Place operator()(const reports::Place& from, const reports::Place& to) const {
     if (to.section == soma_section || from.section == soma_section) return to;
     if (from.section == to.section) return {to.section, .5f * (from.position + to.position)};
-    const auto parent = [&](std::uint32_t s) { return morphology.sections()[s].parent; };
+    const auto parent = [&](std::uint32_t s) { return sections[s].parent; };
     float way = lengths[to.section] * to.position;
     for (SectionId s = parent(to.section); s.valid(); s = parent(s.value())) {
       const bool there = s.value() == from.section;
@@ -253,36 +497,45 @@ struct Middle {
 };
 
 // Writes the segments of a draft, their places with them.
-Drawn emit(const std::vector<Strip>& strips, const Middle& middle, ClusterTree& out) {
+Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, ClusterTree& out) {
   Drawn drawn;
-  std::array<Bounds, Cluster::group_count> bounds;
+  constexpr std::uint32_t size = Cluster::group_size;
+  std::array<Vec4, Cluster::group_count> low, high;
+  low.fill(Vec4::Constant(INFINITY)), high.fill(Vec4::Constant(-INFINITY));
   std::uint32_t count = 0;
-  const auto for_each = [&](auto&& body) {
-    count = 0;
-    for (const Strip& s : strips)
-      for (std::size_t i = 1; i < s.vertices.size(); ++i, ++count)
-        body(s, i, s.vertices[i - 1], s.vertices[i]);
-  };
-  for_each([&](const Strip& s, std::size_t i, const Vec4& a, const Vec4& b) {
-    const frame::Segment segment{a.x(), a.y(), a.z(), half_pair(a.w(), b.w()),
-                                 b.x(), b.y(), b.z(), s.kind | s.rank << 8 | half_pair(s.mean, 0.f) << 16};
-    out.segments.push_back(segment);
-    out.places.push_back(middle(s.places[i - 1], s.places[i]));
-    if (a != b)
-      drawn.thickness = std::max({drawn.thickness, a.w(), b.w()});  // the soma itself is chosen apart
-    const float from =
-        appears_at(segment, std::max(a.w(), b.w()), s.mean > 0.f ? s.mean : std::min(a.w(), b.w()));
-    for (std::size_t step = 0; step < drawn.visible.size(); ++step)
-      drawn.visible[step] |= std::uint32_t(from <= Cluster::magnifications[step]) << count;
-    for (const Vec4* v : {&a, &b}) bounds[count / Cluster::group_size].add(v->head<3>());
-  });
-  for (std::size_t g = 0; g < bounds.size() && g * Cluster::group_size < count; ++g)
-    drawn.groups[g] = {bounds[g].centre(), 0.f};
-  for_each([&](const Strip&, std::size_t, const Vec4& a, const Vec4& b) {
-    Sphere& sphere = drawn.groups[count / Cluster::group_size];
-    for (const Vec4* v : {&a, &b})
-      sphere.radius = std::max(sphere.radius, (v->head<3>() - sphere.centre).norm() + v->w());
-  });
+  for (const Strip& s : drawing.strips_of(draft)) {
+    const std::uint32_t meta = s.kind | s.rank << 8 | half(s.mean) << 16;
+    const Vec4* a = &drawing.vertices[s.first];
+    std::uint32_t radius = half(a->w());
+    for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
+      const Vec4& b = drawing.vertices[i];
+      const std::uint32_t next_radius = half(b.w());
+      out.segments.push_back({a->x(), a->y(), a->z(), radius | next_radius << 16, b.x(), b.y(), b.z(), meta});
+      out.places[out.segments.size() - 1] = middle(drawing.places[i - 1], drawing.places[i]);
+      const float thickest = std::max(a->w(), b.w());
+      if (*a != b) drawn.thickness = std::max(drawn.thickness, thickest);  // the soma itself is chosen apart
+      const float from = appears_at(s.rank, thickest, s.mean > 0.f ? s.mean : std::min(a->w(), b.w()));
+      for (std::size_t step = 0; step < drawn.visible.size(); ++step)
+        drawn.visible[step] |= std::uint32_t(from <= Cluster::magnifications[step]) << count;
+      Vec4 &l = low[count / size], &h = high[count / size];
+      l = l.cwiseMin(*a).cwiseMin(b), h = h.cwiseMax(*a).cwiseMax(b);
+      a = &b;
+      radius = next_radius;
+    }
+  }
+  for (std::uint32_t g = 0; g * size < count; ++g)
+    drawn.groups[g] = {.5f * (low[g] + high[g]).head<3>(), 0.f};
+  count = 0;
+  for (const Strip& s : drawing.strips_of(draft))
+    for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
+      Sphere& sphere = drawn.groups[count / size];
+      const auto reach = [&](const Vec4& v) {
+        sphere.radius = std::max(sphere.radius, (v.head<3>() - sphere.centre).norm() + v.w());
+      };
+      if (i == s.first + 1 || count % size == 0)
+        reach(drawing.vertices[i - 1]);  // else it was the last one's end
+      reach(drawing.vertices[i]);
+    }
   return drawn;
 }
 
@@ -301,28 +554,44 @@ std::uint32_t packed(const Sphere& sphere, const Sphere& of_cluster) {
   return bits | std::uint32_t(std::clamp(std::ceil(radius * 1.0001f / unit), 0.f, 255.f)) << 24;
 }
 
-}  // namespace
+// Of every section, as section_length and section_area have them, found together.
+struct Sizes {
+  std::vector<double> lengths, areas;
+};
 
-std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
+Sizes sizes_of(const Morphology& m) {
+  Sizes sizes;
+  for (const Section& s : m.sections()) {
+    const auto points = m.points().subspan(s.first_point, s.point_count);
+    double length = 0., area = 0.;
+    for (std::size_t i = 1; i < points.size(); ++i) {
+      const double along = segment_length(points[i - 1], points[i]);
+      const double taper = double(points[i].radius) - points[i - 1].radius;
+      length += along;
+      area += std::numbers::pi * (double(points[i - 1].radius) + points[i].radius) *
+              std::sqrt(along * along + taper * taper);
+    }
+    sizes.lengths.push_back(length), sizes.areas.push_back(area);
+  }
+  return sizes;
+}
+
+std::vector<std::uint32_t> branch_numbers(const Morphology& m, std::span<const double> lengths) {
   const std::size_t count = m.sections().size();
-  std::vector<double> below(count);  // longest path from the start of the section to a tip
+  std::vector<double> below(count);        // longest path from the start of the section to a tip
+  std::vector<std::uint32_t> heir(count);  // the daughter it runs through
   for (std::size_t i = count; i-- > 0;) {
-    const SectionId id(i);
     double longest = 0.;
-    for (const SectionId child : m.children(id)) longest = std::max(longest, below[child.value()]);
-    below[i] = section_length(m, id) + longest;
+    for (const SectionId child : m.children(SectionId(i)))
+      if (const double way = below[child.value()]; way > longest || !heir[i])
+        longest = way, heir[i] = child.value();
+    below[i] = lengths[i] + longest;
   }
   // Every section that does not continue its parent's longest path begins a branch of its own.
   std::vector<std::uint32_t> starts, branch_start(count), numbers(count);
   for (std::size_t i = 0; i < count; ++i) {
     const SectionId parent = m.sections()[i].parent;
-    bool continues = false;
-    if (parent.valid()) {
-      const auto siblings = m.children(parent);
-      const auto longest =
-          std::ranges::max_element(siblings, {}, [&](SectionId s) { return below[s.value()]; });
-      continues = longest->value() == i;
-    }
+    const bool continues = parent.valid() && heir[parent.value()] == i;
     branch_start[i] = continues ? branch_start[parent.value()] : std::uint32_t(i);
     if (!continues) starts.push_back(std::uint32_t(i));
   }
@@ -331,6 +600,12 @@ std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
   for (std::uint32_t n = 0; n < starts.size(); ++n) number_of[starts[n]] = n;
   for (std::size_t i = 0; i < count; ++i) numbers[i] = number_of[branch_start[i]];
   return numbers;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
+  return branch_numbers(m, sizes_of(m).lengths);
 }
 
 ClusterTree build_clusters(const Morphology& m) {
@@ -346,12 +621,12 @@ ClusterTree build_clusters(const Morphology& m) {
   tree.soma_radius = soma.radius;
 
   // Ranks: the share of the neuron's length that lies in branches of smaller number.
-  const std::vector<std::uint32_t> numbers = branch_numbers(m);
+  const Sizes sizes = sizes_of(m);
+  const std::vector<std::uint32_t> numbers = branch_numbers(m, sizes.lengths);
   std::vector<double> lengths(sections + 1);
-  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += section_length(m, SectionId(i));
+  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += sizes.lengths[i];
   std::vector<double> means(sections);  // of the radius along each branch
-  for (std::size_t i = 0; i < sections; ++i)
-    means[numbers[i]] += section_area(m, SectionId(i)) / (2. * std::numbers::pi);
+  for (std::size_t i = 0; i < sections; ++i) means[numbers[i]] += sizes.areas[i] / (2. * std::numbers::pi);
   for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
   // A branch that is thicker than the one it leaves must not be seen without it.
   for (std::size_t i = 0; i < sections; ++i)
@@ -363,18 +638,48 @@ ClusterTree build_clusters(const Morphology& m) {
     return std::uint32_t(std::min(255., 256. * lengths[numbers[i]] / total));
   };
 
-  // Depth first, the longest path first, so that a run of segments follows a branch. Node 0 is the soma, node s + 1
-  // the end of section s; nodes beyond are where a run is cut inside a section.
-  std::vector<Strip> runs;
+  // Depth first, the longest path first, so that a run of segments follows a branch; leaves are runs of at most `limit`
+  // segments, sections cut where a leaf is full. Node 0 is the soma, node s + 1 the end of section s; nodes beyond are
+  // where a section is cut.
+  Drawing drawing;
+  auto& drafts = drawing.drafts;
+  const std::size_t guess = m.points().size() + sections;
+  drawing.vertices.reserve(3 * guess), drawing.places.reserve(3 * guess),
+      drawing.strips.reserve(3 * sections);
+  std::uint32_t nodes = std::uint32_t(sections + 1);
+  std::size_t filled = limit;
+  // The strip runs over the last vertices of the drawing, from `run.first` on.
+  const auto add = [&](Strip run) {
+    const auto last = std::uint32_t(drawing.vertices.size() - 1);
+    const std::uint32_t end = run.end;
+    while (run.first < last) {
+      if (filled == limit) {
+        drafts.push_back({.first_strip = std::uint32_t(drawing.strips.size()),
+                          .sphere = {},
+                          .leaf_first = tree.original_count});
+        filled = 0;
+      }
+      const auto take = std::min(std::uint32_t(limit - filled), last - run.first);
+      run.count = take + 1;
+      run.end = run.first + take == last ? end : nodes++;
+      drawing.strips.push_back(run);
+      ++drafts.back().strip_count;
+      drafts.back().leaf_count += take;
+      tree.original_count += take;
+      filled += take;
+      run.first += take;
+      run.begin = run.end;
+    }
+  };
+  const auto put = [&](const Vec4& v, const reports::Place& place) {
+    drawing.vertices.push_back(v);
+    drawing.places.emplace_back(place);
+  };
+  const auto here = [&] { return std::uint32_t(drawing.vertices.size()); };
   if (soma.radius > 0.f) {
     const Vec4 centre(soma.x - origin.x(), soma.y - origin.y(), soma.z - origin.z(), soma.radius);
-    runs.push_back({.vertices = {centre, centre},
-                    .places = {{}, {}},
-                    .kind = 1,
-                    .rank = 0,
-                    .mean = 0.f,
-                    .begin = 0,
-                    .end = 0});
+    put(centre, {}), put(centre, {});
+    add({.first = 0, .kind = 1});
   }
   std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
   std::vector<float> ways(sections);  // along the points of each section
@@ -383,120 +688,108 @@ ClusterTree build_clusters(const Morphology& m) {
     open.pop_back();
     const auto points = m.points(id);
     const Section& section = m.section(id);
-    Strip strip{.vertices = {},
-                .places = {},
-                .kind = std::uint32_t(section.kind),
-                .rank = rank_of(id.value()),
-                .mean = float(means[numbers[id.value()]]),
-                .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
-                .end = id.value() + 1};
-    float way = 0.f;
-    for (const Point& p : points) {
-      if (!strip.vertices.empty()) way += (vertex(p) - strip.vertices.back()).head<3>().norm();
-      strip.vertices.push_back(vertex(p));
-      strip.places.push_back({id.value(), way});
-    }
-    for (reports::Place& place : strip.places) place.position = way > 0.f ? place.position / way : .5f;
-    ways[id.value()] = way;
-    if (!section.parent.valid() && soma.radius > 0.f) {
+    const Vec4 first = vertex(points.front());
+    if (const float gap = first.head<3>().norm();
+        !section.parent.valid() && soma.radius > 0.f && gap < 6.f * soma.radius) {
       // A cone from inside the soma to the stem, when it begins near enough to belong there.
-      const Vec4 first = strip.vertices.front();
-      const float gap = first.head<3>().norm();
-      if (gap > 0.f && gap < 6.f * soma.radius) {
-        const float inside = std::max(.3f * soma.radius, 0.f);
-        const Vec3 direction = first.head<3>() / gap;
-        const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
-        Strip cone{
-            .vertices = {}, .places = {{}, {}}, .kind = 1, .rank = 0, .mean = 0.f, .begin = 0, .end = 0};
-        Vec4 start;
-        start << direction * inside, width;
-        cone.vertices = {start, first};
-        if (gap > inside) runs.push_back(std::move(cone));
+      const float inside = .3f * soma.radius;
+      const Vec3 direction = first.head<3>() / gap;
+      const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
+      Vec4 start;
+      start << direction * inside, width;
+      if (gap > inside) {
+        const std::uint32_t at = here();
+        put(start, {}), put(first, {});
+        add({.first = at, .kind = 1});
       }
     }
-    if (strip.vertices.size() >= 2) runs.push_back(std::move(strip));
-    std::vector<SectionId> next(m.children(id).begin(), m.children(id).end());
-    std::ranges::stable_sort(
-        next, [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
+    const std::uint32_t begin = here();
+    drawing.vertices.resize(begin + points.size()), drawing.places.resize(begin + points.size());
+    const auto vertices = std::span(drawing.vertices).subspan(begin);
+    const auto places = std::span(drawing.places).subspan(begin);
+    float way = 0.f;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      vertices[i] = vertex(points[i]);
+      if (i) way += (vertices[i] - vertices[i - 1]).head<3>().norm();
+      places[i] = {id.value(), way};
+    }
+    for (reports::Place& place : places) place.position = way > 0.f ? place.position / way : .5f;
+    ways[id.value()] = way;
+    if (points.size() >= 2)
+      add({.first = begin,
+           .kind = std::uint32_t(section.kind),
+           .rank = rank_of(id.value()),
+           .mean = float(means[numbers[id.value()]]),
+           .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
+           .end = id.value() + 1});
+    else
+      drawing.vertices.pop_back(), drawing.places.pop_back();
+    const auto next = m.children(id);
     open.insert(open.end(), next.begin(), next.end());
+    std::sort(open.end() - std::ptrdiff_t(next.size()), open.end(),
+              [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
   }
-  if (runs.empty()) return tree;
+  if (drafts.empty()) return tree;
 
-  // Leaves: runs of at most `limit` segments, sections cut where a leaf is full.
-  std::vector<Draft> drafts;
-  std::uint32_t nodes = std::uint32_t(sections + 1);
-  std::size_t filled = limit;
-  for (const Strip& run : runs) {
-    std::uint32_t begin = run.begin;
-    for (std::size_t at = 0; at + 1 < run.vertices.size();) {
-      if (filled == limit) {
-        drafts.push_back({});
-        drafts.back().leaf_first = tree.original_count;
-        filled = 0;
-      }
-      const std::size_t take = std::min(limit - filled, run.vertices.size() - 1 - at);
-      const bool last = at + take + 1 == run.vertices.size();
-      const auto part = [&](const auto& list) {
-        return std::remove_cvref_t<decltype(list)>(list.begin() + std::ptrdiff_t(at),
-                                                   list.begin() + std::ptrdiff_t(at + take + 1));
-      };
-      Strip piece{.vertices = part(run.vertices),
-                  .places = part(run.places),
-                  .kind = run.kind,
-                  .rank = run.rank,
-                  .mean = run.mean,
-                  .begin = begin,
-                  .end = last ? run.end : nodes++};
-      begin = piece.end;
-      drafts.back().strips.push_back(std::move(piece));
-      drafts.back().leaf_count += std::uint32_t(take);
-      tree.original_count += std::uint32_t(take);
-      filled += take;
-      at += take;
-    }
-  }
-  std::vector<std::uint32_t> degree(nodes);
-  for (std::size_t i = 0; i < drafts.size(); ++i) {
+  // Which leaves touch each node, from the first to the last of them.
+  constexpr std::uint32_t nowhere = 0xffffffffu;
+  std::vector<std::pair<std::uint32_t, std::uint32_t>> touching(nodes, {nowhere, 0});
+  for (std::uint32_t i = 0; i < drafts.size(); ++i) {
     Draft& d = drafts[i];
     d.first_leaf = i, d.last_leaf = i + 1;
-    d.sphere = around(d.strips);
-    for (const Strip& s : d.strips) ++degree[s.begin], ++degree[s.end];
+    d.sphere = around(drawing.vertices_of(d, d));
+    for (const Strip& s : drawing.strips_of(d))
+      for (const std::uint32_t node : {s.begin, s.end})
+        touching[node] = {std::min(touching[node].first, i), std::max(touching[node].second, i)};
   }
-  degree[0] += 1;  // nothing is joined through the soma
 
   // Merge neighbours in pairs, level by level.
-  std::vector<std::size_t> level(drafts.size());
+  std::vector<std::uint8_t> numbers_in_sketch(nodes, Sketch::unnumbered);
+  std::vector<std::uint32_t> level(drafts.size());
   std::iota(level.begin(), level.end(), 0u);
   while (level.size() > 1) {
-    std::vector<std::size_t> above;
+    std::vector<std::uint32_t> above;
     for (std::size_t i = 0; i < level.size(); i += 2) {
       if (i + 1 == level.size()) {
         above.push_back(level[i]);
         continue;
       }
       const Draft &a = drafts[level[i]], &b = drafts[level[i + 1]];
-      std::vector<std::uint32_t> outside = degree;
-      for (std::size_t leaf = a.first_leaf; leaf < b.last_leaf; ++leaf)
-        for (const Strip& s : drafts[leaf].strips) --outside[s.begin], --outside[s.end];
-      Draft parent = parent_of(a, b, outside);
-      const std::span leaves(&drafts[a.first_leaf], b.last_leaf - a.first_leaf);
-      parent.error = std::max({a.error, b.error, measured_error(parent.strips, leaves)});
-      parent.children[0] = std::int64_t(level[i]);
-      parent.children[1] = std::int64_t(level[i + 1]);
-      above.push_back(drafts.size());
-      drafts.push_back(std::move(parent));
+      const auto outside = [&](std::uint32_t node) {  // nothing is joined through the soma
+        return node == 0 || touching[node].first < a.first_leaf || touching[node].second >= b.last_leaf;
+      };
+      Sketch sketch(drawing, a, b, outside, numbers_in_sketch);
+      float error = std::max(a.error, b.error);
+      if (sketch.segment_count() > limit) sketch.coarsen(std::max(first_tolerance, .5f * error));
+      error =
+          sketch.measured_error(drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]), error);
+      Draft parent{.sphere = around(a.sphere, b.sphere),
+                   .error = error,
+                   .leaf_first = a.leaf_first,
+                   .leaf_count = a.leaf_count + b.leaf_count,
+                   .first_leaf = a.first_leaf,
+                   .last_leaf = b.last_leaf,
+                   .children = {level[i], level[i + 1]}};
+      sketch.write(drawing, parent);
+      above.push_back(std::uint32_t(drafts.size()));
+      drafts.push_back(parent);
     }
     level = std::move(above);
   }
 
   // Out: leaf segments first and in order, then the coarser ones; clusters root first.
-  const Middle middle{m, std::move(ways)};
+  const Middle middle{m.sections(), std::move(ways)};
+  std::size_t segments = 0;
+  for (const Draft& d : drafts) segments += drawing.segment_count(d);
+  tree.segments.reserve(segments), tree.places.resize(segments);
   std::vector<Drawn> drawn(drafts.size());
   std::vector<std::uint32_t> first(drafts.size());
   for (std::size_t i = 0; i < drafts.size(); ++i) {
     first[i] = std::uint32_t(tree.segments.size());
-    drawn[i] = emit(drafts[i].strips, middle, tree);
+    drawn[i] = emit(drawing, drafts[i], middle, tree);
   }
+  tree.section.reserve(tree.original_count);
+  tree.clusters.reserve(drafts.size());
   for (std::uint32_t i = 0; i < tree.original_count; ++i) tree.section.push_back(tree.places[i].section);
   const std::size_t count = drafts.size();
   const auto index = [&](std::int64_t draft) {
@@ -512,7 +805,7 @@ ClusterTree build_clusters(const Morphology& m) {
               .error = d.error,
               .thickness = drawn[i].thickness,
               .first_segment = first[i],
-              .segment_count = std::uint32_t(segment_count(d.strips)),
+              .segment_count = drawing.segment_count(d),
               .children = {index(d.children[0]), index(d.children[1])},
               .leaf_first = d.leaf_first,
               .leaf_count = d.leaf_count};

@@ -37,7 +37,7 @@ struct Place {
 }  // namespace
 
 bool draws(const frame::Segment& segment, const frame::Instance& instance, const frame::Camera& camera,
-           float focal, bool as_line, std::uint32_t subframes) {
+           float focal, bool as_line, float thinnest) {
   const Place place(instance);
   const Mat3 axes = camera.axes();
   const auto seen = [&](const Vec3& p) {
@@ -50,14 +50,15 @@ bool draws(const frame::Segment& segment, const frame::Instance& instance, const
   const float ra = from_half(segment.radii), rb = from_half(segment.radii >> 16);
   const float la = camera.orthographic() ? 1.f : za, lb = camera.orthographic() ? 1.f : zb;
   if (!as_line && focal * std::max(ra / la, rb / lb) >= .75f) return true;
-  if (subframes != 1) return subframes > 0;  // drawn where pixels' centres meet it
+  if (thinnest == 0.f) return true;  // drawn where samples meet it
   const Vec2 d = (b.head<2>() / lb - a.head<2>() / la).cwiseAbs();
   const float stretch = d.maxCoeff() > 0.f ? d.norm() / d.maxCoeff() : 1.f;
-  float width = focal * (ra / la + rb / lb) * stretch;
+  const float width = focal * (ra / la + rb / lb) * stretch;
   const float mean = from_half(segment.meta >> 16);
-  if (width < 1.f && mean > 0.f)
-    width = std::min(focal * mean * (1.f / la + 1.f / lb) * float(FOREST_MEAN_STRETCH), 1.f);
-  return int(width + 1.f - float(segment.meta >> 8 & 255u) / 256.f - 1.f / 512.f) >= 1;
+  const float rank = float(segment.meta >> 8 & 255u) / 256.f + 1.f / 512.f;
+  if (width < thinnest && mean > 0.f)
+    return focal * mean * (1.f / la + 1.f / lb) * float(FOREST_MEAN_STRETCH) / thinnest > rank;
+  return thinnest < 1.f || width >= rank;  // a picture of one sample draws whole pixels
 }
 
 Connectedness::Connectedness(const Forest& forest) : forest_(forest), roots_(forest.neurons().size()) {
@@ -75,7 +76,7 @@ Connectedness::Connectedness(const Forest& forest) : forest_(forest), roots_(for
 }
 
 Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camera,
-                                      const frame::Viewport& viewport, std::uint32_t subframes) const {
+                                      const frame::Viewport& viewport, float thinnest) const {
   struct Piece {
     const frame::Item* item;
     bool as_line;
@@ -92,7 +93,7 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
       for (std::uint32_t drawn = piece.item->drawn; drawn; drawn &= drawn - 1) {
         const frame::Segment& s =
             forest_.segments()[piece.item->first_segment + std::uint32_t(std::countr_zero(drawn))];
-        if (subframes == 0 || draws(s, instance, camera, focal, piece.as_line, subframes)) {
+        if (draws(s, instance, camera, focal, piece.as_line, thinnest)) {
           begins.push_back(begin_of(s));
           ends.push_back(end_of(s));
         }

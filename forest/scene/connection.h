@@ -8,10 +8,10 @@
 
 namespace forest::scene {
 
-/// Whether a picture of so many subframes draws this segment of this item, were nothing before it: a single one leaves thin
-/// branches out by rank, after render/opengl/shaders (draw_line), which a test compares with this.
+/// Whether a picture whose thinnest lines are so wide (frame::Frame::thinnest) draws this segment of this item, were nothing
+/// before it: thin branches are left out by rank, after render/opengl/shaders (draw_line), which a test compares with this.
 bool draws(const frame::Segment& segment, const frame::Instance& instance, const frame::Camera& camera,
-           float focal, bool as_line, std::uint32_t subframes);
+           float focal, bool as_line, float thinnest);
 
 struct Connections {
   std::uint64_t runs = 0;  // of drawn segments, each beginning where nothing drawn of its neuron ends
@@ -24,9 +24,9 @@ struct Connections {
 class Connectedness {
  public:
   explicit Connectedness(const Forest& forest);
-  /// @param subframes  of the picture; 0: as if nothing of the cut were too thin to be drawn
+  /// @param thinnest  of the picture; 0: nothing of the cut is too thin to be drawn
   Connections operator()(const Cut& cut, const frame::Camera& camera, const frame::Viewport& viewport,
-                         std::uint32_t subframes) const;
+                         float thinnest) const;
 
  private:
   const Forest& forest_;

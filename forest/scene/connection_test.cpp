@@ -20,7 +20,7 @@ TEST(Connection, TheWholeForestHangsTogether) {
   const Forest forest = sample();
   const Connectedness connectedness(forest);
   const frame::Camera camera = overview(forest).camera;
-  const Connections found = connectedness(whole(forest, camera, viewport), camera, viewport, 0);
+  const Connections found = connectedness(whole(forest, camera, viewport), camera, viewport, 0.f);
   EXPECT_EQ(found.disconnected, 0u);
   EXPECT_GT(found.runs, forest.instances().size());
 }
@@ -33,7 +33,7 @@ TEST(Connection, NoChoiceOfDetailBreaksABranchOnAWholeDolly) {
     for (const float error : {.5f, 1.f, 3.f, 6.f}) {
       const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
       const Cut cut = choose(forest, Eye(camera, viewport, {.error = error, .gaze = {}}), viewport);
-      EXPECT_EQ(connectedness(cut, camera, viewport, 0).disconnected, 0u) << i << " " << error;
+      EXPECT_EQ(connectedness(cut, camera, viewport, 0.f).disconnected, 0u) << i << " " << error;
     }
 }
 
@@ -46,7 +46,7 @@ TEST(Connection, APieceThatIsMissingIsNoticed) {
   for (std::size_t i = 0; i < all.capsules.size(); i += 7) {
     Cut cut = all;
     cut.capsules.erase(cut.capsules.begin() + std::ptrdiff_t(i));
-    (connectedness(cut, camera, viewport, 0).disconnected ? broken : last) += 1;
+    (connectedness(cut, camera, viewport, 0.f).disconnected ? broken : last) += 1;
   }
   EXPECT_GT(broken, 0u);
   EXPECT_GT(last, 0u);  // without what comes last on its branch nothing comes apart
@@ -61,11 +61,13 @@ TEST(Connection, ABranchThatIsTooThinInTheMiddleComesApart) {
   const frame::Instance instance{0, 0, 0, 0, 0, 0, 0, 1};
   const frame::Camera camera{.eye = {0, 0, 100}};
   const float focal = camera.focal(200.f);  // 2.75 pixels a µm
-  EXPECT_TRUE(draws(segment(0, .3f), instance, camera, focal, true, 1));
-  EXPECT_FALSE(draws(segment(0, .05f), instance, camera, focal, true, 1));
-  EXPECT_TRUE(draws(segment(0, .05f), instance, camera, focal, true, 64));  // in one of so many subframes
+  EXPECT_TRUE(draws(segment(0, .3f), instance, camera, focal, true, 1.f));
+  EXPECT_FALSE(draws(segment(0, .05f), instance, camera, focal, true, 1.f));
+  EXPECT_TRUE(draws(segment(0, .05f), instance, camera, focal, true, .25f));
+  EXPECT_FALSE(draws(segment(0, .3f), instance, camera, focal, true, 4.f));
+  EXPECT_TRUE(draws(segment(0, .05f), instance, camera, focal, true, 0.f));
   EXPECT_FALSE(
-      draws(segment(0, .05f), {0, 0, 200, 0, 0, 0, 0, 1}, camera, focal, false, 64));  // behind the eye
+      draws(segment(0, .05f), {0, 0, 200, 0, 0, 0, 0, 1}, camera, focal, false, 0.f));  // behind the eye
 }
 
 TEST(Whole, HoldsEverySegmentOnceWhenAllIsInSight) {

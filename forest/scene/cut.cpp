@@ -101,7 +101,7 @@ void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std:
   const Detail& detail = look.eye.detail();
   const frame::Kind kind = look.state(index).kind;
   const bool thin = is_thin(c, magnification, detail);
-  const std::uint32_t shown = detail.thin ? c.visible_at(magnification) : c.all();
+  const std::uint32_t shown = detail.thinnest > 0.f ? c.visible_at(magnification / detail.thinnest) : c.all();
   if (groups == every_group && sphere.radius * magnification <= group_limit)
     return add(cut, item(index, c.first_segment, shown, sphere), kind, thin);
   std::uint32_t hidden = 0;

@@ -56,37 +56,43 @@ TEST(Eye, TheGazeIsSharpAndTheRestGrowsWithEccentricity) {
   EXPECT_GT(before, 2.f * detail.error);
 }
 
+// A scene of which a picture of one sample takes so long, of many five times as long, and less with a larger error; how often
+// the number of samples changes.
+std::uint32_t watch(Budget& budget, double milliseconds, int pictures) {
+  std::uint32_t changes = 0, before = budget.samples();
+  for (int i = 0; i < pictures; ++i) {
+    budget.took(milliseconds * (budget.samples() > 1 ? 5. : 1.) / double(budget.error()));
+    changes += budget.samples() != before, before = budget.samples();
+  }
+  return changes;
+}
+
 TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   Budget budget(50.);
-  for (int i = 0; i < 50; ++i) budget.took(200.);
+  watch(budget, 1000., 50);
   EXPECT_FLOAT_EQ(budget.error(), 6.f);
+  EXPECT_FLOAT_EQ(budget.thinnest(), 6.f);
   const float before = budget.error();
   budget.took(30.);
   EXPECT_LT(budget.error(), before);
-  for (int i = 0; i < 50; ++i) budget.took(10.);
+  watch(budget, 40., 50);
   EXPECT_FLOAT_EQ(budget.error(), 1.f);
+  EXPECT_FLOAT_EQ(budget.thinnest(), 1.f);
   EXPECT_EQ(budget.samples(), 1u);
 }
 
 TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   Budget budget(50.);
-  // A scene of which a picture of many samples takes so much longer, and less with a larger error.
-  const auto watch = [&](double milliseconds, int pictures) {
-    std::uint32_t changes = 0, before = budget.samples();
-    for (int i = 0; i < pictures; ++i) {
-      budget.took(milliseconds * (budget.samples() > 1 ? 6. : 1.) / double(budget.error()));
-      changes += budget.samples() != before, before = budget.samples();
-    }
-    return changes;
-  };
-  EXPECT_EQ(watch(4., 60), 1u);
+  EXPECT_EQ(watch(budget, 4., 60), 1u);
   EXPECT_EQ(budget.samples(), 16u);
   EXPECT_NEAR(budget.error(), .5f, .02f);
-  EXPECT_EQ(watch(8., 60), 0u);  // less detail, as many samples
-  EXPECT_NEAR(budget.error(), .96f, .05f);
-  EXPECT_EQ(watch(14., 60), 1u);
+  EXPECT_EQ(budget.thinnest(), 0.f);
+  EXPECT_EQ(watch(budget, 20., 60), 0u);  // less detail, as many samples
+  EXPECT_NEAR(budget.error(), 2.f, .1f);
+  EXPECT_NEAR(budget.thinnest(), .25f, .05f);
+  EXPECT_EQ(watch(budget, 40., 60), 1u);
   EXPECT_EQ(budget.samples(), 1u);
-  EXPECT_EQ(watch(7., 60), 0u);  // many would take too long again
+  EXPECT_EQ(watch(budget, 20., 60), 0u);  // many would take too long again
 }
 
 TEST(Cut, DrawsEverySegmentInSightOnce) {

@@ -47,6 +47,21 @@ static_assert(sizeof(Neuron) == 32 && sizeof(SectionFacts) == 32);
 std::vector<std::byte> pack(const circuit::Circuit& circuit, std::span<const Morphology> neurons,
                             Progress& progress = Progress::none(), const circuit::NodeNames& nodes = {});
 
+/// Gives the distinct neuron named circuit.morphologies[index]. Asked once for each, by several threads at a time.
+using NeuronSource = std::function<Morphology(std::size_t index)>;
+
+struct PackFigures {
+  std::uint64_t segments = 0;       // original ones of the distinct neurons
+  std::uint64_t segment_total = 0;  // of all instances, as if each were stored
+  std::uint64_t bytes = 0;          // of the file
+};
+
+/// The same, bytes and all, into a file and with neurons that need not fit into memory: each is asked for when its turn
+/// comes, and a few dozen are there at a time. The file is there whole or not at all (core/file.h).
+PackFigures pack(const circuit::Circuit& circuit, const NeuronSource& source,
+                 const std::filesystem::path& out, Progress& progress = Progress::none(),
+                 const circuit::NodeNames& nodes = {});
+
 /// An open forest file; immutable, cheap to copy.
 class Forest {
  public:

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/forest.h"
 
+#include <algorithm>
+#include <atomic>
+#include <unistd.h>
+
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/core/parallel.h"
 
 #include "tests/sample_forest.h"
@@ -41,6 +46,89 @@ TEST(ForestFile, IsTheSameAtAnyNumberOfThreads) {
   const auto all = pack(circuit, neurons);
   const ThreadLimit one(1);
   EXPECT_EQ(all, pack(circuit, neurons));
+}
+
+class PackedFile : public ::testing::Test {
+ protected:
+  void SetUp() override { std::filesystem::create_directories(folder_); }
+  void TearDown() override { std::filesystem::remove_all(folder_); }
+  std::ptrdiff_t entries() const { return std::distance(std::filesystem::directory_iterator(folder_), {}); }
+  const std::filesystem::path folder_ =
+      std::filesystem::temp_directory_path() / ("forest_pack_test." + std::to_string(::getpid()));
+  const std::filesystem::path file_ = folder_ / "a.forest";
+};
+
+// Enough that every part that waits goes to the disk on its way.
+circuit::Circuit many(std::size_t count) {
+  circuit::Circuit c = sample_circuit(3 * count);
+  c.morphologies.clear();
+  for (std::size_t i = 0; i < count; ++i) c.morphologies.push_back("neuron " + std::to_string(i));
+  for (std::size_t i = 0; i < c.instances.size(); ++i) c.instances[i].morphology = std::uint32_t(i % count);
+  return c;
+}
+Morphology one_of_many(std::size_t index) { return testing::random_tree(index, int(index % 400)); }
+
+TEST_F(PackedFile, IsThatOfMemoryByteForByteAtAnyNumberOfThreads) {
+  constexpr std::size_t count = 300;
+  const circuit::Circuit circuit = many(count);
+  std::vector<Morphology> neurons;
+  for (std::size_t i = 0; i < count; ++i) neurons.push_back(one_of_many(i));
+  const auto memory = pack(circuit, neurons);
+  const Forest forest = Forest::from_bytes(memory);
+  ASSERT_GT(std::as_bytes(forest.places()).size(), 2u << 20);
+  for (const unsigned threads : {1u, 2u, 7u}) {
+    const ThreadLimit limit(threads);
+    const PackFigures figures = pack(circuit, one_of_many, file_);
+    const MappedFile file(file_);
+    EXPECT_TRUE(std::ranges::equal(file.bytes(), memory)) << threads;
+    EXPECT_EQ(figures.bytes, memory.size());
+    EXPECT_EQ(figures.segments, forest.section_of_segment().size());
+    EXPECT_EQ(figures.segment_total, forest.segment_total());
+    EXPECT_EQ(entries(), 1);
+  }
+}
+
+TEST_F(PackedFile, NeuronsAreAskedForOnceEachAndNoneLongBeforeItsTurn) {
+  constexpr std::size_t count = 2000;
+  std::vector<std::atomic<int>> asked(count);
+  struct : Progress {
+    void begin(std::string_view, std::size_t) override {}
+    void advance(std::size_t steps) override { written += steps; }
+    void end() override {}
+    std::atomic<std::size_t> written = 0;
+  } progress;
+  std::atomic<std::size_t> ahead = 0;
+  pack(
+      many(count),
+      [&](std::size_t i) {
+        ++asked[i];
+        const std::size_t written = progress.written;
+        for (std::size_t most = ahead;
+             i > written + most && !ahead.compare_exchange_weak(most, i - written);) {
+        }
+        return testing::random_tree(i, 3);
+      },
+      file_, progress);
+  for (const auto& times : asked) EXPECT_EQ(times, 1);
+  EXPECT_LT(ahead, 128u);
+}
+
+TEST_F(PackedFile, ASourceThatFailsLeavesWhatWasThere) {
+  const auto fails = [](std::size_t i) {
+    if (i == 150) throw InputError("bad.swc", 7, "is no neuron");
+    return one_of_many(i);
+  };
+  EXPECT_THROW(pack(many(300), fails, file_), InputError);
+  EXPECT_EQ(entries(), 0);
+  write_file(file_, "what was there");
+  EXPECT_THROW(pack(many(300), fails, file_), InputError);
+  EXPECT_EQ(MappedFile(file_).text(), "what was there");
+  EXPECT_EQ(entries(), 1);
+  auto wrong = many(3);
+  wrong.instances[2].morphology = 99;
+  EXPECT_THROW(pack(wrong, one_of_many, file_), Error);
+  EXPECT_THROW(pack(many(3), one_of_many, folder_ / "no" / "where.forest"), Error);
+  EXPECT_EQ(MappedFile(file_).text(), "what was there");
 }
 
 TEST(ForestFile, CutShortAtAnyByteIsRefused) {

@@ -70,17 +70,21 @@ float Eye::acceptable(const Sphere& sphere) const {
   return detail_.error * std::max(1.f, gaze_.resolved(eccentricity, detail_));
 }
 
+// Pixels of error that many samples are drawn with at most.
+static float most_of_many(float worst) { return std::min(3.f, worst); }
+
 void Budget::took(double milliseconds) {
-  // Many samples take up to eight times as long as one. Changing back and forth would be seen, so several pictures must agree.
+  // Many samples at their largest error still show more than one at its smallest, in about twice the time. Changing back and
+  // forth would be seen, so several pictures must agree, and what was in vain is not tried again so soon.
   constexpr std::uint32_t many = 16;
-  constexpr double longer = 8.;
   const bool one = samples_ == 1;
-  const float least = one ? 1.f : .5f, most = one ? worst_ : std::min(1.5f, worst_);
-  const bool other = one ? error_ <= least && longer * milliseconds < milliseconds_
+  const float least = one ? 1.f : .5f, most = one ? worst_ : most_of_many(worst_);
+  const bool other = one ? error_ <= least && longer_ * milliseconds < milliseconds_
                          : error_ >= most && milliseconds > 1.1 * milliseconds_;
   agreed_ = other ? agreed_ + 1 : 0;
   if (agreed_ == 3) {
-    samples_ = one ? many : 1, error_ = 1.f, agreed_ = 0;
+    if (!one) longer_ *= 2.;
+    samples_ = one ? many : 1, error_ = one ? most_of_many(worst_) : 1.f, agreed_ = 0;
     return;
   }
   const double ratio = std::clamp(milliseconds / milliseconds_, .5, 2.);

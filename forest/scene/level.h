@@ -2,6 +2,7 @@
 // How much detail a place in the picture deserves: pure functions of bounds, error, camera and gaze.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 
 #include "forest/frame/camera.h"
@@ -20,8 +21,10 @@ struct Detail {
       0.f;  // degrees that the picture's height takes in the viewer's sight; 0: as many as the field of view
   std::optional<frame::Area> area = {};  // only these pixels are wanted; none: all
   float surface_width =
-      3.f;            // branches wider than this many pixels are drawn as capsules, thinner ones as lines
-  bool thin = false;  // leave out runs whose branches are all too thin for their rank: right for one subframe
+      3.f;  // branches wider than this many pixels are drawn as capsules, thinner ones as lines
+  // Branches thinner than this many pixels are drawn as wide, as many of them as cover the same area: whole branches stand
+  // for their like. 0: all are drawn as they are. A picture of one sample cannot draw less than a pixel.
+  float thinnest = 0.f;
 };
 
 /// Where somebody looks on a flat screen, and how far beside it things are seen. Degrees are those of the viewer, whose sight
@@ -95,11 +98,15 @@ class Budget {
   explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
   std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
+  /// As Detail::thinnest: what is smaller than the error need not be there one by one.
+  float thinnest() const { return samples_ == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
   /// To be told of every picture that was drawn so.
   void took(double milliseconds);
 
  private:
   double milliseconds_;
+  double longer_ =
+      1.8;  // times the one sample's that many are taken to need; more where they were tried in vain
   float worst_, error_ = 1.f;
   std::uint32_t samples_ = 1, agreed_ = 0;  // pictures that have asked for the other number of samples
 };

@@ -346,9 +346,13 @@ View portrait(const Forest& forest) {
   return view;
 }
 
+float thinnest_of(const View& view) {
+  return view.samples == 1 ? std::max(view.detail.thinnest, 1.f) : view.detail.thinnest;
+}
+
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
-  detail.thin = view.samples == 1;
+  detail.thinnest = thinnest_of(view);
   if (detail.gaze) detail.gaze = Vec2(detail.gaze->x() * float(width), detail.gaze->y() * float(height));
   return detail;
 }
@@ -357,7 +361,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
                      std::uint32_t width, std::uint32_t height, std::span<const frame::Overlay> overlays) {
   frame::Frame f;
   f.camera = view.camera;
-  f.width = width, f.height = height, f.subframes = view.samples;
+  f.width = width, f.height = height, f.subframes = view.samples, f.thinnest = thinnest_of(view);
   f.palette = colouring.palette;
   f.opacities = colouring.opacities, f.states = colouring.states;
   if (cut.entries)

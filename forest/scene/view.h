@@ -64,6 +64,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
 
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
+/// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
+float thinnest_of(const View& view);
 
 /// The outline of the column: circles at the limits of the layers and a few verticals. Empty when it is no column.
 std::vector<frame::Overlay> outline(const Forest& forest);

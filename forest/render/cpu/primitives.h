@@ -232,8 +232,10 @@ template <int S>
     const float middle = py + slope * column;
     const std::int32_t low = clipped(std::ceil(middle - reach - .5f), edges.low, edges.high),
                        high = clipped(std::ceil(middle + reach - .5f), edges.low, edges.high);
+    const std::uint32_t nearest = key_of(larger(smaller(depth[0], depth[S - 1]) - bulge - 1.f, 0.f), 0);
     for (std::int32_t y = low; y < high; ++y) {
       const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
+      if (S == 1 && window.seen(at_x, at_y) < nearest) continue;
       const float noise = noise_at(at_x, at_y, subframe);
       Keys<S> keys;
       FOREST_LANES

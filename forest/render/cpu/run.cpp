@@ -28,7 +28,8 @@ void load(const Picture& picture, const frame::Item& item, const std::uint8_t* e
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
   const frame::State state = picture.state_of(item);
   const std::uint32_t colour = state.colour_class * 8u;
-  const float turn = golden * float(picture.constants.subframe);
+  // Which lines are drawn for their like does not change from sample to sample.
+  const float turn = picture.constants.thinnest > 0.f ? 0.f : golden * float(picture.constants.subframe);
   r.count = 0;
   for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
     const frame::Segment& s = segments[std::countr_zero(drawn)];
@@ -122,16 +123,19 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, float spread, Run& r
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
+  const float thinnest = c.thinnest, per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
     const bool steep = high > wide;
     const float major = steep ? high : wide;
     const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
-    const float of_branch = smaller(r.mean_width[i] * float(FOREST_MEAN_STRETCH), 1.f);
-    const float fair = across < 1.f && r.mean_width[i] > 0.f ? of_branch : across;
-    const float whole = std::floor(fair + 1.f - r.rank[i] - 1.f / 512.f);
-    const float line = single ? whole : across;
+    const bool thin = across < thinnest && r.mean_width[i] > 0.f;
+    const float share = smaller(r.mean_width[i] * per_thinnest, 1.f), rank = r.rank[i] + 1.f / 512.f;
+    const float instead =
+        single ? std::floor(thinnest + 1.f - rank / larger(share, 1e-6f)) : across / larger(share, 1e-6f);
+    const float whole = single ? std::floor(across + 1.f - rank) : across;
+    const float line = thin ? (share > rank ? instead : 0.f) : whole;
     // From the end of the smaller coordinate to the other.
     const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
     const bool turned = ax > bx;

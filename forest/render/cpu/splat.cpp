@@ -17,7 +17,7 @@ namespace {
 constexpr std::size_t items_a_chunk = 256;
 constexpr std::uint32_t number_bits = 13;  // of a thing's number within its chunk
 static_assert(items_a_chunk * run <= 1u << number_bits);
-constexpr std::size_t look_every = 1024;  // things drawn in a square; between, what they hide is found out
+constexpr float look_every = 16.f;  // of a square's pixels, drawn; between, what they hide is found out
 
 // What some items, that follow one another, give to be drawn.
 struct Chunk {
@@ -214,12 +214,20 @@ class Gatherer {
   }
 };
 
+// How many pixels it covers.
+[[gnu::always_inline]] inline float pixels_of(const Box& b, const Square& s) {
+  const float wide = smaller(b.right, float(s.right)) - larger(b.left, float(s.left)),
+              high = smaller(b.bottom, float(s.bottom)) - larger(b.top, float(s.top));
+  return larger(wide, 1.f) * larger(high, 1.f);
+}
+
 template <int S>
 [[gnu::always_inline]] inline void draw_square(const Picture& picture, const Samples<S>& samples,
                                                const Chunk* chunks, std::span<const std::uint32_t> things,
                                                const Square& square, Canvas& canvas) {
   Window<S> window(canvas, square);
-  std::size_t drawn = 0;
+  const float area = float((square.right - square.left) * (square.bottom - square.top));
+  float drawn = 0.f;
   for (std::size_t n = 0; n < things.size(); ++n) {
     if (n + things_ahead < things.size())
       with(
@@ -237,7 +245,8 @@ template <int S>
             Door<S> door(window, samples, picture.constants.subframes, t.opacity, t.key);
             if (!door.shut()) draw<S>(picture, samples, t, door);
           }
-          if (++drawn % look_every == 0) canvas.look(square);
+          drawn += pixels_of(b, square);
+          if (drawn > look_every * area) canvas.look(square), drawn = 0.f;
         });
   }
 }

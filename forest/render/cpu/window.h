@@ -45,6 +45,10 @@ class Window {
     FOREST_LANES
     for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
   }
+  /// The first of a pixel's keys.
+  [[gnu::always_inline]] std::uint32_t seen(std::int32_t x, std::int32_t y) const {
+    return *canvas_.at(x, y);
+  }
   /// Whether all of the FOREST_TILE pixels from `x`, a multiple of as many, on have keys before this one.
   [[gnu::always_inline]] bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const {
     std::uint32_t farthest = 0;
@@ -96,6 +100,7 @@ class Door {
     }
     window_.put(x, y, seen);
   }
+  std::uint32_t seen(std::int32_t x, std::int32_t y) const { return window_.seen(x, y); }
   bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const { return window_.before(x, y, key); }
   bool hidden(float left, float top, float right, float bottom, float nearest_code) const {
     return window_.hidden(left, top, right, bottom, nearest_code);

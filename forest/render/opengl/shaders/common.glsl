@@ -77,7 +77,7 @@ uint payload_of(uint entry, float shade, float noise) {
 }
 
 float noise_at(int x, int y) {  // interleaved gradient noise (Jimenez 2014), moved by the subframe
-  return fract(52.9829189 * fract(0.06711056 * float(x) + 0.00583715 * float(y)) + golden * float(view.subframe));
+  return fract(52.9829189 * fract(0.06711056 * float(x) + 0.00583715 * float(y)) + golden * float(view.thinnest > 0.0 ? 0u : view.subframe));
 }
 
 vec3 light() { return vec3(view.light_x, view.light_y, view.light_z); }
@@ -187,10 +187,15 @@ void draw_line(Capsule c) {
   float major = max(abs(d.x), abs(d.y));
   float stretch = major > 0.0 ? length(d) / major : 1.0;
   float width = width_in_pixels(c) * stretch;
-  if (view.subframes == 1u) {
+  float rank = c.rank + 1.0 / 512.0;
+  bool single = view.subframes == 1u;
+  if (width < view.thinnest && c.mean > 0.0) {
     // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
-    if (width < 1.0 && c.mean > 0.0) width = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH, 1.0);
-    width = floor(width + 1.0 - c.rank - 1.0 / 512.0);
+    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH / view.thinnest, 1.0);
+    if (share <= rank) return;
+    width = single ? floor(view.thinnest + 1.0 - rank / share) : width / share;
+  } else if (single) {
+    width = floor(width + 1.0 - rank);
     if (width < 1.0) return;
   }
   if (hidden(min(p, q) - 0.5 * width, max(p, q) + 0.5 * width, min(c.a.z, c.b.z), 6u)) return;
@@ -209,14 +214,25 @@ void draw_line(Capsule c) {
   float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
   float a2 = max(0.0, 1.0 - along * along - b * b);
   float shade = 0.5 * sqrt(max(0.0, 1.0 + 1.5707963 * b + (a2 + 2.0 * b * b) / 3.0));
-  uint payload = payload_of(c.entry, shade, fract(c.rank * 7.0));
+  float noise = fract(c.rank * 7.0);
+  uint payload = payload_of(c.entry, shade, noise);
+  // Of several subframes each meets the cylinder somewhere.
+  vec3 beside = cross(c.b - c.a, eye);
+  if ((steep ? beside.x : -beside.y) < 0.0) beside = -beside;
+  float lit_side = 0.5 * dot(beside, light()) * inversesqrt(max(dot(beside, beside), 1e-30)), lit_front = 0.5 * b;
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5, half_width = 0.5 * width;
   float z = za + (float(first) + 0.5 - p.x) * rise;
   // One loop over the pixels of all scan lines, tested at its end (see hidden).
   int x = first, across = clipped(y - half_width, limit_y), end = clipped(y + half_width, limit_y);
   do {
-    if (across < end) put(steep ? across : x, steep ? x : across, z, payload);
+    if (across < end) {
+      if (!single) {
+        float t = (float(across) - y) / half_width;
+        payload = payload_of(c.entry, 0.5 + t * lit_side + sqrt(max(0.0, 1.0 - t * t)) * lit_front, noise);
+      }
+      put(steep ? across : x, steep ? x : across, z, payload);
+    }
     if (++across >= end) {
       ++x;
       y += slope;

@@ -1,0 +1,48 @@
+// SPDX-License-Identifier: Apache-2.0
+// Repositories of earlier versions, brought up to date where SQL alone does not do it (schema.h).
+#include <fmt/format.h>
+
+#include "forest/repository/impl.h"
+#include "forest/repository/names.h"
+#include "forest/repository/packing.h"
+
+namespace forest::repository {
+
+void Repository::Impl::refill(Database& database, int from) {
+  Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
+  if (from < 3) impl.refill_shapes();
+  if (from < 4) impl.refill_grammars();
+}
+
+/// Before version 3 a section was named by two numbers, before version 2 points were not packed.
+void Repository::Impl::refill_shapes() {
+  Statements all(*database);
+  std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from neurons").value_or(0))));
+  sql << "select id from neurons order by id", into(ids);
+  for (const int id : ids) {
+    const Morphology m =
+        morphology_of(stored(NeuronId(std::size_t(id)), "point_count",
+                             fmt::format("old_sections where neuron = {} order by number", id)));
+    for (const char* table : {"points", "arbors"})
+      sql << fmt::format("delete from {} where neuron = {}", table, id);
+    sql << "delete from " + of_metrics(id);
+    all.id = id;
+    all.rows = rows_of(m);
+    all.packed_points = packed(m.points());
+    all.run_shape();
+  }
+  sql << "drop table old_sections";
+}
+
+/// Before version 4 the text of a grammar was one line.
+void Repository::Impl::refill_grammars() {
+  std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from grammars").value_or(0))));
+  sql << "select id from grammars order by id", into(ids);
+  for (const int id : ids) {
+    const std::string text = escaped_lines(
+        unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
+    sql << "update grammars set text = :text where id = :id", use(text), use(id);
+  }
+}
+
+}  // namespace forest::repository

@@ -1,0 +1,254 @@
+// SPDX-License-Identifier: Apache-2.0
+// Packing. Neurons are clustered on all cores and written in their order; segments, two thirds of the file, go to where
+// they stay, the other parts into scratch files that are joined at the end.
+#include <algorithm>
+#include <cstring>
+#include <optional>
+
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/core/hash.h"
+#include "forest/core/parallel.h"
+#include "forest/morphology/measure.h"
+#include "forest/scene/forest_layout.h"
+
+namespace forest::scene {
+namespace {
+
+using namespace layout;
+using Json = nlohmann::ordered_json;
+using Bytes = std::span<const std::byte>;
+
+std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes) {
+  Json json{{"name", c.name}, {"radius", c.radius}, {"morphologies", c.morphologies}};
+  for (const auto& layer : c.layers)
+    json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
+  for (const auto& type : c.types)
+    json["types"].push_back(
+        {{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
+  if (!nodes.runs.empty()) json["populations"] = nodes.populations;
+  for (const circuit::NodeRun& run : nodes.runs)
+    json["nodes"].push_back({run.population, run.first_node, run.count});
+  return json.dump(-1, ' ', false, Json::error_handler_t::replace);
+}
+
+std::vector<SectionFacts> facts_of(const Morphology& m) {
+  std::vector<SectionFacts> facts;
+  std::vector<double> distances;  // from the soma to the ends, as path_distances has them
+  distances.reserve(m.sections().size());
+  facts.reserve(m.sections().size());
+  for (std::size_t i = 0; i < m.sections().size(); ++i) {
+    const SectionId id(i);
+    const auto points = m.points(id);
+    const Section& s = m.section(id);
+    const double length = section_length(m, id);
+    const double before = s.parent.valid() ? distances[s.parent.value()] : 0.;
+    distances.push_back(before + length);
+    facts.push_back({s.parent.valid() ? s.parent.value() : 0xffffffffu, std::uint32_t(s.kind),
+                     std::uint32_t(m.order(id)), std::uint32_t(m.children(id).size()), float(length),
+                     2.f * points.front().radius, 2.f * points.back().radius, float(distances.back())});
+  }
+  return facts;
+}
+
+/// One neuron on its way: all that is said of it, numbers counted from its own beginning.
+struct Made {
+  ClusterTree tree;
+  std::vector<SectionFacts> facts;
+};
+
+/// Where the file goes: into memory or on a disk.
+class Output {
+ public:
+  explicit Output(NewFile* file) : file_(file) {}
+
+  NewFile* file() const { return file_; }  // null: into memory
+  std::uint64_t size() const { return size_; }
+  void write(Bytes bytes) {
+    size_ += bytes.size();
+    if (file_) return file_->write(bytes);
+    memory_.insert(memory_.end(), bytes.begin(), bytes.end());
+  }
+  void overwrite(Bytes bytes) {  // from the beginning on
+    if (file_) return file_->overwrite(0, bytes);
+    std::ranges::copy(bytes, memory_.begin());
+  }
+  std::vector<std::byte> memory() { return std::move(memory_); }
+
+ private:
+  NewFile* file_;
+  std::vector<std::byte> memory_;
+  std::uint64_t size_ = 0;
+};
+
+/// A part that waits for its place while it grows: on the disk but for its last megabyte, when the file goes there too.
+class Waiting {
+ public:
+  void add(Bytes bytes, NewFile* file) {
+    size_ += bytes.size();
+    memory_.insert(memory_.end(), bytes.begin(), bytes.end());
+    if (!file || memory_.size() < piece) return;
+    if (!scratch_) scratch_.emplace(*file);
+    scratch_->write(memory_);
+    memory_.clear();
+  }
+  /// Calls body(bytes) for all of it, piece by piece, and forgets it.
+  template <class Body>
+  void pour(Body&& body) {
+    const std::uint64_t on_disk = size_ - memory_.size();
+    std::vector<std::byte> buffer(std::size_t(std::min<std::uint64_t>(on_disk, piece)));
+    for (std::uint64_t at = 0; at < on_disk; at += buffer.size()) {
+      buffer.resize(std::size_t(std::min<std::uint64_t>(buffer.size(), on_disk - at)));
+      scratch_->read(at, buffer);
+      body(Bytes(buffer));
+    }
+    body(Bytes(memory_));
+    scratch_.reset();
+    memory_ = {};
+  }
+
+ private:
+  static constexpr std::size_t piece = 1 << 20;
+  std::vector<std::byte> memory_;
+  std::optional<ScratchFile> scratch_;
+  std::uint64_t size_ = 0;
+};
+
+class Packer {
+ public:
+  explicit Packer(Output& out) : out_(out) {
+    const std::array<std::byte, sizeof(Header)> later{};
+    out_.write(later);
+    begin(Part::segments);
+  }
+
+  void add(Made made) {
+    ClusterTree& tree = made.tree;
+    const Neuron n{.first_cluster = next(Part::clusters),
+                   .cluster_count = std::uint32_t(tree.clusters.size()),
+                   .first_segment = next(Part::segments),
+                   .original_count = tree.original_count,
+                   .first_original = next(Part::section_of_segment),
+                   .first_section = next(Part::sections),
+                   .section_count = std::uint32_t(made.facts.size()),
+                   .soma_radius = tree.soma_radius};
+    for (Cluster& cluster : tree.clusters) {
+      cluster.first_segment += n.first_segment;
+      cluster.leaf_first += n.first_segment;
+      if (!cluster.is_leaf())
+        for (auto& child : cluster.children) child += n.first_cluster;
+    }
+    add(Part::segments, tree.segments);
+    add(Part::clusters, tree.clusters);
+    add(Part::neurons, n);
+    add(Part::section_of_segment, tree.section);
+    add(Part::sections, made.facts);
+    add(Part::places, tree.places);
+    originals_.push_back(n.original_count);
+  }
+
+  PackFigures finish(const circuit::Circuit& c, const circuit::NodeNames& nodes) {
+    PackFigures figures;
+    for (const std::uint32_t count : originals_) figures.segments += count;
+    for (const circuit::Instance& i : c.instances) {
+      const Quat q = i.orientation;
+      const frame::Instance instance{i.position.x(), i.position.y(), i.position.z(), i.morphology,
+                                     q.x(),          q.y(),          q.z(),          q.w()};
+      add(Part::instances, instance);
+      add(Part::types, i.type);
+      add(Part::layers, i.layer);
+      figures.segment_total += originals_[i.morphology];
+    }
+    const std::string description = describe(c, nodes);
+    add(Part::text, description);
+    for (std::uint32_t p = 0; p < part_count; ++p) {
+      if (p != Part::segments) {
+        begin(Part(p));
+        waiting_[p].pour([&](Bytes bytes) { out_.write(bytes); });
+      }
+      header_.table[p] = {p, element_sizes[p], offsets_[p], counts_[p], hashes_[p].value()};
+    }
+    header_.file_size = figures.bytes = out_.size();
+    header_.table_hash = hash64(std::as_bytes(std::span(header_.table)), header_.file_size);
+    out_.overwrite(std::as_bytes(std::span(&header_, 1)));
+    return figures;
+  }
+
+ private:
+  void begin(Part part) {
+    constexpr std::array<std::byte, alignment> zeros{};
+    out_.write(Bytes(zeros).first((alignment - out_.size() % alignment) % alignment));
+    offsets_[part] = out_.size();
+  }
+  std::uint32_t next(Part part) const { return std::uint32_t(counts_[part]); }
+  template <class T>
+  void add(Part part, const T& one) {
+    add(part, std::span(&one, 1));
+  }
+  template <std::ranges::contiguous_range Range>
+  void add(Part part, const Range& elements) {
+    const Bytes bytes = std::as_bytes(std::span(elements));
+    if ((counts_[part] += bytes.size() / element_sizes[part]) > 0xffffffffull)
+      throw LimitError(
+          "a forest file holds at most 4,294,967,295 distinct segments; plant fewer distinct neurons");
+    hashes_[part].add(bytes);
+    if (part == Part::segments)
+      out_.write(bytes);
+    else
+      waiting_[part].add(bytes, out_.file());
+  }
+  Output& out_;
+  Header header_{
+      .magic = magic, .version = version, .parts = part_count, .file_size = 0, .table_hash = 0, .table = {}};
+  std::array<std::uint64_t, part_count> offsets_{}, counts_{};
+  std::array<BlockHash, part_count> hashes_;
+  std::array<Waiting, part_count> waiting_;
+  std::vector<std::uint32_t> originals_;  // how many original segments each neuron has
+};
+
+PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource& source, Progress& progress,
+                      const circuit::NodeNames& nodes) {
+  circuit::check(c);
+  progress.begin("packing", c.morphologies.size());
+  Packer packer(out);
+  parallel_in_order(
+      c.morphologies.size(),
+      [&](std::size_t i) {
+        const Morphology m = source(i);
+        return Made{build_clusters(m), facts_of(m)};
+      },
+      [&](std::size_t, Made made) {
+        packer.add(std::move(made));
+        progress.advance();
+      });
+  const PackFigures figures = packer.finish(c, nodes);
+  progress.end();
+  return figures;
+}
+
+}  // namespace
+
+std::vector<std::byte> pack(const circuit::Circuit& c, std::span<const Morphology> morphologies,
+                            Progress& progress, const circuit::NodeNames& nodes) {
+  if (morphologies.size() != c.morphologies.size())
+    throw Error(fmt::format("the circuit names {} morphologies and {} came with it", c.morphologies.size(),
+                            morphologies.size()));
+  Output out(nullptr);
+  pack_into(
+      out, c, [&](std::size_t i) { return morphologies[i]; }, progress, nodes);
+  return out.memory();
+}
+
+PackFigures pack(const circuit::Circuit& c, const NeuronSource& source, const std::filesystem::path& path,
+                 Progress& progress, const circuit::NodeNames& nodes) {
+  NewFile file(path);
+  Output out(&file);
+  const PackFigures figures = pack_into(out, c, source, progress, nodes);
+  file.commit();
+  return figures;
+}
+
+}  // namespace forest::scene
