@@ -18,7 +18,8 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
                                    const scene::Colouring& colouring,
                                    std::span<const frame::Overlay> overlays,
                                    const std::optional<frame::Glass>& glass, std::uint32_t first,
-                                   std::uint32_t last, const scene::Chooser::Painter& painter) {
+                                   std::uint32_t last, const scene::Chooser::Painter& painter,
+                                   const Dresser& dress) {
   const std::vector<scene::Layer> plan = scene::layers_of(view, width, height);
   while (layers_.size() < plan.size()) {
     layers_.push_back(std::make_unique<Drawn>(Drawn{scene::Chooser(forest_), make_(), {}}));
@@ -30,11 +31,9 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     const scene::Layer& layer = plan[i];
     Drawn& drawn = *layers_[i];
     auto start = Clock::now();
-    if (first == 0) {
-      const frame::Viewport viewport{float(layer.width), float(layer.height)};
-      drawn.chooser.choose(scene::Eye(view.camera, viewport, scene::detail_for(view, layer, width, height)),
-                           viewport, colouring.shown(), painter);
-    }
+    const frame::Viewport viewport{float(layer.width), float(layer.height)};
+    const scene::Eye eye(view.camera, viewport, scene::detail_for(view, layer, width, height));
+    if (first == 0) drawn.chooser.choose(eye, viewport, colouring.shown(), painter);
     figures_.cull += milliseconds_since(start);
     frame::Frame frame =
         scene::compose(forest_, view, colouring, drawn.chooser.cut(), layer.width, layer.height, overlays);
@@ -42,6 +41,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     frame.glass = glass;
     frame.first_subframe = first, frame.last_subframe = last;
     drawn.chooser.complete(frame);
+    if (dress) dress(frame, drawn.chooser.cut(), eye);
     const frame::Timing timing = drawn.renderer->draw(frame);
     drawn.chooser.remember(drawn.renderer->seen());
     figures_.draw += timing.draw, figures_.resolve += timing.resolve;

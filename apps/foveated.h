@@ -19,6 +19,9 @@ class Foveated {
   /// @param make  a renderer for a layer; called once for each
   Foveated(scene::Forest forest, Maker make) : forest_(std::move(forest)), make_(std::move(make)) {}
 
+  /// Adds surfaces to the frame of every layer, which is composed of that cut.
+  using Dresser = std::function<void(frame::Frame&, const scene::Cut&, const scene::Eye&)>;
+
   struct Figures {
     double cull = 0., draw = 0., resolve = 0., unite = 0.;  // milliseconds
     std::uint64_t segments = 0;                             // chosen, of all layers
@@ -30,7 +33,8 @@ class Foveated {
   const frame::Image& draw(const scene::View& view, std::uint32_t width, std::uint32_t height,
                            const scene::Colouring& colouring, std::span<const frame::Overlay> overlays = {},
                            const std::optional<frame::Glass>& glass = {}, std::uint32_t first = 0,
-                           std::uint32_t last = 1024, const scene::Chooser::Painter& painter = {});
+                           std::uint32_t last = 1024, const scene::Chooser::Painter& painter = {},
+                           const Dresser& dress = {});
   const Figures& figures() const { return figures_; }
 
  private:

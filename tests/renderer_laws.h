@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // What holds for every renderer that makes pictures. A room that has one includes this in its test and instantiates it:
-// INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make));
+// INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make)); and the same for SurfaceLaws.
 #pragma once
 
 #include <algorithm>
@@ -19,6 +19,7 @@ namespace forest::render {
 using Maker = std::unique_ptr<Renderer> (*)();
 
 class RendererLaws : public testing::TestWithParam<Maker> {};
+class SurfaceLaws : public testing::TestWithParam<Maker> {};  // of triangles: the reference keeps them, too
 
 namespace {
 
@@ -238,6 +239,270 @@ TEST_P(RendererLaws, TransparentThingsBlendAsTheirOpacitiesSayInAnyOrder) {
       }
 }
 
+// Triangles in the world of one colour, and what they point to.
+struct Facets {
+  std::vector<Vec3> positions, normals;
+  std::vector<std::uint8_t> entries, openness, presence;
+  std::vector<Triangle> triangles;
+
+  /// A corner with its normal along z.
+  std::uint32_t corner(const Vec3& at, std::uint8_t entry = 3, const Vec3& normal = Vec3::UnitZ()) {
+    positions.push_back(at), normals.push_back(normal), entries.push_back(entry);
+    return std::uint32_t(positions.size() - 1);
+  }
+  void triangle(const Vec3& a, const Vec3& b, const Vec3& c, std::uint8_t entry = 3) {
+    triangles.push_back({corner(a, entry), corner(b, entry), corner(c, entry)});
+  }
+  frame::Surface surface() const {
+    frame::Surface s;
+    s.positions = positions, s.normals = normals, s.entries = entries, s.openness = openness;
+    s.presence = presence;
+    s.triangles = triangles;
+    return s;
+  }
+};
+
+// Where a point of the world is seen, as a pixel of the picture.
+std::array<std::uint8_t, 3> pixel_at(const frame::Frame& frame, const frame::Image& image,
+                                     const Vec3& point) {
+  const Vec3 at = frame::project(frame.camera, {float(frame.width), float(frame.height)}, point);
+  const std::size_t place = 4 * (std::size_t(at.y()) * image.width + std::size_t(at.x()));
+  return {image.pixels[place], image.pixels[place + 1], image.pixels[place + 2]};
+}
+
+TEST_P(SurfaceLaws, ATriangleCoversItsPixels) {
+  for (const auto projection : {frame::Projection::perspective, frame::Projection::orthographic})
+    for (const float depth : {-40.f, 0.f, 50.f})
+      for (const bool turned : {false, true}) {
+        Fixture f(GetParam());
+        f.frame.camera.projection = projection;
+        f.frame.subframes = 16;
+        const Vec3 a(-12, -8, depth), b(14, -5, depth), c(-3, 11, depth);
+        Facets facets;
+        turned ? facets.triangle(a, c, b) : facets.triangle(a, b, c);
+        const std::vector surfaces{facets.surface()};
+        f.frame.surfaces = surfaces;
+        const frame::Image image = f.draw();
+        const double scale = projection == frame::Projection::perspective
+                                 ? f.frame.camera.focal(200.f) / (100. - depth)
+                                 : f.frame.camera.focal(200.f);
+        const double area = .5 * double((b - a).cross(c - a).norm()) * scale * scale;
+        EXPECT_NEAR(red_area(image) / area, 1., .01) << depth;
+        EXPECT_GT(pixel_at(f.frame, image, {-1, 0, depth})[0], 60);
+        for (const Vec3& beside : {Vec3(-11, 0, depth), Vec3(8, 4, depth), Vec3(2, -9, depth)})
+          EXPECT_EQ(pixel_at(f.frame, image, beside)[0], 0);
+      }
+}
+
+TEST_P(SurfaceLaws, TrianglesSideBySideLeaveNoGapAndNoRim) {
+  for (const auto& [eye, size] : {std::pair(100.f, 20.f), std::pair(4e5f, 8e4f), std::pair(.3f, .06f)}) {
+    Fixture f(GetParam());
+    f.frame.camera.eye.z() = eye, f.frame.camera.near = std::min(.5f, .1f * eye);
+    Facets facets;
+    constexpr int steps = 60;  // corners that no pixel's middle meets, not even in a turned grid
+    for (int j = 0; j <= steps; ++j)
+      for (int i = 0; i <= steps; ++i) {
+        const float x = (float(i) / steps - .5f) * 2.f * size, y = (float(j) / steps - .5f) * 2.f * size;
+        facets.corner({.98f * x - .17f * y, .17f * x + .98f * y, .3f * x * std::sin(9.f * y / size)});
+      }
+    const auto at = [](int i, int j) { return std::uint32_t(j * (steps + 1) + i); };
+    for (int j = 0; j < steps; ++j)
+      for (int i = 0; i < steps; ++i) {
+        facets.triangles.push_back({at(i, j), at(i + 1, j), at(i + 1, j + 1)});
+        facets.triangles.push_back({at(i, j), at(i + 1, j + 1), at(i, j + 1)});
+      }
+    const std::vector surfaces{facets.surface()};
+    f.frame.surfaces = surfaces;
+    const frame::Image image = f.draw();
+    const float inside = .7f * size;
+    for (float y = -inside; y <= inside; y += inside / 40.f)
+      for (float x = -inside; x <= inside; x += inside / 40.f) {
+        if (std::hypot(x, y) >= inside) continue;
+        EXPECT_GT(pixel_at(f.frame, image, {x, y, 0.f})[0], 20) << x << " " << y << " of " << size;
+      }
+    EXPECT_EQ(pixel_at(f.frame, image, {1.6f * size, 0, 0})[0], 0);
+  }
+}
+
+TEST_P(SurfaceLaws, TheNearestOfTrianglesAndSegmentsIsSeen) {
+  for (const float depth : {-20.f, 20.f})
+    for (const auto list : {&frame::Lists::capsules, &frame::Lists::lines, &frame::Lists::dots}) {
+      Fixture f(GetParam());
+      f.add({0, 0, 0}, {0, 0, 0}, 4.f);
+      if (list == &frame::Lists::lines) f.segments[0].ax = -5.f, f.segments[0].bx = 5.f;
+      f.frame.palette[5] = Vec3(0, 1, 0);
+      f.frame.*list = f.items;
+      Facets facets;
+      facets.triangle({-30, -20, depth}, {30, -20, depth}, {0, 30, depth}, 5);
+      const std::vector surfaces{facets.surface()};
+      f.frame.surfaces = surfaces;
+      f.frame.subframes = 4;
+      const auto seen = pixel_at(f.frame, f.draw(), {.4f, .4f, 0});
+      EXPECT_GT(seen[depth > 0.f ? 1 : 0], 60) << depth;
+      EXPECT_EQ(seen[depth > 0.f ? 0 : 1], 0) << depth;
+    }
+}
+
+TEST_P(SurfaceLaws, TrianglesMayPassTheEyeAndReachFarBeyondThePicture) {
+  // The ground, three micrometres below the eye, from behind it to the horizon.
+  for (const float reach : {1e3f, 1e5f, 1e6f}) {
+    Fixture f(GetParam());
+    f.frame.camera.near = .05f;
+    Facets facets;
+    const auto ground = [&](float x, float z) { return Vec3(x * reach, -3.f, 100.f + z * reach); };
+    facets.triangle(ground(-1, 1), ground(1, 1), ground(0, -1));
+    const std::vector surfaces{facets.surface()};
+    f.frame.surfaces = surfaces;
+    const frame::Image image = f.draw();
+    // It ends .9 reach before the eye at the farthest, almost on the horizon; its sides leave the picture near the eye.
+    EXPECT_GT(image.pixels[4 * (199 * 200 + 100)], 20) << reach;
+    EXPECT_GT(image.pixels[4 * (199 * 200 + 2)], 20) << reach;
+    EXPECT_GT(image.pixels[4 * (199 * 200 + 197)], 20) << reach;
+    EXPECT_GT(image.pixels[4 * (110 * 200 + 100)], 20) << reach;
+    EXPECT_EQ(image.pixels[4 * (98 * 200 + 100)], 0) << reach;
+    EXPECT_EQ(image.pixels[4 * (5 * 200 + 100)], 0) << reach;
+    EXPECT_NEAR(red_area(image), 2e4, 1500.) << reach;
+    // Before the near distance nothing is seen of it.
+    f.frame.camera.near = 20.f;
+    EXPECT_EQ(f.draw().pixels[4 * (199 * 200 + 100)], 0) << reach;
+  }
+}
+
+TEST_P(SurfaceLaws, WhatIsSeenThroughASurfaceIsItsShare) {
+  for (const std::uint32_t subframes : {64u, 16u, 1u})
+    for (const int opacity : {64, 128, 200}) {
+      Fixture f(GetParam());
+      f.frame.subframes = subframes;
+      f.frame.palette[5] = Vec3(0, 1, 0);
+      Facets before, behind;
+      before.triangle({-40, -40, 20}, {40, -40, 20}, {0, 60, 20});
+      behind.triangle({-40, -40, -20}, {40, -40, -20}, {0, 60, -20}, 5);
+      frame::Surface front = before.surface(), back = behind.surface();
+      const std::vector first{front}, second{back};
+      f.frame.surfaces = first;
+      const double red = middle_of(f.draw()).first;
+      f.frame.surfaces = second;
+      const double green = middle_of(f.draw()).second;
+      front.opacity = std::uint8_t(opacity), back.opacity = std::uint8_t(255 - opacity / 2);
+      const double share = opacity / 255., other = (255 - opacity / 2) / 255.;
+      for (const auto& both : {std::vector{front, back}, std::vector{back, front}}) {
+        f.frame.surfaces = both;
+        const auto [seen_red, seen_green] = middle_of(f.draw());
+        EXPECT_NEAR(seen_red / red, share, .06) << subframes;
+        EXPECT_NEAR(seen_green / green, (1. - share) * other, .06) << subframes;
+      }
+      // Half present, it is half as opaque; and from end to end it goes over.
+      before.presence.assign(3, 128);
+      frame::Surface half = before.surface();
+      half.opacity = std::uint8_t(opacity);
+      const std::vector halves{half};
+      f.frame.surfaces = halves;
+      EXPECT_NEAR(middle_of(f.draw()).first / red, .5 * share, .06) << subframes;
+      before.presence = {0, 255,
+                         128};  // the picture's middle is halfway between the first two, and halfway up
+      EXPECT_NEAR(middle_of(f.draw()).first / red, .5 * share, .1) << subframes;
+      // A capsule behind shows through, too.
+      f.add({-30, 0, 0}, {30, 0, 0}, 12.f);
+      f.segments[0].meta = 5;
+      f.frame.capsules = f.items;
+      f.frame.surfaces = {};
+      const double whole = middle_of(f.draw()).second;
+      front.opacity = std::uint8_t(opacity);
+      const std::vector one{front};
+      f.frame.surfaces = one;
+      EXPECT_NEAR(middle_of(f.draw()).second / whole, 1. - share, .06) << subframes;
+    }
+}
+
+TEST_P(SurfaceLaws, SurfacesAreLitColouredAndPlacedAsTheySay) {
+  Fixture f(GetParam());
+  f.frame.subframes = 64;
+  f.frame.palette[9] = Vec3(0, 1, 0), f.frame.palette[127] = Vec3(0, 0, 1);
+  const Vec3 a(-30, -30, 0), b(30, -30, 0), c(0, 40, 0), towards(-.35f, .75f, .55f);
+  Facets facets;
+  facets.triangles.push_back({facets.corner(a, 9, towards.normalized()),
+                              facets.corner(b, 127, towards.normalized()),
+                              facets.corner(c, 9, towards.normalized())});
+  const auto light_at = [&](const Vec3& place) {
+    const std::vector surfaces{facets.surface()};
+    f.frame.surfaces = surfaces;
+    const auto pixel = pixel_at(f.frame, f.draw(), place);
+    return std::array{light_of(pixel[0]), light_of(pixel[1]), light_of(pixel[2])};
+  };
+  const auto left = light_at({-28, -29, 0}), right = light_at({28, -29, 0}), between = light_at({0, -29, 0});
+  EXPECT_GT(left[1], .9);
+  EXPECT_LT(left[2], .1);
+  EXPECT_GT(right[2], .9);
+  EXPECT_LT(right[1], .1);
+  EXPECT_NEAR(between[1], .5 * left[1], .16);  // what is lit fully is a fifth brighter than white
+  EXPECT_NEAR(between[2], .5 * right[2], .16);
+  EXPECT_EQ(between[0], 0.);
+  // Turned away from the light, or where little of it gets, it is darker; from behind it is lit from behind.
+  for (Vec3& normal : facets.normals) normal = Vec3(.35f, -.75f, .55f).normalized();
+  const double away = light_at({-28, -29, 0})[1];
+  EXPECT_LT(away, .6);
+  std::swap(facets.triangles[0][1], facets.triangles[0][2]);
+  EXPECT_NEAR(light_at({-28, -29, 0})[1], .16 + 1.05 * std::pow(1. - std::sqrt((away - .16) / 1.05), 2.),
+              .04);
+  std::swap(facets.triangles[0][1], facets.triangles[0][2]);
+  for (Vec3& normal : facets.normals) normal = towards.normalized();
+  facets.openness.assign(3, 51);  // a fifth
+  EXPECT_NEAR(light_at({-28, -29, 0})[1], .16 + 1.05 * .04, .04);
+  // In a neuron's coordinates: turned by a quarter about the view and moved.
+  const float half = std::sqrt(.5f);
+  f.instances.assign(1, {5, 0, -10, 0, 0, 0, half, half});
+  facets.openness.clear();
+  std::vector placed{facets.surface()};
+  placed[0].instance = 0;
+  f.frame.surfaces = placed;
+  const frame::Image image = f.draw();
+  EXPECT_GT(pixel_at(f.frame, image, {34, 28, -10})[2], 100);  // b
+  EXPECT_GT(pixel_at(f.frame, image, {-30, 0, -10})[1], 100);  // near c
+  EXPECT_EQ(pixel_at(f.frame, image, {-20, 20, -10})[1], 0);
+  // The same number says the same arrays, another one others; colours are asked for every time.
+  placed[0].version = 7;
+  EXPECT_EQ(f.draw().pixels, image.pixels);
+  EXPECT_EQ(f.draw().pixels, image.pixels);
+  facets.entries.assign(3, 3);
+  placed[0].entries = facets.entries;
+  EXPECT_GT(pixel_at(f.frame, f.draw(), {34, 28, -10})[0], 100);
+  for (Vec3& position : facets.positions) position.x() += 500.f;
+  placed[0].version = 8;
+  EXPECT_EQ(f.draw().covered, 0.);
+}
+
+TEST_P(SurfaceLaws, RefusesSurfacesThatBreakTheContract) {
+  const auto refused = [](const auto& change) {
+    Fixture f(GetParam());
+    f.renderer->load({f.segments, f.instances});
+    Facets facets;
+    facets.triangle({-12, -8, 0}, {14, -5, 0}, {-3, 11, 0});
+    frame::Surface surface;
+    change(facets, surface);
+    const std::uint32_t instance = surface.instance;
+    surface = facets.surface();
+    surface.instance = instance;
+    const std::vector surfaces{surface};
+    f.frame.surfaces = surfaces;
+    try {
+      f.renderer->draw(f.frame);
+    } catch (const Error&) {
+      return true;
+    }
+    return false;
+  };
+  EXPECT_FALSE(refused([](Facets&, frame::Surface&) {}));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.triangles[0][1] = 3; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.positions[0].y() = NAN; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.normals[0] *= 2.f; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.normals[0].x() = NAN; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.normals.pop_back(); }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.entries[2] = 128; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.openness = {1, 2}; }));
+  EXPECT_TRUE(refused([](Facets& x, frame::Surface&) { x.presence = {1}; }));
+  EXPECT_TRUE(refused([](Facets&, frame::Surface& s) { s.instance = 1; }));
+}
+
 TEST_P(RendererLaws, OpacityOfAKindAndOfAPartAreObeyed) {
   Fixture f(GetParam());
   f.add({-20, 10, 0}, {20, 10, 0}, 6.f);
@@ -275,14 +540,6 @@ TEST_P(RendererLaws, ABranchDrawnAsDotsCoversItsArea) {
   const double scale = f.frame.camera.focal(200.f) / 100.,
                expected = 20 * std::sqrt(8.) * 1.2 * scale * scale;
   EXPECT_NEAR(red_area(f.draw()), expected, .2 * expected);
-}
-
-// Where a point of the world is seen, as a pixel of the picture.
-std::array<std::uint8_t, 3> pixel_at(const frame::Frame& frame, const frame::Image& image,
-                                     const Vec3& point) {
-  const Vec3 at = frame::project(frame.camera, {float(frame.width), float(frame.height)}, point);
-  const std::size_t place = 4 * (std::size_t(at.y()) * image.width + std::size_t(at.x()));
-  return {image.pixels[place], image.pixels[place + 1], image.pixels[place + 2]};
 }
 
 TEST_P(RendererLaws, AnOrthographicCameraShowsThingsAsLargeAtAnyDepth) {

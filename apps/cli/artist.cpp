@@ -50,7 +50,12 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     };
   auto start = Clock::now();
   if (view.detail.gaze) {
-    drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter);
+    drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter,
+                                 [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
+                                   surfaces_.show(frame, *colouring_, playback_.has_value());
+                                   if (skin_ && view.skin)
+                                     skin_->show(frame, near, eye, *colouring_, painter);
+                                 });
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.resolve = f.resolve, drawn.read = f.unite;
@@ -64,6 +69,12 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
+  surfaces_.show(frame, *colouring_, playback_.has_value());
+  if (skin_ && view.skin) {
+    start = Clock::now();
+    skin_->show(frame, cut, eye, *colouring_, painter);
+    drawn.cull += milliseconds_since(start);
+  }
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();

@@ -12,6 +12,8 @@
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
 #include "forest/scene/scanpath.h"
+#include "forest/scene/skin.h"
+#include "forest/scene/surfaces.h"
 #include "forest/scene/view.h"
 
 #include "apps/cli/drawer.h"
@@ -39,6 +41,11 @@ class Artist {
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
+  /// From now on these surfaces are in the pictures, too.
+  void show(scene::Surfaces surfaces) { surfaces_ = std::move(surfaces); }
+  /// From now on neurons near the eye have skin, unless the view says otherwise.
+  void give_skin() { skin_.emplace(forest_); }
+  const scene::Skin* skin() const { return skin_ ? &*skin_ : nullptr; }
   /// ms that each picture stands for, for pictures that leave out steps.
   void set_window(double milliseconds) { window_ = milliseconds; }
   const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
@@ -55,6 +62,8 @@ class Artist {
   std::unique_ptr<render::Renderer> renderer_;
   Foveated foveated_;
   std::vector<frame::Overlay> outline_;
+  scene::Surfaces surfaces_;
+  std::optional<scene::Skin> skin_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
   scene::Background coloured_for_ = scene::Background::dark;

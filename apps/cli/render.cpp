@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
-// brainforest render and brainforest movie: a forest file becomes a picture or a film, without a display.
+// brainforest render and brainforest movie: a forest file becomes a picture or a film, without a display. Surfaces of a
+// cortex can be in it, or be all of it.
+#include <map>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -13,6 +15,7 @@
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
+#include "apps/cli/surface_options.h"
 #include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
 #include "apps/view_text.h"
@@ -23,6 +26,24 @@ namespace {
 constexpr const char* view_help =
     "View as a JSON file or text (docs/scene/view.md); by default the whole forest";
 
+const std::map<std::string, scene::Side> sides{{"left", scene::Side::left},   {"right", scene::Side::right},
+                                               {"front", scene::Side::front}, {"back", scene::Side::back},
+                                               {"above", scene::Side::above}, {"below", scene::Side::below}};
+
+scene::Forest empty_forest() { return scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {})); }
+
+// What is shown when nobody says what: the neurons, or the surfaces from one side.
+scene::View default_view(const scene::Forest& forest, const scene::Surfaces& surfaces,
+                         std::optional<scene::Side> side, float aspect) {
+  if (!surfaces.empty() && (side || forest.instances().empty())) {
+    scene::View view;
+    view.camera = surfaces.camera(side.value_or(surfaces.outside()), aspect);
+    view.fog = 0.f;
+    return view;
+  }
+  return scene::overview(forest);
+}
+
 }  // namespace
 
 std::function<void()> render(CLI::App& command, Console& console) {
@@ -31,13 +52,23 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::string view, size = "1920x1080";
     std::vector<float> gaze;
     bool outline = false;
+    SurfaceOptions surfaces;
+    bool skin = false;
+    std::optional<scene::Side> side;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
     ActivityOptions activity;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("forest", options->forest, "Forest file")->required();
-  command.add_option("--view", options->view, view_help);
+  command.add_option("forest", options->forest, "Forest file, or the surface of a cortex")->required();
+  auto* one_view = command.add_option("--view", options->view, view_help);
+  add_surfaces(command, options->surfaces);
+  command.add_flag("--skin", options->skin,
+                   "Neurons near the eye have a smooth skin and spines (takes seconds)");
+  command.add_option("--from", options->side, "Show all of the surfaces, from this side of the brain")
+      ->transform(CLI::CheckedTransformer(sides))
+      ->option_text("left|right|front|back|above|below")
+      ->excludes(one_view);
   add_targets(command, options->targets);
   add_activity(command, options->activity, "--time", "Its moment that is shown, ms; by default the first");
   add_size(command, options->size);
@@ -53,12 +84,23 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_renderer(command, options->drawer);
   return [options, &console] {
     const auto [width, height] = parse_size(options->size);
-    const scene::Forest forest = scene::Forest::open(options->forest);
-    scene::View view = options->view.empty() ? scene::overview(forest) : read_view(options->view);
+    SurfaceOptions named = options->surfaces;
+    const bool alone = is_surface(options->forest);
+    if (alone) named.files.insert(named.files.begin(), options->forest);
+    scene::Surfaces surfaces = read_surfaces(named, console);
+    const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
+    scene::View view = options->view.empty()
+                           ? default_view(forest, surfaces, options->side, float(width) / float(height))
+                           : read_view(options->view);
+    const nlohmann::ordered_json of_surfaces = {{"triangles", surfaces.triangles()},
+                                                {"range", surfaces.shown_range()},
+                                                {"colour_map", surfaces.map->name}};
     if (!options->gaze.empty()) view.detail.gaze = Vec2(options->gaze[0], options->gaze[1]);
     add_appearances(options->targets, view.targets);
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
+    artist.show(std::move(surfaces));
+    if (options->skin) artist.give_skin();
     play(artist, options->activity, view);
     const Drawn drawn = artist.draw(view, width, height, options->outline);
     io::write_png(options->out, width, height, drawn.image.pixels);
@@ -71,6 +113,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
                   {"milliseconds", drawn.activity.gather + drawn.activity.paint}};
     console.print({{"file", options->out.string()},
                    {"activity", activity},
+                   {"surfaces", of_surfaces},
+                   {"skin_triangles", artist.skin() ? artist.skin()->figures().triangles : 0},
                    {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
                    {"neurons", drawn.neurons},
                    {"segments", drawn.segments},
@@ -92,6 +136,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::string size = "1280x720";
     FilmPlan plan;
     TargetOptions targets;
+    SurfaceOptions surfaces;
+    bool skin = false;
     Drawer drawer = Drawer::automatic;
     ActivityOptions activity;
     std::optional<double> rate;
@@ -109,6 +155,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
                           "Milliseconds of activity a second of film; by default all of it is shown"),
       1e-6, 1e9);
   add_targets(command, options->targets);
+  add_surfaces(command, options->surfaces);
+  command.add_flag("--skin", options->skin,
+                   "Neurons near the eye have a smooth skin and spines (takes seconds)");
   command
       .add_option("--path", options->path,
                   "Key views from a file, one on each line, as the studio records them")
@@ -145,6 +194,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     add_appearances(options->targets, plan.targets);
     Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
+    artist.show(read_surfaces(options->surfaces, console));
+    if (options->skin) artist.give_skin();
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();

@@ -62,6 +62,35 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const Overlay& o : frame.overlays)
     require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
             "an overlay must be finite and its colour a palette entry");
+  require(frame.surfaces.size() < (1u << 20), "there must be fewer than 1,048,576 surfaces");
+  for (const Surface& surface : frame.surfaces) check(surface, geometry);
+}
+
+void check(const Surface& s, const Geometry& geometry) {
+  const std::size_t count = s.positions.size();
+  require(s.normals.size() == count && s.entries.size() == count &&
+              (s.openness.empty() || s.openness.size() == count) &&
+              (s.presence.empty() || s.presence.size() == count),
+          "every position of a surface needs a normal and a palette entry; light and presence have all of "
+          "them or none");
+  require(count < (1u << 27) && s.triangles.size() < (1u << 27),
+          "a surface must have fewer than 134,217,728 positions and triangles");
+  require(s.instance == Surface::in_world || s.instance < geometry.instances.size(),
+          "a surface names an instance that is not there");
+  float most = 0.f;  // of all of them: there may be a million
+  bool finite = true;
+  for (std::size_t i = 0; i < count; ++i) {
+    finite &= s.positions[i].allFinite();
+    most = std::max(most, std::abs(s.normals[i].squaredNorm() - 1.f));
+    finite &= s.normals[i].allFinite();
+  }
+  require(finite, "the positions and normals of a surface must be finite");
+  require(most < .01f, "the normals of a surface must be of unit length");
+  std::uint32_t bits = 0, last = 0;
+  for (const std::uint8_t entry : s.entries) bits |= entry;
+  require(bits < 128, "the colours of a surface must be palette entries");
+  for (const Triangle& t : s.triangles) last = std::max({last, t[0], t[1], t[2]});
+  require(s.triangles.empty() || last < count, "a triangle names a position that is not there");
 }
 
 bool transparent(const Frame& frame) {

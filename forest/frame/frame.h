@@ -13,6 +13,7 @@
 
 #include "forest/frame/camera.h"
 #include "forest/frame/layout.h"
+#include "forest/geometry/mesh.h"
 #include "forest/geometry/plane.h"
 
 namespace forest::frame {
@@ -24,7 +25,7 @@ struct Geometry {
 };
 
 /// Primitives that a neuron may be drawn with, however large it is in the picture.
-enum class Kind : std::uint8_t { any, dots, lines, capsules, somata };
+enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin };
 
 /// How a neuron is shown, or a branch of it: 4 bytes, so that changing thousands costs nothing. Renderers read the colour
 /// class and the opacity; the rest has been obeyed by whoever made the lists.
@@ -78,6 +79,31 @@ struct Overlay {
   float radius = 1.f;        // µm; never thinner than two pixels on screen
   std::uint32_t colour = 0;  // palette entry
 };
+
+/// Triangles with smooth shading: the surface of a cortex, the skin of a neuron. Both sides are seen.
+struct Surface {
+  static constexpr std::uint32_t in_world = 0xffffffffu;
+
+  std::span<const Vec3> positions;  // µm, in the world or of a neuron
+  std::span<const Vec3>
+      normals;  // unit, one a position; of the side from which triangles run counter-clockwise
+  std::span<const std::uint8_t>
+      entries;  // of the palette, one a position. Between them triangles are dithered
+  std::span<const std::uint8_t>
+      openness;  // one a position: the share of light that gets there, in 255ths; none: all of it
+  std::span<const std::uint8_t> presence;  // one a position: times the opacity, in 255ths; none: all is there
+  std::span<const Triangle> triangles;     // into positions
+  std::uint32_t instance = in_world;       // whose coordinates these are
+  std::uint8_t opacity = 255;              // 255: opaque
+  // What a renderer has seen under this number, entries, presence and opacity aside, it need not take again; 0: it may have
+  // changed.
+  std::uint64_t version = 0;
+};
+
+/// What tells its screen door from others: surfaces in the world are things of their own, those of one instance pieces of one.
+inline std::uint32_t door_number(std::span<const Surface> surfaces, std::size_t which) {
+  return surfaces[which].instance == Surface::in_world ? std::uint32_t(which) : 0u;
+}
 
 /// Where a band of a frame's lists ends. Bands follow one another from near to far; what the earlier ones hide
 /// is not drawn in the later ones.
@@ -133,6 +159,7 @@ struct Frame : Lists {
   Opacities opacities = opaque();
   std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
+  std::span<const Surface> surfaces;
   std::optional<Glass> glass;
   /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, or once for those that are
   /// drawn together, when the lists are drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
@@ -167,7 +194,8 @@ inline std::uint32_t drawn_together(std::uint32_t subframes) {
 
 /// Throws Error naming the first violated sentence of this contract: sizes, indices, finite camera, colours.
 void check(const Frame& frame, const Geometry& geometry);
-/// Whether anything in it may be transparent.
+void check(const Surface& surface, const Geometry& geometry);
+/// Whether any segment in it may be transparent.
 bool transparent(const Frame& frame);
 void check(const Lists& lists, const Geometry& geometry);
 

@@ -37,6 +37,14 @@ struct Item {
   float x, y, z, radius;  // a sphere around all of it, in the world, µm
 };
 
+/// A corner of triangles.
+struct Vertex {
+  float x, y, z;
+  uint openness;  // 0–255
+  float nx, ny, nz;
+  uint reserved;
+};
+
 /// One picture's constants. Directions are the camera's axes in the world; z is the depth along `forward`.
 struct Constants {
   float eye_x, eye_y, eye_z, focal;  // focal: pixels per unit slope
@@ -59,8 +67,10 @@ struct Constants {
   float glass_right_x, glass_right_y, glass_right_z,
       glass_left_edge;                                       // it reaches from here, along its right …
   float glass_up_x, glass_up_y, glass_up_z, glass_low_edge;  // … and its up
-  float glass_right_edge, glass_high_edge, reserved_a, reserved_b;  // … to here
-  float glass_red, glass_green, glass_blue, reserved_c;             // linear light
+  float glass_right_edge, glass_high_edge;                   // … to here
+  uint opacity, door;                        // 0–255, of the surface drawn, and the key of its screen door
+  float glass_red, glass_green, glass_blue;  // linear light
+  uint instance;                             // of the surface drawn; all ones: it lies in the world
 };
 
 // A pixel's key: depth (20 bits, logarithmic), palette entry (7 bits), shade (5 bits). The smallest key wins, so the
@@ -127,11 +137,20 @@ FOREST_SHARED bool forest_shows(uint opacity, uint key, uint subframe) {
   return (threshold >> 16) * 255u < opacity << 16;
 }
 
+// A surface folds, so that one ray may meet it often: its two sides have doors of their own in every pixel, and what is half
+// transparent shows half of the nearest front, and a quarter of the nearest back behind it.
+FOREST_SHARED uint forest_surface_key(uint number, uint instance) {
+  return forest_mixed(forest_mixed(number + 0x51ed270bu) + instance);
+}
+FOREST_SHARED uint forest_side_key(uint surface_key, bool front, uint pixel) {
+  return surface_key ^ forest_mixed(front ? pixel : ~pixel);
+}
+
 // Occlusion: the farthest key of every square of 8 × 8 pixels, then of every 8 × 8 of those.
 #define FOREST_TILE 8u
 
 #ifdef __cplusplus
-static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 &&
+static_assert(sizeof(Segment) == 32 && sizeof(Instance) == 32 && sizeof(Item) == 32 && sizeof(Vertex) == 32 &&
               sizeof(Constants) == 256);
 inline constexpr uint cluster_size = FOREST_CLUSTER_SIZE;
 /// Item::drawn of all of so many segments, of cluster_size when they are more.

@@ -6,6 +6,7 @@
 #include <cassert>
 #include <cmath>
 #include <limits>
+#include <optional>
 #include <span>
 
 #include <fmt/format.h>
@@ -110,16 +111,23 @@ float smooth_minimum(float a, float b, float k) {
 /// 8·point + subset. A corner of a triangle is a key, and in the upper bits which neighbour owns it.
 struct Block {
   std::vector<std::uint16_t> keys;  // ascending
-  std::vector<Vec3> positions;
+  std::vector<Vec3> positions, normals;
   std::vector<std::uint8_t> labels;
+  std::vector<std::uint32_t> cones;  // nearest
   std::vector<std::array<std::uint16_t, 3>> triangles;
 };
 
 class BlockMaker {
  public:
+  /// @param with_normals  and with the nearest cones
   BlockMaker(const Field& field, std::uint64_t key, std::span<const Entry> cones,
-             std::span<const Entry> joints)
-      : field_(field), cones_(cones), joints_(joints), corner_(unpack(key)), distances_(cones.size()) {
+             std::span<const Entry> joints, bool with_normals = false)
+      : field_(field),
+        cones_(cones),
+        joints_(joints),
+        with_normals_(with_normals),
+        corner_(unpack(key)),
+        distances_(cones.size()) {
     for (std::int64_t& i : corner_) i *= block_points;
   }
 
@@ -170,11 +178,19 @@ class BlockMaker {
     return least;
   }
 
-  std::uint8_t nearest_label(const Vec3& p) {
+  std::uint32_t nearest_cone(const Vec3& p) {
     distance(p);
     const auto at = std::ranges::min_element(distances_);
-    return at == distances_.end() ? std::uint8_t(0)
-                                  : field_.cones[cones_[std::size_t(at - distances_.begin())].item].label;
+    return at == distances_.end() ? 0u : cones_[std::size_t(at - distances_.begin())].item;
+  }
+
+  /// Differences towards the corners of a tetrahedron.
+  Vec3 gradient(const Vec3& p) {
+    static constexpr float ways[4][3] = {{1, 1, 1}, {1, -1, -1}, {-1, 1, -1}, {-1, -1, 1}};
+    Vec3 sum = Vec3::Zero();
+    for (const auto& way : ways) sum += distance(p + .2f * field_.voxel * Vec3::Map(way)) * Vec3::Map(way);
+    const float length = sum.norm();
+    return length > 0.f ? Vec3(sum / length) : Vec3(Vec3::UnitY());
   }
 
   void add_vertices(int x, int y, int z) {
@@ -186,7 +202,9 @@ class BlockMaker {
       const Vec3 p = crossing(place(x, y, z), d, place(u, v, w), e);
       block_.keys.push_back(std::uint16_t(8 * ((z * block_points + y) * block_points + x) + subset));
       block_.positions.push_back(p);
-      block_.labels.push_back(nearest_label(p));
+      const std::uint32_t nearest = nearest_cone(p);
+      block_.labels.push_back(cones_.empty() ? std::uint8_t(0) : field_.cones[nearest].label);
+      if (with_normals_) block_.cones.push_back(nearest), block_.normals.push_back(gradient(p));
     }
   }
 
@@ -264,6 +282,7 @@ class BlockMaker {
 
   const Field& field_;
   std::span<const Entry> cones_, joints_;
+  bool with_normals_;
   Cell corner_;
   std::vector<float> distances_;
   std::array<float, look_points * look_points * look_points> values_;
@@ -275,6 +294,55 @@ std::span<const Entry> of_block(const std::vector<Entry>& entries, std::uint64_t
   const auto first = std::partition_point(entries.begin(), entries.end(), before);
   return {first, std::find_if(first, entries.end(), [block](const Entry& e) { return e.block != block; })};
 }
+
+/// @param part  blocks beside this sphere may be left out
+Field field_of(const std::vector<BranchCone>& cones, const std::vector<Joint>& joints, float voxel,
+               const Vec3& origin, const std::optional<Sphere>& part = {}) {
+  Field field{.cones = cones, .joints = joints, .voxel = voxel, .near_cones = {}, .near_joints = {}};
+  std::vector<std::vector<std::uint32_t>> branches;
+  for (std::uint32_t i = 0; i < cones.size(); ++i) {
+    field.cones[i].shape.a -= origin, field.cones[i].shape.b -= origin;
+    if (cones[i].branch >= branches.size()) branches.resize(cones[i].branch + 1);
+    branches[cones[i].branch].push_back(i);
+  }
+  constexpr float anywhere = std::numeric_limits<float>::infinity();
+  const Vec3 centre = part ? Vec3(part->centre - origin) : Vec3::Zero();
+  for (std::uint32_t i = 0; i < cones.size(); ++i)
+    field.note(i, voxel, centre, part ? part->radius : anywhere);
+  for (std::uint32_t i = 0; i < joints.size(); ++i) {
+    Joint& joint = field.joints[i];
+    joint.centre -= origin;
+    const float band = voxel + joint.rounding;
+    Bounds around;
+    around.add(joint.centre, joint.reach);
+    field.blocks_around(around, [&](const Cell& at, const Vec3& middle) {
+      if ((middle - joint.centre).norm() <= joint.reach + block_reach * voxel)
+        field.near_joints.push_back({pack(at), i});
+    });
+    for (const std::uint32_t branch : joint.branches)
+      if (branch < branches.size())
+        for (const std::uint32_t cone : branches[branch])
+          if (signed_distance(joint.centre, field.cones[cone].shape) < joint.reach + band)
+            field.note(cone, band, joint.centre, joint.reach);
+  }
+  for (auto* list : {&field.near_cones, &field.near_joints}) {
+    std::ranges::sort(*list);
+    list->erase(std::unique(list->begin(), list->end()), list->end());
+  }
+  return field;
+}
+
+/// Of blocks, ascending, without those that lie within a cone.
+std::vector<std::uint64_t> places_of(const Field& field) {
+  std::vector<std::uint64_t> places;
+  for (const auto& entry : field.near_cones)
+    if (places.empty() || places.back() != entry.block) places.push_back(entry.block);
+  std::erase_if(places,
+                [&](std::uint64_t at) { return of_block(field.near_cones, at).back().item == solid; });
+  return places;
+}
+
+constexpr std::int64_t piece_blocks = 8;  // along an edge
 
 }  // namespace
 
@@ -310,41 +378,8 @@ Mesh polygonise(const std::vector<BranchCone>& cones, const std::vector<Joint>& 
                     "remove what lies far off",
                     box.extent().maxCoeff(), voxel));
 
-  Field field{.cones = cones, .joints = joints, .voxel = voxel, .near_cones = {}, .near_joints = {}};
-  std::vector<std::vector<std::uint32_t>> branches;
-  for (std::uint32_t i = 0; i < cones.size(); ++i) {
-    field.cones[i].shape.a -= origin, field.cones[i].shape.b -= origin;
-    if (cones[i].branch >= branches.size()) branches.resize(cones[i].branch + 1);
-    branches[cones[i].branch].push_back(i);
-  }
-  constexpr float anywhere = std::numeric_limits<float>::infinity();
-  for (std::uint32_t i = 0; i < cones.size(); ++i) field.note(i, voxel, Vec3::Zero(), anywhere);
-  for (std::uint32_t i = 0; i < joints.size(); ++i) {
-    Joint& joint = field.joints[i];
-    joint.centre -= origin;
-    const float band = voxel + joint.rounding;
-    Bounds around;
-    around.add(joint.centre, joint.reach);
-    field.blocks_around(around, [&](const Cell& at, const Vec3& middle) {
-      if ((middle - joint.centre).norm() <= joint.reach + block_reach * voxel)
-        field.near_joints.push_back({pack(at), i});
-    });
-    for (const std::uint32_t branch : joint.branches)
-      if (branch < branches.size())
-        for (const std::uint32_t cone : branches[branch])
-          if (signed_distance(joint.centre, field.cones[cone].shape) < joint.reach + band)
-            field.note(cone, band, joint.centre, joint.reach);
-  }
-  for (auto* list : {&field.near_cones, &field.near_joints}) {
-    std::ranges::sort(*list);
-    list->erase(std::unique(list->begin(), list->end()), list->end());
-  }
-
-  std::vector<std::uint64_t> places;  // of blocks, ascending, without those that lie within a cone
-  for (const auto& entry : field.near_cones)
-    if (places.empty() || places.back() != entry.block) places.push_back(entry.block);
-  std::erase_if(places,
-                [&](std::uint64_t at) { return of_block(field.near_cones, at).back().item == solid; });
+  const Field field = field_of(cones, joints, voxel, origin);
+  const std::vector<std::uint64_t> places = places_of(field);
   std::vector<Block> blocks(places.size());
   parallel_for(places.size(), 16, [&](std::size_t i) {
     blocks[i] = BlockMaker(field, places[i], of_block(field.near_cones, places[i]),
@@ -389,6 +424,78 @@ Mesh polygonise(const std::vector<BranchCone>& cones, const std::vector<Joint>& 
     }
   });
   return mesh;
+}
+
+Sphere PieceLattice::around(const Cell& cell) const {
+  // As a block, whose edge is an eighth of the piece's.
+  const auto middle = [&](std::size_t i) {
+    return (float(cell[i]) + .5f) * float(piece_blocks * block_points);
+  };
+  return {origin + voxel * lattice_place(middle(0), middle(1), middle(2)),
+          block_reach / float(look_points - 1) * float(block_points) * float(piece_blocks) * voxel};
+}
+
+std::pair<PieceLattice::Cell, PieceLattice::Cell> PieceLattice::cells(const Bounds& box) const {
+  Cell first, last;
+  const Vec3 low = (box.low - origin) / voxel, high = (box.high - origin) / voxel;
+  constexpr float edge = float(piece_blocks * block_points);
+  for (int axis = 0; axis < 3; ++axis) {  // i = Y + Z, j = X + Z, k = X + Y
+    const int p = (axis + 1) % 3, q = (axis + 2) % 3;
+    first[std::size_t(axis)] = std::int64_t(std::floor((low[p] + low[q] - 1.f) / edge));
+    last[std::size_t(axis)] = std::int64_t(std::floor((high[p] + high[q] + 1.f) / edge));
+  }
+  return {first, last};
+}
+
+Piece polygonise_piece(const std::vector<BranchCone>& cones, const std::vector<Joint>& joints,
+                       const PieceLattice& lattice, const PieceLattice::Cell& cell) {
+  Piece piece;
+  Sphere part = lattice.around(cell);
+  part.radius += 4.f * block_reach * lattice.voxel;
+  const Field field = field_of(cones, joints, lattice.voxel, lattice.origin, part);
+  // Its blocks, and those behind, which own vertices of its triangles.
+  std::vector<std::uint64_t> places = places_of(field);
+  const auto inside = [&](std::uint64_t place, std::int64_t more) {
+    const Cell at = unpack(place);
+    for (std::size_t axis = 0; axis < 3; ++axis) {
+      const std::int64_t from = cell[axis] * piece_blocks;
+      if (at[axis] < from || at[axis] >= from + piece_blocks + more) return false;
+    }
+    return true;
+  };
+  std::erase_if(places, [&](std::uint64_t place) { return !inside(place, 1); });
+  std::vector<Block> blocks(places.size());
+  parallel_for(places.size(), 4, [&](std::size_t i) {
+    blocks[i] = BlockMaker(field, places[i], of_block(field.near_cones, places[i]),
+                           of_block(field.near_joints, places[i]), true)
+                    .make();
+  });
+  std::vector<std::vector<std::uint32_t>> vertices(blocks.size());  // of blocks' vertices: in the piece, + 1
+  for (std::size_t i = 0; i < blocks.size(); ++i) vertices[i].resize(blocks[i].positions.size());
+  const auto vertex = [&](std::size_t from, std::uint16_t corner) {
+    Cell at = unpack(places[from]);
+    for (std::size_t axis = 0; axis < 3; ++axis) at[axis] += corner >> (12 + axis) & 1;
+    const auto owner = std::size_t(std::ranges::lower_bound(places, pack(at)) - places.begin());
+    assert(owner < places.size() && places[owner] == pack(at));
+    const Block& block = blocks[owner];
+    const auto key = std::ranges::lower_bound(block.keys, std::uint16_t(corner & 0xfff));
+    assert(key != block.keys.end() && *key == (corner & 0xfff));
+    const auto which = std::size_t(key - block.keys.begin());
+    std::uint32_t& known = vertices[owner][which];
+    if (!known) {
+      piece.mesh.positions.push_back(block.positions[which] + lattice.origin);
+      piece.mesh.labels.push_back(block.labels[which]);
+      piece.normals.push_back(block.normals[which]);
+      piece.cones.push_back(block.cones[which]);
+      known = std::uint32_t(piece.mesh.positions.size());
+    }
+    return known - 1;
+  };
+  for (std::size_t i = 0; i < blocks.size(); ++i)
+    if (inside(places[i], 0))
+      for (const auto& [a, b, c] : blocks[i].triangles)
+        piece.mesh.triangles.push_back({vertex(i, a), vertex(i, b), vertex(i, c)});
+  return piece;
 }
 
 }  // namespace forest

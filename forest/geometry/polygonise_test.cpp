@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/geometry/polygonise.h"
 
+#include <array>
+#include <map>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -90,6 +93,50 @@ TEST(Polygonise, TooFineIsRefusedWithTheFinestThatIsNot) {
   EXPECT_THROW(
       polygonise({cone({0, 0, 0}, {0, 0, 0}, 1, 1), cone({1e9f, 0, 0}, {1e9f, 0, 0}, 1, 1)}, {}, .5f),
       LimitError);
+}
+
+TEST(Polygonise, PiecesSideBySideMakeTheWholeSurface) {
+  const std::vector<BranchCone> cones{cone({0, 0, 0}, {0, 30, 0}, 4, 3, 0),
+                                      cone({0, 30, 0}, {20, 50, 5}, 3, 2, 1),
+                                      cone({0, 30, 0}, {-25, 45, -9}, 3, 2.5f, 2)};
+  const std::vector<Joint> joints{
+      {.centre = {0, 30, 0}, .reach = 9, .rounding = 1.5f, .branches = {0, 1, 2}}};
+  for (const float voxel : {1.f, .5f}) {
+    const PieceLattice lattice{Vec3(-30, -5, -20) - Vec3::Constant(PieceLattice::margin_voxels), voxel};
+    Bounds box;
+    for (const BranchCone& c : cones)
+      box.add(c.shape.a, c.shape.radius_a + 1), box.add(c.shape.b, c.shape.radius_b + 1);
+    const auto [first, last] = lattice.cells(box);
+    Mesh all;
+    std::map<std::array<float, 3>, std::uint32_t> known;
+    std::size_t pieces = 0;
+    for (std::int64_t z = first[2]; z <= last[2]; ++z)
+      for (std::int64_t y = first[1]; y <= last[1]; ++y)
+        for (std::int64_t x = first[0]; x <= last[0]; ++x) {
+          const Piece piece = polygonise_piece(cones, joints, lattice, {x, y, z});
+          pieces += !piece.mesh.triangles.empty();
+          ASSERT_EQ(piece.normals.size(), piece.mesh.positions.size());
+          ASSERT_EQ(piece.cones.size(), piece.mesh.positions.size());
+          std::vector<std::uint32_t> places;
+          for (std::size_t i = 0; i < piece.mesh.positions.size(); ++i) {
+            const Vec3& p = piece.mesh.positions[i];
+            const Sphere around = lattice.around({x, y, z});
+            EXPECT_LT((p - around.centre).norm(), around.radius + 2.f * voxel);
+            EXPECT_NEAR(piece.normals[i].norm(), 1.f, 1e-4f);
+            EXPECT_LT(signed_distance(p + .5f * piece.normals[i], cones[piece.cones[i]].shape), 1.6f);
+            const auto [at, added] =
+                known.try_emplace({p.x(), p.y(), p.z()}, std::uint32_t(all.positions.size()));
+            if (added) all.positions.push_back(p), all.labels.push_back(0);
+            places.push_back(at->second);
+          }
+          for (const Triangle& t : piece.mesh.triangles)
+            all.triangles.push_back({places[t[0]], places[t[1]], places[t[2]]});
+        }
+    EXPECT_GT(pieces, voxel < 1.f ? 3u : 1u);
+    EXPECT_TRUE(is_closed(all));
+    EXPECT_EQ(count_pieces(all), 1u);
+    EXPECT_NEAR(volume(all) / volume(polygonise(cones, joints, voxel)), 1., .005);
+  }
 }
 
 }  // namespace

@@ -15,7 +15,7 @@
 namespace forest::scene {
 namespace {
 
-constexpr std::size_t class_count = 16;
+constexpr std::size_t class_count = 15;  // the entries of the last one are for surfaces and overlays
 constexpr std::size_t most_hues = 60'000, most_rows = 250;
 constexpr std::size_t depth_steps = 10;
 constexpr std::uint32_t grey = 0xBBBBBB;

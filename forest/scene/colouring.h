@@ -57,7 +57,7 @@ struct Colouring {
   Shown shown() const { return {states, parts}; }
 };
 
-/// There are sixteen colour classes: where a view needs more, the rarest colours become the most similar of the others.
+/// There are fifteen colour classes: where a view needs more, the rarest colours become the most similar of the others.
 /// Throws Error for a target that is not there, a branch of a neuron that is not there.
 Colouring colour(const Targets& targets, const View& view);
 /// Without targets.

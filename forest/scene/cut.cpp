@@ -71,26 +71,6 @@ void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
   cut.segments += std::uint32_t(std::popcount(run.drawn));
 }
 
-// The states of the sections of a neuron that has parts; null: that of the neuron.
-std::vector<const frame::State*> states_of_sections(const Look& look, std::uint32_t index) {
-  const Forest& forest = look.forest;
-  const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
-  std::vector<const frame::State*> states(neuron.section_count, nullptr);
-  for (const Part& part : std::ranges::equal_range(look.shown.parts, index, {}, &Part::instance)) {
-    if (part.section == soma_section) {
-      std::ranges::fill(states, &part.state);
-      continue;
-    }
-    std::vector<bool> inside(neuron.section_count);
-    for (std::uint32_t s = part.section; s < neuron.section_count; ++s) {  // parents come first
-      const std::uint32_t parent = forest.sections()[neuron.first_section + s].parent;
-      inside[s] = s == part.section || (parent != 0xffffffffu && inside[parent]);
-      if (inside[s]) states[s] = &part.state;
-    }
-  }
-  return states;
-}
-
 // A leaf of a neuron with parts: runs of segments of one state.
 void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const Sphere& sphere, bool thin,
                std::span<const frame::State* const> states, Cut& cut) {
@@ -145,7 +125,8 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
   const frame::State state = look.state(index);
   const bool parted =
       state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
-  const auto states = parted ? states_of_sections(look, index) : std::vector<const frame::State*>();
+  const auto states =
+      parted ? section_states(look.forest, look.shown, index) : std::vector<const frame::State*>();
   if (state.kind == frame::Kind::somata && !parted) return;
   std::uint32_t open[64];
   int depth = 0;
@@ -260,6 +241,25 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
 }
 
 }  // namespace
+
+std::vector<const frame::State*> section_states(const Forest& forest, const Shown& shown,
+                                                std::uint32_t index) {
+  const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
+  std::vector<const frame::State*> states(neuron.section_count, nullptr);
+  for (const Part& part : std::ranges::equal_range(shown.parts, index, {}, &Part::instance)) {
+    if (part.section == soma_section) {
+      std::ranges::fill(states, &part.state);
+      continue;
+    }
+    std::vector<bool> inside(neuron.section_count);
+    for (std::uint32_t s = part.section; s < neuron.section_count; ++s) {  // parents come first
+      const std::uint32_t parent = forest.sections()[neuron.first_section + s].parent;
+      inside[s] = s == part.section || (parent != 0xffffffffu && inside[parent]);
+      if (inside[s]) states[s] = &part.state;
+    }
+  }
+  return states;
+}
 
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
            const Shown& shown) {

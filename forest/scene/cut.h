@@ -32,6 +32,10 @@ struct Shown {
   std::span<const Part> parts;           // by instance; later ones win. Their neurons are flagged as parted
 };
 
+/// The states of the sections of a neuron that has parts; null: that of the neuron.
+std::vector<const frame::State*> section_states(const Forest& forest, const Shown& shown,
+                                                std::uint32_t instance);
+
 struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;

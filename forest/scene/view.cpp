@@ -19,7 +19,7 @@ using Json = nlohmann::ordered_json;
 constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
 
 constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
-constexpr std::array<std::string_view, 5> kind_names{"any", "dots", "lines", "capsules", "somata"};
+constexpr std::array<std::string_view, 6> kind_names{"any", "dots", "lines", "capsules", "somata", "skin"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
@@ -255,7 +255,10 @@ View parse_view(std::string_view text, const std::string& name) {
       v.fog = number_of(value, name, key, 0.f, 100.f);
     else if (key == "halo")
       v.halo = number_of(value, name, key, 0.f, 10.f);
-    else if (key == "colour_by")
+    else if (key == "skin") {
+      if (!value.is_boolean()) throw InputError(name, 0, "'skin' must be true or false");
+      v.skin = value.get<bool>();
+    } else if (key == "colour_by")
       v.colour_by = ColourBy(word_of(value, name, key, colour_names));
     else if (key == "background")
       v.background = Background(word_of(value, name, key, background_names));
@@ -293,6 +296,7 @@ std::string to_json(const View& v) {
             {"samples", v.samples},
             {"fog", v.fog},
             {"halo", v.halo}};
+  if (!v.skin) json["skin"] = false;
   if (v.detail.gaze) {
     json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
     json["fovea"] = v.detail.fovea;

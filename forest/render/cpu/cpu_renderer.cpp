@@ -3,9 +3,11 @@
 
 #include <chrono>
 
+#include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/resolve.h"
 #include "forest/render/cpu/splat.h"
+#include "forest/render/cpu/triangles.h"
 
 namespace forest::render {
 namespace {
@@ -22,6 +24,7 @@ struct CpuRenderer::State {
   cpu::Picture picture;
   cpu::Canvas canvas;
   cpu::Splatter splatter;
+  cpu::SurfaceDrawer surfaces;
   frame::DepthMap seen;
   cpu::Sums sums;
   frame::Image image;
@@ -56,7 +59,11 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
     s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.hole.value_or(frame::Area{}), f.gaps);
-    timing.drawn = s.splatter.draw(s.picture, f, s.canvas, true);
+    if (!f.surfaces.empty()) {  // first, for they hide much
+      parallel_for(s.canvas.squares(), 1, [&](std::size_t n) { s.canvas.clear(s.canvas.square(n)); });
+      s.surfaces.draw(s.picture, f.surfaces, s.canvas);
+    }
+    timing.drawn = s.splatter.draw(s.picture, f, s.canvas, f.surfaces.empty());
     if (f.rest) {
       s.seen = s.canvas.depth_map();
       const frame::Lists more = f.rest(s.seen);

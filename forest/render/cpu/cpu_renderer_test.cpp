@@ -11,9 +11,9 @@
 namespace forest::render {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(Processor, RendererLaws, testing::Values(+[]() -> std::unique_ptr<Renderer> {
-                           return std::make_unique<CpuRenderer>();
-                         }));
+std::unique_ptr<Renderer> make() { return std::make_unique<CpuRenderer>(); }
+INSTANTIATE_TEST_SUITE_P(Processor, RendererLaws, testing::Values(make));
+INSTANTIATE_TEST_SUITE_P(Processor, SurfaceLaws, testing::Values(make));
 
 TEST(Arithmetic, IsAsExactAsItSays) {
   for (float x = 1e-30f; x < 1e30f; x *= 1.0371f) {

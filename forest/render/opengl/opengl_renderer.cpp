@@ -7,6 +7,7 @@
 #include <chrono>
 #include <cmath>
 #include <cstring>
+#include <map>
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -101,6 +102,28 @@ struct Drawing {
   Program dots, lines, capsules, close_ups;
 };
 
+// What draws surfaces.
+struct Facing {
+  Program triangles{"triangles", shaders::triangles, shaders::triangle},
+      close_ups{"triangle_close_ups", shaders::triangle_close_ups, shaders::triangle};
+};
+
+// The parts of a surface that stay.
+struct SurfaceBuffers {
+  Buffer vertices, triangles;
+  bool used = true;  // in this picture
+
+  void upload(const frame::Surface& s) {
+    std::vector<frame::Vertex> corners(s.positions.size());
+    for (std::size_t i = 0; i < corners.size(); ++i) {
+      const Vec3 &p = s.positions[i], &n = s.normals[i];
+      corners[i] = {p.x(), p.y(), p.z(), s.openness.empty() ? 255u : s.openness[i], n.x(), n.y(), n.z(), 0};
+    }
+    vertices.upload(std::span<const frame::Vertex>(corners));
+    triangles.upload(s.triangles);
+  }
+};
+
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -122,6 +145,11 @@ struct OpenGLRenderer::Device {
   Drawing opaque{""};
   std::unique_ptr<Drawing> transparent;  // made when something is
   const Drawing* drawing = &opaque;
+  std::unique_ptr<Facing> facing;                  // made when there are surfaces
+  std::map<std::uint64_t, SurfaceBuffers> meshes;  // by version
+  SurfaceBuffers passing;                          // of a surface without one
+  Buffer mesh_looks;
+  std::vector<std::uint8_t> looks;  // of every vertex: palette entry, presence
   Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
   Buffer segments, instances, states, palette, overlay_segments, uniforms, keys, sums, image, queue,
       large_queue, tiles;
@@ -235,6 +263,41 @@ struct OpenGLRenderer::Device {
     glDispatchComputeIndirect(0);
   }
 
+  void draw_surfaces(const frame::Frame& f) {
+    if (!facing) facing = std::make_unique<Facing>();
+    for (std::size_t k = 0; k < f.surfaces.size(); ++k) {
+      const frame::Surface& surface = f.surfaces[k];
+      if (surface.triangles.empty() || surface.opacity == 0) continue;
+      SurfaceBuffers* mesh = &passing;
+      if (surface.version == 0) {
+        passing.upload(surface);
+      } else {
+        const auto [known, added] = meshes.try_emplace(surface.version);
+        mesh = &known->second;
+        if (added) mesh->upload(surface);
+        mesh->used = true;
+      }
+      looks.resize(2 * surface.entries.size());
+      for (std::size_t i = 0; i < surface.entries.size(); ++i)
+        looks[2 * i] = surface.entries[i],
+                  looks[2 * i + 1] = surface.presence.empty() ? std::uint8_t(255) : surface.presence[i];
+      mesh_looks.upload(std::span<const std::uint8_t>(looks));
+      const std::uint32_t nothing[4] = {0, 1, 1, 0};
+      glNamedBufferSubData(large_queue.name(), 0, sizeof nothing, nothing);
+      constants.item_count = std::uint32_t(surface.triangles.size());
+      constants.instance = surface.instance, constants.opacity = surface.opacity;
+      constants.door = frame::forest_surface_key(frame::door_number(f.surfaces, k), surface.instance);
+      set_constants();
+      mesh->vertices.bind_texels(0, GL_RGBA32UI);
+      mesh->triangles.bind_texels(2, GL_R32UI);
+      mesh_looks.bind_texels(9, GL_RG8UI);
+      facing->triangles.use();
+      const std::uint32_t groups = (constants.item_count + FOREST_GROUP - 1) / FOREST_GROUP;
+      glDispatchCompute(std::min(groups, 32768u), (groups + 32767) / 32768, 1);
+      run_queue(facing->close_ups, large_queue);
+    }
+  }
+
   void find_tiles() {
     glMemoryBarrier(written_for_readers);
     tile.use();
@@ -264,7 +327,11 @@ struct OpenGLRenderer::Device {
   }
 
   void draw_subframe(const frame::Frame& f) {
-    draw_bands(lists, f.bands, true);
+    if (!f.surfaces.empty()) {  // they hide much
+      draw_surfaces(f);
+      find_tiles();
+    }
+    draw_bands(lists, f.bands, f.surfaces.empty());
     if (f.rest) {
       find_tiles();
       read_depths();
@@ -339,6 +406,7 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
   frame::check(f, d.geometry);
   d.upload(f);
   d.prepare(f);
+  for (auto& [version, mesh] : d.meshes) mesh.used = false;
   d.seen = {};
   frame::Timing timing;
   const std::uint32_t last = std::min(f.last_subframe, f.subframes);
@@ -358,6 +426,7 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
     glFinish();
     timing.resolve += milliseconds_since(start);
   }
+  std::erase_if(d.meshes, [](const auto& known) { return !known.second.used; });
   if (const GLenum error = glGetError())
     throw Error(
         fmt::format("OpenGL reports error 0x{:x} after drawing; there may be too little memory", error));

@@ -6,9 +6,9 @@
 namespace forest::render {
 namespace {
 
-INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(+[]() -> std::unique_ptr<Renderer> {
-                           return std::make_unique<OffscreenRenderer>();
-                         }));
+std::unique_ptr<Renderer> make() { return std::make_unique<OffscreenRenderer>(); }
+INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make));
+INSTANTIATE_TEST_SUITE_P(OpenGL, SurfaceLaws, testing::Values(make));
 
 }  // namespace
 }  // namespace forest::render

@@ -13,6 +13,9 @@ extern const char* const capsules;
 extern const char* const close_ups;
 extern const char* const cull;
 extern const char* const tiles;
+extern const char* const triangle;  // a part of the two that follow
+extern const char* const triangles;
+extern const char* const triangle_close_ups;
 extern const char* const resolve;
 
 }  // namespace forest::render::shaders

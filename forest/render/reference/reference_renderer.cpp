@@ -57,6 +57,16 @@ struct Capsule {
   std::uint32_t opacity, key;  // 0–255, of a screen door; see frame/layout.h
 };
 
+// A triangle before the camera.
+struct Facet {
+  std::array<Vec3, 3> at, normal;
+  std::array<float, 3> openness, opacity;
+  std::array<std::uint8_t, 3> entry;
+  float nearest;
+  int left, right, top, bottom;  // as a Capsule's
+  std::uint32_t key;             // of its surface's screen door
+};
+
 // One picture's camera.
 struct Eye {
   Mat3 to_camera;
@@ -148,6 +158,36 @@ bool project(const Eye& eye, Capsule& c) {
   c.c2 = nested ? 0.f : 1.f - c.s * c.s;
   c.moment = c.a.cross(c.u);
   return true;
+}
+
+// False when nothing of it lies in the picture.
+bool project(const Eye& eye, Facet& f) {
+  float left = INFINITY, right = -INFINITY, top = INFINITY, bottom = -INFINITY;
+  f.nearest = INFINITY;
+  bool cut = false, seen = false;
+  for (const Vec3& p : f.at) {
+    if (p.z() < eye.near) {
+      cut = true;
+      continue;
+    }
+    const float scale = eye.scale(p.z());
+    left = std::min(left, scale * p.x()), right = std::max(right, scale * p.x());
+    top = std::min(top, -scale * p.y()), bottom = std::max(bottom, -scale * p.y());
+    f.nearest = std::min(f.nearest, p.z());
+    seen = true;
+  }
+  if (!seen) return false;
+  f.left = f.top = 0, f.right = eye.width, f.bottom = eye.height;
+  if (cut) {  // it reaches the near distance: anywhere
+    f.nearest = eye.near;
+    return true;
+  }
+  const auto whole = [](float v, int limit) { return std::clamp(int(std::clamp(v, -1e6f, 1e6f)), 0, limit); };
+  f.left = whole(eye.centre_x + left - 1.f, eye.width),
+  f.right = whole(eye.centre_x + right + 2.f, eye.width);
+  f.top = whole(eye.centre_y + top - 1.f, eye.height),
+  f.bottom = whole(eye.centre_y + bottom + 2.f, eye.height);
+  return f.left < f.right && f.top < f.bottom;
 }
 
 float distance_to_line(const Capsule& c, float x, float y) {
@@ -260,6 +300,13 @@ void meet(const Capsule& c, const Rays& rays, const Eye& eye, std::uint32_t show
   if (changed) pixel.farthest = *std::ranges::max_element(pixel.depth);
 }
 
+// Interleaved gradient noise (Jimenez 2014), which moves from subframe to subframe: as in the other renderers.
+float noise_at(int x, int y, std::uint32_t subframe) {
+  const auto fraction = [](float v) { return v - std::floor(v); };
+  return fraction(52.9829189f * fraction(.06711056f * float(x) + .00583715f * float(y)) +
+                  .61803399f * float(subframe));
+}
+
 // Draws sixteen samples of every pixel. `shift`: where in the pixel they lie.
 class Canvas {
  public:
@@ -277,24 +324,26 @@ class Canvas {
     for (std::size_t i = 0; i < lanes; ++i) shift_x_[i] = shift[i].x(), shift_y_[i] = shift[i].y();
   }
 
-  void add(std::vector<Capsule>& capsules) {
-    // Which capsules each tile has to draw.
+  // Capsules or facets.
+  template <class Primitive>
+  void add(const std::vector<Primitive>& list) {
+    // Which of them each tile has to draw.
     std::vector<std::uint32_t> begin(farthest_.size() + 1), next;
-    const auto tiles_of = [&](const Capsule& c, const auto& visit) {
+    const auto tiles_of = [&](const Primitive& c, const auto& visit) {
       for (int y = c.top / tile; y <= (c.bottom - 1) / tile; ++y)
         for (int x = c.left / tile; x <= (c.right - 1) / tile; ++x)
           if (const std::size_t at = std::size_t(y * wide_ + x); c.nearest < farthest_[at]) visit(at);
     };
-    for (const Capsule& c : capsules) tiles_of(c, [&](std::size_t t) { ++begin[t + 1]; });
+    for (const Primitive& c : list) tiles_of(c, [&](std::size_t t) { ++begin[t + 1]; });
     std::partial_sum(begin.begin(), begin.end(), begin.begin());
     std::vector<std::uint32_t> drawn(begin.back());
     next = begin;
-    for (std::size_t i = 0; i < capsules.size(); ++i)
-      tiles_of(capsules[i], [&](std::size_t t) { drawn[next[t]++] = std::uint32_t(i); });
+    for (std::size_t i = 0; i < list.size(); ++i)
+      tiles_of(list[i], [&](std::size_t t) { drawn[next[t]++] = std::uint32_t(i); });
     parallel_for(farthest_.size(), 1, [&](std::size_t t) {
       if (begin[t] == begin[t + 1]) return;
       const int x = int(t) % wide_ * tile, y = int(t) / wide_ * tile;
-      for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) draw(capsules[drawn[i]], x, y);
+      for (std::uint32_t i = begin[t]; i < begin[t + 1]; ++i) draw(list[drawn[i]], x, y);
       float farthest = 0.f;
       for (int row = y; row < std::min(y + tile, eye_.height); ++row)
         for (int column = x; column < std::min(x + tile, eye_.width); ++column)
@@ -362,6 +411,52 @@ class Canvas {
         }
         const auto place = std::uint32_t(y * eye_.width + x);
         meet(c, rays, eye_, shown(c, by_pixel_ ? frame::forest_mixed(place) : 0u), pixel);
+      }
+  }
+
+  // Möller & Trumbore 1997, "Fast, minimum storage ray/triangle intersection".
+  void draw(const Facet& f, int x0, int y0) {
+    using Vec3d = Eigen::Vector3d;
+    const Vec3d p = f.at[0].cast<double>(), along = f.at[1].cast<double>() - p,
+                beside = f.at[2].cast<double>() - p;
+    for (int y = std::max(f.top, y0); y < std::min(f.bottom, y0 + tile); ++y)
+      for (int x = std::max(f.left, x0); x < std::min(f.right, x0 + tile); ++x) {
+        Pixel& pixel = at(x, y);
+        if (f.nearest >= pixel.farthest) continue;
+        const auto place = std::uint32_t(y * eye_.width + x);
+        bool changed = false;
+        for (std::uint32_t i = 0; i < lanes; ++i) {
+          const Vec3d slope((x + .5 - double(eye_.centre_x) - double(shift_x_[i])) / double(eye_.focal),
+                            (double(eye_.centre_y) + double(shift_y_[i]) - y - .5) / double(eye_.focal), 1.);
+          const Vec3d ray = eye_.orthographic ? Vec3d::UnitZ() : slope,
+                      from = eye_.orthographic ? Vec3d(slope - ray) : Vec3d::Zero();
+          const Vec3d across = ray.cross(beside);
+          const double volume = along.dot(across);
+          if (volume == 0.) continue;
+          const Vec3d to = from - p, turned = to.cross(along);
+          const double u = to.dot(across) / volume, v = ray.dot(turned) / volume,
+                       z = beside.dot(turned) / volume;
+          if (u < 0. || v < 0. || u + v > 1. || z < double(eye_.near) || !(float(z) < pixel.depth[i]))
+            continue;
+          // The camera's axes, with the depth away from the eye, are left-handed: a front's volume is negative.
+          const bool front = volume < 0.;
+          const std::uint32_t subframe = std::min(first_ + i, last_ - 1);
+          const float b = float(u), c = float(v), a = 1.f - b - c;
+          const auto opacity = std::uint32_t(a * f.opacity[0] + b * f.opacity[1] + c * f.opacity[2] + .5f);
+          if (opacity < 255 &&
+              !frame::forest_shows(opacity, frame::forest_side_key(f.key, front, place), subframe))
+            continue;
+          const Vec3 normal = a * f.normal[0] + b * f.normal[1] + c * f.normal[2];
+          const float facing = normal.dot(eye_.light) / std::max(normal.norm(), 1e-9f);
+          pixel.depth[i] = float(z);
+          pixel.shade[i] = std::clamp((a * f.openness[0] + b * f.openness[1] + c * f.openness[2]) *
+                                          (.5f + (front ? .5f : -.5f) * facing),
+                                      0.f, 1.f);
+          const float pick = noise_at(x + 37, y + 11, subframe);
+          pixel.entry[i] = f.entry[pick < a ? 0 : pick < a + b ? 1 : 2];
+          changed = true;
+        }
+        if (changed) pixel.farthest = *std::ranges::max_element(pixel.depth);
       }
   }
 
@@ -458,12 +553,40 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
     return c.opacity > 0 && project(eye, c);
   };
 
+  std::vector<Facet> facets;
+  for (std::size_t k = 0; k < f.surfaces.size(); ++k) {
+    const frame::Surface& surface = f.surfaces[k];
+    Mat3 turn = eye.to_camera;
+    Vec3 at = Vec3::Zero();
+    if (surface.instance != frame::Surface::in_world) {
+      const frame::Instance& i = geometry_.instances[surface.instance];
+      turn = turn * Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix();
+      at = {i.x, i.y, i.z};
+    }
+    at = eye.seen(at);
+    for (const Triangle& triangle : surface.triangles) {
+      Facet facet;
+      for (std::size_t i = 0; i < 3; ++i) {
+        const std::size_t vertex = triangle[i];
+        facet.at[i] = turn * surface.positions[vertex] + at;
+        facet.normal[i] = turn * surface.normals[vertex];
+        facet.openness[i] = surface.openness.empty() ? 1.f : float(surface.openness[vertex]) / 255.f;
+        facet.opacity[i] = float(surface.opacity) *
+                           (surface.presence.empty() ? 1.f : float(surface.presence[vertex]) / 255.f);
+        facet.entry[i] = surface.entries[vertex];
+      }
+      facet.key = frame::forest_surface_key(frame::door_number(f.surfaces, k), surface.instance);
+      if (surface.opacity > 0 && project(eye, facet)) facets.push_back(facet);
+    }
+  }
+
   const std::uint32_t last = std::min(f.last_subframe, f.subframes);
   for (std::uint32_t first = f.first_subframe; first < last; first += lanes) {
     std::array<Vec2, lanes> shift;
     for (std::uint32_t i = 0; i < lanes; ++i)
       shift[i] = frame::sample_place(std::min(first + i, last - 1), f.subframes);
     Canvas canvas(eye, shift, first, last, f.subframes);
+    canvas.add(facets);
     std::vector<Capsule> capsules;
     for (std::size_t from = 0; from < items.size();) {
       std::size_t to = from, segments = 0;

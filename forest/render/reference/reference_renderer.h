@@ -10,7 +10,7 @@
 namespace forest::render {
 
 /// Dots, lines and capsules of a frame are all drawn as capsules, and thin branches by the share of samples that meet
-/// them: nothing is stochastic, nothing is left out, nothing is rounded but the last 8 bits. Camera, light, fog, halo and
+/// them, surfaces by one ray a sample: nothing is stochastic, nothing is left out, nothing is rounded but the last 8 bits. Camera, light, fog, halo and
 /// colours are those of the contract; bands are not needed. Samples lie where frame::sample_place says, and every sample
 /// has its own halo, as every subframe of the other renderers has.
 class ReferenceRenderer final : public Renderer {

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/surface_options.h"
+
+#include <cmath>
+#include <cstdlib>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/io/surface.h"
+#include "forest/scene/colouring.h"
+
+#include "apps/cli/console.h"
+
+namespace forest::cli {
+namespace {
+
+std::string map_names() {
+  std::string names;
+  for (const scene::ColourMap& map : scene::colour_maps())
+    names += (names.empty() ? "" : ", ") + std::string(map.name);
+  return names;
+}
+
+// "low:high"
+std::pair<float, float> parse_range(const std::string& text) {
+  const std::size_t colon = text.find(':');
+  const auto number = [&](const std::string& part) {
+    char* end = nullptr;
+    const float value = std::strtof(part.c_str(), &end);
+    return part.empty() || *end ? NAN : value;
+  };
+  const float low = number(text.substr(0, colon)),
+              high = colon == text.npos ? NAN : number(text.substr(colon + 1));
+  if (!(std::isfinite(low) && std::isfinite(high) && low < high))
+    throw Error(
+        fmt::format("'{}' is no range; give the values at both ends of the colour map, the lower one "
+                    "first, for example --range 1.5:4",
+                    text));
+  return {low, high};
+}
+
+}  // namespace
+
+void add_surfaces(CLI::App& command, SurfaceOptions& options) {
+  const auto each = [](CLI::Option* option) { return option->allow_extra_args(false); };  // one at a time
+  each(command.add_option(
+      "--surface", options.files,
+      "Surface of a cortex to show, too: GIFTI (.surf.gii) or FreeSurfer (lh.pial), in mm"));
+  each(command.add_option(
+           "--surface-opacity", options.opacities,
+           "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow"))
+      ->check(CLI::Range(0., 1.));
+  each(command.add_option(
+      "--overlay", options.overlays,
+      "Values or areas that colour the surfaces, in their order: GIFTI (.shape.gii, .func.gii, .label.gii), "
+      "FreeSurfer (lh.thickness, lh.curv), or text of a value a line"));
+  command.add_option("--colour-map", options.map, "Of the values: " + map_names());
+  command.add_option("--range", options.range,
+                     "Values at the ends of the colour map, LOW:HIGH; by default nearly all are within");
+}
+
+bool is_surface(const std::filesystem::path& file) { return io::may_be_surface(MappedFile(file).text()); }
+
+scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
+  scene::Surfaces surfaces;
+  if (!options.map.empty()) {
+    surfaces.map = scene::find_colour_map(options.map);
+    if (!surfaces.map)
+      throw Error(fmt::format("there is no colour map '{}'; give one of {}", options.map, map_names()));
+  }
+  if (!options.range.empty()) surfaces.range = parse_range(options.range);
+  if (options.overlays.size() > options.files.size())
+    throw Error(
+        fmt::format("{} overlays are given and {} surfaces; an overlay colours the surface in its place",
+                    options.overlays.size(), options.files.size()));
+  for (std::size_t i = 0; i < options.files.size(); ++i) {
+    const float opacity =
+        options.opacities.empty() ? 1.f : options.opacities[std::min(i, options.opacities.size() - 1)];
+    surfaces.add(io::read_surface(MappedFile(options.files[i]).text(), options.files[i].string()), opacity);
+    if (i >= options.overlays.size()) continue;
+    const std::string name = options.overlays[i].string();
+    const io::SurfaceValues read = io::read_surface_values(MappedFile(options.overlays[i]).text(), name);
+    try {
+      if (read.labels.empty()) {
+        surfaces.colour(read.values);
+        continue;
+      }
+      std::vector<scene::AreaColour> areas;
+      for (const io::SurfaceLabel& label : read.labels) {
+        if (label.alpha == 0.f) continue;
+        const auto byte = [&](int k) { return std::uint32_t(std::lround(255.f * label.colour[k])); };
+        areas.push_back({label.key, scene::light_of(byte(0) << 16 | byte(1) << 8 | byte(2))});
+      }
+      surfaces.colour(read.values, areas);
+    } catch (const Error& error) {
+      throw InputError(name, 0, error.what());
+    }
+  }
+  if (options.opacities.size() > options.files.size())
+    console.warn(fmt::format("{} of the opacities belong to no surface",
+                             options.opacities.size() - options.files.size()));
+  return surfaces;
+}
+
+}  // namespace forest::cli

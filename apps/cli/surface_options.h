@@ -1,0 +1,34 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surfaces of a cortex in a picture, as render and movie take them (docs/scene/surfaces.md).
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "forest/scene/surfaces.h"
+
+namespace CLI {
+class App;
+}
+
+namespace forest::cli {
+
+class Console;
+
+struct SurfaceOptions {
+  std::vector<std::filesystem::path> files, overlays;
+  std::vector<float> opacities;
+  std::string map, range;
+};
+
+/// --surface, --surface-opacity, --overlay, --colour-map, --range
+void add_surfaces(CLI::App& command, SurfaceOptions& options);
+
+/// Whether a file that was named as the forest is a surface of a cortex.
+bool is_surface(const std::filesystem::path& file);
+
+/// Reads all of them. Values that belong to no surface, and what cannot be read, throw Error.
+scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console);
+
+}  // namespace forest::cli

@@ -1,0 +1,94 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/freesurfer.h"
+
+#include <bit>
+#include <cstdint>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/io/surface.h"
+
+namespace forest::io {
+namespace {
+
+constexpr std::string_view surface_mark = "\xff\xff\xfe", values_mark = "\xff\xff\xff";
+
+class Words {
+ public:
+  Words(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {}
+
+  void skip(std::size_t count) { bytes_.remove_prefix(std::min(count, bytes_.size())); }
+  void skip_line() { skip(std::min(bytes_.find('\n'), bytes_.size()) + 1); }
+  /// Refuses to go on when fewer bytes are left.
+  void need(std::uint64_t count) const {
+    if (bytes_.size() < count)
+      throw InputError(name_, 0,
+                       fmt::format("is cut off: {} more bytes should follow and {} do; get the whole file",
+                                   count, bytes_.size()));
+  }
+  std::uint32_t word() {
+    need(4);
+    std::uint32_t value = 0;
+    for (std::size_t i = 0; i < 4; ++i) value = value << 8 | static_cast<unsigned char>(bytes_[i]);
+    skip(4);
+    return value;
+  }
+  float real() { return std::bit_cast<float>(word()); }
+  std::uint32_t count(const char* of) {
+    const auto value = std::int32_t(word());
+    if (value < 0)
+      throw InputError(name_, 0, fmt::format("says that it has {} {}; get the file again", value, of));
+    return std::uint32_t(value);
+  }
+
+ private:
+  std::string_view bytes_;
+  const std::string& name_;
+};
+
+}  // namespace
+
+bool is_freesurfer_surface(std::string_view bytes) { return bytes.starts_with(surface_mark); }
+bool is_freesurfer_values(std::string_view bytes) { return bytes.starts_with(values_mark); }
+
+Mesh read_freesurfer_surface(std::string_view bytes, const std::string& name) {
+  Words words(bytes, name);
+  words.skip(surface_mark.size());
+  words.skip_line(), words.skip_line();
+  const std::uint64_t vertices = words.count("vertices"), triangles = words.count("triangles");
+  words.need(12 * (vertices + triangles));
+  Mesh mesh;
+  mesh.positions.reserve(vertices), mesh.triangles.reserve(triangles);
+  for (std::uint64_t i = 0; i < vertices; ++i) {
+    Vec3 at;
+    for (float& x : at) x = words.real();
+    mesh.positions.push_back(micrometres(at, name));
+  }
+  mesh.labels.assign(vertices, 0);
+  for (std::uint64_t i = 0; i < triangles; ++i) {
+    Triangle& corners = mesh.triangles.emplace_back();
+    for (std::uint32_t& corner : corners) corner = words.word();
+  }
+  check_corners(mesh, name);
+  if (mesh.triangles.empty()) throw InputError(name, 0, "has no triangle; give a surface that is not empty");
+  return mesh;
+}
+
+std::vector<float> read_freesurfer_values(std::string_view bytes, const std::string& name) {
+  Words words(bytes, name);
+  words.skip(values_mark.size());
+  const std::uint32_t vertices = words.count("vertices");
+  words.count("triangles");
+  if (const std::uint32_t each = words.count("values a vertex"); each != 1)
+    throw InputError(name, 0,
+                     fmt::format("has {} values a vertex and one is shown; it may be a surface of the old "
+                                 "kind, which mris_convert makes anew",
+                                 each));
+  words.need(4 * std::uint64_t(vertices));
+  std::vector<float> values(vertices);
+  for (float& value : values) value = words.real();
+  return values;
+}
+
+}  // namespace forest::io

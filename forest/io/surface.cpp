@@ -1,0 +1,119 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/surface.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <optional>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/io/freesurfer.h"
+#include "forest/io/gifti.h"
+#include "forest/io/inflate.h"
+#include "forest/io/plain_text.h"
+
+namespace forest::io {
+namespace {
+
+constexpr std::size_t most_unpacked = std::size_t(1) << 30;  // bytes
+
+bool is_packed(std::string_view bytes) { return bytes.starts_with("\x1f\x8b"); }
+
+// As they are, or unpacked into `place`.
+std::string_view unpacked(std::string_view bytes, std::string& place, const std::string& name) {
+  if (!is_packed(bytes)) return bytes;
+  place = inflated(bytes, most_unpacked, name);
+  return place;
+}
+
+bool is_gifti(std::string_view bytes) { return first_element(bytes) == "GIFTI"; }
+
+std::optional<float> number(std::string_view word) {
+  std::string text(word);
+  char* end = nullptr;
+  const float value = std::strtof(text.c_str(), &end);
+  if (text.empty() || *end != 0) return {};
+  return value;
+}
+
+// One number a line; empty lines are none.
+SurfaceValues read_lines(std::string_view text, const std::string& name) {
+  SurfaceValues result;
+  for (std::size_t line = 1; !text.empty(); ++line) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view word = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
+    while (!word.empty() && blank(word.back())) word.remove_suffix(1);
+    while (!word.empty() && blank(word.front())) word.remove_prefix(1);
+    if (word.empty()) continue;
+    const auto value = number(word);
+    if (!value)
+      throw InputError(name, line,
+                       fmt::format("'{}' is no number; give a GIFTI or FreeSurfer file of values, or one "
+                                   "number a line",
+                                   printable(word)));
+    result.values.push_back(*value);
+  }
+  return result;
+}
+
+}  // namespace
+
+bool may_be_surface(std::string_view bytes) {
+  return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) || is_gifti(bytes);
+}
+
+Mesh read_surface(std::string_view bytes, const std::string& name) {
+  std::string place;
+  const std::string_view content = unpacked(bytes, place, name);
+  if (is_freesurfer_surface(content)) return read_freesurfer_surface(content, name);
+  if (is_gifti(content)) return read_gifti_surface(content, name);
+  throw InputError(name, 0,
+                   "is no surface that is known; give a GIFTI file (.surf.gii) or FreeSurfer's triangles "
+                   "(lh.pial); mris_convert makes either of many others");
+}
+
+SurfaceValues read_surface_values(std::string_view bytes, const std::string& name) {
+  std::string place;
+  const std::string_view content = unpacked(bytes, place, name);
+  SurfaceValues result;
+  if (is_freesurfer_values(content))
+    result.values = read_freesurfer_values(content, name);
+  else if (is_gifti(content))
+    result = read_gifti_values(content, name);
+  else
+    result = read_lines(content, name);
+  if (result.values.empty())
+    throw InputError(name, 0, "holds no value; give a file with one for every vertex");
+  for (float& value : result.values)
+    if (!std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
+  return result;
+}
+
+std::string printable(std::string_view word) {
+  std::string result(word.substr(0, 40));
+  for (char& c : result)
+    if (c < ' ' || c > '~') c = '?';
+  return result;
+}
+
+Vec3 micrometres(const Vec3& millimetres, const std::string& name) {
+  constexpr float farthest = 1e5f;                       // mm
+  if (!(millimetres.cwiseAbs().maxCoeff() <= farthest))  // also where one is not a number
+    throw InputError(name, 0, "has a vertex that is nowhere (not a number, or farther than 100 m); mend it");
+  return millimetres * 1000.f;
+}
+
+void check_corners(const Mesh& mesh, const std::string& name) {
+  for (std::size_t i = 0; i < mesh.triangles.size(); ++i)
+    for (const std::uint32_t corner : mesh.triangles[i])
+      if (corner >= mesh.positions.size())
+        throw InputError(name, 0,
+                         fmt::format("triangle {} names vertex {} of {}; get the whole file", i,
+                                     std::int32_t(corner), mesh.positions.size()));
+}
+
+}  // namespace forest::io

@@ -1,0 +1,328 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/surface.h"
+
+#include <bit>
+#include <cmath>
+#include <cstring>
+#include <zlib.h>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+
+#include "tests/real_data.h"
+
+namespace forest::io {
+namespace {
+
+// As programs write them, so that readers are not tested by their own.
+std::string big_endian(std::uint32_t value) {
+  return {char(value >> 24), char(value >> 16), char(value >> 8), char(value)};
+}
+std::string big_endian(float value) { return big_endian(std::bit_cast<std::uint32_t>(value)); }
+
+// A tetrahedron, in mm.
+constexpr float places[4][3] = {{0, 0, 0}, {30, 0, 0}, {0, -20.5, 0}, {0, 0, 1e-3f}};
+constexpr std::uint32_t corners[4][3] = {{0, 1, 2}, {0, 3, 1}, {0, 2, 3}, {1, 3, 2}};
+
+std::string freesurfer_surface() {
+  std::string bytes =
+      "\xff\xff\xfe"
+      "created by nobody on no day\n\n" +
+      big_endian(4u) + big_endian(4u);
+  for (const auto& place : places)
+    for (const float x : place) bytes += big_endian(x);
+  for (const auto& triangle : corners)
+    for (const std::uint32_t corner : triangle) bytes += big_endian(corner);
+  return bytes;
+}
+
+std::string freesurfer_values(std::initializer_list<float> values) {
+  std::string bytes =
+      "\xff\xff\xff" + big_endian(std::uint32_t(values.size())) + big_endian(4u) + big_endian(1u);
+  for (const float value : values) bytes += big_endian(value);
+  return bytes;
+}
+
+std::string base64(const std::string& bytes) {
+  constexpr const char* signs = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t bits = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+    for (std::size_t k = 0; k < 4; ++k)
+      text += i + k < bytes.size() + 1 ? signs[bits >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+std::string deflated(const std::string& bytes, int window = 15) {
+  std::string result(bytes.size() + 200, '\0');
+  z_stream stream{};
+  EXPECT_EQ(deflateInit2(&stream, 6, Z_DEFLATED, window, 8, Z_DEFAULT_STRATEGY), Z_OK);
+  std::string input = bytes;
+  stream.next_in = reinterpret_cast<Bytef*>(input.data()), stream.avail_in = uInt(input.size());
+  stream.next_out = reinterpret_cast<Bytef*>(result.data()), stream.avail_out = uInt(result.size());
+  EXPECT_EQ(deflate(&stream, Z_FINISH), Z_STREAM_END);
+  result.resize(stream.total_out);
+  deflateEnd(&stream);
+  return result;
+}
+std::string gzipped(const std::string& bytes) { return deflated(bytes, 15 + 16); }
+
+template <class T>
+std::string raw(const T* values, std::size_t count, bool big) {
+  std::string bytes(sizeof(T) * count, '\0');
+  std::memcpy(bytes.data(), values, bytes.size());
+  if (big)
+    for (std::size_t i = 0; i < count; ++i)
+      std::reverse(bytes.begin() + std::ptrdiff_t(i * sizeof(T)),
+                   bytes.begin() + std::ptrdiff_t((i + 1) * sizeof(T)));
+  return bytes;
+}
+
+std::string array(const std::string& intent, const std::string& type, const std::string& sizes,
+                  const std::string& encoding, const std::string& data,
+                  const std::string& more = "Endian=\"LittleEndian\"") {
+  return fmt::format(
+      "<DataArray Intent=\"NIFTI_INTENT_{}\" DataType=\"NIFTI_TYPE_{}\" {} Encoding=\"{}\" {}>\n<MetaData/>"
+      "<Data>{}</Data></DataArray>\n",
+      intent, type, sizes, encoding, more, data);
+}
+
+std::string gifti(const std::string& inside) {
+  return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n"
+         "<!DOCTYPE GIFTI SYSTEM \"http://www.nitrc.org/frs/download.php/115/gifti.dtd\">\n"
+         "<GIFTI Version=\"1.0\" NumberOfDataArrays=\"2\">\n" +
+         inside + "</GIFTI>\n";
+}
+
+const std::string point_sizes = "Dimensionality=\"2\" Dim0=\"4\" Dim1=\"3\"";
+const std::string value_sizes = "Dimensionality=\"1\" Dim0=\"4\"";
+
+std::string gifti_surface(const std::string& encoding, bool big = false) {
+  const auto coded = [&](const std::string& bytes) {
+    std::string text = base64(encoding[0] == 'G' ? deflated(bytes) : bytes);
+    text.insert(text.size() / 2, "\n  ");  // as some break their lines
+    return text;
+  };
+  const std::string more = big ? "Endian=\"BigEndian\"" : "Endian=\"LittleEndian\"";
+  return gifti(array("POINTSET", "FLOAT32", point_sizes, encoding, coded(raw(&places[0][0], 12, big)), more) +
+               array("TRIANGLE", "INT32", point_sizes, encoding, coded(raw(&corners[0][0], 12, big)), more));
+}
+
+void expect_tetrahedron(const Mesh& mesh) {
+  ASSERT_EQ(mesh.positions.size(), 4u);
+  ASSERT_EQ(mesh.triangles.size(), 4u);
+  EXPECT_EQ(mesh.labels.size(), 4u);
+  for (std::size_t i = 0; i < 4; ++i)
+    for (std::size_t k = 0; k < 3; ++k) {
+      EXPECT_FLOAT_EQ(mesh.positions[i][Eigen::Index(k)], 1000.f * places[i][k]);
+      EXPECT_EQ(mesh.triangles[i][k], corners[i][k]);
+    }
+}
+
+std::string error_of(auto&& read) {
+  try {
+    read();
+  } catch (const InputError& error) {
+    return error.what();
+  }
+  return "";
+}
+std::string surface_error(const std::string& bytes) {
+  return error_of([&] { (void)read_surface(bytes, "s"); });
+}
+std::string values_error(const std::string& bytes) {
+  return error_of([&] { (void)read_surface_values(bytes, "v"); });
+}
+
+TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {
+  expect_tetrahedron(read_surface(freesurfer_surface(), "lh.pial"));
+  expect_tetrahedron(read_surface(freesurfer_surface() + "what FreeSurfer adds", "lh.pial"));
+  expect_tetrahedron(read_surface(gzipped(freesurfer_surface()), "lh.pial.gz"));
+  for (const bool big : {false, true}) {
+    expect_tetrahedron(read_surface(gifti_surface("Base64Binary", big), "g"));
+    expect_tetrahedron(read_surface(gifti_surface("GZipBase64Binary", big), "g"));
+    expect_tetrahedron(read_surface(gzipped(gifti_surface("GZipBase64Binary", big)), "g.gz"));
+  }
+  std::string points, faces, columns;
+  for (const auto& place : places)
+    for (const float x : place) points += fmt::format(" {}\n", x);
+  for (std::size_t k = 0; k < 3; ++k)
+    for (const auto& triangle : corners) columns += fmt::format("{} ", triangle[k]);
+  expect_tetrahedron(read_surface(gifti(array("POINTSET", "FLOAT64", point_sizes, "ASCII", points) +
+                                        array("TRIANGLE", "UINT8", point_sizes, "ASCII", columns,
+                                              "ArrayIndexingOrder=\"ColumnMajorOrder\"")),
+                                  "g"));
+}
+
+TEST(Surface, ValuesAreReadFromEveryFormat) {
+  const float values[] = {1.5f, -2.f, NAN, 3e-5f};
+  const auto expect = [&](const SurfaceValues& read) {
+    ASSERT_EQ(read.values.size(), 4u);
+    EXPECT_TRUE(read.labels.empty());
+    for (std::size_t i = 0; i < 4; ++i)
+      EXPECT_TRUE(read.values[i] == values[i] || (std::isnan(read.values[i]) && i == 2)) << i;
+  };
+  expect(read_surface_values(freesurfer_values({1.5f, -2.f, NAN, 3e-5f}), "lh.curv"));
+  expect(read_surface_values(freesurfer_values({1.5f, -2.f, INFINITY, 3e-5f}), "lh.curv"));
+  expect(read_surface_values(gifti(array("SHAPE", "FLOAT32", value_sizes, "GZipBase64Binary",
+                                         base64(deflated(raw(values, 4, false))))),
+                             "g"));
+  expect(read_surface_values(gifti(array("NONE", "FLOAT32", value_sizes, "ASCII", "1.5 -2 nan 3e-5")), "g"));
+  expect(read_surface_values("1.5\n-2\r\n\nnan\n 3e-5", "t.txt"));
+  expect(read_surface_values(gzipped("1.5\n-2\nnan\n3e-5\n"), "t.txt.gz"));
+  const std::int32_t keys[] = {0, 7, 7, 2};
+  const SurfaceValues labels = read_surface_values(
+      gifti("<LabelTable><Label Key=\"0\" Red=\"1\" Green=\"1\" Blue=\"1\" Alpha=\"0\">none</Label>"
+            "<Label Key=\"7\" Red=\".5\" Green=\"0\" Blue=\"x\" Alpha=\"1\"><![CDATA[V1 & "
+            "V2]]></Label></LabelTable>" +
+            array("LABEL", "INT32", value_sizes, "Base64Binary", base64(raw(keys, 4, false)))),
+      "g");
+  EXPECT_EQ(labels.values, (std::vector<float>{0, 7, 7, 2}));
+  ASSERT_EQ(labels.labels.size(), 2u);
+  EXPECT_EQ(labels.labels[1].name, "V1 & V2");
+  EXPECT_EQ(labels.labels[1].key, 7);
+  EXPECT_EQ(labels.labels[1].colour, Vec3(.5f, 0.f, 0.f));
+  EXPECT_EQ(labels.labels[0].alpha, 0.f);
+}
+
+TEST(Surface, EveryFileThatIsCutOffIsAnErrorOrWhole) {
+  for (const std::string& whole :
+       {freesurfer_surface(), gzipped(freesurfer_surface()), gifti_surface("Base64Binary"),
+        gifti_surface("GZipBase64Binary"), gzipped(gifti_surface("GZipBase64Binary"))})
+    for (std::size_t size = 0; size + 1 < whole.size(); ++size) {
+      const std::string part = whole.substr(0, size);
+      // A gzip file without its sum, and XML without its last line end, hold everything.
+      if (surface_error(part).empty()) expect_tetrahedron(read_surface(part, "part"));
+    }
+  const std::string values = freesurfer_values({1, 2, 3});
+  for (std::size_t size = 4; size < values.size(); ++size)
+    EXPECT_NE(values_error(values.substr(0, size)), "") << size;
+}
+
+TEST(Surface, SizesThatLieCostNoMemory) {
+  std::string bytes =
+      "\xff\xff\xfe"
+      "a\n\n" +
+      big_endian(0x7fffffffu) + big_endian(0x7fffffffu);
+  EXPECT_NE(surface_error(bytes).find("cut off"), std::string::npos);
+  bytes =
+      "\xff\xff\xfe"
+      "a\n\n" +
+      big_endian(0x80000000u) + big_endian(1u);
+  EXPECT_NE(surface_error(bytes).find("-2147483648 vertices"), std::string::npos);
+  EXPECT_NE(values_error("\xff\xff\xff" + big_endian(0x7fffffffu) + big_endian(1u) + big_endian(1u)), "");
+  EXPECT_NE(values_error("\xff\xff\xff" + big_endian(1u) + big_endian(1u) + big_endian(3u)).find("3 values"),
+            std::string::npos);
+  const std::string data = base64(deflated(std::string(48, 'a')));
+  for (const auto& [sizes, what] :
+       {std::pair("Dimensionality=\"2\" Dim0=\"200000000\" Dim1=\"3\"", "268,435,456"),
+        std::pair("Dimensionality=\"2\" Dim0=\"90000000\" Dim1=\"2\"", "bytes"),
+        std::pair("Dimensionality=\"2\" Dim0=\"99999999999999999999\" Dim1=\"3\"", "Dim0"),
+        std::pair("Dimensionality=\"2\" Dim0=\"-4\" Dim1=\"3\"", "Dim0"),
+        std::pair("Dimensionality=\"2\" Dim0=\"4\"", "Dim1"), std::pair("Dimensionality=\"0\"", "dimension"),
+        std::pair("Dimensionality=\"6\" Dim0=\"4\" Dim1=\"100000\" Dim2=\"100000\" Dim3=\"1\" Dim4=\"1\" "
+                  "Dim5=\"1\"",
+                  "268")})
+    for (const char* encoding : {"GZipBase64Binary", "Base64Binary", "ASCII"}) {
+      const std::string error = values_error(gifti(array("SHAPE", "FLOAT32", sizes, encoding, data)));
+      EXPECT_NE(error, "") << sizes;
+      if (encoding[0] == 'G') {
+        EXPECT_NE(error.find(what), std::string::npos) << error;
+      }
+    }
+  // What unpacks to more than it says is not unpacked to its end.
+  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "GZipBase64Binary",
+                                     base64(deflated(std::string(1 << 20, 'a'))))))
+                .find("more than it says"),
+            std::string::npos);
+}
+
+TEST(Surface, WhatCannotBeIsRefusedWithOneSentence) {
+  std::string bytes = freesurfer_surface();
+  bytes.replace(bytes.size() - 4, 4, big_endian(4u));
+  EXPECT_EQ(surface_error(bytes), "s: triangle 3 names vertex 4 of 4; get the whole file");
+  bytes.replace(bytes.size() - 4, 4, big_endian(0xffffffffu));
+  EXPECT_NE(surface_error(bytes), "");
+  for (const float wrong : {NAN, INFINITY, -2e8f}) {
+    bytes = freesurfer_surface();
+    bytes.replace(3 + 28 + 8 + 1, 4, big_endian(wrong));
+    EXPECT_NE(surface_error(bytes), "") << wrong;
+  }
+  EXPECT_NE(surface_error("\xff\xff\xfe"
+                          "a\n\n" +
+                          big_endian(0u) + big_endian(0u)),
+            "");
+  const std::string points = array("POINTSET", "FLOAT32", point_sizes, "ASCII", "0 0 0 1 0 0 0 1 0 0 0 1");
+  for (const char* triangles :
+       {"0 1 2 0 1 3 0 2 3 1 2 4", "0 1 2 0 1 3 0 2 3 1 2 -1", "0 1 2 0 1 3 0 2 3 1 2 nan",
+        "0 1 2 0 1 3 0 2 3 1 2 1e30", "0 1 2 0 1 3 0 2 3 1 2", "0 1 2 0 1 3 0 2 3 1 2 3 3",
+        "0 1 2 0 1 3 0 2 3 1 2 x", ""})
+    EXPECT_NE(surface_error(gifti(points + array("TRIANGLE", "INT32", point_sizes, "ASCII", triangles))), "")
+        << triangles;
+  EXPECT_NE(surface_error(gifti(points)).find("TRIANGLE"), std::string::npos);
+  EXPECT_NE(surface_error(gifti("")).find("POINTSET"), std::string::npos);
+  EXPECT_NE(values_error(gifti(points)).find("no values"), std::string::npos);
+  EXPECT_NE(surface_error(gifti(array("POINTSET", "COMPLEX64", point_sizes, "ASCII", "0"))).find("COMPLEX64"),
+            std::string::npos);
+  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "ExternalFileBinary", "")))
+                .find("another file"),
+            std::string::npos);
+  EXPECT_NE(
+      values_error(gifti(array("SHAPE", "FLOAT32", value_sizes, "Base64Binary", "????"))).find("base64"),
+      std::string::npos);
+  EXPECT_NE(values_error(gifti(array("SHAPE", "FLOAT32", point_sizes, "ASCII", "0 0 0 1 0 0 0 1 0 0 0 1")))
+                .find("3 values"),
+            std::string::npos);
+  EXPECT_NE(surface_error("<GIFTI><DataArray>").find("XML"), std::string::npos);
+  for (const char* other : {"", "1 2 3", "# vtk DataFile", "\x1f\x8bnothing", "\xff\xff\xfd"})
+    EXPECT_NE(surface_error(other), "") << other;
+  for (const char* other : {"", "a\n", "1 2\n"}) EXPECT_NE(values_error(other), "") << other;
+  EXPECT_EQ(values_error("1\ntwo\x1b[2J\n").find('\x1b'), std::string::npos);
+  // Elements within one another cost no stack.
+  std::string deep = "<GIFTI>";
+  for (int i = 0; i < 200'000; ++i) deep += "<a>";
+  EXPECT_NE(surface_error(deep), "");
+}
+
+TEST(Surface, RealFilesAreWhatTheirAtlasesSay) {
+  FOREST_REAL_DATA(folder, "cortex");
+  const auto read = [&](const char* file) { return MappedFile(folder / file); };
+  const MappedFile pial_file = read("fsaverage5/pial_left.gii.gz"),
+                   white_file = read("fsaverage5/white_left.gii.gz");
+  const Mesh pial = read_surface(pial_file.text(), "pial"), white = read_surface(white_file.text(), "white");
+  EXPECT_EQ(pial.positions.size(), 10242u);
+  EXPECT_EQ(pial.triangles.size(), 20480u);
+  EXPECT_TRUE(is_closed(pial));
+  EXPECT_EQ(count_pieces(pial), 1u);
+  EXPECT_EQ(pial.triangles, white.triangles);
+  // An average hemisphere: some 500 cm³ within the pia, more than within the white surface; µm³.
+  EXPECT_GT(volume(pial) / 1e12, 400.);
+  EXPECT_LT(volume(pial) / 1e12, 650.);
+  EXPECT_LT(volume(white), volume(pial));
+  const SurfaceValues thickness =
+      read_surface_values(read("fsaverage5/thick_left.gii.gz").text(), "thickness");
+  ASSERT_EQ(thickness.values.size(), 10242u);
+  double sum = 0.;
+  for (std::size_t i = 0; i < 10242; ++i)
+    sum += double((pial.positions[i] - white.positions[i]).norm()) / 1000. - double(thickness.values[i]);
+  EXPECT_NEAR(sum / 10242., 0., .5);  // mm
+  for (const char* file :
+       {"fs_LR_left/fs_LR.32k.L.pial.surf.gii", "bigbrain_left/tpl-bigbrain_hemi-L_desc-pial.surf.gii.gz",
+        "fsaverage5/flat_left.gii.gz"}) {
+    const MappedFile one = read(file);
+    EXPECT_GT(read_surface(one.text(), file).triangles.size(), 18000u) << file;
+  }
+  EXPECT_EQ(
+      read_surface_values(read("bigbrain_left/tpl-bigbrain_hemi-L_desc-layer1_thickness.txt.gz").text(), "t")
+          .values.size(),
+      163842u);
+}
+
+}  // namespace
+}  // namespace forest::io

@@ -1,0 +1,83 @@
+// SPDX-License-Identifier: Apache-2.0
+// Surfaces beside the neurons of a picture: those of a cortex, plain or coloured by the values on them. What lies deep in a
+// sulcus gets less light, so that gyri and sulci are told apart from any side and whatever the colour.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <span>
+#include <utility>
+#include <vector>
+
+#include "forest/core/bounds.h"
+#include "forest/frame/frame.h"
+#include "forest/geometry/mesh.h"
+#include "forest/scene/colour_map.h"
+
+namespace forest::scene {
+
+struct Colouring;
+
+/// From where a brain is looked at. Its axes run to the right, to the front and upwards.
+enum class Side : std::uint8_t { left, right, front, back, above, below };
+
+/// An area of a parcellation.
+struct AreaColour {
+  std::int32_t key = 0;
+  Vec3 colour = Vec3::Constant(.7f);  // linear light
+};
+
+/// How deep below its smoothed surface every vertex lies, in units of the smoothing: negative on gyri, positive in sulci, 0
+/// on what is flat. The smoothing is a diffusion over the mesh as wide as `width` (µm), as FreeSurfer's sulcal depth is a
+/// movement during one (Fischl, Sereno & Dale 1999, NeuroImage 9:195).
+std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width);
+
+/// Of arrays that a frame::Surface is made of: a number that none had before.
+std::uint64_t next_version();
+
+class Surfaces {
+ public:
+  /// @param opacity  0–1
+  void add(Mesh mesh, float opacity = 1.f);
+  /// Colours the last one by a value a vertex, NaN for none. Throws Error when there are not as many.
+  void colour(std::span<const float> values);
+  /// The same by areas; values that are no key of one are none.
+  void colour(std::span<const float> keys, std::span<const AreaColour> areas);
+
+  bool empty() const { return list_.empty(); }
+  const Bounds& bounds() const { return bounds_; }
+  std::size_t triangles() const;
+  /// The view from a side in which all of it is as large as fits.
+  /// @param aspect  width of the picture over its height
+  frame::Camera camera(Side side, float aspect) const;
+  /// The side from which a hemisphere shows most: its own; above when both are there.
+  Side outside() const;
+
+  const ColourMap* map = &colour_maps().front();
+  /// Values at the ends of the map; none: all but the lowest and highest two hundredths.
+  std::optional<std::pair<float, float>> range;
+  std::pair<float, float> shown_range() const;
+
+  /// Adds them to a frame, in palette entries that the neurons do not use. The frame must not outlive this object, or a
+  /// change of it.
+  /// @param playing  activity takes entries, too
+  void show(frame::Frame& frame, const Colouring& colouring, bool playing);
+
+ private:
+  struct One {
+    Mesh mesh;
+    std::vector<Vec3> normals;
+    std::vector<std::uint8_t> openness, entries;
+    std::vector<float> values;         // empty: plain
+    std::vector<std::uint16_t> areas;  // 1 + index of the colour, 0 for none; empty: none
+    float opacity = 1.f;
+    std::uint64_t version = 0;
+  };
+
+  std::vector<One> list_;
+  std::vector<Vec3> area_colours_;
+  std::vector<frame::Surface> shown_;
+  Bounds bounds_;
+};
+
+}  // namespace forest::scene
