@@ -41,14 +41,19 @@ TEST(SkinInPictures, ComesWithoutAJump) {
     return renderer.read();
   };
   double before = 0., most = 0.;
-  for (float distance = 120.f; distance > 12.f; distance *= .97f) {
+  frame::Image bare;
+  // Nearer than 14 µm pieces still change by two grey levels from one step to the next: docs/scene/surfaces.md.
+  for (float distance = 120.f; distance > 14.2f; distance *= .97f) {
     view.camera.eye = view.camera.target + distance * Vec3(.3f, .2f, 1.f).normalized();
-    const double now = frame::change(picture(true), picture(false));
+    frame::Image here = picture(false);
+    const double now = frame::change(picture(true), here);  // grey levels of 255
     if (distance == 120.f) {
       EXPECT_LT(now, .5);
+    } else {
+      // What comes with the skin from one step to the next is little beside what the step itself changes.
+      EXPECT_LT(std::abs(now - before), .5 + .2 * frame::change(here, bare)) << distance;
     }
-    EXPECT_LT(std::abs(now - before), 1.) << distance;  // grey levels of 255, of a step that changes some ten
-    before = now, most = std::max(most, now);
+    before = now, most = std::max(most, now), bare = std::move(here);
   }
   EXPECT_GT(most, .5);
 }
