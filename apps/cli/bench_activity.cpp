@@ -15,7 +15,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <sys/mman.h>
-#include <sys/resource.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -167,8 +166,7 @@ void run(const Options& options, Console& console) {
                   console.progress());
   });
 
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);  // from here on the file's own pages would count
+  const std::uint64_t peak = peak_bytes();  // from here on the file's own pages would count
   Random random(options.seed, 0, 21);
   const auto any_step = [&] { return random.below(options.steps); };
   std::vector<Code> codes(width);
@@ -239,7 +237,7 @@ void run(const Options& options, Console& console) {
                  {"error", error},
                  {"stated_error", activity.facts().range.error()},
                  {"units", activity.facts().units},
-                 {"packing_peak_bytes", std::uint64_t(usage.ru_maxrss) * 1024}});
+                 {"packing_peak_bytes", peak}});
   console.say(fmt::format(
       "Made up: {} neurons, {} values a step, {} steps; {:.1f} MB, {:.2f} bytes a value, packed in {:.1f} s",
       options.neurons, width, options.steps, double(activity.bytes()) / 1e6, double(activity.bytes()) / total,
@@ -254,7 +252,7 @@ void run(const Options& options, Console& console) {
                   "took {:.0f} MB of memory; "
                   "{:.1f} % of the file was still in memory when it should not",
                   double(played) / playing, raster, error, activity.facts().units,
-                  activity.facts().range.error(), double(usage.ru_maxrss) / 1e3, 100. * still_cached));
+                  activity.facts().range.error(), double(peak) / 1e6, 100. * still_cached));
 }
 
 }  // namespace

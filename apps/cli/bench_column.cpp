@@ -10,7 +10,6 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/resource.h>
 
 #include "forest/core/error.h"
 #include "forest/reports/synthetic.h"
@@ -30,7 +29,7 @@ struct Options {
   std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
-  double budget = 31.;  // milliseconds a picture
+  double budget = 30.;  // milliseconds a picture
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;
@@ -155,9 +154,7 @@ void run(const Options& options, Console& console) {
   const scene::CameraPath path = scene::walk(forest);
   const Part inside = measure(
       artist, options, [&](float t) { return path.at(.5f + .5f * t); }, console);
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
-  const std::uint64_t peak = std::uint64_t(usage.ru_maxrss) * 1024;
+  const std::uint64_t peak = peak_bytes();
 
   const auto json_of = [&](const Part& p) {
     nlohmann::ordered_json of{{"frames_per_second", p.per_second()},

@@ -19,7 +19,6 @@
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
-#include <sys/resource.h>
 #include <sys/wait.h>
 
 #include "forest/core/error.h"
@@ -253,12 +252,10 @@ void draw_ours(const Options& options) {
       io::write_png(options.draw / fmt::format("ours-{}.png", i), width, height, drawn.image.pixels);
     }
   }
-  rusage usage{};
-  ::getrusage(RUSAGE_SELF, &usage);
   fmt::print("{}\n", Json{{"frame_seconds", frames},
                           {"core_seconds", cores},
                           {"first_picture_seconds", first},
-                          {"peak_bytes", std::uint64_t(usage.ru_maxrss) * 1024},
+                          {"peak_bytes", peak_bytes()},
                           {"renderer", artist.renderer()}}
                          .dump());
 }

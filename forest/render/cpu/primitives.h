@@ -284,6 +284,18 @@ template <int S>
       Hits<lanes> hits;
       const bool single = S == 1 || (px[lanes - 1] >= inner_left && px[0] <= inner_right);
       if (single) meet<lanes>(c, picture.light, body, px, py, hits);
+      if constexpr (S == 1) {
+        std::uint32_t row[lanes];
+        FOREST_LANES
+        for (int k = 0; k < lanes; ++k) {
+          const bool wanted = (hits.hit[k] != 0) & (x + k >= low) & (x + k < high);
+          const std::uint32_t key =
+              key_of(hits.code[k], payload_of(entry, hits.shade[k], noise_at(x + k, y, subframe)));
+          row[k] = wanted ? key : FOREST_KEY_EMPTY;
+        }
+        window.put_row(x, y, row);
+        continue;
+      }
       for (std::int32_t n = std::max(low - x, 0); n < std::min(lanes, high - x); ++n) {
         const float noise = noise_at(x + n, y, subframe);
         Keys<S> keys;

@@ -45,6 +45,13 @@ class Window {
     FOREST_LANES
     for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
   }
+  /// Of single samples, the FOREST_TILE pixels from `x`, a multiple of as many, on.
+  [[gnu::always_inline]] void put_row(std::int32_t x, std::int32_t y,
+                                      const std::uint32_t (&keys)[FOREST_TILE]) {
+    std::uint32_t* pixel = canvas_.at(x, y);
+    FOREST_LANES
+    for (int k = 0; k < int(FOREST_TILE); ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
+  }
   /// The first of a pixel's keys.
   [[gnu::always_inline]] std::uint32_t seen(std::int32_t x, std::int32_t y) const {
     return *canvas_.at(x, y);
@@ -99,6 +106,10 @@ class Door {
       seen[k] = shows ? keys[k] : FOREST_KEY_EMPTY;
     }
     window_.put(x, y, seen);
+  }
+  void put_row(std::int32_t x, std::int32_t y, const std::uint32_t (&keys)[FOREST_TILE]) {
+    for (std::int32_t k = 0; k < std::int32_t(FOREST_TILE); ++k)
+      if (keys[k] != FOREST_KEY_EMPTY) put(x + k, y, {keys[k]});
   }
   std::uint32_t seen(std::int32_t x, std::int32_t y) const { return window_.seen(x, y); }
   bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const { return window_.before(x, y, key); }
