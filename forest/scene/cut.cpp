@@ -8,6 +8,7 @@
 #include <numeric>
 
 #include "forest/core/parallel.h"
+#include "forest/scene/placed.h"
 
 namespace forest::scene {
 namespace {
@@ -16,15 +17,6 @@ constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is d
 constexpr float group_limit =
     12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
 constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
-
-struct Placed {
-  Vec3 position;
-  Mat3 turn;
-  explicit Placed(const frame::Instance& i)
-      : position(i.x, i.y, i.z), turn(Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix()) {}
-  Sphere operator()(const Sphere& s) const { return {position + turn * s.centre, s.radius}; }
-  Sphere operator()(const Cluster& c) const { return (*this)(Sphere{{c.x, c.y, c.z}, c.radius}); }
-};
 
 frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t drawn, const Sphere& sphere) {
   return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};

@@ -10,6 +10,7 @@
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/scene/placed.h"
 #include "forest/scene/surfaces.h"
 
 namespace forest::scene {
@@ -32,14 +33,6 @@ float smooth_step(float from, float to, float x) {
   const float t = std::clamp((x - from) / (to - from), 0.f, 1.f);
   return t * t * (3.f - 2.f * t);
 }
-
-struct Place {
-  Vec3 at;
-  Mat3 turn;
-  explicit Place(const frame::Instance& i)
-      : at(i.x, i.y, i.z), turn(Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix()) {}
-  Sphere operator()(const Sphere& s) const { return {at + turn * s.centre, s.radius}; }
-};
 
 Sphere around(const BranchCone& c) {
   return {.5f * (c.shape.a + c.shape.b),
@@ -339,7 +332,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     const std::uint32_t first = item.first_segment - neuron.first_segment;
     if (first >= neuron.original_count) continue;
     const Shape& of = shape(which);
-    const Place place(instances[item.instance]);
+    const Placed place(instances[item.instance]);
     std::optional<std::size_t> at;
     for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
       const std::uint32_t segment = first + std::uint32_t(std::countr_zero(drawn));
@@ -371,7 +364,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   std::vector<Stretch> parts;
   for (const Near& near : list) {
     const Shape& of = shape(instances[near.instance].morphology);
-    const Place place(instances[near.instance]);
+    const Placed place(instances[near.instance]);
     for (const std::uint32_t segment : near.segments) {
       const BranchCone& whole = of.cones[segment];
       const RoundCone& c = whole.shape;
@@ -409,7 +402,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   for (std::size_t n = 0; n < list.size(); ++n) {
     const std::uint32_t which = instances[list[n].instance].morphology;
     const Shape& of = shape(which);
-    const Place place(instances[list[n].instance]);
+    const Placed place(instances[list[n].instance]);
     const auto look = [&](auto&& self, int level, const PieceLattice::Cell& cell,
                           std::span<const std::uint32_t> segments) -> void {
       const PieceLattice grid{of.origin, voxel_of(level)};
@@ -509,7 +502,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   parallel_for(used.size(), 1, [&](std::size_t k) {
     const auto& [one, made] = used[k];
     const Near& near = list[one->near];
-    const Place place(instances[near.instance]);
+    const Placed place(instances[near.instance]);
     const frame::State whole = state_of(near.instance);
     const Shape& of = *shapes_.at(std::get<0>(one->key));
     const std::size_t count = made->segment.size();
@@ -526,7 +519,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         entry = runs.entries->capsules[run * frame::cluster_size + segment % frame::cluster_size];
       }
       const float magnification =
-          eye.magnification({place.at + place.turn * made->piece.mesh.positions[v], 0.f});
+          eye.magnification({place.position + place.turn * made->piece.mesh.positions[v], 0.f});
       const float share = share_of(state.kind) * coarser * (branch ? 1.f : 2.f);
       float presence = share > 0.f && state.is(frame::State::visible)
                            ? smooth_step(skin_begins * share, skin_complete * share,
