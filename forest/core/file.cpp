@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/file.h"
 
+#include <algorithm>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -31,6 +32,12 @@ bool write_all(int file, std::span<const std::byte> bytes) {
   }
   return true;
 }
+
+/// What was written sets out for the disk now, so that fsync waits for little. It may fail: nothing depends on it.
+void send(int file, std::uint64_t at, std::uint64_t count) {
+  ::sync_file_range(file, off64_t(at), off64_t(count), SYNC_FILE_RANGE_WRITE);
+}
+constexpr std::uint64_t piece = 1 << 20;  // sent at a time
 
 constexpr std::string_view open_files = "/proc/self/fd/";
 
@@ -150,9 +157,14 @@ const std::filesystem::path& NewFile::path() {
 
 void NewFile::write(std::span<const std::byte> bytes) {
   if (!write_all(file_, bytes)) fail("written");
+  // Piece by piece, as they fill up.
+  const auto end = std::uint64_t(std::max<off_t>(0, ::lseek(file_, 0, SEEK_CUR)));
+  const std::uint64_t begin = end - std::min<std::uint64_t>(end, bytes.size()), full = end / piece * piece;
+  if (!stream_ && full > begin) send(file_, begin / piece * piece, full - begin / piece * piece);
 }
 
 void NewFile::overwrite(std::uint64_t at, std::span<const std::byte> bytes) {
+  const std::uint64_t begin = at, count = bytes.size();
   while (!bytes.empty()) {
     const ssize_t wrote = ::pwrite(file_, bytes.data(), bytes.size(), off_t(at));
     if (wrote < 0 && errno == EINTR) continue;
@@ -160,6 +172,7 @@ void NewFile::overwrite(std::uint64_t at, std::span<const std::byte> bytes) {
     bytes = bytes.subspan(std::size_t(wrote));
     at += std::uint64_t(wrote);
   }
+  if (!stream_ && count >= piece) send(file_, begin, count);
 }
 
 void NewFile::commit() {

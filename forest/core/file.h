@@ -42,7 +42,7 @@ class NewFile {
   const std::filesystem::path& path();  // where to write until then, for libraries that ask for a name
   /// Appends. Throws Error when the disk is full.
   void write(std::span<const std::byte> bytes);
-  /// Writes over what is there already; the next write() still appends.
+  /// Writes over what is there, or beyond, by any thread; the next write() still goes behind the last.
   void overwrite(std::uint64_t at, std::span<const std::byte> bytes);
   void commit();
 

@@ -115,6 +115,20 @@ TEST_F(FileInAFolder, UntilItIsThereNothingIsToBeSeen) {
   }
 }
 
+TEST_F(FileInAFolder, WhatIsWrittenBeyondTheEndStaysThere) {
+  const auto place = folder_ / "pieces";
+  const std::string large(3 << 20, 'x');
+  const auto bytes_of = [](std::string_view text) { return std::as_bytes(std::span(text)); };
+  NewFile file(place);
+  file.write(bytes_of(large));
+  file.overwrite(large.size() + 5, bytes_of(large));
+  file.overwrite(large.size() + 2, bytes_of("yy"));
+  file.write(bytes_of("z"));
+  file.commit();
+  const std::string whole = large + "z" + std::string(1, '\0') + "yy" + std::string(1, '\0') + large;
+  EXPECT_TRUE(MappedFile(place).text() == whole);
+}
+
 TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
   const auto place = folder_ / "film";
   {

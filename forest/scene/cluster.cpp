@@ -203,13 +203,17 @@ class Sketch {
           continue;
         }
       }
-      for (; i < end; ++i) {  // one point to four segments
-        std::uint32_t lane = 0;
-        float nearest = groups[near / 4].squared_distance(points[i]).minCoeff(&lane);
-        near = near / 4 * 4 + lane;
-        for (std::uint32_t g = 0; g < group_count && nearest > worst_squared; ++g)
-          if (const float squared = groups[g].squared_distance(points[i]).minCoeff(&lane); squared < nearest)
-            nearest = squared, near = 4 * g + lane;
+      for (; i < end; ++i) {  // one point to four segments; they follow one another as the points do
+        std::uint32_t at = near / 4;
+        Four squared = groups[at].squared_distance(points[i]);
+        float nearest = squared.minCoeff();
+        for (std::uint32_t asked = 1, g = at; asked < group_count && nearest > worst_squared; ++asked) {
+          g = g + 1 < group_count ? g + 1 : 0;
+          const Four other = groups[g].squared_distance(points[i]);
+          if (const float least = other.minCoeff(); least < nearest) nearest = least, squared = other, at = g;
+        }
+        near = 4 * at;
+        while (near % 4 < 3 && squared[near % 4] != nearest) ++near;
         worst_squared = std::max(worst_squared, nearest);
       }
     }

@@ -72,9 +72,17 @@ class Output {
     if (file_) return file_->write(bytes);
     memory_.insert(memory_.end(), bytes.begin(), bytes.end());
   }
-  void overwrite(Bytes bytes) {  // from the beginning on
-    if (file_) return file_->overwrite(0, bytes);
-    std::ranges::copy(bytes, memory_.begin());
+  /// Makes room for what put() brings; zeros where it brings nothing.
+  void extend(std::uint64_t size) {
+    if (!file_)
+      memory_.resize(std::size_t(size));
+    else if (size > size_)
+      file_->overwrite(size - 1, std::array<std::byte, 1>{});
+    size_ = size;
+  }
+  void put(std::uint64_t at, Bytes bytes) {  // by any thread, into what is there
+    if (file_) return file_->overwrite(at, bytes);
+    std::ranges::copy(bytes, memory_.begin() + std::ptrdiff_t(at));
   }
   std::vector<std::byte> memory() { return std::move(memory_); }
 
@@ -95,17 +103,21 @@ class Waiting {
     scratch_->write(memory_);
     memory_.clear();
   }
-  /// Calls body(bytes) for all of it, piece by piece, and forgets it.
+  std::uint64_t size() const { return size_; }
+  /// Calls body(at, bytes) for all of it, piece by piece and on all cores, and forgets it.
   template <class Body>
   void pour(Body&& body) {
     const std::uint64_t on_disk = size_ - memory_.size();
-    std::vector<std::byte> buffer(std::size_t(std::min<std::uint64_t>(on_disk, piece)));
-    for (std::uint64_t at = 0; at < on_disk; at += buffer.size()) {
-      buffer.resize(std::size_t(std::min<std::uint64_t>(buffer.size(), on_disk - at)));
-      scratch_->read(at, buffer);
-      body(Bytes(buffer));
-    }
-    body(Bytes(memory_));
+    parallel_ranges(std::size_t((on_disk + piece - 1) / piece), 1, [&](std::size_t begin, std::size_t end) {
+      std::vector<std::byte> buffer;
+      for (std::uint64_t at = begin * piece; at < std::min<std::uint64_t>(end * piece, on_disk);
+           at += piece) {
+        buffer.resize(std::size_t(std::min<std::uint64_t>(piece, on_disk - at)));
+        scratch_->read(at, buffer);
+        body(at, Bytes(buffer));
+      }
+    });
+    body(on_disk, Bytes(memory_));
     scratch_.reset();
     memory_ = {};
   }
@@ -117,12 +129,14 @@ class Waiting {
   std::uint64_t size_ = 0;
 };
 
+constexpr std::uint64_t aligned(std::uint64_t size) { return (size + alignment - 1) / alignment * alignment; }
+
 class Packer {
  public:
   explicit Packer(Output& out) : out_(out) {
-    const std::array<std::byte, sizeof(Header)> later{};
+    const std::array<std::byte, aligned(sizeof(Header))> later{};
     out_.write(later);
-    begin(Part::segments);
+    offsets_[Part::segments] = out_.size();
   }
 
   void add(Made made) {
@@ -166,23 +180,19 @@ class Packer {
     add(Part::text, description);
     for (std::uint32_t p = 0; p < part_count; ++p) {
       if (p != Part::segments) {
-        begin(Part(p));
-        waiting_[p].pour([&](Bytes bytes) { out_.write(bytes); });
+        const std::uint64_t offset = offsets_[p] = aligned(out_.size());
+        out_.extend(offset + waiting_[p].size());
+        waiting_[p].pour([&](std::uint64_t at, Bytes bytes) { out_.put(offset + at, bytes); });
       }
       header_.table[p] = {p, element_sizes[p], offsets_[p], counts_[p], hashes_[p].value()};
     }
     header_.file_size = figures.bytes = out_.size();
     header_.table_hash = hash64(std::as_bytes(std::span(header_.table)), header_.file_size);
-    out_.overwrite(std::as_bytes(std::span(&header_, 1)));
+    out_.put(0, std::as_bytes(std::span(&header_, 1)));
     return figures;
   }
 
  private:
-  void begin(Part part) {
-    constexpr std::array<std::byte, alignment> zeros{};
-    out_.write(Bytes(zeros).first((alignment - out_.size() % alignment) % alignment));
-    offsets_[part] = out_.size();
-  }
   std::uint32_t next(Part part) const { return std::uint32_t(counts_[part]); }
   template <class T>
   void add(Part part, const T& one) {

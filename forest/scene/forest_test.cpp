@@ -88,6 +88,11 @@ TEST_F(PackedFile, IsThatOfMemoryByteForByteAtAnyNumberOfThreads) {
   }
 }
 
+TEST_F(PackedFile, MayHoldNothing) {
+  EXPECT_EQ(pack(circuit::Circuit{}, one_of_many, file_).bytes, std::filesystem::file_size(file_));
+  EXPECT_EQ(Forest::open(file_).segment_total(), 0u);
+}
+
 TEST_F(PackedFile, NeuronsAreAskedForOnceEachAndNoneLongBeforeItsTurn) {
   constexpr std::size_t count = 2000;
   std::vector<std::atomic<int>> asked(count);
