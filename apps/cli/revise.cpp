@@ -133,7 +133,8 @@ std::string text_of(const Value& value) {
 /// "'axon'" or "nothing".
 std::string quoted(const std::string& text) { return text.empty() ? "nothing" : shown(text); }
 
-/// Whether the cell is as it was written, though another program has saved it since: some keep 15 digits of a number.
+/// Whether the cell is as it was written, though another program has saved it since: some keep 15 digits of a number. What is
+/// derived was once written with more digits than those of a picometre.
 bool same(const Value& stored, const ReadCell& cell, bool entry) {
   if (const auto* text = std::get_if<std::string>(&stored)) {
     if (cell.kind == Kind::error || cell.kind == Kind::formula) return false;
@@ -146,7 +147,7 @@ bool same(const Value& stored, const ReadCell& cell, bool entry) {
   const auto is = number_in(cell);
   if (!is) return false;
   return entry ? float(*is) == float(was)
-               : std::abs(*is - was) <= 1e-12 * std::max(std::abs(*is), std::abs(was));
+               : std::abs(*is - was) <= 1e-6 + 1e-12 * std::max(std::abs(*is), std::abs(was));
 }
 
 /// What is wrong with a number of a person, or "".

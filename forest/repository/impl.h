@@ -34,6 +34,8 @@ inline std::size_t room(std::size_t count) { return count + 2; }
 inline int number_of(NeuronId id) { return int(id.value()); }
 
 std::string hash_of(std::string_view text);
+/// In the order of a run, so that the index of fingerprints grows at its end and not all over.
+std::string grown_fingerprint(const Grown& grown, std::uint64_t checksum);
 void check_name(std::string_view what, std::string_view name);  // throws Error when it is none
 
 // What a column of text, or of whole numbers, answered.
@@ -65,6 +67,7 @@ struct Repository::Impl {
   static void refill(Database& database, int from);
   void refill_shapes();
   void refill_grammars();
+  void refill_fingerprints();
 
   /// Calls `body`; errors of the database become sentences.
   template <class Body>

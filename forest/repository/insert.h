@@ -31,6 +31,7 @@ struct InsertColumn {
       values;
   bool bytes = false;                                 // a text that is no text; null when empty
   std::function<bool(std::size_t row)> is_null = {};  // of no row when empty
+  bool whole = false;                                 // whole numbers as reals: rounded
 };
 
 /// The prepared statement of one database.
@@ -48,6 +49,10 @@ class Insert {
   template <class T>
   Insert& with(const char* column, const T& values, std::function<bool(std::size_t)> is_null = {}) {
     columns_.push_back({column, &values, false, std::move(is_null)});
+    return *this;
+  }
+  Insert& with_whole(const char* column, const Reals& values) {
+    columns_.push_back({column, &values, false, {}, true});
     return *this;
   }
   Insert& with_bytes(const char* column, const std::string& bytes) {

@@ -157,22 +157,28 @@ const std::string grammar_text = "axiom: A\nA -> \\(90) F(1) A\n";
 
 /// What makes the tables those of an older version, in either database.
 std::string as_version(int version) {
-  if (version == 5) return "";  // whose points are not packed
-  std::string sql =
+  std::string sql = "drop view section; drop view junction; update neurons set fingerprint = 'older' || id; ";
+  for (const char* column : {"length", "area", "start_diameter", "end_diameter", "end_x", "end_y", "end_z"})
+    sql += fmt::format(
+        "alter table sections rename column {0}_{1} to {0}; update sections set {0} = {0} / 1e6; ", column,
+        column == std::string_view("area") ? "nm2" : "pm");
+  const char* views = "create view section as select 1 as one; create view junction as select 1 as one; ";
+  if (version >= 5) return sql + views;  // points are not packed in either
+  sql +=
       "drop view metric; alter table neuron_metrics rename to later_metrics; "
       "create table neuron_metrics (metric integer not null, neuron integer not null, value double precision "
       "not null, primary key (metric, value, neuron)); "
       "create unique index metrics_of_neuron on neuron_metrics (neuron, metric); "
       "insert into neuron_metrics select metric, neuron, value from later_metrics; drop table later_metrics; "
       "create view metric as select 1 as one; ";
-  if (version == 4) return sql;
+  if (version == 4) return sql + views;
   sql +=
       "drop view model; drop view distribution; drop index distributions_by_name; "
       "drop table model_distributions; drop table models; "
       "update grammars set text = 'axiom: A\\x0AA -> \\\\(90) F(1) A\\x0A'; ";
-  if (version == 3) return sql;
+  if (version == 3) return sql + views;
   sql +=
-      "drop view section; drop view junction; alter table sections rename to later; "
+      "alter table sections rename to later; "
       "create table sections (neuron integer not null, number integer not null, parent integer, arbor "
       "integer not null, "
       "branch_order integer not null, length double precision not null, kind integer not null, tag integer "
@@ -186,8 +192,7 @@ std::string as_version(int version) {
       "cast(sum(points) over (partition by id >> 24 order by id) - points as integer), points, daughters, "
       "area from later; "
       "drop table later; ";
-  if (version == 2)
-    return sql + "create view section as select 1 as one; create view junction as select 1 as one; ";
+  if (version == 2) return sql + views;
   return sql +
          "drop view neuron; drop view metric; drop table neuron_metrics; drop table metrics; drop table "
          "distributions; "
@@ -211,7 +216,7 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
   const std::string script = (folder_ / "older.sql").string();
   Random random(3);
   std::size_t unfinished = 0;
-  for (const int version : {1, 2, 3, 4, 5}) {
+  for (const int version : {1, 2, 3, 4, 5, 6}) {
     std::string old_bytes, old_name;
     const std::string sql = as_version(version);
     if (is_file()) {
@@ -252,6 +257,8 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
               0);
     EXPECT_EQ(repository.query("select text from model where name = 'bush' and version = 1").rows[0][0],
               Answer::Value(grammar_text));
+    EXPECT_EQ(count("select count(*) from neurons where fingerprint like 'older%'"), 0);
+    EXPECT_THAT(Repository::open(place_, Access::read).check(), testing::IsEmpty());
     const auto lengths = repository.query("select sum(length) from section where neuron = 9").rows[0][0];
     EXPECT_NEAR(std::get<double>(lengths), rows[8].length, 1e-6 * rows[8].length);
     EXPECT_EQ(Repository::open(place_, Access::write).add_distribution("ratio", "default", "text"), 1);

@@ -5,6 +5,7 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 
 #include "forest/core/error.h"
 
@@ -55,36 +56,71 @@ std::size_t decimals(std::span<const Point> points) {
   return places;
 }
 
+using Steps = std::array<std::int64_t, 4>;
+
+Steps steps_of(const Point& p, bool decimal, double scale) {
+  Steps steps;
+  const std::array<float, 4> values = numbers(p);
+  for (std::size_t k = 0; k < 4; ++k)
+    steps[k] = decimal ? std::int64_t(std::round(double(values[k]) * scale)) : order_of(values[k]);
+  return steps;
+}
+
+/// Walks over the runs as their points come.
+class Walk {
+ public:
+  explicit Walk(const Runs& runs) : runs_(runs), ends_(runs.counts.size()) {}
+
+  /// Of the next point, which is number `at`: from which point it is the difference, or none: from the one before.
+  std::optional<std::size_t> from(std::size_t at) {
+    std::optional<std::size_t> from;
+    for (; run_ < ends_.size() && at == end_; ++run_) {  // some may have no point
+      const std::int32_t parent = runs_.parents[run_], count = runs_.counts[run_];
+      if (count < 0 || parent >= std::int32_t(run_)) throw Error("its sections are damaged");
+      from = parent >= 0 && ends_[std::size_t(parent)] ? std::optional(ends_[std::size_t(parent)] - 1)
+                                                       : std::nullopt;
+      ends_[run_] = end_ += std::size_t(count);
+    }
+    return from;
+  }
+
+ private:
+  Runs runs_;
+  std::vector<std::size_t> ends_;  // one after the last point of each run
+  std::size_t run_ = 0, end_ = 0;
+};
+
 }  // namespace
 
-std::string packed(std::span<const Point> points) {
+std::string packed(std::span<const Point> points, const Runs& runs) {
   if (points.empty()) return {};
   const std::size_t places = decimals(points);
   const bool decimal = places != in_floats;
   const double scale = decimal ? scales[places] : 0.;
   std::string bytes(1, char(places));
   bytes.reserve((decimal ? 8 : 14) * points.size());
-  std::array<std::int64_t, 4> before{};
-  for (const Point& p : points) {
-    const std::array<float, 4> values = numbers(p);
+  Steps before{};
+  Walk walk(runs);
+  for (std::size_t i = 0; i < points.size(); ++i) {
+    const std::array<float, 4> values = numbers(points[i]);
+    if (const auto from = walk.from(i)) before = steps_of(points[*from], decimal, scale);
+    const Steps steps = steps_of(points[i], decimal, scale);
     std::array<char, 40> written;  // ten bytes a number at most
     std::size_t count = 0;
     for (std::size_t k = 0; k < 4; ++k) {
-      const std::int64_t steps =
-          decimal ? std::int64_t(std::round(double(values[k]) * scale)) : order_of(values[k]);
-      const std::int64_t difference = steps - before[k];
-      before[k] = steps;
+      const std::int64_t difference = steps[k] - before[k];
       std::uint64_t zigzag = (std::uint64_t(difference) << 1) ^ std::uint64_t(difference >> 63);
       if (decimal && is_minus_zero(values[k])) zigzag = minus_zero;
       for (; zigzag > 127; zigzag >>= 7) written[count++] = char(zigzag | 128);
       written[count++] = char(zigzag);
     }
+    before = steps;
     bytes.append(written.data(), count);
   }
   return bytes.size() < points.size() * sizeof(Point) ? bytes : std::string();
 }
 
-std::vector<Point> unpacked(const std::string& bytes) {
+std::vector<Point> unpacked(const std::string& bytes, const Runs& runs) {
   const auto damaged = [] { return Error("its packed points are damaged"); };
   const std::size_t places = bytes.empty() ? in_floats + 1 : static_cast<unsigned char>(bytes[0]);
   if (places > in_floats) throw damaged();
@@ -92,8 +128,10 @@ std::vector<Point> unpacked(const std::string& bytes) {
   const double scale = decimal ? scales[places] : 0.;
   std::vector<Point> points;
   points.reserve(bytes.size() / 6);
-  std::array<std::int64_t, 4> before{};
+  Steps before{};
+  Walk walk(runs);
   for (std::size_t at = 1; at < bytes.size();) {
+    if (const auto from = walk.from(points.size())) before = steps_of(points[*from], decimal, scale);
     std::array<float, 4> values{};
     for (std::size_t k = 0; k < 4; ++k) {
       std::uint64_t zigzag = 0;

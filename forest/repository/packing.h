@@ -7,8 +7,11 @@
 //   steps, zigzag (0, -1, 1, -2, …), seven bits a byte, the lowest first, the eighth bit set on all but the last
 //   in decimals 2⁶³ stands for the number -0, from which the next difference is that from 0
 //   floats are counted in their order: 0 and above as their bits say, those with a sign from -0, which is -1, downwards
+//   the first point of a section that grows out of another is the difference from the last point of that one, which it
+//   mostly repeats
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <string>
 
@@ -16,10 +19,16 @@
 
 namespace forest::repository {
 
-/// Empty when packing would not make it smaller.
-std::string packed(std::span<const Point> points);
+/// The sections whose points follow one another: how many each has, and out of which it grows, -1 for none. Without them
+/// each point is the difference from the one before.
+struct Runs {
+  std::span<const std::int32_t> parents, counts;
+};
 
-/// Throws Error when the bytes are damaged.
-std::vector<Point> unpacked(const std::string& bytes);
+/// Empty when packing would not make it smaller.
+std::string packed(std::span<const Point> points, const Runs& runs = {});
+
+/// Throws Error when the bytes are damaged, or are not those of such sections.
+std::vector<Point> unpacked(const std::string& bytes, const Runs& runs = {});
 
 }  // namespace forest::repository

@@ -96,6 +96,49 @@ TEST(Packing, WhatWouldNotBeSmallerIsLeft) {
   EXPECT_TRUE(packed({}).empty());
 }
 
+/// Sections of some points each, which begin where the one ends that they grow out of.
+struct Branched {
+  std::vector<Point> points;
+  std::vector<std::int32_t> parents, counts;
+  Runs runs() const { return {parents, counts}; }
+};
+Branched branched(std::vector<Point> from) {
+  Branched b;
+  Random random(9, 1, 1);
+  std::vector<std::size_t> ends;
+  for (std::size_t at = 0; at < from.size();) {
+    const std::size_t run = ends.size(), count = std::min<std::size_t>(1 + random.below(8), from.size() - at);
+    const std::int32_t parent = run % 7 == 0 ? -1 : std::int32_t(random.below(std::uint32_t(run)));
+    if (parent >= 0) from[at] = from[ends[std::size_t(parent)]];
+    b.parents.push_back(parent), b.counts.push_back(std::int32_t(count));
+    ends.push_back((at += count) - 1);
+  }
+  b.points = std::move(from);
+  return b;
+}
+
+TEST(Packing, ASectionBeginsWhereTheOneEndsThatItGrowsOutOf) {
+  for (const Branched& b : {branched(traced(2)), branched(grown())}) {
+    const std::string bytes = packed(b.points, b.runs());
+    ASSERT_FALSE(bytes.empty());
+    EXPECT_TRUE(same_bits(unpacked(bytes, b.runs()), b.points));
+    const double without = double(packed(b.points).size());
+    EXPECT_LT(double(bytes.size()), .9 * without) << "a point in five is there already";
+  }
+}
+
+TEST(Packing, SectionsMayHaveNoPointsAndBeDamaged) {
+  const auto points = grown(6);
+  const std::vector<std::int32_t> parents{-1, 0, 1, 1}, counts{0, 2, 0, 4};
+  const std::string bytes = packed(points, {parents, counts});
+  ASSERT_FALSE(bytes.empty());
+  EXPECT_TRUE(same_bits(unpacked(bytes, {parents, counts}), points));
+  const std::vector<std::int32_t> later{-1, 3, 1, 1}, negative{0, -2, 0, 4}, long_ones{2000, 2000, 1, 1};
+  EXPECT_THROW(unpacked(bytes, {later, counts}), Error);
+  EXPECT_THROW(unpacked(bytes, {parents, negative}), Error);
+  EXPECT_NO_THROW(unpacked(bytes, {parents, long_ones})) << "its checksum will not be right";
+}
+
 TEST(Packing, CutOrChangedBytesAreAnErrorOrPoints) {
   for (const std::string& bytes : {packed(traced(2, 20)), packed(grown(20))}) {
     for (std::size_t size = 0; size < bytes.size(); ++size) {

@@ -21,13 +21,17 @@ namespace {
 
 /// Two neurons of a population with the same fingerprint came from the same source.
 std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
-  if (const auto* grown = std::get_if<Grown>(&provenance))
-    return hash_of(fmt::format("{} {} {} {}", grown->grammar_hash, grown->seed, grown->index, checksum));
+  if (const auto* grown = std::get_if<Grown>(&provenance)) return grown_fingerprint(*grown, checksum);
   const std::string& hash = std::get<Traced>(provenance).hash;
   return hash.empty() ? hash_of(fmt::format("{}", checksum)) : hash;
 }
 
 }  // namespace
+
+std::string grown_fingerprint(const Grown& grown, std::uint64_t checksum) {
+  const std::string run = hash_of(fmt::format("{} {}", grown.grammar_hash, grown.seed));
+  return fmt::format("{}-{:08x}-{:016x}", run.substr(0, 16), grown.index, checksum);
+}
 
 std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
 
@@ -58,7 +62,7 @@ Repository Repository::open(const std::string& place, Access access) {
 
 Prepared::Prepared(Morphology morphology) {
   Rows rows = rows_of(morphology);
-  std::string points = packed(morphology.points());
+  std::string points = packed(morphology.points(), runs_of(rows));
   const std::uint64_t sum = checksum(rows);
   data_ = std::unique_ptr<Data>(new Data{std::move(morphology), std::move(rows), std::move(points), sum});
 }
@@ -208,11 +212,6 @@ Rows Repository::Impl::stored(NeuronId id, const char* points, const std::string
   rows.soma_points = bytes("select {} from somata where neuron = :id", "points", neuron);
   rows.soma_links = bytes("select {} from somata where neuron = :id", "links", neuron);
   rows.points = bytes("select {} from points where neuron = :id", "data", neuron);
-  if (ask<int>("select packing from points where neuron = :id", neuron).value_or(0)) {
-    const std::vector<Point> unpacked_points = unpacked(rows.points);
-    rows.points.assign(reinterpret_cast<const char*>(unpacked_points.data()),
-                       unpacked_points.size() * sizeof(Point));
-  }
 
   if (const auto n = std::size_t(
           ask<int>("select coalesce(max(sections), 0) from neurons where id = :id", neuron).value_or(0))) {
@@ -223,6 +222,10 @@ Rows Repository::Impl::stored(NeuronId id, const char* points, const std::string
     if (s.size() != n) throw Error("sections are missing");
     s.first_point.resize(n);
     std::exclusive_scan(s.point_count.begin(), s.point_count.end(), s.first_point.begin(), 0);
+  }
+  if (const int packing = ask<int>("select packing from points where neuron = :id", neuron).value_or(0)) {
+    const auto whole = unpacked(rows.points, packing < 2 ? Runs() : runs_of(rows));
+    rows.points.assign(reinterpret_cast<const char*>(whole.data()), whole.size() * sizeof(Point));
   }
   if (const std::size_t n = count("spines")) {
     Ints section(room(n)), shape(room(n));

@@ -56,6 +56,8 @@ std::optional<SomaKind> soma_kind(std::string_view name) {
   return SomaKind(found - soma_kinds.begin());
 }
 
+Runs runs_of(const Rows& rows) { return {rows.sections.parent, rows.sections.point_count}; }
+
 Rows rows_of(const Morphology& m, bool measured) {
   Rows rows;
   rows.points = blob_of(m.points());
@@ -98,12 +100,14 @@ Rows rows_of(const Morphology& m, bool measured) {
     s.first_point.push_back(std::int32_t(section.first_point));
     s.point_count.push_back(std::int32_t(section.point_count));
     s.daughters.push_back(std::int32_t(m.children(id).size()));
-    s.length.push_back(length);
-    s.area.push_back(section_area(m, id));
+    // Whole numbers of picometres, and of square nanometres: the database keeps them in half the bytes.
+    const auto put = [](std::vector<double>& column, double value) {
+      column.push_back(std::round(1e6 * value));
+    };
+    put(s.length, length), put(s.area, section_area(m, id));
     const Point &begin = m.points(id).front(), &end = m.points(id).back();
-    s.start_diameter.push_back(2. * double(begin.radius));
-    s.end_diameter.push_back(2. * double(end.radius));
-    s.end_x.push_back(double(end.x)), s.end_y.push_back(double(end.y)), s.end_z.push_back(double(end.z));
+    put(s.start_diameter, 2. * double(begin.radius)), put(s.end_diameter, 2. * double(end.radius));
+    put(s.end_x, double(end.x)), put(s.end_y, double(end.y)), put(s.end_z, double(end.z));
   }
   if (measured) measure(m, rows);
   rows.spines.assign(m.spines().begin(), m.spines().end());

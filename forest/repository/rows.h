@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "forest/morphology/morphology.h"
+#include "forest/repository/packing.h"
 
 namespace forest::repository {
 
@@ -21,7 +22,7 @@ struct Rows {
   struct {  // one entry a section
     std::vector<std::int32_t> parent, arbor, order, kind, tag, soma_point, first_point, point_count,
         daughters;  // parent: -1 for a root
-    std::vector<double> length, area, start_diameter, end_diameter, end_x, end_y, end_z;
+    std::vector<double> length, area, start_diameter, end_diameter, end_x, end_y, end_z;  // pm, nm²: whole
     std::size_t size() const { return parent.size(); }
   } sections;
   struct {  // one entry a root
@@ -34,6 +35,9 @@ struct Rows {
   std::vector<Spine> spines;
   Annotations annotations;
 };
+
+/// How `points` are divided into sections (packing.h); stands as long as the rows do.
+Runs runs_of(const Rows& rows);
 
 /// With `measured` the metrics too, which take most of the time.
 Rows rows_of(const Morphology& morphology, bool measured = true);

@@ -269,7 +269,39 @@ create view metric as
        join neuron_metrics v on v.metric = m.id and v.neuron = n.id;
 )sql"},
     // Points that are no decimals are packed too (packing.h), which an older program does not read. What is there stays.
-    Migration{6, ""}};
+    Migration{6, ""},
+    // Measures of sections are whole numbers of picometres and square nanometres, which SQLite keeps in three or four bytes
+    // instead of eight, and the views give them in micrometres. Points are packed from the end of the section they grow out
+    // of; those that are there stay. The program writes the fingerprints of grown neurons anew, in the order of their runs.
+    Migration{7, R"sql(
+drop view section;
+drop view junction;
+alter table sections rename column length to length_pm;
+alter table sections rename column area to area_nm2;
+alter table sections rename column start_diameter to start_diameter_pm;
+alter table sections rename column end_diameter to end_diameter_pm;
+alter table sections rename column end_x to end_x_pm;
+alter table sections rename column end_y to end_y_pm;
+alter table sections rename column end_z to end_z_pm;
+update sections set length_pm = round(1e6 * length_pm), area_nm2 = round(1e6 * area_nm2),
+  start_diameter_pm = round(1e6 * start_diameter_pm), end_diameter_pm = round(1e6 * end_diameter_pm),
+  end_x_pm = round(1e6 * end_x_pm), end_y_pm = round(1e6 * end_y_pm), end_z_pm = round(1e6 * end_z_pm);
+create view section as
+  select n.id as neuron, n.name as name, p.name as population, s.id & 16777215 as section, s.parent, s.arbor,
+         s.branch_order, k.name as kind, s.tag, s.points, s.length_pm / 1e6 as length, s.area_nm2 / 1e6 as area,
+         s.start_diameter_pm / 1e6 as start_diameter, s.end_diameter_pm / 1e6 as end_diameter
+  from neurons n cross join sections s join populations p on p.id = n.population
+       left join section_kinds k on k.id = s.kind
+  where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
+create view junction as
+  select n.id as neuron, n.name as name, p.name as population, s.id & 16777215 as section,
+         case s.daughters when 0 then 'terminal' when 1 then 'node' when 2 then 'bifurcation' else 'multifurcation' end
+           as junction,
+         s.daughters, s.branch_order, s.end_x_pm / 1e6 as x, s.end_y_pm / 1e6 as y, s.end_z_pm / 1e6 as z,
+         s.end_diameter_pm / 1e6 as diameter
+  from neurons n cross join sections s join populations p on p.id = n.population
+  where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
+)sql"}};
 
 inline constexpr int section_bits = 24;                      // of sections.id
 inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository

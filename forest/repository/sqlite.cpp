@@ -8,6 +8,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <new>
+#include <type_traits>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -125,6 +126,8 @@ class FromColumns final : public InsertStatement {
 
   std::size_t run(std::size_t count) override {
     const sqlite::sqlite3_int64 before = sqlite::sqlite3_total_changes(database_);
+    cells_.clear();
+    for (const InsertColumn& c : columns_) cells_.push_back(cell_of(c));
     count_ = count;
     const int result = sqlite::sqlite3_step(statement_.get());
     sqlite::sqlite3_reset(statement_.get());
@@ -182,33 +185,49 @@ class FromColumns final : public InsertStatement {
       return SQLITE_OK;
     };
     m.xColumn = [](sqlite::sqlite3_vtab_cursor* cursor, Context* context, int number) {
-      const InsertColumn& c = of(cursor).columns_[std::size_t(number)];
-      if (c.is_null && c.is_null(row(cursor)))
+      const Cell& cell = of(cursor).cells_[std::size_t(number)];
+      if (cell.is_null && (*cell.is_null)(row(cursor)))
         sqlite::sqlite3_result_null(context);
       else
-        std::visit([&](const auto* value) { answer(context, c, *value, row(cursor)); }, c.values);
+        cell.answer(context, cell, cell.in_each_row ? row(cursor) : 0);
       return SQLITE_OK;
     };
     return m;
   }
   inline static const sqlite::sqlite3_module module = functions();
 
-  template <class T>
-  static void answer(Context* context, const InsertColumn& c, const std::vector<T>& values, std::size_t row) {
-    answer(context, c, values[row], row);
+  /// A column where it stands during one run: looked up once, since each of millions of values passes here.
+  struct Cell {
+    void (*answer)(Context*, const Cell&, std::size_t row);
+    const void* values;
+    bool in_each_row, bytes;
+    const std::function<bool(std::size_t)>* is_null;  // or null
+  };
+
+  static Cell cell_of(const InsertColumn& c) {
+    return std::visit(
+        [&]<class T>(const T* values) -> Cell {
+          const auto cell = [&]<class V>(const V* first, bool in_each_row) -> Cell {
+            return {answer<V>, first, in_each_row, c.bytes, c.is_null ? &c.is_null : nullptr};
+          };
+          if constexpr (requires { typename T::allocator_type; } && !std::is_same_v<T, std::string>)
+            return cell(values->data(), true);
+          else
+            return cell(values, false);
+        },
+        c.values);
   }
-  static void answer(Context* context, const InsertColumn&, int value, std::size_t) {
-    sqlite::sqlite3_result_int(context, value);
-  }
-  static void answer(Context* context, const InsertColumn&, long long value, std::size_t) {
-    sqlite::sqlite3_result_int64(context, value);
-  }
-  static void answer(Context* context, const InsertColumn&, double value, std::size_t) {
-    sqlite::sqlite3_result_double(context, value);
-  }
-  static void answer(Context* context, const InsertColumn& c, const std::string& value, std::size_t) {
-    // The value stays where it is until the row is stored.
-    if (!c.bytes)
+
+  template <class V>
+  static void answer(Context* context, const Cell& cell, std::size_t row) {
+    const V& value = static_cast<const V*>(cell.values)[row];
+    if constexpr (std::is_same_v<V, int>)
+      sqlite::sqlite3_result_int(context, value);
+    else if constexpr (std::is_same_v<V, long long>)
+      sqlite::sqlite3_result_int64(context, value);
+    else if constexpr (std::is_same_v<V, double>)
+      sqlite::sqlite3_result_double(context, value);
+    else if (!cell.bytes)  // a text stays where it is until the row is stored
       sqlite::sqlite3_result_text(context, value.data(), int(value.size()), SQLITE_STATIC);
     else if (value.empty())
       sqlite::sqlite3_result_null(context);
@@ -224,6 +243,7 @@ class FromColumns final : public InsertStatement {
   sqlite::sqlite3* database_;
   std::span<const InsertColumn> columns_;
   std::string name_, declaration_;
+  std::vector<Cell> cells_;
   std::size_t count_ = 0;  // none but in run(): a question finds the table empty
   Statement statement_{nullptr, sqlite::sqlite3_finalize};
 };

@@ -16,12 +16,12 @@ finds() {  # the change, the words
   [ "$got" = 1 ] && grep -qE -- "$2" err.txt || { echo "status $got of: $1"; cat err.txt; exit 1; }
 }
 one="neuron 'plain' \(id 1\) is not what its points say"
-finds 'update sections set length = 1 where id >> 24 = 1' "$one \(length of sections is 1 in row 0, not 10, and 3 more values\); take it out with"
+finds 'update sections set length_pm = 1 where id >> 24 = 1' "$one \(length_pm of sections is 1 in row 0, not 10000000, and 3 more values\); take it out with"
 grep -q 'hurt.db: 1 finding' err.txt
-finds 'update sections set length = 1' "neuron 'spiny' .* \(length of sections is 1 in row 0, not 10, and 3 more values\)"
+finds 'update sections set length_pm = 1' "neuron 'spiny' .* \(length_pm of sections is 1 in row 0, not 10000000, and 3 more values\)"
 grep -q 'hurt.db: 2 findings' err.txt
-for column in arbor branch_order daughters area start_diameter end_diameter end_x end_y end_z; do
-  finds "update sections set $column = $column + 1 where id = (1 << 24) + 2" "$one \($column of sections is [^ ]+ in row 2, not [^ ]+\);"
+for column in arbor branch_order daughters area_nm2 start_diameter_pm end_diameter_pm end_x_pm end_y_pm end_z_pm; do
+  finds "update sections set $column = $column + 3 where id = (1 << 24) + 2" "$one \($column of sections is [^ ]+ in row 2, not [^ ]+\);"
 done
 for column in stems points spines length; do
   finds "update neurons set $column = $column + 1 where id = 1" "$one \($column of neurons is "

@@ -37,13 +37,13 @@ cmp one.db two.db
 [ "$(ls one.db*)" = one.db ]
 
 # An independent reader finds what the schema's page says.
-[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n6' ]
+[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n7' ]
 [ "$(sqlite3 one.db 'select count(*), sum(sections), min(name), max(name) from neurons')" = '40|'"$(sqlite3 one.db 'select count(*) from sections')"'|cell00|cell39' ]
 [ "$(sqlite3 one.db "select count(*) from neurons join provenance on neuron = id where origin = 'traced' and length(source_hash) = 32 and source_file like 'cells/%.swc'")" = 40 ]
 python3 - <<'PY'
 import math, sqlite3, struct
 db = sqlite3.connect("one.db")
-def unpacked(blob):  # docs/repository/schema.md
+def unpacked(blob, sections):  # docs/repository/schema.md
     numbers, before, at, points = [], [0] * 4, 1, []
     while at < len(blob):
         value = shift = 0
@@ -52,19 +52,28 @@ def unpacked(blob):  # docs/repository/schema.md
             value |= (byte & 127) << shift; shift += 7
             if byte < 128: break
         numbers.append(None if value == 1 << 63 else (value >> 1) ^ -(value & 1))
-    for i in range(0, len(numbers), 4):
-        before = [0 if b is None else a + b for a, b in zip(before, numbers[i:i + 4])]
-        points.append([b / 10 ** blob[0] for b in before])
+    i, ends = 0, []
+    for parent, count, _ in sections:
+        if parent is not None: before = ends[parent]
+        for i in range(i, i + 4 * count, 4):
+            before = [0 if b is None else a + b for a, b in zip(before, numbers[i:i + 4])]
+            points.append([b / 10 ** blob[0] for b in before])
+        i += 4
+        ends.append(before)
+    assert i == len(numbers)
     return points
 
 for neuron, packing, blob in db.execute("select neuron, packing, data from points"):
-    assert packing == 1 and len(blob) < 10 * db.execute("select points from neurons where id = ?", (neuron,)).fetchone()[0]
-    points = unpacked(blob)
+    assert packing == 2 and len(blob) < 10 * db.execute("select points from neurons where id = ?", (neuron,)).fetchone()[0]
+    sections = db.execute(
+        "select parent, points, length from section where neuron = ? order by section", (neuron,)).fetchall()
+    points, ends = unpacked(blob, sections), []
     first = 0
-    for parent, count, length in db.execute(
-            "select parent, points, length from section where neuron = ? order by section", (neuron,)):
+    for parent, count, length in sections:
         run = points[first:first + count]
+        assert parent is None or run[0] == ends[parent]
         first += count
+        ends.append(run[-1])
         assert abs(sum(math.dist(a[:3], b[:3]) for a, b in zip(run, run[1:])) - length) < 1e-3 * length
     assert db.execute("select sum(length) from arbors where neuron = ?", (neuron,)).fetchone()[0] > 0
 PY
