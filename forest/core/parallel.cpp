@@ -5,6 +5,7 @@
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
+#include <tbb/parallel_sort.h>
 
 namespace forest {
 
@@ -31,6 +32,8 @@ void detail::in_order(std::size_t count, const std::function<std::shared_ptr<voi
         take(made.first, made.second.get());
       }));
 }
+
+void parallel_sort(std::span<Keyed> numbers) { tbb::parallel_sort(numbers.begin(), numbers.end()); }
 
 ThreadLimit::ThreadLimit(unsigned threads) {
   if (threads) control_ = new tbb::global_control(tbb::global_control::max_allowed_parallelism, threads);

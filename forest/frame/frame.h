@@ -22,10 +22,15 @@ namespace forest::frame {
 struct Geometry {
   std::span<const Segment> segments;
   std::span<const Instance> instances;
+  std::span<const Owner> owners = {};  // of the last segments, which lie in the world
+
+  bool straw(const Item& item) const { return item.instance == FOREST_IN_WORLD; }
+  /// Of a straw.
+  const Owner& owner(std::size_t segment) const { return owners[segment - (segments.size() - owners.size())]; }
 };
 
 /// Primitives that a neuron may be drawn with, however large it is in the picture.
-enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin };
+enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin, bricks };
 
 /// How a neuron is shown, or a branch of it: 4 bytes, so that changing thousands costs nothing. Renderers read the colour
 /// class and the opacity; the rest has been obeyed by whoever made the lists.

@@ -16,7 +16,8 @@ namespace {
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
 constexpr float group_limit =
     12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
-constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
+constexpr std::size_t chunk = 64;  // things; fixed, so that the result does not depend on threads
+constexpr std::size_t neurons_a_part = 64, bricks_a_part = 64;
 
 frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t drawn, const Sphere& sphere) {
   return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
@@ -27,7 +28,6 @@ bool is_thin(const Cluster& c, float magnification, const Detail& detail) {
   return 2.f * c.thickness * magnification <= detail.surface_width;
 }
 
-constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
 // What is looked at, and what is known to be hidden.
@@ -38,9 +38,27 @@ struct Look {
   const Occluders* occluders;  // may be null
   bool keep;                   // what they hide
   const Shown& shown;
+  bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
 
   frame::State state(std::uint32_t index) const {
     return shown.states.empty() ? frame::State{} : shown.states[index];
+  }
+  float straw_width() const { return forest.bricks().back().width; }
+  /// Whether a neuron is drawn by straws.
+  bool far(std::uint32_t index) const {
+    if (forest.bricks().empty()) return false;
+    const frame::State s = state(index);
+    if (!s.is(frame::State::visible) || s.is(frame::State::parted)) return false;
+    return s.kind == frame::Kind::bricks ||
+           (s.kind == frame::Kind::any && eye.good_enough(forest.spheres()[index], straw_width()));
+  }
+
+ private:
+  bool plainly() const {
+    std::uint32_t kinds = 0, flags = frame::State::visible, parted = 0;
+    for (const frame::State& s : shown.states)
+      kinds |= std::uint32_t(s.kind), flags &= s.flags, parted |= s.flags;
+    return !kinds && flags && !(parted & frame::State::parted);
   }
 };
 
@@ -49,6 +67,7 @@ void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
   if (!run.drawn) return;
   switch (kind) {
     case frame::Kind::somata:
+    case frame::Kind::bricks:
       return;
     case frame::Kind::dots:
       for (std::uint32_t drawn = run.drawn; drawn; drawn &= drawn - 1) {
@@ -107,7 +126,7 @@ void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std:
     else
       add(cut, item(index, c.first_segment + first, drawn, around), kind, thin);
   }
-  if (hidden && look.keep) cut.left_out.push_back({index, at, hidden});
+  if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, hidden});
 }
 
 void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
@@ -129,7 +148,7 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
     const Sphere sphere = placed(c);
     if (!look.frustum.may_see(sphere)) continue;
     if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({index, at, 0});
+      if (look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, 0});
       continue;
     }
     if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
@@ -150,7 +169,7 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
   if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
   if (look.occluders && look.occluders->hide(sphere)) {
-    if (look.keep) cut.left_out.push_back({index, soma, 0});
+    if (look.keep) cut.left_out.push_back({LeftOut::soma, index, 0, 0});
     return;
   }
   frame::Item ball = item(index, neuron.first_segment, 1, sphere);
@@ -166,7 +185,7 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
 }
 
 void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
-  if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
+  if (!(look.state(index).flags & (frame::State::visible | frame::State::parted)) || look.far(index)) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
   const std::uint64_t before = cut.segments;
@@ -175,22 +194,114 @@ void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
   cut.neurons += cut.segments > before;
 }
 
+// The neurons of a grove, and of all below it.
+void choose_grove(const Look& look, std::uint32_t from, Cut& cut) {
+  const Groves& groves = look.forest.groves();
+  std::vector<std::uint32_t> open{from};
+  while (!open.empty()) {
+    const std::uint32_t at = open.back();
+    open.pop_back();
+    const Groves::Node& node = groves.nodes()[at];
+    if (!look.frustum.may_see(node.sphere)) continue;
+    if (look.plain && !look.forest.bricks().empty() && look.eye.good_enough(node.sphere, look.straw_width()))
+      continue;
+    if (look.occluders && look.occluders->hide(node.sphere)) {
+      if (look.keep) cut.left_out.push_back({LeftOut::grove, 0, at, 0});
+      continue;
+    }
+    for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back(node.first_child + c);
+    if (node.child_count) continue;
+    for (const std::uint32_t i : groves.members().subspan(node.first, node.count)) choose_neuron(look, i, cut);
+  }
+}
+
+// Of a brick, these groups of straws, but for those whose neurons are near.
+void choose_straws(const Look& look, std::uint32_t at, std::uint32_t groups, Cut& cut) {
+  const Brick& b = look.forest.bricks()[at];
+  const Sphere sphere = b.sphere();
+  const float magnification = look.eye.magnification(sphere), thinnest = look.eye.detail().thinnest;
+  std::uint32_t shown = thinnest > 0.f ? b.shown(b.width * magnification / thinnest) : b.all();
+  // Within the reach of a neuron around, all may be known to be far.
+  const Sphere wide{sphere.centre, sphere.radius + 2.f * look.forest.reach()};
+  if (!look.plain || !look.eye.good_enough(wide, look.straw_width())) {
+    const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
+    for (std::uint32_t rest = shown; rest; rest &= rest - 1)
+      if (const int i = std::countr_zero(rest); !look.far(owners[std::size_t(i)].instance)) shown &= ~(1u << i);
+  }
+  const auto put = [&](std::uint32_t drawn, const Sphere& around) {
+    if (!drawn) return;
+    cut.lines.push_back(item(FOREST_IN_WORLD, b.first_segment, drawn, around));
+    cut.segments += std::uint32_t(std::popcount(drawn));
+  };
+  if (groups == every_group && sphere.radius * magnification <= group_limit) return put(shown, sphere);
+  std::uint32_t hidden = 0;
+  for (std::uint32_t g = 0; g < Brick::group_count; ++g) {
+    const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
+    if (!drawn || !(groups >> g & 1u)) continue;
+    const Sphere around = b.group(g);
+    if (!look.frustum.may_see(around)) continue;
+    if (look.occluders && look.occluders->hide(around))
+      hidden |= 1u << g;
+    else
+      put(drawn, around);
+  }
+  if (hidden && look.keep) cut.left_out.push_back({LeftOut::brick, 0, at, hidden});
+}
+
+// The finest straws are drawn however near they are, where their neuron is far: the nearest point of a sphere is nearer.
+void choose_bricks(const Look& look, std::uint32_t from, Cut& cut) {
+  const auto bricks = look.forest.bricks();
+  std::vector<std::uint32_t> open{from};
+  while (!open.empty()) {
+    const std::uint32_t at = open.back();
+    open.pop_back();
+    const Brick& b = bricks[at];
+    const Sphere sphere = b.sphere();
+    if (!look.frustum.may_see(sphere)) continue;
+    if (look.occluders && look.occluders->hide(sphere)) {
+      if (look.keep) cut.left_out.push_back({LeftOut::brick, 0, at, 0});
+      continue;
+    }
+    if (b.child_count && !look.eye.good_enough(sphere, b.width)) {
+      for (std::uint32_t c = b.child_count; c-- > 0;) open.push_back(b.first_child + c);
+      continue;
+    }
+    // Its neurons are near when they are nearer than it: nothing to draw.
+    if (look.plain && !look.eye.good_enough(sphere, look.straw_width())) continue;
+    choose_straws(look, at, every_group, cut);
+  }
+}
+
+// Bricks that hold all others, some hundreds where there are as many.
+std::vector<std::uint32_t> parts_of(std::span<const Brick> bricks) {
+  std::vector<std::uint32_t> parts;
+  if (!bricks.empty()) parts.push_back(0);
+  while (!parts.empty() && parts.size() < 128 && bricks[parts.front()].child_count) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t at : parts)
+      for (std::uint32_t c = 0; c < bricks[at].child_count; ++c) next.push_back(bricks[at].first_child + c);
+    parts = std::move(next);
+  }
+  return parts;
+}
+
 void append(auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-// What `choose_one(i, cut)` adds for each i below `count`, in this order.
-Cut in_chunks(std::size_t count, auto&& choose_one) {
-  std::vector<Cut> parts((count + chunk - 1) / chunk);
+// What `choose_one(i, cut)` adds for each i below `count`, in this order; `each` at a time.
+Cut in_chunks(std::size_t count, std::size_t each, auto&& choose_one) {
+  std::vector<Cut> parts((count + each - 1) / each);
   parallel_for(parts.size(), 1, [&](std::size_t p) {
-    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i) choose_one(i, parts[p]);
+    for (std::size_t i = p * each; i < std::min(count, (p + 1) * each); ++i) choose_one(i, parts[p]);
   });
   Cut whole;
-  for (const Cut& part : parts) {
+  for (Cut& part : parts) {
     append(whole.dots, part.dots);
     append(whole.lines, part.lines);
     append(whole.capsules, part.capsules);
     append(whole.left_out, part.left_out);
     whole.segments += part.segments;
     whole.neurons += part.neurons;
+    part = {};
   }
   return whole;
 }
@@ -256,8 +367,10 @@ std::vector<const frame::State*> section_states(const Forest& forest, const Show
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
            const Shown& shown) {
   const Look look{forest, eye, eye.frustum(), before, true, shown};
-  Cut cut = in_chunks(forest.instances().size(),
-                      [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
+  const auto groves = forest.groves().parts(neurons_a_part), bricks = parts_of(forest.bricks());
+  Cut cut = in_chunks(groves.size() + bricks.size(), 1, [&](std::size_t i, Cut& part) {
+    i < groves.size() ? choose_grove(look, groves[i], part) : choose_bricks(look, bricks[i - groves.size()], part);
+  });
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
                capsules = sort_near_to_far(cut.capsules, eye);
   cut.bands = bands_of(dots, lines, capsules);
@@ -267,16 +380,21 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const O
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
              const Occluders& now, const Shown& shown) {
   const Look look{forest, eye, eye.frustum(), &now, false, shown};
-  return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
-    const auto [instance, cluster, groups] = left_out[i];
-    if (cluster == soma) {
-      choose_soma(look, instance, part);
-    } else if (groups) {
-      const Placed placed(forest.instances()[instance]);
-      choose_groups(look, instance, cluster, groups, placed, placed(forest.clusters()[cluster]), part);
-    } else {
-      choose_clusters(look, instance, cluster, part);
+  return in_chunks(left_out.size(), chunk, [&](std::size_t n, Cut& part) {
+    const LeftOut& l = left_out[n];
+    switch (l.what) {
+      case LeftOut::grove:
+        return choose_grove(look, l.number, part);
+      case LeftOut::soma:
+        return choose_soma(look, l.instance, part);
+      case LeftOut::brick:
+        return l.groups ? choose_straws(look, l.number, l.groups, part) : choose_bricks(look, l.number, part);
+      case LeftOut::cluster:
+        break;
     }
+    if (!l.groups) return choose_clusters(look, l.instance, l.number, part);
+    const Placed placed(forest.instances()[l.instance]);
+    choose_groups(look, l.instance, l.number, l.groups, placed, placed(forest.clusters()[l.number]), part);
   });
 }
 

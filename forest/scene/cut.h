@@ -13,11 +13,14 @@
 
 namespace forest::scene {
 
-/// What was left out because an earlier picture hid it: a cluster and all below it, some of the groups that a cluster draws,
-/// or a soma.
+/// What was left out because an earlier picture hid it: a cluster or a brick and all below it, some of the groups that it
+/// draws, a soma, or the neurons of a grove.
 struct LeftOut {
-  std::uint32_t instance = 0, cluster = 0;  // 0xffffffff: the soma
-  std::uint32_t groups = 0;                 // bit i: group i of the cluster; 0: all of it, and all below
+  enum What : std::uint32_t { cluster, soma, grove, brick };
+  What what = cluster;
+  std::uint32_t instance = 0;  // of a cluster or a soma
+  std::uint32_t number = 0;    // of the cluster, the grove or the brick
+  std::uint32_t groups = 0;    // bit i: group i; 0: all of it, and all below
 };
 
 /// A branch that is shown otherwise than its neuron: a section and all that grows out of it.
@@ -40,7 +43,7 @@ struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
   std::uint64_t segments = 0;  // drawn
-  std::uint32_t neurons = 0;   // in sight
+  std::uint32_t neurons = 0;   // in sight, and near enough not to be straws
   std::vector<LeftOut> left_out;
   // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
   struct Entries {

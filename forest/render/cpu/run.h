@@ -24,6 +24,16 @@ struct Picture {
   frame::State state_of(const frame::Item& item) const {
     return item.state ? frame::unpacked(item.state) : states[item.instance];
   }
+  /// Where an item's neuron stands, as camera = turn · p + at.
+  struct Standing {
+    Mat3 turn;
+    Vec3 at;
+  };
+  Standing standing(const frame::Item& item) const {
+    if (geometry.straw(item)) return {to_camera, to_camera * -eye};
+    const frame::Instance& i = geometry.instances[item.instance];
+    return {to_camera * Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix(), to_camera * (Vec3(i.x, i.y, i.z) - eye)};
+  }
 };
 
 inline constexpr std::size_t run = FOREST_CLUSTER_SIZE;

@@ -132,7 +132,7 @@ constexpr std::size_t ahead = 3, things_ahead = 6;
 void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
   const auto* at = reinterpret_cast<const char*>(&geometry.segments[item.first_segment]);
   for (std::size_t i = 0; i < 8; i += 2) __builtin_prefetch(at + i * sizeof(frame::Segment));
-  __builtin_prefetch(&geometry.instances[item.instance]);
+  if (!geometry.straw(item)) __builtin_prefetch(&geometry.instances[item.instance]);
 }
 
 // Brings things to the picture, but for what is hidden already.
@@ -146,10 +146,7 @@ class Gatherer {
   std::uint64_t add(const frame::Item& item, const std::uint8_t* entries, Kind kind, Chunk& chunk) {
     const frame::Constants& c = picture_.constants;
     if (const Extent e(picture_, item); !item.drawn || hidden(e.box, e.nearest_code)) return 0;
-    const frame::Instance& instance = picture_.geometry.instances[item.instance];
-    const Mat3 turn =
-        picture_.to_camera * Quat(instance.qw, instance.qx, instance.qy, instance.qz).toRotationMatrix();
-    const Vec3 at = picture_.to_camera * (Vec3(instance.x, instance.y, instance.z) - picture_.eye);
+    const auto [turn, at] = picture_.standing(item);
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
     project(c, turn, at, picture_.light, r_);

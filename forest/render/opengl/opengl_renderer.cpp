@@ -151,7 +151,7 @@ struct OpenGLRenderer::Device {
   Buffer mesh_looks;
   std::vector<std::uint8_t> looks;  // of every vertex: palette entry, presence
   Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, states, palette, overlay_segments, uniforms, keys, sums, image, queue,
+  Buffer segments, instances, owners, states, palette, overlay_segments, uniforms, keys, sums, image, queue,
       large_queue, tiles;
   ListSet lists{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}},
       rest{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}};
@@ -220,6 +220,7 @@ struct OpenGLRenderer::Device {
     tiles.reserve((pixels / 32 + width + height + 64) * 4);
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
     instances.bind_texels(1, GL_RGBA32UI);
+    owners.bind_texels(10, GL_RG32UI);
     keys.bind_texels(3, GL_R32UI);
     states.bind_texels(4, GL_RGBA8UI);
     palette.bind_texels(5, GL_RGBA32F);
@@ -399,6 +400,7 @@ void OpenGLRenderer::load(const frame::Geometry& geometry) {
   device_->geometry = geometry;
   device_->segments.upload(geometry.segments);
   device_->instances.upload(geometry.instances);
+  device_->owners.upload(geometry.owners);
 }
 
 frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {

@@ -11,6 +11,7 @@ layout(binding = 5) uniform samplerBuffer palette;          // linear, and 0–2
 layout(binding = 6) uniform usamplerBuffer queue_seen;
 layout(binding = 7) uniform usamplerBuffer large_seen;
 layout(binding = 8) uniform usamplerBuffer tiles_seen;
+layout(binding = 10) uniform usamplerBuffer owners;         // of the straws, which are the last segments: instance, segment
 layout(binding = 9) uniform usamplerBuffer entries;         // of this list's segments, where FOREST_ENTRIES
 
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
@@ -116,10 +117,16 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.rank = 0.0;
     c.mean = 0.0;
   } else {
-    vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
-    vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
-    c.a = to_camera(at + turned(q, c.a));
-    c.b = to_camera(at + turned(q, c.b));
+    if (item.x == FOREST_IN_WORLD) {
+      c.a = to_camera(c.a);
+      c.b = to_camera(c.b);
+      item.x = texelFetch(owners, int(item.y + index) - (textureSize(segments) / 2 - textureSize(owners))).x;
+    } else {
+      vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
+      vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
+      c.a = to_camera(at + turned(q, c.a));
+      c.b = to_camera(at + turned(q, c.b));
+    }
     c.mean = unpackHalf2x16(meta >> 16).x;
     uvec4 state = item.w == 0u ? texelFetch(states, int(item.x)) : (uvec4(item.w) >> uvec4(0u, 8u, 16u, 24u)) & 255u;
     c.entry = state.x * 8u + (meta & 7u);
