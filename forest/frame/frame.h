@@ -128,6 +128,8 @@ struct Lists {
   std::span<const Item> capsules;  // runs near enough to have a surface
   std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
   Entries entries;                 // where colours change along branches
+
+  bool empty() const { return dots.empty() && lines.empty() && capsules.empty(); }
 };
 
 /// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,
@@ -166,9 +168,11 @@ struct Frame : Lists {
   std::span<const Overlay> overlays;
   std::span<const Surface> surfaces;
   std::optional<Glass> glass;
-  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, or once for those that are
-  /// drawn together, when the lists are drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
-  std::function<Lists(const DepthMap&)> rest;
+  /// What the scene left out as probably hidden, or as far, and shows after all. Asked in rounds 0, 1, 2 … in every subframe, or
+  /// once for those that are drawn together: when the lists are drawn, then when what was returned before is, each time with how far
+  /// one sees then, until nothing comes back. A map without squares asks for all at once. What it returns must stay valid until
+  /// it is asked again. May be empty.
+  std::function<Lists(const DepthMap&, std::uint32_t round)> rest;
 };
 
 /// 8-bit sRGB, rows from the top, 4 bytes a pixel (alpha 255).

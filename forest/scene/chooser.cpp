@@ -1,27 +1,67 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/chooser.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace forest::scene {
+
+namespace {
+
+// How far it is looked, round by round: to where an earlier picture ended nearly everywhere, beyond the last bits of it, and to
+// the end. What is near hides most of what is far, and then nobody has to choose it.
+std::array<float, 2> horizons_of(const frame::DepthMap& seen) {
+  std::vector<float> depths;
+  for (const float depth : seen.depths)
+    if (std::isfinite(depth)) depths.push_back(depth);
+  if (depths.empty()) return {INFINITY, INFINITY};
+  const auto share = [&](float part) {
+    const auto nth = depths.begin() + std::ptrdiff_t(part * float(depths.size() - 1));
+    std::nth_element(depths.begin(), nth, depths.end());
+    return *nth;
+  };
+  const float near = std::max(share(.7f), 100.f);  // of the eye itself within a bush little is told
+  return {near, std::max(2.f * near, 1.25f * share(.97f))};
+}
+
+}  // namespace
 
 const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
                            Painter painter) {
   eye_ = eye, viewport_ = viewport, shown_ = shown, painter_ = std::move(painter);
   revealed_segments_ = drawings_ = 0;
-  cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr, shown);
+  if (!before_ && !forest_.groves().nodes().empty()) {
+    const float nearest = eye.nearest_depth(forest_.groves().nodes().front().sphere);
+    horizons_ = {nearest + 150.f, nearest + 600.f};
+  }
+  const Sight guess{before_ ? &*before_ : nullptr, horizons_[0]};
+  cut_ = scene::choose(forest_, eye, viewport, guess, shown);
   if (painter_) painter_(cut_, eye);
   return cut_;
 }
 
 void Chooser::complete(frame::Frame& frame) {
-  frame.rest = [this](const frame::DepthMap& seen) {
-    revealed_ = revealed(forest_, *eye_, viewport_, cut_.left_out, Occluders(seen, eye_->camera(), viewport_),
-                         shown_);
+  frame.rest = [this](const frame::DepthMap& seen, std::uint32_t round) {
+    if (round == 0) round_ = 0, ++drawings_;
+    const Occluders now(seen, eye_->camera(), viewport_);
+    do {
+      const std::span<const LeftOut> left = round_ ? revealed_.left_out : cut_.left_out;
+      if (left.empty()) return frame::Lists{};
+      // A map of nothing hides nothing: there is no use in rounds.
+      const bool rounds = !seen.depths.empty() && round_ + 1 < horizons_.size();
+      const float horizon = rounds ? horizons_[round_ + 1] : INFINITY;
+      revealed_ = revealed(forest_, *eye_, viewport_, left, {&now, horizon}, shown_);  // `left` is read before it goes
+      ++round_;
+    } while (revealed_.lists().empty());
     if (painter_) painter_(revealed_, *eye_);
-    revealed_segments_ += revealed_.segments, ++drawings_;
+    revealed_segments_ += revealed_.segments;
     return revealed_.lists();
   };
 }
 
-void Chooser::remember(const frame::DepthMap& seen) { before_.emplace(seen, eye_->camera(), viewport_); }
+void Chooser::remember(const frame::DepthMap& seen) {
+  before_.emplace(seen, eye_->camera(), viewport_);
+  horizons_ = horizons_of(seen);
+}
 
 }  // namespace forest::scene

@@ -3,6 +3,8 @@
 // again once the rest is drawn. The pictures are those that would be drawn without a guess; they are drawn sooner.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <functional>
 #include <optional>
 
@@ -35,6 +37,8 @@ class Chooser {
   frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
+  std::array<float, 2> horizons_{INFINITY, INFINITY};  // µm along the view
+  std::size_t round_ = 0;  // of those after the cut
   Painter painter_;
   Cut cut_, revealed_;
   std::uint64_t revealed_segments_ = 0, drawings_ = 0;

@@ -11,6 +11,21 @@
 #include "forest/scene/placed.h"
 
 namespace forest::scene {
+
+// It begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
+Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
+  constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
+  const Bounds& bounds = forest.soma_bounds();
+  if (!(strength > 0.f) || bounds.empty()) return {};
+  const float extent = .5f * bounds.extent().norm() + 100.f;
+  const float depth = -camera.axes().col(2).dot(bounds.centre() - camera.eye);
+  const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
+  // Within the forest one sees a hundred micrometres or two, whatever its size.
+  const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
+  const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
+  return {std::max(20.f, depth - size), (length + inside * (std::min(length, seen_inside) - length)) / strength};
+}
+
 namespace {
 
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
@@ -35,13 +50,30 @@ struct Look {
   const Forest& forest;
   const Eye& eye;
   const frame::Frustum& frustum;
-  const Occluders* occluders;  // may be null
-  bool keep;                   // what they hide
+  const Sight& sight;
+  bool keep;  // what is hidden
   const Shown& shown;
+  Fog fog = fog_of(forest, eye.camera(), eye.detail().fog);
   bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
 
   frame::State state(std::uint32_t index) const {
     return shown.states.empty() ? frame::State{} : shown.states[index];
+  }
+  // Good enough for the eye through what fog there is.
+  bool good_enough(const Sphere& sphere, float error) const {
+    return error * eye.magnification(sphere) <= eye.acceptable(sphere) * fog.forgives(eye.nearest_depth(sphere));
+  }
+  bool in_sight(const Sphere& sphere) const {
+    return frustum.may_see(sphere) && eye.nearest_depth(sphere) < fog.end();
+  }
+  bool hides(const Sphere& sphere) const { return sight.occluders && sight.occluders->hide(sphere); }
+  // Whether it is left out for now, or for good.
+  bool leaves_out(const Sphere& sphere, const LeftOut& what, Cut& cut) const {
+    if (const bool far = eye.nearest_depth(sphere) > sight.horizon; far || hides(sphere)) {
+      if (far || keep) cut.left_out.push_back(what);
+      return true;
+    }
+    return false;
   }
   float straw_width() const { return forest.bricks().back().width; }
   /// Whether a neuron is drawn by straws.
@@ -50,7 +82,7 @@ struct Look {
     const frame::State s = state(index);
     if (!s.is(frame::State::visible) || s.is(frame::State::parted)) return false;
     return s.kind == frame::Kind::bricks ||
-           (s.kind == frame::Kind::any && eye.good_enough(forest.spheres()[index], straw_width()));
+           (s.kind == frame::Kind::any && good_enough(forest.spheres()[index], straw_width()));
   }
 
  private:
@@ -120,8 +152,8 @@ void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std:
     const std::uint32_t first = g * Cluster::group_size, drawn = shown >> first & 255u;
     if (!drawn || !(groups >> g & 1u)) continue;
     const Sphere around = placed(c.group(g));
-    if (!look.frustum.may_see(around)) continue;
-    if (look.occluders && look.occluders->hide(around))
+    if (!look.in_sight(around)) continue;
+    if (look.hides(around))
       hidden |= 1u << g;
     else
       add(cut, item(index, c.first_segment + first, drawn, around), kind, thin);
@@ -146,12 +178,9 @@ void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, 
     const std::uint32_t at = open[--depth];
     const Cluster& c = clusters[at];
     const Sphere sphere = placed(c);
-    if (!look.frustum.may_see(sphere)) continue;
-    if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, 0});
-      continue;
-    }
-    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
+    if (!look.in_sight(sphere)) continue;
+    if (look.leaves_out(sphere, {LeftOut::cluster, index, at, 0}, cut)) continue;
+    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !look.good_enough(sphere, c.error))) {
       open[depth++] = c.children[1];
       open[depth++] = c.children[0];
       continue;
@@ -167,11 +196,8 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
   const frame::Instance& instance = look.forest.instances()[index];
   const Neuron& neuron = look.forest.neurons()[instance.morphology];
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
-  if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
-  if (look.occluders && look.occluders->hide(sphere)) {
-    if (look.keep) cut.left_out.push_back({LeftOut::soma, index, 0, 0});
-    return;
-  }
+  if (!(neuron.soma_radius > 0.f) || !look.in_sight(sphere)) return;
+  if (look.leaves_out(sphere, {LeftOut::soma, index, 0, 0}, cut)) return;
   frame::Item ball = item(index, neuron.first_segment, 1, sphere);
   const frame::State state = look.state(index);
   if (state.is(frame::State::parted)) {
@@ -202,13 +228,10 @@ void choose_grove(const Look& look, std::uint32_t from, Cut& cut) {
     const std::uint32_t at = open.back();
     open.pop_back();
     const Groves::Node& node = groves.nodes()[at];
-    if (!look.frustum.may_see(node.sphere)) continue;
-    if (look.plain && !look.forest.bricks().empty() && look.eye.good_enough(node.sphere, look.straw_width()))
+    if (!look.in_sight(node.sphere)) continue;
+    if (look.plain && !look.forest.bricks().empty() && look.good_enough(node.sphere, look.straw_width()))
       continue;
-    if (look.occluders && look.occluders->hide(node.sphere)) {
-      if (look.keep) cut.left_out.push_back({LeftOut::grove, 0, at, 0});
-      continue;
-    }
+    if (look.leaves_out(node.sphere, {LeftOut::grove, 0, at, 0}, cut)) continue;
     for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back(node.first_child + c);
     if (node.child_count) continue;
     for (const std::uint32_t i : groves.members().subspan(node.first, node.count)) choose_neuron(look, i, cut);
@@ -223,7 +246,7 @@ void choose_straws(const Look& look, std::uint32_t at, std::uint32_t groups, Cut
   std::uint32_t shown = thinnest > 0.f ? b.shown(b.width * magnification / thinnest) : b.all();
   // Within the reach of a neuron around, all may be known to be far.
   const Sphere wide{sphere.centre, sphere.radius + 2.f * look.forest.reach()};
-  if (!look.plain || !look.eye.good_enough(wide, look.straw_width())) {
+  if (!look.plain || !look.good_enough(wide, look.straw_width())) {
     const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
     for (std::uint32_t rest = shown; rest; rest &= rest - 1)
       if (const int i = std::countr_zero(rest); !look.far(owners[std::size_t(i)].instance)) shown &= ~(1u << i);
@@ -239,8 +262,8 @@ void choose_straws(const Look& look, std::uint32_t at, std::uint32_t groups, Cut
     const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
     if (!drawn || !(groups >> g & 1u)) continue;
     const Sphere around = b.group(g);
-    if (!look.frustum.may_see(around)) continue;
-    if (look.occluders && look.occluders->hide(around))
+    if (!look.in_sight(around)) continue;
+    if (look.hides(around))
       hidden |= 1u << g;
     else
       put(drawn, around);
@@ -257,17 +280,14 @@ void choose_bricks(const Look& look, std::uint32_t from, Cut& cut) {
     open.pop_back();
     const Brick& b = bricks[at];
     const Sphere sphere = b.sphere();
-    if (!look.frustum.may_see(sphere)) continue;
-    if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({LeftOut::brick, 0, at, 0});
-      continue;
-    }
-    if (b.child_count && !look.eye.good_enough(sphere, b.width)) {
+    if (!look.in_sight(sphere)) continue;
+    if (look.leaves_out(sphere, {LeftOut::brick, 0, at, 0}, cut)) continue;
+    if (b.child_count && !look.good_enough(sphere, b.width)) {
       for (std::uint32_t c = b.child_count; c-- > 0;) open.push_back(b.first_child + c);
       continue;
     }
     // Its neurons are near when they are nearer than it: nothing to draw.
-    if (look.plain && !look.eye.good_enough(sphere, look.straw_width())) continue;
+    if (look.plain && !look.good_enough(sphere, look.straw_width())) continue;
     choose_straws(look, at, every_group, cut);
   }
 }
@@ -343,6 +363,13 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
   return bands;
 }
 
+// From near to far, in bands.
+void arrange(Cut& cut, const Eye& eye) {
+  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
+               capsules = sort_near_to_far(cut.capsules, eye);
+  cut.bands = bands_of(dots, lines, capsules);
+}
+
 }  // namespace
 
 std::vector<const frame::State*> section_states(const Forest& forest, const Shown& shown,
@@ -364,23 +391,21 @@ std::vector<const frame::State*> section_states(const Forest& forest, const Show
   return states;
 }
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Sight& guess,
            const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), before, true, shown};
+  const Look look{forest, eye, eye.frustum(), guess, true, shown};
   const auto groves = forest.groves().parts(neurons_a_part), bricks = parts_of(forest.bricks());
   Cut cut = in_chunks(groves.size() + bricks.size(), 1, [&](std::size_t i, Cut& part) {
     i < groves.size() ? choose_grove(look, groves[i], part) : choose_bricks(look, bricks[i - groves.size()], part);
   });
-  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
-               capsules = sort_near_to_far(cut.capsules, eye);
-  cut.bands = bands_of(dots, lines, capsules);
+  arrange(cut, eye);
   return cut;
 }
 
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
-             const Occluders& now, const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), &now, false, shown};
-  return in_chunks(left_out.size(), chunk, [&](std::size_t n, Cut& part) {
+             const Sight& now, const Shown& shown) {
+  const Look look{forest, eye, eye.frustum(), now, false, shown};
+  Cut cut = in_chunks(left_out.size(), chunk, [&](std::size_t n, Cut& part) {
     const LeftOut& l = left_out[n];
     switch (l.what) {
       case LeftOut::grove:
@@ -396,6 +421,8 @@ Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::
     const Placed placed(forest.instances()[l.instance]);
     choose_groups(look, l.instance, l.number, l.groups, placed, placed(forest.clusters()[l.number]), part);
   });
+  arrange(cut, eye);
+  return cut;
 }
 
 }  // namespace forest::scene

@@ -2,6 +2,7 @@
 // The choice of what is drawn: for every neuron in sight the coarsest clusters that are good enough for the eye.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,7 +14,7 @@
 
 namespace forest::scene {
 
-/// What was left out because an earlier picture hid it: a cluster or a brick and all below it, some of the groups that it
+/// What was left out because an earlier picture hid it, or because it is far: a cluster or a brick and all below it, some of the groups that it
 /// draws, a soma, or the neurons of a grove.
 struct LeftOut {
   enum What : std::uint32_t { cluster, soma, grove, brick };
@@ -58,14 +59,24 @@ struct Cut {
   }
 };
 
-/// Pure: depends on its arguments alone, and is the same at any number of threads.
-/// @param before  what an earlier picture hid, as a guess: it goes to `left_out`. Null: everything in sight is chosen
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-           const Occluders* before = nullptr, const Shown& shown = {});
+/// The depth cue of a picture.
+/// @param strength  as Detail::fog
+Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength);
 
-/// Of what was left out, that which `now`, of the same view with all else drawn, does not hide. Drawn besides, the
-/// picture is the one without any guess.
+/// What stands before what is looked at, and how far it is looked.
+struct Sight {
+  const Occluders* occluders = nullptr;  // what they hide is left out
+  float horizon = INFINITY;  // µm along the view: what begins beyond is left out
+};
+
+/// Pure: depends on its arguments alone, and is the same at any number of threads.
+/// @param guess  an earlier picture, as a guess: what it hides goes to `left_out`, as does what is far
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Sight& guess = {},
+           const Shown& shown = {});
+
+/// Of what was left out, that which `now`, the same view with all else drawn, does not hide; what is far is left out again. Drawn
+/// besides until nothing is left out, it gives the picture without any guess.
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown = {});
+             std::span<const LeftOut> left_out, const Sight& now, const Shown& shown = {});
 
 }  // namespace forest::scene

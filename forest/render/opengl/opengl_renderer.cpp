@@ -333,10 +333,11 @@ struct OpenGLRenderer::Device {
       find_tiles();
     }
     draw_bands(lists, f.bands, f.surfaces.empty());
-    if (f.rest) {
+    for (std::uint32_t round = 0; f.rest; ++round) {
       find_tiles();
       read_depths();
-      const frame::Lists more = f.rest(seen);
+      const frame::Lists more = f.rest(seen, round);
+      if (more.empty()) break;
       frame::check(more, geometry);
       upload(rest, more);
       draw_bands(rest, more.bands, false);

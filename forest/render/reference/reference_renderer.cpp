@@ -527,7 +527,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   };
   add(f);
   if (f.rest) {
-    const frame::Lists rest = f.rest(seen_);  // all of it
+    const frame::Lists rest = f.rest({}, 0);  // all of it
     frame::check(rest, geometry_);
     add(rest);
   }
