@@ -5,11 +5,29 @@ namespace forest::scene {
 
 const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
                            Painter painter) {
-  eye_ = eye, viewport_ = viewport, shown_ = shown, painter_ = std::move(painter);
-  revealed_segments_ = drawings_ = 0;
-  cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr, shown);
-  if (painter_) painter_(cut_, eye);
+  Chooser* one[] = {this};
+  choose(one, {&eye, 1}, {&viewport, 1}, shown, painter);
   return cut_;
+}
+
+void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
+                     std::span<const frame::Viewport> viewports, const Shown& shown, const Painter& painter) {
+  const auto& first = choosers.front()->eye_;
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    const Chooser& c = *choosers[i];
+    // One that was not asked for a while knows what another camera saw.
+    const bool knows = c.before_ && first && c.eye_->camera() == first->camera();
+    sights.push_back({eyes[i], knows ? &*c.before_ : nullptr});
+  }
+  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown);
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    Chooser& c = *choosers[i];
+    c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
+    c.revealed_segments_ = c.drawings_ = 0;
+    c.cut_ = std::move(cuts[i]);
+    if (painter) painter(c.cut_, eyes[i]);
+  }
 }
 
 void Chooser::complete(frame::Frame& frame) {

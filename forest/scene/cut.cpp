@@ -22,21 +22,14 @@ frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t draw
   return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
 }
 
-// Whether its branches are so thin that they are drawn as lines.
-bool is_thin(const Cluster& c, float magnification, const Detail& detail) {
-  return 2.f * c.thickness * magnification <= detail.surface_width;
-}
-
 constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
-// What is looked at, and what is known to be hidden.
+// What is looked at, by whom, and what is known to be hidden.
 struct Look {
   const Forest& forest;
-  const Eye& eye;
-  const frame::Frustum& frustum;
-  const Occluders* occluders;  // may be null
-  bool keep;                   // what they hide
+  std::span<const Sight> sights;
+  bool keep;  // what is hidden
   const Shown& shown;
 
   frame::State state(std::uint32_t index) const {
@@ -85,74 +78,115 @@ void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const
   }
 }
 
+// A sphere as all sights see it, and as the camera of the pictures before saw it; that once somebody asks.
+class Judged {
+ public:
+  Judged(const Look& look, const Sphere& sphere)
+      : sphere_(sphere), seen_(look.sights.front().eye.see(sphere)) {}
+
+  const Seen& seen() const { return seen_; }
+  bool hidden(const Sight& sight) {
+    if (!sight.before) return false;
+    if (!before_) before_ = sight.before->see(sphere_);
+    return sight.before->hide(*before_);
+  }
+
+ private:
+  const Sphere& sphere_;
+  Seen seen_;
+  std::optional<Seen> before_;
+};
+
+// Calls take(i) for each of a set of sights, a bit for each.
+void each_of(std::uint32_t sights, auto&& take) {
+  for (; sights; sights &= sights - 1) take(std::size_t(std::countr_zero(sights)));
+}
+
 // Of a cluster that is good enough, these groups.
-void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std::uint32_t groups,
-                   const Placed& placed, const Sphere& sphere, Cut& cut) {
+void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, std::uint32_t at,
+                   std::uint32_t groups, const Placed& placed, const Sphere& sphere, const Seen& seen,
+                   Cut& cut) {
   const Cluster& c = look.forest.clusters()[at];
-  const float magnification = look.eye.magnification(sphere);
-  const Detail& detail = look.eye.detail();
   const frame::Kind kind = look.state(index).kind;
-  const bool thin = is_thin(c, magnification, detail);
-  const std::uint32_t shown = detail.thinnest > 0.f ? c.visible_at(magnification / detail.thinnest) : c.all();
-  if (groups == every_group && sphere.radius * magnification <= group_limit)
-    return add(cut, item(index, c.first_segment, shown, sphere), kind, thin);
+  const auto shown = [&](const Seen& where) {
+    const float thinnest = sight.eye.detail().thinnest;
+    return thinnest > 0.f ? c.visible_at(sight.eye.magnification(where) / thinnest) : c.all();
+  };
+  if (groups == every_group && sphere.radius * sight.eye.magnification(seen) <= group_limit)
+    return add(cut, item(index, c.first_segment, shown(seen), sphere), kind,
+               sight.eye.thin(seen, c.thickness));
   std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
-    const std::uint32_t first = g * Cluster::group_size, drawn = shown >> first & 255u;
-    if (!drawn || !(groups >> g & 1u)) continue;
+    const std::uint32_t first = g * Cluster::group_size;
+    if (!(groups >> g & 1u) || first >= c.segment_count) continue;
     const Sphere around = placed(c.group(g));
-    if (!look.frustum.may_see(around)) continue;
-    if (look.occluders && look.occluders->hide(around))
+    Judged judged(look, around);
+    if (!sight.eye.may_see(judged.seen())) continue;
+    const std::uint32_t drawn = shown(judged.seen()) >> first & 255u;
+    if (!drawn) continue;
+    if (judged.hidden(sight))
       hidden |= 1u << g;
     else
-      add(cut, item(index, c.first_segment + first, drawn, around), kind, thin);
+      add(cut, item(index, c.first_segment + first, drawn, around), kind,
+          sight.eye.thin(judged.seen(), c.thickness));
   }
   if (hidden && look.keep) cut.left_out.push_back({index, at, hidden});
 }
 
-void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
+// For each sight, from one cluster on; returns which of them may see it.
+std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from,
+                              std::span<Cut> cuts) {
+  const std::uint32_t all = frame::first_segments(look.sights.size());
   const Placed placed(look.forest.instances()[index]);
   const auto clusters = look.forest.clusters();
-  const Eye& eye = look.eye;
   const frame::State state = look.state(index);
   const bool parted =
       state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
   const auto states =
       parted ? section_states(look.forest, look.shown, index) : std::vector<const frame::State*>();
-  if (state.kind == frame::Kind::somata && !parted) return;
-  std::uint32_t open[64];
-  int depth = 0;
-  open[depth++] = from;
+  if (state.kind == frame::Kind::somata && !parted) return all;
+  struct Open {
+    std::uint32_t cluster, sights;  // those for which its parent was too coarse
+  };
+  std::array<Open, 64> open;
+  std::size_t depth = 0;
+  std::uint32_t may_see = 0;
+  open[depth++] = {from, all};
   while (depth) {
-    const std::uint32_t at = open[--depth];
+    const auto [at, sights] = open[--depth];
     const Cluster& c = clusters[at];
     const Sphere sphere = placed(c);
-    if (!look.frustum.may_see(sphere)) continue;
-    if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({index, at, 0});
-      continue;
-    }
-    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
-      open[depth++] = c.children[1];
-      open[depth++] = c.children[0];
-      continue;
-    }
-    if (parted)
-      add_parts(look, index, c, sphere, is_thin(c, eye.magnification(sphere), eye.detail()), states, cut);
-    else
-      choose_groups(look, index, at, every_group, placed, sphere, cut);
+    Judged judged(look, sphere);
+    const Seen& seen = judged.seen();
+    std::uint32_t finer = 0;
+    each_of(sights, [&](std::size_t s) {
+      const Sight& sight = look.sights[s];
+      Cut& cut = cuts[s];
+      if (!sight.eye.may_see(seen)) return;
+      if (at == from) may_see |= 1u << s;
+      if (judged.hidden(sight)) {
+        if (look.keep) cut.left_out.push_back({index, at, 0});
+      } else if (!c.is_leaf() && depth + 2 <= open.size() &&
+                 (parted || !sight.eye.good_enough(seen, c.error))) {
+        finer |= 1u << s;
+      } else if (parted) {
+        add_parts(look, index, c, sphere, sight.eye.thin(seen, c.thickness), states, cut);
+      } else {
+        choose_groups(look, sight, index, at, every_group, placed, sphere, seen, cut);
+      }
+    });
+    if (!finer) continue;
+    open[depth++] = {c.children[1], finer};
+    open[depth++] = {c.children[0], finer};
   }
+  return may_see;
 }
 
-void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
+void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
   const frame::Instance& instance = look.forest.instances()[index];
   const Neuron& neuron = look.forest.neurons()[instance.morphology];
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
-  if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
-  if (look.occluders && look.occluders->hide(sphere)) {
-    if (look.keep) cut.left_out.push_back({index, soma, 0});
-    return;
-  }
+  if (!(neuron.soma_radius > 0.f)) return;
   frame::Item ball = item(index, neuron.first_segment, 1, sphere);
   const frame::State state = look.state(index);
   if (state.is(frame::State::parted)) {
@@ -160,38 +194,51 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
       if (part.section == soma_section) ball.state = frame::packed(part.state);
     if (!(ball.state ? frame::unpacked(ball.state) : state).is(frame::State::visible)) return;
   }
-  const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
-  (large ? cut.capsules : cut.dots).push_back(ball);
-  ++cut.segments;
+  Judged judged(look, sphere);
+  each_of(sights, [&](std::size_t s) {
+    const Sight& sight = look.sights[s];
+    if (!sight.eye.may_see(judged.seen())) return;
+    if (judged.hidden(sight)) {
+      if (look.keep) cuts[s].left_out.push_back({index, soma, 0});
+      return;
+    }
+    const bool large = neuron.soma_radius * sight.eye.magnification(judged.seen()) > dot_limit;
+    (large ? cuts[s].capsules : cuts[s].dots).push_back(ball);
+    ++cuts[s].segments;
+  });
 }
 
-void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
+void choose_neuron(const Look& look, std::uint32_t index, std::span<Cut> cuts) {
   if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
-  const std::uint64_t before = cut.segments;
-  choose_clusters(look, index, neuron.first_cluster, cut);
-  choose_soma(look, index, cut);
-  cut.neurons += cut.segments > before;
+  std::array<std::uint64_t, most_sights> before;
+  std::ranges::transform(cuts, before.begin(), &Cut::segments);
+  // The soma lies within its root.
+  choose_soma(look, index, choose_clusters(look, index, neuron.first_cluster, cuts), cuts);
+  for (std::size_t s = 0; s < cuts.size(); ++s) cuts[s].neurons += cuts[s].segments > before[s];
 }
 
 void append(auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-// What `choose_one(i, cut)` adds for each i below `count`, in this order.
-Cut in_chunks(std::size_t count, auto&& choose_one) {
-  std::vector<Cut> parts((count + chunk - 1) / chunk);
-  parallel_for(parts.size(), 1, [&](std::size_t p) {
-    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i) choose_one(i, parts[p]);
+// What `choose_one(i, cuts)` adds to each of so many cuts for each i below `count`, in this order.
+std::vector<Cut> in_chunks(std::size_t count, std::size_t cuts, auto&& choose_one) {
+  std::vector<Cut> parts((count + chunk - 1) / chunk * cuts);
+  parallel_for(parts.size() / cuts, 1, [&](std::size_t p) {
+    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i)
+      choose_one(i, std::span(parts).subspan(p * cuts, cuts));
   });
-  Cut whole;
-  for (const Cut& part : parts) {
-    append(whole.dots, part.dots);
-    append(whole.lines, part.lines);
-    append(whole.capsules, part.capsules);
-    append(whole.left_out, part.left_out);
-    whole.segments += part.segments;
-    whole.neurons += part.neurons;
-  }
+  std::vector<Cut> whole(cuts);
+  parallel_for(cuts, 1, [&](std::size_t c) {
+    for (std::size_t p = c; p < parts.size(); p += cuts) {
+      append(whole[c].dots, parts[p].dots);
+      append(whole[c].lines, parts[p].lines);
+      append(whole[c].capsules, parts[p].capsules);
+      append(whole[c].left_out, parts[p].left_out);
+      whole[c].segments += parts[p].segments;
+      whole[c].neurons += parts[p].neurons;
+    }
+  });
   return whole;
 }
 
@@ -253,31 +300,44 @@ std::vector<const frame::State*> section_states(const Forest& forest, const Show
   return states;
 }
 
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown) {
+  const Look look{forest, sights, true, shown};
+  std::vector<Cut> cuts = in_chunks(forest.instances().size(), sights.size(), [&](std::size_t i, auto parts) {
+    choose_neuron(look, std::uint32_t(i), parts);
+  });
+  parallel_for(cuts.size(), 1, [&](std::size_t s) {
+    Cut& cut = cuts[s];
+    const Eye& eye = sights[s].eye;
+    const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
+                 capsules = sort_near_to_far(cut.capsules, eye);
+    cut.bands = bands_of(dots, lines, capsules);
+  });
+  return cuts;
+}
+
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
            const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), before, true, shown};
-  Cut cut = in_chunks(forest.instances().size(),
-                      [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
-  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
-               capsules = sort_near_to_far(cut.capsules, eye);
-  cut.bands = bands_of(dots, lines, capsules);
-  return cut;
+  const Sight sight{eye, before};
+  return std::move(choose(forest, std::span(&sight, 1), shown).front());
 }
 
 Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
              const Occluders& now, const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), &now, false, shown};
-  return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
-    const auto [instance, cluster, groups] = left_out[i];
-    if (cluster == soma) {
-      choose_soma(look, instance, part);
-    } else if (groups) {
-      const Placed placed(forest.instances()[instance]);
-      choose_groups(look, instance, cluster, groups, placed, placed(forest.clusters()[cluster]), part);
-    } else {
-      choose_clusters(look, instance, cluster, part);
-    }
-  });
+  const Sight sight{eye, &now};
+  const Look look{forest, std::span(&sight, 1), false, shown};
+  return std::move(in_chunks(left_out.size(), 1, [&](std::size_t i, std::span<Cut> cut) {
+                     const auto [instance, cluster, groups] = left_out[i];
+                     if (cluster == soma) {
+                       choose_soma(look, instance, 1, cut);
+                     } else if (groups) {
+                       const Placed placed(forest.instances()[instance]);
+                       const Sphere sphere = placed(forest.clusters()[cluster]);
+                       choose_groups(look, sight, instance, cluster, groups, placed, sphere, eye.see(sphere),
+                                     cut.front());
+                     } else {
+                       choose_clusters(look, instance, cluster, cut);
+                     }
+                   }).front());
 }
 
 }  // namespace forest::scene

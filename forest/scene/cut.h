@@ -55,8 +55,18 @@ struct Cut {
   }
 };
 
+/// One of the pictures that clusters are chosen for together: parts of one view, seen by one camera, at sizes of their own (fovea.h).
+struct Sight {
+  const Eye& eye;
+  // What an earlier picture hid, as a guess: it goes to `left_out`. Null: everything in sight is chosen. All of the earlier pictures
+  // were seen by one camera too.
+  const Occluders* before = nullptr;
+};
+inline constexpr std::size_t most_sights = 32;
+
+/// Of each sight the same cut as of it alone, in one walk over the forest.
 /// Pure: depends on its arguments alone, and is the same at any number of threads.
-/// @param before  what an earlier picture hid, as a guess: it goes to `left_out`. Null: everything in sight is chosen
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {});
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
            const Occluders* before = nullptr, const Shown& shown = {});
 
