@@ -49,7 +49,7 @@ scene::Scanpath looking_about(double milliseconds, std::uint64_t seed) {
 
 struct Part {
   std::string name;
-  double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., unite = 0., covered = 0.;
+  double frames = 0., seconds = 0., cull = 0., draw = 0., unite = 0., covered = 0.;
   std::uint64_t segments = 0,
                 whole_segments = 0;          // chosen for the pictures compared, with and without a gaze
   std::uint64_t drawn = 0, whole_drawn = 0;  // of them, neither hidden nor beside what is wanted
@@ -104,7 +104,7 @@ class Bench {
       if (i > 0) {  // the first has nothing to go by
         const Foveated::Figures& f = foveated_.figures();
         part.frames += 1, part.seconds += seconds, part.took.push_back(1000. * seconds);
-        part.cull += f.cull, part.draw += f.draw, part.resolve += f.resolve, part.unite += f.unite;
+        part.cull += f.cull, part.draw += f.draw, part.unite += f.unite;
         part.covered += image.covered;
       }
       if (i % every == every - 1) {
@@ -115,7 +115,7 @@ class Bench {
       console_.progress().advance();
     }
     console_.progress().end();
-    for (double* sum : {&part.cull, &part.draw, &part.resolve, &part.unite, &part.covered})
+    for (double* sum : {&part.cull, &part.draw, &part.unite, &part.covered})
       *sum /= part.frames;
     if (part.covered < .005)
       throw Error(fmt::format("{}: the pictures show nothing; nothing was measured", name));
@@ -199,11 +199,10 @@ void run(const Options& options, Console& console) {
          {"segments_without", p.whole_segments / p.compared},
          {"fovea_pixels", p.fovea_pixels},
          {"fovea_differ", p.fovea_differ},
-         {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}, {"unite", p.unite}}},
+         {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
          {"covered", p.covered}});
     rows.push_back({p.name, fmt::format("{:.1f}", p.per_second()), fmt::format("{:.1f}", p.cull),
-                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.resolve),
-                    fmt::format("{:.1f}", p.unite), fmt::format("{}", p.drawn / p.compared),
+                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.unite), fmt::format("{}", p.drawn / p.compared),
                     fmt::format("{}", p.whole_drawn / p.compared), fmt::format("{:.1f}", p.ratio()),
                     fmt::format("{:.1f}", p.ratio_chosen()),
                     fmt::format("{} of {}", p.fovea_differ, p.fovea_pixels)});
@@ -212,7 +211,7 @@ void run(const Options& options, Console& console) {
   console.print(json);
   console.say(fmt::format("{} neurons, {} segments, {}, {}", bench.forest().instances().size(),
                           bench.forest().segment_total(), options.size, bench.renderer()));
-  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "resolve ms", "unite ms", "segments",
+  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "unite ms", "segments",
                  "without gaze", "ratio", "of those chosen", "pixels of the fovea that differ"},
                 rows);
 }

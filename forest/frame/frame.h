@@ -133,10 +133,11 @@ struct Lists {
 };
 
 /// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,
-/// along the view); infinite where a pixel shows nothing.
+/// along the view); infinite where a pixel shows nothing. Of a picture of which only an area is wanted, those of that may be all.
 struct DepthMap {
   std::uint32_t width = 0, height = 0;  // squares
   std::vector<float> depths;
+  std::uint32_t left = 0, top = 0;  // squares of the picture before the first
 };
 
 /// A clear rectangle in the world, through which what lies behind is seen tinted.

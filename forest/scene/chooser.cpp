@@ -5,7 +5,6 @@
 #include <cmath>
 
 namespace forest::scene {
-
 namespace {
 
 // How far it is looked, round by round: to where an earlier picture ended nearly everywhere, beyond the last bits of it, and to
@@ -24,20 +23,41 @@ std::array<float, 2> horizons_of(const frame::DepthMap& seen) {
   return {near, std::max(2.f * near, 1.25f * share(.97f))};
 }
 
+// When nothing is known yet.
+std::array<float, 2> first_horizons(const Forest& forest, const Eye& eye) {
+  if (forest.groves().nodes().empty()) return {INFINITY, INFINITY};
+  const float nearest = eye.nearest_depth(forest.groves().nodes().front().sphere);
+  return {nearest + 150.f, nearest + 600.f};
+}
+
 }  // namespace
 
 const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
                            Painter painter) {
-  eye_ = eye, viewport_ = viewport, shown_ = shown, painter_ = std::move(painter);
-  revealed_segments_ = drawings_ = 0;
-  if (!before_ && !forest_.groves().nodes().empty()) {
-    const float nearest = eye.nearest_depth(forest_.groves().nodes().front().sphere);
-    horizons_ = {nearest + 150.f, nearest + 600.f};
-  }
-  const Sight guess{before_ ? &*before_ : nullptr, horizons_[0]};
-  cut_ = scene::choose(forest_, eye, viewport, guess, shown);
-  if (painter_) painter_(cut_, eye);
+  Chooser* one[] = {this};
+  choose(one, {&eye, 1}, {&viewport, 1}, shown, painter);
   return cut_;
+}
+
+void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
+                     std::span<const frame::Viewport> viewports, const Shown& shown, const Painter& painter) {
+  const auto& first = choosers.front()->eye_;
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    Chooser& c = *choosers[i];
+    if (!c.before_) c.horizons_ = first_horizons(c.forest_, eyes[i]);
+    // One that was not asked for a while knows what another camera saw.
+    const bool knows = c.before_ && first && c.eye_->camera() == first->camera();
+    sights.push_back({eyes[i], knows ? &*c.before_ : nullptr, c.horizons_[0]});
+  }
+  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown);
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    Chooser& c = *choosers[i];
+    c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
+    c.revealed_segments_ = c.drawings_ = 0;
+    c.cut_ = std::move(cuts[i]);
+    if (painter) painter(c.cut_, eyes[i]);
+  }
 }
 
 void Chooser::complete(frame::Frame& frame) {
@@ -50,7 +70,7 @@ void Chooser::complete(frame::Frame& frame) {
       // A map of nothing hides nothing: there is no use in rounds.
       const bool rounds = !seen.depths.empty() && round_ + 1 < horizons_.size();
       const float horizon = rounds ? horizons_[round_ + 1] : INFINITY;
-      revealed_ = revealed(forest_, *eye_, viewport_, left, {&now, horizon}, shown_);  // `left` is read before it goes
+      revealed_ = revealed(forest_, {*eye_, &now, horizon}, left, shown_);
       ++round_;
     } while (revealed_.lists().empty());
     if (painter_) painter_(revealed_, *eye_);

@@ -22,6 +22,10 @@ class Chooser {
   /// The cut of the next picture; valid until the one after it. What `shown` points to must last until it is drawn.
   const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {},
                     Painter painter = {});
+  /// The same for parts of one view, seen by one camera, all at once: chooser i, of the same forest, for eye i and viewport i.
+  static void choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
+                     std::span<const frame::Viewport> viewports, const Shown& shown = {},
+                     const Painter& painter = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);

@@ -63,20 +63,23 @@ struct Cut {
 /// @param strength  as Detail::fog
 Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength);
 
-/// What stands before what is looked at, and how far it is looked.
+/// One of the pictures that are chosen for together: parts of one view, seen by one camera, at sizes of their own (fovea.h).
 struct Sight {
-  const Occluders* occluders = nullptr;  // what they hide is left out
+  const Eye& eye;
+  // What a picture shows; what it hides is left out. Null: nothing is hidden. All were seen by one camera, which may be an earlier one.
+  const Occluders* before = nullptr;
   float horizon = INFINITY;  // µm along the view: what begins beyond is left out
 };
+inline constexpr std::size_t most_sights = 32;
 
+/// What is drawn for each sight, the same as for it alone, in one walk over the forest.
 /// Pure: depends on its arguments alone, and is the same at any number of threads.
-/// @param guess  an earlier picture, as a guess: what it hides goes to `left_out`, as does what is far
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Sight& guess = {},
-           const Shown& shown = {});
+/// @param sights  what they leave out goes to `left_out`: earlier pictures are a guess
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {});
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
 
-/// Of what was left out, that which `now`, the same view with all else drawn, does not hide; what is far is left out again. Drawn
-/// besides until nothing is left out, it gives the picture without any guess.
-Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Sight& now, const Shown& shown = {});
+/// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its
+/// horizon is left out again. Drawn besides until nothing is left out, it gives the picture without any guess.
+Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown = {});
 
 }  // namespace forest::scene
