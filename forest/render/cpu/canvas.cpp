@@ -24,9 +24,9 @@ FOREST_CLONES std::uint32_t farthest(const std::uint32_t* keys, std::size_t coun
   return far;
 }
 
-FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t most) {
+FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t limit) {
   std::uint32_t n = 0;
-  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= most;
+  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= limit;
   return n;
 }
 
@@ -143,7 +143,7 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   if (whole(tx, ty) && (gaps_ == 0.f || wanted_ == (1ull << samples_) - 1)) {
     const std::size_t all = std::size_t(tile * tile) * std::size_t(samples_);
     const std::uint32_t* keys = at(tx * tile, ty * tile);  // what is not wanted or beyond the picture's edges is 0
-    return gaps_ == 0.f ? farthest(keys, all) : farthest_but(keys, all, all - std::uint32_t(float(all) * gaps_));
+    return gaps_ == 0.f ? farthest(keys, all) : farthest_but(keys, all, std::uint32_t(all) - std::uint32_t(float(all) * gaps_));
   }
   std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile) * most_samples> keys;
   std::size_t count = 0;
