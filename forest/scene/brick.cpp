@@ -64,7 +64,8 @@ void enclose(Brick& brick, std::span<const frame::Segment> straws, std::span<con
 
 }  // namespace
 
-std::uint32_t Brick::shown(float share) const {
+std::uint32_t Brick::shown(float magnification) const {
+  const float share = float(FOREST_MEAN_STRETCH) * width * magnification * std::min(1.f, length * magnification);
   return first_by_rank[std::size_t(std::clamp(std::ceil(share * 32.f), 0.f, 32.f))] & all();
 }
 
@@ -163,7 +164,7 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
     parallel_for(level.bricks, 256, [&](std::size_t n) {
       Brick& brick = result.bricks[level.first_brick + n];
       const std::size_t begin = level.first_straw + n * Brick::straws;
-      brick.width = look.width;
+      brick.width = look.width, brick.length = look.length;
       brick.segment_count = std::uint32_t(std::min<std::size_t>(Brick::straws, level.straws - n * Brick::straws));
       brick.first_segment = first_straw + std::uint32_t(begin);
       for (std::uint32_t s = 0; s < brick.segment_count; ++s) {

@@ -10,6 +10,8 @@
 // A neuron is drawn by its clusters or by its straws, never by both: that is a matter of it and the eye alone.
 #pragma once
 
+#include <algorithm>
+#include <cmath>
 #include <cstdint>
 #include <span>
 #include <vector>
@@ -25,19 +27,21 @@ struct Brick {
   static constexpr std::uint32_t straws = 32, group_size = 8, group_count = straws / group_size;
 
   float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // around all of its straws, those of its children as well, µm
-  float width = 0.f;                              // of a straw, µm
+  float width = 0.f, length = 0.f;                // of a straw, µm
   std::uint32_t first_segment = 0, segment_count = 0;
   std::uint32_t first_child = 0, child_count = 0;  // bricks; 0 for the finest
   std::uint32_t groups[group_count] = {};          // the sphere around each eight of the straws
-  std::uint32_t reserved[3] = {};
+  std::uint32_t reserved[2] = {};
 
+  /// How large what a straw stands for may look, µm: from far it is a dot of its area.
+  float error() const { return std::min(width, std::sqrt(width * length)); }
   Sphere sphere() const { return {{x, y, z}, radius}; }
   Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], sphere()); }
   std::uint32_t all() const {
     return segment_count >= 32 ? 0xffffffffu : (1u << segment_count) - 1u;
   }
-  /// Those of a rank less than `share`: bit i is straw i.
-  std::uint32_t shown(float share) const;
+  /// Those that may be drawn where 1 µm covers so many times the width of the thinnest line: bit i is straw i.
+  std::uint32_t shown(float magnification) const;
 };
 static_assert(sizeof(Brick) == 64);
 

@@ -65,7 +65,7 @@ struct Look {
   bool has_straws() const { return !forest.bricks().empty(); }
   // Whether straws are good enough for neurons within.
   bool straws_do(const Sight& sight, const Seen& seen) const {
-    return has_straws() && good_enough(sight, seen, forest.bricks().back().width);
+    return has_straws() && good_enough(sight, seen, forest.bricks().back().error());
   }
   // For which of some sights a neuron is drawn by straws.
   std::uint32_t far(std::uint32_t index, std::uint32_t of_sights) const {
@@ -307,7 +307,7 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
   const Sight& sight = look.sights[s];
   const Sphere sphere = b.sphere();
   const float magnification = sight.eye.magnification(sphere), thinnest = sight.eye.detail().thinnest;
-  std::uint32_t shown = thinnest > 0.f ? b.shown(b.width * magnification / thinnest) : b.all();
+  std::uint32_t shown = thinnest > 0.f ? b.shown(magnification / thinnest) : b.all();
   // Within the reach of a neuron around, all may be known to be far.
   const Sphere wide{sphere.centre, sphere.radius + 2.f * look.forest.reach()};
   if (!look.plain || !look.straws_do(sight, sight.eye.see(wide))) {
@@ -351,7 +351,7 @@ void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
       if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s])) return;
-      if (b.child_count && !look.good_enough(sight, seen, b.width))
+      if (b.child_count && !look.good_enough(sight, seen, b.error()))
         finer |= 1u << s;
       else if (!look.plain || look.straws_do(sight, seen))  // else its neurons, which are nearer, are near, too
         choose_straws(look, s, at, every_group, cuts[s]);

@@ -205,7 +205,8 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
                 within(b.first_segment, b.segment_count, f.segments().size()) &&
                 within(b.first_child, b.child_count, bricks.size()) &&
                 (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
-                std::isfinite(b.x + b.y + b.z + b.radius + b.width) && b.radius >= 0.f && b.width > 0.f,
+                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length) && b.radius >= 0.f && b.width > 0.f &&
+                b.length > 0.f,
             wrong);
   });
   parallel_for(f.owners().size(), 4096, [&](std::size_t i) {

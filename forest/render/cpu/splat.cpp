@@ -150,6 +150,7 @@ class Gatherer {
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
     project(c, turn, at, picture_.light, r_);
+    if (picture_.geometry.straw(item)) lengthen(c, r_);
     prepare_lines(c, picture_.spread, r_);
     std::uint64_t added = 0;
     for (std::size_t i = 0; i < r_.count; ++i)

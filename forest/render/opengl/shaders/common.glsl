@@ -31,6 +31,7 @@ struct Capsule {
   uint entry;  // of the palette
   float rank;  // in [0, 1): a branch of width w < 1 pixel is drawn when w > rank
   float mean;  // radius of its branch; 0: as its own
+  bool straw;  // never shorter than it is wide
 };
 
 vec3 to_camera(vec3 world) {
@@ -108,6 +109,7 @@ bool fetch(uint item_index, uint index, out Capsule c) {
   c.b = uintBitsToFloat(at_b.xyz);
   c.ra = radii.x;
   c.rb = radii.y;
+  c.straw = item.x == FOREST_IN_WORLD && (view.flags & FOREST_OVERLAY) == 0u;
   if ((view.flags & FOREST_OVERLAY) != 0u) {  // overlays: in the world, at least two pixels wide, entry in the meta word
     c.a = to_camera(c.a);
     c.b = to_camera(c.b);
@@ -190,6 +192,14 @@ int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit)));
 void draw_line(Capsule c) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
   vec2 d = q - p;
+  float drawn_length = length(d), shorter = 1.0;  // a straw shorter than it is wide is drawn longer, and fewer of them
+  if (c.straw && drawn_length < view.thinnest) {
+    shorter = drawn_length / view.thinnest;
+    d = drawn_length > 1e-3 ? d / shorter : vec2(view.thinnest, 0.0);
+    vec2 middle = 0.5 * (p + q);
+    p = middle - 0.5 * d;
+    q = middle + 0.5 * d;
+  }
   bool steep = abs(d.y) > abs(d.x);
   float major = max(abs(d.x), abs(d.y));
   float stretch = major > 0.0 ? length(d) / major : 1.0;
@@ -198,7 +208,7 @@ void draw_line(Capsule c) {
   bool single = view.subframes == 1u;
   if (width < view.thinnest && c.mean > 0.0) {
     // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
-    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH / view.thinnest, 1.0);
+    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / view.thinnest, 1.0);
     if (share <= rank) return;
     width = single ? floor(view.thinnest + 1.0 - rank / share) : width / share;
   } else if (single) {
