@@ -5,32 +5,30 @@
 #include <cmath>
 
 namespace forest::scene {
-namespace {
 
 // How far it is looked, round by round: to where an earlier picture ended nearly everywhere, beyond the last bits of it, and to
 // the end. What is near hides most of what is far, and then nobody has to choose it.
-std::array<float, 2> horizons_of(const frame::DepthMap& seen) {
+Chooser::Horizons Chooser::horizons_of(const frame::DepthMap& seen) {
+  constexpr std::array<float, 3> shares{.6f, .85f, .98f};
+  constexpr float least = 100.f;  // µm: an eye within a bush is told little of where it is going
+  Horizons horizons{INFINITY, INFINITY, INFINITY};
   std::vector<float> depths;
   for (const float depth : seen.depths)
     if (std::isfinite(depth)) depths.push_back(depth);
-  if (depths.empty()) return {INFINITY, INFINITY};
-  const auto share = [&](float part) {
-    const auto nth = depths.begin() + std::ptrdiff_t(part * float(depths.size() - 1));
+  for (std::size_t i = 0; i < shares.size() && !depths.empty(); ++i) {
+    const auto nth = depths.begin() + std::ptrdiff_t(shares[i] * float(depths.size() - 1));
     std::nth_element(depths.begin(), nth, depths.end());
-    return *nth;
-  };
-  const float near = std::max(share(.7f), 100.f);  // of the eye itself within a bush little is told
-  return {near, std::max(2.f * near, 1.25f * share(.97f))};
+    horizons[i] = std::max(*nth, least * float(1u << i));
+  }
+  return horizons;
 }
 
 // When nothing is known yet.
-std::array<float, 2> first_horizons(const Forest& forest, const Eye& eye) {
-  if (forest.groves().nodes().empty()) return {INFINITY, INFINITY};
+Chooser::Horizons Chooser::first_horizons(const Forest& forest, const Eye& eye) {
+  if (forest.groves().nodes().empty()) return {INFINITY, INFINITY, INFINITY};
   const float nearest = eye.nearest_depth(forest.groves().nodes().front().sphere);
-  return {nearest + 150.f, nearest + 600.f};
+  return {nearest + 150.f, nearest + 300.f, nearest + 600.f};
 }
-
-}  // namespace
 
 const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
                            Painter painter) {

@@ -41,7 +41,10 @@ class Chooser {
   frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
-  std::array<float, 2> horizons_{INFINITY, INFINITY};  // µm along the view
+  using Horizons = std::array<float, 3>;  // µm along the view
+  static Horizons horizons_of(const frame::DepthMap& seen);
+  static Horizons first_horizons(const Forest& forest, const Eye& eye);
+  Horizons horizons_{INFINITY, INFINITY, INFINITY};
   std::size_t round_ = 0;  // of those after the cut
   Painter painter_;
   Cut cut_, revealed_;
