@@ -146,7 +146,7 @@ TEST(Chooser, ItsMemoryChangesNoPixelWhateverIsShown) {
       view.samples = samples;
       const scene::Colouring colouring = scene::colour(targets, view);
       const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-      const scene::Cut cut = scene::choose(forest, eye, viewport, nullptr, colouring.shown());
+      const scene::Cut cut = scene::choose(forest, eye, viewport, colouring.shown());
       renderer.draw(scene::compose(forest, view, colouring, cut, width, height));
       const frame::Image plain = renderer.read();
       const scene::Cut& guessed = chooser.choose(eye, viewport, colouring.shown());

@@ -657,7 +657,8 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   const std::vector<frame::Item> first{{0, 0, 1, 0, 0, 0, 0, 200}}, second{{0, 1, 1, 0, 0, 0, 0, 200}};
   f.frame.capsules = first;
   int asked = 0;
-  f.frame.rest = [&](const frame::DepthMap& seen) {
+  f.frame.rest = [&](const frame::DepthMap& seen, std::uint32_t round) {
+    if (round > 0) return frame::Lists{};
     ++asked;
     EXPECT_EQ(seen.width, 25u);
     EXPECT_EQ(seen.depths.size(), 625u);
@@ -671,6 +672,32 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   EXPECT_EQ(f.draw().pixels, whole.pixels);
   EXPECT_GE(asked, 1);  // once for all subframes that are drawn together
   EXPECT_EQ(f.renderer->seen().depths.size(), 625u);
+}
+
+TEST_P(RendererLaws, AStrawLiesInTheWorldAndLooksAsItsOwner) {
+  Fixture f(GetParam());
+  f.frame.subframes = 16;
+  f.frame.palette[8 * 5 + 3] = Vec3(1, .2f, .1f), f.frame.palette[8 * 2 + 3] = Vec3(.1f, .2f, 1);
+  f.add({-20, 3, 0}, {15, -8, 0}, 1.f);
+  f.add({-20, -12, 0}, {15, 12, -30}, 1.f);
+  f.instances = {{0, 0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 0, 0, 1}};
+  f.frame.lines = f.items;
+  const auto draw = [&](std::span<const frame::Item> items, std::span<const frame::Instance> instances,
+                        std::span<const frame::State> states, std::span<const frame::Owner> owners) {
+    f.renderer->load({f.segments, instances, owners});
+    f.frame.lines = items, f.frame.states = states;
+    f.renderer->draw(f.frame);
+    return f.renderer->read();
+  };
+  const std::vector<frame::State> states{{.colour_class = 5}, {.colour_class = 2}};
+  const std::vector<frame::Item> apart{{0, 0, 1, 0, 0, 0, 0, 200}, {1, 1, 1, 0, 0, 0, 0, 200}},
+      straws{{FOREST_IN_WORLD, 0, 3, 0, 0, 0, 0, 200}};
+  const frame::Image expected = draw(apart, f.instances, states, {});
+  // Instances that stand elsewhere do not matter.
+  const std::vector<frame::Instance> elsewhere{{500, 0, 0, 0, 0, 0, 0, 1}, {0, 0, 900, 0, 0, 0, 0, 1}};
+  const std::vector<frame::Owner> owners{{0, 0}, {1, 1}};
+  EXPECT_EQ(draw(straws, elsewhere, states, owners).pixels, expected.pixels);
+  EXPECT_THROW(draw(straws, elsewhere, states, std::span(owners).last(1)), Error);
 }
 
 TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
@@ -718,8 +745,9 @@ TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
   EXPECT_EQ(channels(f.draw()), before);
   f.frame.bands = {};
   // What is revealed brings its own, also when the picture is drawn several times.
-  f.frame.rest = [&](const frame::DepthMap&) {
+  f.frame.rest = [&](const frame::DepthMap&, std::uint32_t round) {
     frame::Lists more;
+    if (round > 0) return more;
     more.capsules = dot, more.entries.capsules = others;
     return more;
   };

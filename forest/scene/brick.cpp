@@ -193,6 +193,17 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
         below = std::span(result.bricks).subspan(brick.first_child, brick.child_count);
       }
       enclose(brick, std::span(result.straws).subspan(begin, brick.segment_count), below);
+      for (const Brick& child : below)
+        brick.neurons = std::max(brick.neurons,
+                                 (child.sphere().centre - brick.sphere().centre).norm() + child.neurons);
+      if (leaf)
+        for (const frame::Owner& owner : std::span(result.owners).subspan(begin, brick.segment_count)) {
+          const frame::Instance& i = instances[owner.instance];
+          const Sphere& of = pieces[i.morphology].sphere;
+          const Vec3 centre = Vec3(i.x, i.y, i.z) + Quat(i.qw, i.qx, i.qy, i.qz) * of.centre;
+          brick.neurons =
+              std::max(brick.neurons, 1.001f * (centre - brick.sphere().centre).norm() + of.radius);
+        }
     });
   }
   return result;

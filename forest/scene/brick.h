@@ -31,7 +31,8 @@ struct Brick {
   std::uint32_t first_segment = 0, segment_count = 0;
   std::uint32_t first_child = 0, child_count = 0;  // bricks; 0 for the finest
   std::uint32_t groups[group_count] = {};          // the sphere around each eight of the straws
-  std::uint32_t reserved[2] = {};
+  float neurons = 0.f;  // radius of a sphere around its centre that holds the neurons of all of its straws, whole, µm
+  std::uint32_t reserved = 0;
 
   /// How large what a straw stands for may look, µm: from far it is a dot of its area.
   float error() const { return std::min(width, std::sqrt(width * length)); }
@@ -54,6 +55,7 @@ struct Pieces {
   };
   std::vector<Piece> pieces;  // along the branches
   float area = 0.f;           // µm², length × diameter of all branches; of a soma what looks as large
+  Sphere sphere;              // around the neuron
 };
 Pieces pieces_of(std::span<const frame::Segment> originals, std::size_t count);
 

@@ -63,9 +63,14 @@ struct Look {
   }
 
   bool has_straws() const { return !forest.bricks().empty(); }
-  // Whether straws are good enough for neurons within.
+  // Whether straws that are so large, µm, do for what lies within: as large as the thinnest line that is drawn for its like, or
+  // small within a pixel. They are no worse than thinning is, but a drawing of every branch is better.
+  bool straws_do(const Sight& sight, const Seen& seen, float size) const {
+    const Detail& d = sight.eye.detail();
+    return good_enough(sight, seen, size * d.error / std::max(d.thinnest, .125f * d.error));
+  }
   bool straws_do(const Sight& sight, const Seen& seen) const {
-    return has_straws() && good_enough(sight, seen, forest.bricks().back().error());
+    return has_straws() && straws_do(sight, seen, forest.bricks().back().error());
   }
   // For which of some sights a neuron is drawn by straws.
   std::uint32_t far(std::uint32_t index, std::uint32_t of_sights) const {
@@ -308,8 +313,7 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
   const Sphere sphere = b.sphere();
   const float magnification = sight.eye.magnification(sphere), thinnest = sight.eye.detail().thinnest;
   std::uint32_t shown = thinnest > 0.f ? b.shown(magnification / thinnest) : b.all();
-  // Within the reach of a neuron around, all may be known to be far.
-  const Sphere wide{sphere.centre, sphere.radius + 2.f * look.forest.reach()};
+  const Sphere wide{sphere.centre, b.neurons};
   if (!look.plain || !look.straws_do(sight, sight.eye.see(wide))) {
     const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
     for (std::uint32_t rest = shown; rest; rest &= rest - 1)
@@ -351,7 +355,7 @@ void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
       if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s])) return;
-      if (b.child_count && !look.good_enough(sight, seen, b.error()))
+      if (b.child_count && !look.straws_do(sight, seen, b.error()))
         finer |= 1u << s;
       else if (!look.plain || look.straws_do(sight, seen))  // else its neurons, which are nearer, are near, too
         choose_straws(look, s, at, every_group, cuts[s]);

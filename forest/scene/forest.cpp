@@ -54,7 +54,6 @@ struct Forest::Data {
   Bounds soma_bounds;
   std::vector<Sphere> spheres;
   Groves groves;
-  float reach = 0.f;
   std::uint64_t segment_total = 0, bytes = 0;
 
   template <class T>
@@ -78,7 +77,6 @@ std::span<const Brick> Forest::bricks() const { return data_->as<Brick>(Part::br
 std::span<const frame::Owner> Forest::owners() const { return data_->as<frame::Owner>(Part::owners); }
 std::span<const Sphere> Forest::spheres() const { return data_->spheres; }
 const Groves& Forest::groves() const { return data_->groves; }
-float Forest::reach() const { return data_->reach; }
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
@@ -205,7 +203,7 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
                 within(b.first_segment, b.segment_count, f.segments().size()) &&
                 within(b.first_child, b.child_count, bricks.size()) &&
                 (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
-                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length) && b.radius >= 0.f && b.width > 0.f &&
+                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) && b.radius >= 0.f && b.width > 0.f &&
                 b.length > 0.f,
             wrong);
   });
@@ -218,7 +216,6 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     const Neuron& n = f.neurons()[f.instances()[i].morphology];
     data->spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
   });
-  for (const Sphere& s : data->spheres) data->reach = std::max(data->reach, s.radius);
   data->groves = Groves(data->spheres);
   circuit::NodeNames& nodes = data->nodes;
   if (nodes.runs.empty()) nodes = {{data->circuit.name}, {{0, 0, 0, std::uint32_t(f.instances().size())}}};

@@ -232,6 +232,10 @@ PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource
         const Morphology m = source(i);
         Made made{build_clusters(m), facts_of(m), {}};
         made.pieces = pieces_of(std::span(made.tree.segments).first(made.tree.original_count), pieces);
+        if (!made.tree.clusters.empty()) {
+          const Cluster& root = made.tree.clusters.front();
+          made.pieces.sphere = {{root.x, root.y, root.z}, root.radius};
+        }
         return made;
       },
       [&](std::size_t, Made made) {

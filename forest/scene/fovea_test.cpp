@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/fovea.h"
 
+#include <bit>
+#include <set>
+
 #include <gtest/gtest.h>
 
 #include "forest/core/random.h"
@@ -145,7 +148,21 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
   EXPECT_LT(fine.segments, all.segments);
   const Gaze gaze(view.camera, viewport, detail_for(view, width, height));
   std::size_t looked_at = 0;
+  const auto straws_looked_at = [&](const Cut& cut) {
+    std::set<std::uint32_t> straws;
+    for (const frame::Item& item : cut.lines)
+      for (std::uint32_t rest = item.instance == FOREST_IN_WORLD ? item.drawn : 0; rest; rest &= rest - 1) {
+        const std::uint32_t number = item.first_segment + std::uint32_t(std::countr_zero(rest));
+        const frame::Segment& s = forest.segments()[number];
+        const Vec3 at = frame::project(view.camera, viewport,
+                                       .5f * (Vec3(s.ax, s.ay, s.az) + Vec3(s.bx, s.by, s.bz)));
+        if (gaze.eccentricity(at.head<2>()) <= view.detail.fovea) straws.insert(number);
+      }
+    return straws;
+  };
+  EXPECT_EQ(straws_looked_at(fine), straws_looked_at(all));
   for (const frame::Item& item : all.lines) {
+    if (item.instance == FOREST_IN_WORLD) continue;
     const Vec3 at = frame::project(view.camera, viewport, {item.x, item.y, item.z});
     if (gaze.eccentricity(at.head<2>()) > view.detail.fovea) continue;
     ++looked_at;
@@ -154,7 +171,7 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
              other.drawn == item.drawn;
     }));
   }
-  EXPECT_GT(looked_at, 5u);
+  EXPECT_GT(looked_at + straws_looked_at(all).size(), 5u);
 }
 
 TEST(Layers, ChosenTogetherAreWhatEachChoosesAlone) {

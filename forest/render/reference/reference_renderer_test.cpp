@@ -218,7 +218,7 @@ TEST(ReferenceRenderer, WhatTheSceneLeftOutIsDrawnToo) {
   const auto all = f.items;
   f.items.resize(1);
   EXPECT_NE(f.draw().pixels, image.pixels);
-  f.frame.rest = [&](const frame::DepthMap& seen) {
+  f.frame.rest = [&](const frame::DepthMap& seen, std::uint32_t) {
     EXPECT_TRUE(seen.depths.empty());
     frame::Lists rest;
     rest.capsules = std::span(all).last(1);
