@@ -42,8 +42,8 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
     const scene::View shown = scene::view_for(view, layer);
-    frame::Frame& frame = frames.emplace_back(scene::compose(forest_, shown, colouring, choosers[i]->cut(),
-                                                             layer.width, layer.height, overlays));
+    frame::Frame& frame = frames.emplace_back(
+        scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height, overlays));
     frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
     frame.glass = glass;
     if (view.samples > 1) frame.first_subframe = first, frame.last_subframe = last;

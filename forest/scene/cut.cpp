@@ -15,7 +15,7 @@ namespace {
 
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
 constexpr float group_limit =
-    12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
+    12.f;               // groups of a cluster of a larger radius, in pixels, are looked at one by one
 constexpr int few = 8;  // segments of a cluster; its groups are not looked at for so few
 constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
 

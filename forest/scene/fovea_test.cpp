@@ -230,7 +230,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       const Vec3 pixel = frame::project(camera, viewport, point);
       if (pixel.z() < camera.near) continue;
       if (seen.known) {
-        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(), 1.001f * focal * seen.reach + .01f);
+        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(),
+                  1.001f * focal * seen.reach + .01f);
         EXPECT_GE(pixel.z(), seen.nearest - 1e-3f);
       }
       const auto in = [&](const frame::Area& a) {
@@ -243,7 +244,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       EXPECT_TRUE(eye.may_see(seen));
     }
     if (eye.may_see(seen)) {
-      EXPECT_TRUE(frame::Frustum(camera, viewport, *detail.area).may_see({sphere.centre, 1.001f * sphere.radius + .01f}));
+      EXPECT_TRUE(frame::Frustum(camera, viewport, *detail.area)
+                      .may_see({sphere.centre, 1.001f * sphere.radius + .01f}));
     }
   }
 }
