@@ -24,14 +24,14 @@ FOREST_CLONES std::uint32_t farthest(const std::uint32_t* keys, std::size_t coun
   return far;
 }
 
-FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t most) {
+FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t key) {
   std::uint32_t n = 0;
-  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= most;
+  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= key;
   return n;
 }
 
 // A key that so many of them are not behind, hardly farther than need be.
-std::uint32_t farthest_but(const std::uint32_t* keys, std::size_t count, std::uint32_t so_many) {
+std::uint32_t farthest_but(const std::uint32_t* keys, std::size_t count, std::size_t so_many) {
   constexpr std::uint32_t last = FOREST_KEY_EMPTY - 1;
   if (count_up_to(keys, count, last) < so_many) return FOREST_KEY_EMPTY;
   // Halved until it is within .2 % of the distance: 2¹⁹ keys are 128 of the 43,240 depths of an octave.
@@ -144,7 +144,7 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
     return 0;
   const std::size_t all = std::size_t(tile * tile) * std::size_t(samples_);
   if (right - left == tile && bottom - top == tile && wanted_ == (1ull << samples_) - 1)
-    return farthest_but(at(left, top), all, all - std::uint32_t(float(all) * gaps_));
+    return farthest_but(at(left, top), all, all - std::size_t(float(all) * gaps_));
   std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile) * most_samples> keys;
   std::size_t count = 0;
   for (std::int32_t y = top; y < bottom; ++y)
