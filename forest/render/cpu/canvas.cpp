@@ -24,9 +24,9 @@ FOREST_CLONES std::uint32_t farthest(const std::uint32_t* keys, std::size_t coun
   return far;
 }
 
-FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t key) {
+FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t count, std::uint32_t limit) {
   std::uint32_t n = 0;
-  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= key;
+  for (std::size_t i = 0; i < count; ++i) n += keys[i] <= limit;
   return n;
 }
 
