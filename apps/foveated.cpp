@@ -41,11 +41,12 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
   std::vector<frame::Frame> frames;
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
-    frame::Frame& frame = frames.emplace_back(scene::compose(forest_, view, colouring, choosers[i]->cut(),
-                                                             layer.width, layer.height, overlays));
+    const scene::View shown = scene::view_for(view, layer);
+    frame::Frame& frame = frames.emplace_back(
+        scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height, overlays));
     frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
     frame.glass = glass;
-    frame.first_subframe = first, frame.last_subframe = last;
+    if (view.samples > 1) frame.first_subframe = first, frame.last_subframe = last;
     choosers[i]->complete(frame);
   }
   figures_.cull = milliseconds_since(start);

@@ -23,11 +23,11 @@ class Foveated {
   using Dresser = std::function<void(frame::Frame&, const scene::Cut&, const scene::Eye&)>;
 
   struct Figures {
-    double cull = 0., draw = 0., unite = 0.;                // milliseconds
-    std::uint64_t segments = 0;                             // chosen, of all layers
-    std::uint64_t drawn = 0;                                // of them, as frame::Timing has it
-    std::uint32_t neurons = 0;                              // in sight, of the layer that sees most
-    std::vector<std::uint64_t> layer_segments;              // the same of each, finest first
+    double cull = 0., draw = 0., unite = 0.;    // milliseconds
+    std::uint64_t segments = 0;                 // chosen, of all layers
+    std::uint64_t drawn = 0;                    // of them, as frame::Timing has it
+    std::uint32_t neurons = 0;                  // in sight, of the layer that sees most
+    std::vector<std::uint64_t> layer_segments;  // the same of each, finest first
   };
   /// Its subframes [first, last) of view.samples, as frame::Frame has them.
   /// Layers are chosen together, and drawn at the same time where their renderers can and there is neither painter nor dresser.

@@ -56,7 +56,8 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
         surfaces_.show(frame, *colouring_, playback_.has_value());
         if (skin_ && view.skin) skin_->show(frame, near, eye, *colouring_, painter);
       };
-    drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter, dress);
+    drawn.image =
+        foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;

@@ -115,8 +115,7 @@ class Bench {
       console_.progress().advance();
     }
     console_.progress().end();
-    for (double* sum : {&part.cull, &part.draw, &part.unite, &part.covered})
-      *sum /= part.frames;
+    for (double* sum : {&part.cull, &part.draw, &part.unite, &part.covered}) *sum /= part.frames;
     if (part.covered < .005)
       throw Error(fmt::format("{}: the pictures show nothing; nothing was measured", name));
     return part;
@@ -186,33 +185,32 @@ void run(const Options& options, Console& console) {
   for (const Part& p : parts) {
     least_ratio = std::min(least_ratio, p.ratio()), least_rate = std::min(least_rate, p.per_second());
     differ += p.fovea_differ;
-    json["parts"].push_back(
-        {{"part", p.name},
-         {"ratio", p.ratio()},
-         {"ratio_chosen", p.ratio_chosen()},
-         {"drawn", p.drawn / p.compared},
-         {"drawn_without", p.whole_drawn / p.compared},
-         {"frames_per_second", p.per_second()},
-         {"slowest_ms", p.slowest()},
-         {"segments", p.segments / p.compared},
-         {"layers", p.layers},
-         {"segments_without", p.whole_segments / p.compared},
-         {"fovea_pixels", p.fovea_pixels},
-         {"fovea_differ", p.fovea_differ},
-         {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
-         {"covered", p.covered}});
+    json["parts"].push_back({{"part", p.name},
+                             {"ratio", p.ratio()},
+                             {"ratio_chosen", p.ratio_chosen()},
+                             {"drawn", p.drawn / p.compared},
+                             {"drawn_without", p.whole_drawn / p.compared},
+                             {"frames_per_second", p.per_second()},
+                             {"slowest_ms", p.slowest()},
+                             {"segments", p.segments / p.compared},
+                             {"layers", p.layers},
+                             {"segments_without", p.whole_segments / p.compared},
+                             {"fovea_pixels", p.fovea_pixels},
+                             {"fovea_differ", p.fovea_differ},
+                             {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
+                             {"covered", p.covered}});
     rows.push_back({p.name, fmt::format("{:.1f}", p.per_second()), fmt::format("{:.1f}", p.cull),
-                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.unite), fmt::format("{}", p.drawn / p.compared),
-                    fmt::format("{}", p.whole_drawn / p.compared), fmt::format("{:.1f}", p.ratio()),
-                    fmt::format("{:.1f}", p.ratio_chosen()),
+                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.unite),
+                    fmt::format("{}", p.drawn / p.compared), fmt::format("{}", p.whole_drawn / p.compared),
+                    fmt::format("{:.1f}", p.ratio()), fmt::format("{:.1f}", p.ratio_chosen()),
                     fmt::format("{} of {}", p.fovea_differ, p.fovea_pixels)});
   }
   json["ratio_min"] = least_ratio, json["frames_per_second_min"] = least_rate, json["fovea_differ"] = differ;
   console.print(json);
   console.say(fmt::format("{} neurons, {} segments, {}, {}", bench.forest().instances().size(),
                           bench.forest().segment_total(), options.size, bench.renderer()));
-  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "unite ms", "segments",
-                 "without gaze", "ratio", "of those chosen", "pixels of the fovea that differ"},
+  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "unite ms", "segments", "without gaze",
+                 "ratio", "of those chosen", "pixels of the fovea that differ"},
                 rows);
 }
 

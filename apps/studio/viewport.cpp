@@ -289,7 +289,7 @@ bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
-  view.samples = layered() ? 1 : budget_.samples();
+  view.samples = budget_.samples();
   view.detail.error *= budget_.error(), view.detail.thinnest = budget_.thinnest();
   draw_part(view, 0, view.samples);
 }

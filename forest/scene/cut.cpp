@@ -30,7 +30,8 @@ namespace {
 
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
 constexpr float group_limit =
-    12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
+    12.f;               // groups of a cluster of a larger radius, in pixels, are looked at one by one
+constexpr int few = 8;  // segments of a cluster; its groups are not looked at for so few
 constexpr std::size_t left_out_at_once = 64, neurons_at_once = 64,
                       bricks_at_least = 128;  // fixed, so that the result does not depend on threads
 
@@ -177,9 +178,10 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
     const float thinnest = sight.eye.detail().thinnest;
     return thinnest > 0.f ? c.visible_at(sight.eye.magnification(where) / thinnest) : c.all();
   };
-  if (groups == every_group && sphere.radius * sight.eye.magnification(seen) <= group_limit)
-    return add(cut, item(index, c.first_segment, shown(seen), sphere), kind,
-               sight.eye.thin(seen, c.thickness));
+  const std::uint32_t all = shown(seen);
+  if (groups == every_group &&
+      (std::popcount(all) <= few || sphere.radius * sight.eye.magnification(seen) <= group_limit))
+    return add(cut, item(index, c.first_segment, all, sphere), kind, sight.eye.thin(seen, c.thickness));
   std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
     const std::uint32_t first = g * Cluster::group_size;

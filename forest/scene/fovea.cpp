@@ -12,6 +12,7 @@ namespace forest::scene {
 namespace {
 
 constexpr std::uint32_t coarsest = 8;
+constexpr std::uint32_t coarse_samples = 4;
 constexpr float fade = .2f;  // of the eccentricity at which a layer ends: how far it reaches into the next
 constexpr float least_fade = .5f;  // degrees
 constexpr float margin = 6.f;      // pixels of a layer around what is shown of it: rims look two pixels far
@@ -178,6 +179,15 @@ Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std
         Vec2(in_layer(detail.gaze->x() * float(width), float(width), float(layer.width), layer.scale),
              in_layer(detail.gaze->y() * float(height), float(height), float(layer.height), layer.scale));
   return detail;
+}
+
+View view_for(const View& view, const Layer& layer) {
+  View shown = view;
+  if (layer.scale <= 1.f) return shown;
+  shown.halo /= layer.scale;
+  shown.detail.thinnest = thinnest_of(view);
+  if (shown.samples == 1) shown.samples = coarse_samples;
+  return shown;
 }
 
 void unite(const View& view, std::span<const Layer> layers, std::span<const frame::Image* const> pictures,

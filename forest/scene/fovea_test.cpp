@@ -133,6 +133,21 @@ TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
     }
 }
 
+TEST(Layers, WithLargerPixelsHaveWeakerRimsAndMoreThanOneSample) {
+  View view = view_with_gaze({.5f, .5f});
+  view.halo = .8f;
+  for (const std::uint32_t samples : {1u, 16u}) {
+    view.samples = samples;
+    for (const Layer& layer : layers_of(view, width, height)) {
+      const View shown = view_for(view, layer);
+      EXPECT_NEAR(shown.halo * layer.scale, .8f, 1e-5f);
+      EXPECT_EQ(shown.samples, samples > 1 ? samples : layer.scale > 1.f ? 4u : 1u);
+      EXPECT_EQ(thinnest_of(shown), thinnest_of(view));  // as many branches, however many samples
+      EXPECT_EQ(shown.camera, view.camera);
+    }
+  }
+}
+
 TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
   const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(), testing::sample_neurons()));
   View view = overview(forest);
@@ -232,7 +247,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       const Vec3 pixel = frame::project(camera, viewport, point);
       if (pixel.z() < camera.near) continue;
       if (seen.known) {
-        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(), 1.001f * focal * seen.reach + .01f);
+        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(),
+                  1.001f * focal * seen.reach + .01f);
         EXPECT_GE(pixel.z(), seen.nearest - 1e-3f);
       }
       const auto in = [&](const frame::Area& a) {
@@ -245,7 +261,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       EXPECT_TRUE(eye.may_see(seen));
     }
     if (eye.may_see(seen)) {
-      EXPECT_TRUE(frame::Frustum(camera, viewport, *detail.area).may_see({sphere.centre, 1.001f * sphere.radius + .01f}));
+      EXPECT_TRUE(frame::Frustum(camera, viewport, *detail.area)
+                      .may_see({sphere.centre, 1.001f * sphere.radius + .01f}));
     }
   }
 }

@@ -49,8 +49,8 @@ Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Det
       middle_(.5f * viewport.width, .5f * viewport.height),
       gaze_(camera, viewport, detail),
       most_acceptable_(detail.error) {
-  const frame::Area& area = detail.area.value_or(
-      frame::Area{0, 0, std::uint32_t(viewport.width), std::uint32_t(viewport.height)});
+  const frame::Area& area =
+      detail.area.value_or(frame::Area{0, 0, std::uint32_t(viewport.width), std::uint32_t(viewport.height)});
   const Vec2 low(float(area.left), float(area.top)), high(float(area.right), float(area.bottom));
   low_ = (low - middle_) / focal_, high_ = (high - middle_) / focal_;
   const auto length = [&](float slope) {

@@ -110,8 +110,8 @@ class Eye {
   /// Whether branches of this radius, µm, are so thin there that they are drawn as lines.
   bool thin(const Seen& seen, float radius) const {
     const float width = 2.f * radius * magnification(seen), wrong = width / detail_.surface_width;
-    return wrong <= 1.f || (wrong * detail_.error <= most_acceptable_ &&
-                            wrong * detail_.error <= acceptable(seen));
+    return wrong <= 1.f ||
+           (wrong * detail_.error <= most_acceptable_ && wrong * detail_.error <= acceptable(seen));
   }
 
  private:

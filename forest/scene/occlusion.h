@@ -27,7 +27,7 @@ class Occluders {
 
   std::uint32_t width_ = 0, height_ = 0;  // tiles
   std::vector<std::vector<float>>
-      squares_;     // of side 2^k, by their upper left tile; cut at the picture's edge
+      squares_;  // of side 2^k, by their upper left tile; cut at the picture's edge
   Viewer viewer_;
   float focal_, centre_x_, centre_y_;  // the middle from the map's upper left corner, pixels
 };

@@ -31,7 +31,7 @@ FOREST_CLONES std::uint32_t count_up_to(const std::uint32_t* keys, std::size_t c
 }
 
 // A key that so many of them are not behind, hardly farther than need be.
-std::uint32_t farthest_but(const std::uint32_t* keys, std::size_t count, std::uint32_t so_many) {
+std::uint32_t farthest_but(const std::uint32_t* keys, std::size_t count, std::size_t so_many) {
   constexpr std::uint32_t last = FOREST_KEY_EMPTY - 1;
   if (count_up_to(keys, count, last) < so_many) return FOREST_KEY_EMPTY;
   // Halved until it is within .2 % of the distance: 2¹⁹ keys are 128 of the 43,240 depths of an octave.
@@ -123,10 +123,12 @@ void Canvas::read_row(std::int32_t y, std::int32_t from, std::int32_t to, std::u
 bool Canvas::whole(std::int32_t tx, std::int32_t ty) const {
   const auto left = std::uint32_t(tx * tile), top = std::uint32_t(ty * tile), right = left + FOREST_TILE,
              bottom = top + FOREST_TILE;
-  return left >= area_.left && top >= area_.top &&
-         (right <= area_.right || std::int32_t(area_.right) == width_) &&
-         (bottom <= area_.bottom || std::int32_t(area_.bottom) == height_) &&
-         !(left < hole_.right && right > hole_.left && top < hole_.bottom && bottom > hole_.top);
+  const bool in_area = left >= area_.left && top >= area_.top &&
+                       (right <= area_.right || std::int32_t(area_.right) == width_) &&
+                       (bottom <= area_.bottom || std::int32_t(area_.bottom) == height_);
+  const bool in_hole =
+      left >= hole_.left && right <= hole_.right && top >= hole_.top && bottom <= hole_.bottom;
+  return in_area && !in_hole && gaps_ == 0.f;
 }
 
 // The farthest key of a tile's wanted samples but for the share of gaps; 0 when there are none.
@@ -140,11 +142,9 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
       top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
     return 0;
-  if (whole(tx, ty) && (gaps_ == 0.f || wanted_ == (1ull << samples_) - 1)) {
-    const std::size_t all = std::size_t(tile * tile) * std::size_t(samples_);
-    const std::uint32_t* keys = at(tx * tile, ty * tile);  // what is not wanted or beyond the picture's edges is 0
-    return gaps_ == 0.f ? farthest(keys, all) : farthest_but(keys, all, std::uint32_t(all) - std::uint32_t(float(all) * gaps_));
-  }
+  const std::size_t all = std::size_t(tile * tile) * std::size_t(samples_);
+  if (right - left == tile && bottom - top == tile && wanted_ == (1ull << samples_) - 1)
+    return farthest_but(at(left, top), all, all - std::size_t(float(all) * gaps_));
   std::array<std::uint32_t, std::size_t(tile) * std::size_t(tile) * most_samples> keys;
   std::size_t count = 0;
   for (std::int32_t y = top; y < bottom; ++y)
@@ -164,7 +164,9 @@ void Canvas::look(const Square& s) {
       for (std::int32_t ty = std::max(cy * tile, s.top / tile); ty < std::min((cy + 1) * tile, bottom); ++ty)
         for (std::int32_t tx = std::max(cx * tile, s.left / tile); tx < std::min((cx + 1) * tile, right);
              ++tx) {
-          const std::uint32_t far = far_in_tile(tx, ty);
+          const std::uint32_t far = whole(tx, ty) ? farthest(at(tx * tile, ty * tile),
+                                                             std::size_t(tile * tile) * std::size_t(samples_))
+                                                  : far_in_tile(tx, ty);
           fine_.farthest[std::size_t(ty * fine_.width + tx)] = far;
           far_of_all = std::max(far_of_all, far);
         }
