@@ -29,7 +29,7 @@ struct Options {
   std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
-  double budget = 30.;  // milliseconds a picture
+  double budget = scene::Budget::usual;
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;
@@ -225,10 +225,7 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
   must_be_whole(
       *command.add_option("--samples", options->samples, "Samples a pixel, instead of what the budget says"),
       1, 1024);
-  command
-      .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
-      ->check(CLI::Range(1., 10000.))
-      ->capture_default_str();
+  add_budget(command, options->budget);
   add_size(command, options->size);
   add_renderer(command, options->drawer);
   command.add_flag("--activity", options->activity,

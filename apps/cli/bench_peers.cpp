@@ -49,7 +49,7 @@ constexpr std::uint32_t settling = 15;         // pictures in which the budget f
 struct Options {
   std::uint32_t neurons = 1000, frames = 6, samples = 16;
   std::optional<std::uint32_t> quick_samples;
-  double budget = 100.;
+  double budget = scene::Budget::usual;
   std::uint64_t seed = 1;
   std::string size = "1280x720", python = "/usr/bin/python3";
   std::vector<std::string> modes{"lines", "impostors", "tubes"};
@@ -399,11 +399,7 @@ std::function<void()> bench_peers(CLI::App& command, Console& console) {
   must_be_whole(*command.add_option("--quick-samples", options->quick_samples,
                                     "Samples a pixel of ours, instead of what the budget says"),
                 1, 1024);
-  must_be_within(*command
-                      .add_option("--budget", options->budget,
-                                  "Milliseconds a picture of ours may take before less detail is chosen")
-                      ->capture_default_str(),
-                 1., 10000.);
+  add_budget(command, options->budget);
   command
       .add_option("--modes", options->modes, "What VTK draws: lines, impostors, tubes; separated by commas")
       ->delimiter(',')

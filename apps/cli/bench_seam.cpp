@@ -31,7 +31,7 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
-  double seconds = 10., budget = 85.;
+  double seconds = 10., budget = scene::Budget::usual;
   std::optional<float> error, thinnest;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;
@@ -366,11 +366,7 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   };
   within(command.add_option("--seconds", options->seconds, "How long the dolly takes")->capture_default_str(),
          .1, 3600.);
-  within(command
-             .add_option("--budget", options->budget,
-                         "Milliseconds a picture may take before less detail is chosen")
-             ->capture_default_str(),
-         1., 10000.);
+  add_budget(command, options->budget);
   within(command.add_option("--error", options->error,
                             "Pixels of acceptable error, and 16 samples, instead of what the budget says"),
          .05, 100.);

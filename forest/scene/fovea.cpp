@@ -171,6 +171,7 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
 
 Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
+  detail.fog = view.fog;
   detail.thinnest = thinnest_of(view);
   detail.area = layer.area;
   if (layer.hole != frame::Area{}) detail.hole = layer.hole;

@@ -132,8 +132,12 @@ class Eye {
 /// ones smaller.
 class Budget {
  public:
+  /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
+  static constexpr double usual = 45.;
+
   /// @param worst  error that is accepted at most, pixels
-  explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
+  explicit Budget(double milliseconds = usual, float worst = 6.f)
+      : milliseconds_(milliseconds), worst_(worst) {}
   std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.

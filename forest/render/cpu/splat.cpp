@@ -151,7 +151,7 @@ class Gatherer {
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
     project(c, turn, at, picture_.light, r_);
     if (picture_.geometry.straw(item)) lengthen(c, r_);
-    prepare_lines(c, picture_.spread, r_);
+    if (kind == Kind::lines || any_thin()) prepare_lines(c, picture_.spread, r_);
     std::uint64_t added = 0;
     for (std::size_t i = 0; i < r_.count; ++i)
       added += r_.opacity[i] && (kind == Kind::lines ? add_stroke(i, chunk) : add_near(i, chunk));
@@ -173,26 +173,37 @@ class Gatherer {
   bool hidden(const Box& b, float nearest_code) const {
     return canvas_.hidden(whole_, b.left, b.top, b.right, b.bottom, nearest_code);
   }
-  template <class Thing>
-  bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
-    const Box b = thing.box(picture_.spread);
-    if (hidden(b, thing.nearest_code())) return false;
+  // Adds make() to a list if something may be seen of what lies in a box.
+  bool put(const Box& b, float nearest_code, auto& list, std::vector<Chunk::Range>& ranges,
+           auto&& make) const {
+    if (hidden(b, nearest_code)) return false;
     const Square s = canvas_.touched(b.left, b.top, b.right, b.bottom);
     if (s.left > s.right || s.top > s.bottom) return false;
-    list.push_back(thing);
+    list.push_back(make());
     ranges.push_back(
         {std::int16_t(s.left), std::int16_t(s.top), std::int16_t(s.right), std::int16_t(s.bottom)});
     return true;
   }
+  template <class Thing>
+  bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
+    return put(thing.box(picture_.spread), thing.nearest_code(), list, ranges, [&] { return thing; });
+  }
   bool add_stroke(std::size_t i, Chunk& chunk) const {
-    return r_.line_width[i] > 0.f && put(Stroke(r_, i), chunk.strokes, chunk.ranges_of_strokes);
+    return r_.line_width[i] > 0.f &&
+           put({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.nearest[i], chunk.strokes,
+               chunk.ranges_of_strokes, [&] { return Stroke(r_, i); });
+  }
+  // Of near ones, what is less than that wide at both ends is a line.
+  static constexpr float thin = .75f;
+  bool any_thin() const {
+    return std::any_of(r_.width, r_.width + r_.count, [](float width) { return width < 2.f * thin; });
   }
   bool add_near(std::size_t i, Chunk& chunk) const {
     if (r_.width[i] < 0.f) return false;
     const frame::Constants& c = picture_.constants;
     const float width = c.focal * std::max(r_.ra[i] / lens(c, r_.az[i]), r_.rb[i] / lens(c, r_.bz[i]));
-    if (width < .75f) return add_stroke(i, chunk);
-    return put(Solid(c, r_, i, width), chunk.solids, chunk.ranges_of_solids);
+    if (width < thin) return add_stroke(i, chunk);
+    return put(Solid(c, r_, i), chunk.solids, chunk.ranges_of_solids);
   }
   // The one segment of a dot.
   std::uint64_t add_beads(const frame::Item& item, const Mat3& turn, const Vec3& at, Chunk& chunk) {
