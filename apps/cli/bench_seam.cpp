@@ -351,8 +351,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_seam(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons,
-            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_planted(command, options->neurons);
   add_whole(command, "--frames", options->frames,
             "Pictures compared with the reference, in pairs of neighbours spread over the dolly; 0: all", 0,
             100'000);
