@@ -15,7 +15,7 @@ TEST(ColourBar, ShowsTheMapAndGreyBelowTheThreshold) {
   const ColourBar bar{.map = &map, .low = -80.f, .high = 20.f, .threshold = -55.f};
   frame::Image image = black(120, 60);
   paint(image, bar, {10.f, 10.f, 110.f, 20.f}, Lettering{.height = 8.f});
-  const auto at = [&](std::size_t x) {
+  const auto at = [&](std::size_t x) -> Vec3 {
     const std::uint8_t* p = &image.pixels[4 * (15 * 120 + x)];
     return Vec3(p[0], p[1], p[2]) / 255.f;
   };
