@@ -14,6 +14,8 @@
 #include "forest/core/error.h"
 #include "forest/render/renderer.h"
 
+#include "tests/small_scene.h"
+
 namespace forest::render {
 
 using Maker = std::unique_ptr<Renderer> (*)();
@@ -23,33 +25,16 @@ class SurfaceLaws : public testing::TestWithParam<Maker> {};  // of triangles: t
 
 namespace {
 
-// One neuron at the origin with the given segments, seen from z = 100 µm; 1 µm is about 2.75 pixels.
-struct Fixture {
+// All of its segments as one item.
+struct Fixture : SmallScene {
   std::unique_ptr<Renderer> renderer;
-  std::vector<frame::Segment> segments;
-  std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
-  std::vector<frame::State> states{{}};
-  std::vector<frame::Item> items;
-  frame::Frame frame;
 
-  explicit Fixture(Maker make) : renderer(make()) {
-    frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
-    frame.width = frame.height = 200;
-    frame.palette.fill(Vec3(1, 0, 0));
-    frame.states = states;
-    frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
-    frame.style.halo = 0.f;
-  }
+  explicit Fixture(Maker make) : renderer(make()) {}
   void add(const Vec3& a, const Vec3& b, float radius) {
-    const std::uint32_t half = std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(radius)));
-    segments.push_back({a.x(), a.y(), a.z(), half | half << 16, b.x(), b.y(), b.z(), 3});
+    add_segment(a, b, radius, radius);
     items.assign(1, {0, 0, frame::first_segments(segments.size()), 0, 0, 0, 0, 200});
   }
-  frame::Image draw() {
-    renderer->load({segments, instances});
-    renderer->draw(frame);
-    return renderer->read();
-  }
+  frame::Image draw() { return drawn_by(*renderer); }
 };
 
 double red_area(const frame::Image& image) {  // in pixels, by coverage

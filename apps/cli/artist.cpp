@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/io/film.h"
 #include "forest/io/png.h"
+#include "forest/scene/colour_bar.h"
 
 namespace forest::cli {
 namespace {
@@ -88,6 +89,20 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   return drawn;
 }
 
+void Artist::explain(const scene::View& view, frame::Image& image) const {
+  std::vector<scene::ColourBar> bars;
+  if (playback_) {
+    const scene::ActivityView look = view.activity.value_or(playback_->view());
+    bars.push_back(
+        scene::bar_of(look, look.time.value_or(playback_->begin()), playback_->activity().facts().units));
+  }
+  if (surfaces_.has_values()) {
+    const auto [low, high] = surfaces_.shown_range();
+    bars.push_back({.map = surfaces_.map, .low = low, .high = high});
+  }
+  scene::paint(image, bars, view.background);
+}
+
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
                  const std::filesystem::path& file, Progress& progress,
                  const std::optional<scene::ActivityView>& activity) {
@@ -96,6 +111,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   io::Film film(file, plan.width, plan.height, plan.frames_per_second);
   if (!plan.pictures.empty()) std::filesystem::create_directories(plan.pictures);
   FilmFigures figures;
+  std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;
   artist.set_window(picture_ms);
   progress.begin("filming", std::size_t(count));
@@ -108,18 +124,20 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
       view.activity = activity;
       view.activity->time = plan.from + i * picture_ms;
     }
-    const Drawn drawn = artist.draw(view, plan.width, plan.height);
-    if (drawn.segments && drawn.image.covered == 0.)
-      throw Error(
-          fmt::format("picture {} of the film shows nothing though {} segments were drawn; the OpenGL driver "
-                      "({}) may be at fault",
-                      i, drawn.segments, artist.renderer()));
+    Drawn drawn = artist.draw(view, plan.width, plan.height);
+    segments += drawn.segments;
     figures.covered += drawn.image.covered / count;
+    if (plan.legend) artist.explain(view, drawn.image);
     film.add(drawn.image.pixels);
     if (!plan.pictures.empty())
       io::write_png(plan.pictures / fmt::format("{:05}.png", i), plan.width, plan.height, drawn.image.pixels);
     progress.advance();
   }
+  if (segments && figures.covered == 0.)
+    throw Error(
+        fmt::format("the film shows nothing though {} segments were drawn; the OpenGL driver ({}) may be at "
+                    "fault, try --renderer cpu",
+                    segments, artist.renderer()));
   film.finish();
   progress.end();
   figures.pictures = std::uint32_t(count);
@@ -146,6 +164,11 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
     throw Error(fmt::format("{}: holds no time {} ms; it runs from {} to {} ms", options.file.string(), time,
                             playback.begin(), playback.end()));
   view.activity->time = time;
+}
+
+void add_legend(CLI::App& command, bool& legend) {
+  command.add_flag("!--no-legend", legend,
+                   "Leave out what the colours of values mean (small pictures do so by themselves)");
 }
 
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {

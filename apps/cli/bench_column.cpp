@@ -219,8 +219,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_column(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons,
-            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_planted(command, options->neurons);
   add_whole(command, "--frames", options->frames, "Pictures drawn outside, and as many inside", 2, 100'000);
   must_be_whole(
       *command.add_option("--samples", options->samples, "Samples a pixel, instead of what the budget says"),

@@ -218,17 +218,10 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_gaze(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command
-      .add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
-      ->check(CLI::Range(10, 10'000'000))
-      ->capture_default_str();
-  command.add_option("--frames", options->frames, "Pictures of each part")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
-  command
-      .add_option("--compared", options->compared, "Of them, how many are compared with those without a gaze")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_planted(command, options->neurons);
+  add_whole(command, "--frames", options->frames, "Pictures of each part", 2, 100'000);
+  add_whole(command, "--compared", options->compared,
+            "Of them, how many are compared with those without a gaze", 1, 100'000);
   must_be_within(*command
                       .add_option("--slope", options->slope,
                                   "Arc minutes by which the smallest angle resolved grows a degree")

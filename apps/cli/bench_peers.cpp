@@ -392,8 +392,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_peers(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons,
-            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_planted(command, options->neurons);
   add_whole(command, "--frames", options->frames, "Cameras of the dolly that are measured", 1, 250);
   add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
   must_be_whole(*command.add_option("--quick-samples", options->quick_samples,

@@ -39,6 +39,9 @@ class Viewport final : public QOpenGLWidget {
   void change(const Settings& settings);
   /// Glides there, slow in and slow out.
   void glide_to(const frame::Camera& camera);
+  /// Through recorded views, as a film of them goes; a hand on the picture ends it. The simulation goes on by itself. Throws
+  /// Error, and stays, for a target that is not there.
+  void fly_along(std::vector<scene::View> views);
   /// Glides to where the selected subarbor, or without one the whole forest, fills the picture.
   void centre();
 
@@ -105,7 +108,9 @@ class Viewport final : public QOpenGLWidget {
   struct Glide {
     scene::CameraPath path;
     frame::Camera end;
-    QElapsedTimer clock;
+    float seconds;
+    bool whole = false;  // whole views, not cameras alone
+    QElapsedTimer clock{};
   };
 
   void set_camera(const frame::Camera& camera);

@@ -133,7 +133,7 @@ class Eye {
 class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
-  static constexpr double usual = 45.;
+  static constexpr double usual = 30.;
 
   /// @param worst  error that is accepted at most, pixels
   explicit Budget(double milliseconds = usual, float worst = 6.f)
