@@ -72,7 +72,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     figures_.drawn += timings[i].drawn;
     figures_.segments += choosers[i]->segments();
     figures_.layer_segments.push_back(choosers[i]->segments());
-    figures_.neurons = std::max(figures_.neurons, choosers[i]->cut().neurons);
+    figures_.neurons = std::max(figures_.neurons, choosers[i]->neurons());
     const frame::Image* image = layers_[i]->renderer->image();
     pictures.push_back(image ? image : &layers_[i]->image);
   }

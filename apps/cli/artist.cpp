@@ -81,7 +81,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
-  drawn.neurons = cut.neurons;
+  drawn.neurons = chooser_.neurons();
   drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;
   start = Clock::now();
   drawn.image = renderer_->read();

@@ -297,7 +297,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
-  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.cut().neurons;
+  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.neurons();
   figures_.samples = last, figures_.error = view.detail.error;
 }
 

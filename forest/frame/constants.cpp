@@ -9,9 +9,7 @@
 namespace forest::frame {
 namespace {
 
-std::uint32_t half_pair(float a, float b) {
-  return to_half(a) | to_half(b) << 16;
-}
+std::uint32_t half_pair(float a, float b) { return to_half(a) | to_half(b) << 16; }
 
 }  // namespace
 

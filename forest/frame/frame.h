@@ -26,7 +26,9 @@ struct Geometry {
 
   bool straw(const Item& item) const { return item.instance == FOREST_IN_WORLD; }
   /// Of a straw.
-  const Owner& owner(std::size_t segment) const { return owners[segment - (segments.size() - owners.size())]; }
+  const Owner& owner(std::size_t segment) const {
+    return owners[segment - (segments.size() - owners.size())];
+  }
 };
 
 /// Primitives that a neuron may be drawn with, however large it is in the picture.

@@ -15,7 +15,8 @@ namespace {
 
 constexpr float straw_length = 24.f;  // µm: a branch runs straight for about so long
 constexpr float straws_a_neuron = 48.f;
-constexpr std::size_t most_straws = 9'000'000;  // of the finest bricks, 360 MB; larger forests have fewer a neuron
+constexpr std::size_t most_straws =
+    9'000'000;  // of the finest bricks, 360 MB; larger forests have fewer a neuron
 constexpr std::uint32_t children = 4;
 
 // The order in which straws of a brick come: van der Corput's, so that any first few are spread over all of it.
@@ -52,8 +53,8 @@ void enclose(Brick& brick, std::span<const frame::Segment> straws, std::span<con
   Bounds box;
   std::array<Bounds, Brick::group_count> boxes;
   for (std::size_t i = 0; i < straws.size(); ++i)
-    for (const Vec3& p : {Vec3(straws[i].ax, straws[i].ay, straws[i].az),
-                          Vec3(straws[i].bx, straws[i].by, straws[i].bz)})
+    for (const Vec3& p :
+         {Vec3(straws[i].ax, straws[i].ay, straws[i].az), Vec3(straws[i].bx, straws[i].by, straws[i].bz)})
       box.add(p, .5f * brick.width), boxes[i / Brick::group_size].add(p, .5f * brick.width);
   for (const Brick& child : below) box.add({child.x, child.y, child.z}, child.radius);
   const Sphere all = around(box);
@@ -65,7 +66,8 @@ void enclose(Brick& brick, std::span<const frame::Segment> straws, std::span<con
 }  // namespace
 
 std::uint32_t Brick::shown(float magnification) const {
-  const float share = float(FOREST_MEAN_STRETCH) * width * magnification * std::min(1.f, length * magnification);
+  const float share =
+      float(FOREST_MEAN_STRETCH) * width * magnification * std::min(1.f, length * magnification);
   return first_by_rank[std::size_t(std::clamp(std::ceil(share * 32.f), 0.f, 32.f))] & all();
 }
 
@@ -165,7 +167,8 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
       Brick& brick = result.bricks[level.first_brick + n];
       const std::size_t begin = level.first_straw + n * Brick::straws;
       brick.width = look.width, brick.length = look.length;
-      brick.segment_count = std::uint32_t(std::min<std::size_t>(Brick::straws, level.straws - n * Brick::straws));
+      brick.segment_count =
+          std::uint32_t(std::min<std::size_t>(Brick::straws, level.straws - n * Brick::straws));
       brick.first_segment = first_straw + std::uint32_t(begin);
       for (std::uint32_t s = 0; s < brick.segment_count; ++s) {
         const std::size_t own = begin + s;
@@ -176,8 +179,7 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
           result.owners[own] = {std::uint32_t(i), first_segments[instances[i].morphology] + p.piece->segment};
           result.straws[own] = straw_at(p.at, p.along, look, p.piece->kind, s);
         } else {  // every fourth of those below: of each of four bricks the eight that come first
-          const std::size_t from =
-              levels[l + 1].first_straw + children * (n * Brick::straws + s);
+          const std::size_t from = levels[l + 1].first_straw + children * (n * Brick::straws + s);
           const frame::Segment& f = result.straws[from];
           const Vec3 a(f.ax, f.ay, f.az), b(f.bx, f.by, f.bz);
           result.owners[own] = result.owners[from];
@@ -194,8 +196,8 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
       }
       enclose(brick, std::span(result.straws).subspan(begin, brick.segment_count), below);
       for (const Brick& child : below)
-        brick.neurons = std::max(brick.neurons,
-                                 (child.sphere().centre - brick.sphere().centre).norm() + child.neurons);
+        brick.neurons =
+            std::max(brick.neurons, (child.sphere().centre - brick.sphere().centre).norm() + child.neurons);
       if (leaf)
         for (const frame::Owner& owner : std::span(result.owners).subspan(begin, brick.segment_count)) {
           const frame::Instance& i = instances[owner.instance];

@@ -26,21 +26,21 @@ namespace forest::scene {
 struct Brick {
   static constexpr std::uint32_t straws = 32, group_size = 8, group_count = straws / group_size;
 
-  float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // around all of its straws, those of its children as well, µm
-  float width = 0.f, length = 0.f;                // of a straw, µm
+  float x = 0.f, y = 0.f, z = 0.f,
+        radius = 0.f;               // around all of its straws, those of its children as well, µm
+  float width = 0.f, length = 0.f;  // of a straw, µm
   std::uint32_t first_segment = 0, segment_count = 0;
   std::uint32_t first_child = 0, child_count = 0;  // bricks; 0 for the finest
   std::uint32_t groups[group_count] = {};          // the sphere around each eight of the straws
-  float neurons = 0.f;  // radius of a sphere around its centre that holds the neurons of all of its straws, whole, µm
+  float neurons =
+      0.f;  // radius of a sphere around its centre that holds the neurons of all of its straws, whole, µm
   std::uint32_t reserved = 0;
 
   /// How large what a straw stands for may look, µm: from far it is a dot of its area.
   float error() const { return std::min(width, std::sqrt(width * length)); }
   Sphere sphere() const { return {{x, y, z}, radius}; }
   Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], sphere()); }
-  std::uint32_t all() const {
-    return segment_count >= 32 ? 0xffffffffu : (1u << segment_count) - 1u;
-  }
+  std::uint32_t all() const { return segment_count >= 32 ? 0xffffffffu : (1u << segment_count) - 1u; }
   /// Those that may be drawn where 1 µm covers so many times the width of the thinnest line: bit i is straw i.
   std::uint32_t shown(float magnification) const;
 };
@@ -50,8 +50,8 @@ static_assert(sizeof(Brick) == 64);
 struct Pieces {
   struct Piece {
     Vec3 at = Vec3::Zero(), along = Vec3::Zero();  // its middle, µm; unit
-    std::uint32_t segment = 0;  // of the neuron's original ones
-    std::uint32_t kind = 0;     // as in Segment::meta
+    std::uint32_t segment = 0;                     // of the neuron's original ones
+    std::uint32_t kind = 0;                        // as in Segment::meta
   };
   std::vector<Piece> pieces;  // along the branches
   float area = 0.f;           // µm², length × diameter of all branches; of a soma what looks as large

@@ -34,6 +34,9 @@ class Chooser {
 
   /// Of the last picture, all subframes' mean: chosen and revealed.
   std::uint64_t segments() const { return cut_.segments + (drawings_ ? revealed_segments_ / drawings_ : 0); }
+  std::uint32_t neurons() const {
+    return cut_.neurons + std::uint32_t(drawings_ ? revealed_neurons_ / drawings_ : 0);
+  }
 
  private:
   Forest forest_;
@@ -48,7 +51,7 @@ class Chooser {
   std::size_t round_ = 0;  // of those after the cut
   Painter painter_;
   Cut cut_, revealed_;
-  std::uint64_t revealed_segments_ = 0, drawings_ = 0;
+  std::uint64_t revealed_segments_ = 0, revealed_neurons_ = 0, drawings_ = 0;
 };
 
 }  // namespace forest::scene

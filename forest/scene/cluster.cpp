@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The cluster tree follows the idea of hierarchical clusters with locked borders (Karis et al. 2021, "Nanite: a deep
 // dive", and meshoptimizer's clusterlod) carried over from triangles to branches.
-#include "forest/core/half.h"
 #include "forest/scene/cluster.h"
 
 #include <algorithm>
@@ -11,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "forest/core/half.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::scene {
@@ -452,7 +452,6 @@ class Sketch {
       dropped_reach_;  // how far what was dropped there reached; negative where nothing was
 };
 
-
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
@@ -794,7 +793,8 @@ ClusterTree build_clusters(const Morphology& m) {
               .children = {index(d.children[0]), index(d.children[1])},
               .leaf_first = d.leaf_first,
               .leaf_count = d.leaf_count};
-    std::ranges::transform(drawn[i].groups, c.groups, [&](const Sphere& g) { return packed_group(g, sphere); });
+    std::ranges::transform(drawn[i].groups, c.groups,
+                           [&](const Sphere& g) { return packed_group(g, sphere); });
     std::ranges::copy(drawn[i].visible, c.visible);
     tree.clusters.push_back(c);
   }

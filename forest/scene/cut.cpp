@@ -23,7 +23,8 @@ Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
   // Within the forest one sees a hundred micrometres or two, whatever its size.
   const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
   const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
-  return {std::max(20.f, depth - size), (length + inside * (std::min(length, seen_inside) - length)) / strength};
+  return {std::max(20.f, depth - size),
+          (length + inside * (std::min(length, seen_inside) - length)) / strength};
 }
 
 namespace {
@@ -201,8 +202,8 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
 }
 
 // For each sight, from one cluster on; returns which of them may see it.
-std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, std::uint32_t of_sights,
-                              std::span<Cut> cuts) {
+std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from,
+                              std::uint32_t of_sights, std::span<Cut> cuts) {
   const Placed placed(look.forest.instances()[index]);
   const auto clusters = look.forest.clusters();
   const frame::State state = look.state(index);
@@ -273,7 +274,11 @@ void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, st
 void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
   if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
-  if (!neuron.cluster_count || !(sights &= ~look.far(index, sights))) return;
+  if (!neuron.cluster_count) return;
+  if (const std::uint32_t far = look.far(index, sights)) {
+    each_of(far, [&](std::size_t s) { cuts[s].neurons += 1; });
+    if (!(sights &= ~far)) return;
+  }
   std::array<std::uint64_t, most_sights> before;
   std::ranges::transform(cuts, before.begin(), &Cut::segments);
   // The soma lies within its root.
@@ -297,7 +302,11 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     std::uint32_t within = 0;
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
-      if (!look.in_sight(sight, judged.seen()) || (look.plain && look.straws_do(sight, judged.seen()))) return;
+      if (!look.in_sight(sight, judged.seen())) return;
+      if (look.plain && look.straws_do(sight, judged.seen())) {
+        cuts[s].neurons += node.count;
+        return;
+      }
       if (!judged.left_out(look, sight, {LeftOut::grove, 0, at, 0}, cuts[s])) within |= 1u << s;
     });
     if (!within) continue;
@@ -356,10 +365,12 @@ void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
     std::uint32_t finer = 0;
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
-      if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s])) return;
+      if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s]))
+        return;
       if (b.child_count && !look.straws_do(sight, seen, b.error()))
         finer |= 1u << s;
-      else if (!look.plain || look.straws_do(sight, seen))  // else its neurons, which are nearer, are near, too
+      else if (!look.plain ||
+               look.straws_do(sight, seen))  // else its neurons, which are nearer, are near, too
         choose_straws(look, s, at, every_group, cuts[s]);
     });
     if (!finer) continue;
@@ -508,7 +519,8 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
     }
     const Placed placed(forest.instances()[l.instance]);
     const Sphere sphere = placed(forest.clusters()[l.number]);
-    choose_groups(look, now, l.instance, l.number, l.groups, placed, sphere, now.eye.see(sphere), cuts.front());
+    choose_groups(look, now, l.instance, l.number, l.groups, placed, sphere, now.eye.see(sphere),
+                  cuts.front());
   };
   Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
   arrange(cut, now.eye);

@@ -44,7 +44,7 @@ struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
   std::uint64_t segments = 0;  // drawn
-  std::uint32_t neurons = 0;   // in sight, and near enough not to be straws
+  std::uint32_t neurons = 0;   // in sight; of those that are straws, in a part of the forest that is
   std::vector<LeftOut> left_out;
   // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
   struct Entries {
@@ -80,6 +80,7 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport
 
 /// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its
 /// horizon is left out again. Drawn besides until nothing is left out, it gives the picture without any guess.
-Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown = {});
+Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out,
+             const Shown& shown = {});
 
 }  // namespace forest::scene

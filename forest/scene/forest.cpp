@@ -146,8 +146,8 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     throw InputError(name, 0, "has a damaged description" + again);
   }
   require(f.neurons().size() == data->circuit.morphologies.size() &&
-              f.places().size() + f.owners().size() == f.segments().size() && f.types().size() == f.instances().size() &&
-              f.layers().size() == f.instances().size(),
+              f.places().size() + f.owners().size() == f.segments().size() &&
+              f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
           wrong);
   const auto clusters = f.clusters();
   parallel_for(clusters.size(), 1024, [&](std::size_t own) {
@@ -203,12 +203,13 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
                 within(b.first_segment, b.segment_count, f.segments().size()) &&
                 within(b.first_child, b.child_count, bricks.size()) &&
                 (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
-                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) && b.radius >= 0.f && b.width > 0.f &&
-                b.length > 0.f,
+                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) &&
+                b.radius >= 0.f && b.width > 0.f && b.length > 0.f,
             wrong);
   });
   parallel_for(f.owners().size(), 4096, [&](std::size_t i) {
-    require(f.owners()[i].instance < f.instances().size() && f.owners()[i].segment < f.places().size(), wrong);
+    require(f.owners()[i].instance < f.instances().size() && f.owners()[i].segment < f.places().size(),
+            wrong);
   });
   data->spheres.resize(f.instances().size());
   parallel_for(f.instances().size(), 1024, [&](std::size_t i) {

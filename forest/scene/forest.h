@@ -78,11 +78,12 @@ class Forest {
   std::span<const Neuron> neurons() const;
   std::span<const std::uint32_t> section_of_segment() const;
   std::span<const SectionFacts> sections() const;
-  std::span<const reports::Place> places() const;  // of every segment that is no straw: the middle of what it stands for
-  std::span<const Brick> bricks() const;           // the one around all first; none in a forest without branches
-  std::span<const frame::Owner> owners() const;    // of the straws, which are the last segments
-  std::span<const std::uint32_t> types() const;    // of every instance: index in circuit().types
-  std::span<const std::uint32_t> layers() const;   // of every instance: index in circuit().layers
+  std::span<const reports::Place> places()
+      const;  // of every segment that is no straw: the middle of what it stands for
+  std::span<const Brick> bricks() const;  // the one around all first; none in a forest without branches
+  std::span<const frame::Owner> owners() const;   // of the straws, which are the last segments
+  std::span<const std::uint32_t> types() const;   // of every instance: index in circuit().types
+  std::span<const std::uint32_t> layers() const;  // of every instance: index in circuit().layers
 
   /// Names, types, layers and radius; its instances are left empty, they are above.
   const circuit::Circuit& circuit() const;

@@ -162,7 +162,8 @@ class Packer {
     instances.reserve(c.instances.size());
     for (const circuit::Instance& i : c.instances) {
       const Quat q = i.orientation;
-      instances.push_back({i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()});
+      instances.push_back(
+          {i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()});
       add(Part::types, i.type);
       add(Part::layers, i.layer);
       figures.segment_total += originals_[i.morphology];
@@ -216,7 +217,8 @@ class Packer {
   std::array<std::uint64_t, part_count> offsets_{}, counts_{};
   std::array<BlockHash, part_count> hashes_;
   std::array<Waiting, part_count> waiting_;
-  std::vector<std::uint32_t> originals_, first_segments_;  // how many original segments each neuron has, and which
+  std::vector<std::uint32_t> originals_,
+      first_segments_;  // how many original segments each neuron has, and which
   std::vector<Pieces> pieces_;
 };
 
@@ -225,7 +227,8 @@ PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource
   circuit::check(c);
   progress.begin("packing", c.morphologies.size());
   Packer packer(out);
-  const std::size_t pieces = std::clamp<std::size_t>(pieces_in_all / std::max<std::size_t>(c.morphologies.size(), 1), 16, 256);
+  const std::size_t pieces =
+      std::clamp<std::size_t>(pieces_in_all / std::max<std::size_t>(c.morphologies.size(), 1), 16, 256);
   parallel_in_order(
       c.morphologies.size(),
       [&](std::size_t i) {

@@ -169,8 +169,8 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
       for (std::uint32_t rest = item.instance == FOREST_IN_WORLD ? item.drawn : 0; rest; rest &= rest - 1) {
         const std::uint32_t number = item.first_segment + std::uint32_t(std::countr_zero(rest));
         const frame::Segment& s = forest.segments()[number];
-        const Vec3 at = frame::project(view.camera, viewport,
-                                       .5f * (Vec3(s.ax, s.ay, s.az) + Vec3(s.bx, s.by, s.bz)));
+        const Vec3 at =
+            frame::project(view.camera, viewport, .5f * (Vec3(s.ax, s.ay, s.az) + Vec3(s.bx, s.by, s.bz)));
         if (gaze.eccentricity(at.head<2>()) <= view.detail.fovea) straws.insert(number);
       }
     return straws;

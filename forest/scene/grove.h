@@ -24,8 +24,8 @@ class Groves {
   static constexpr std::uint32_t in_leaf = 32, children = 8;
 
   struct Node {
-    Sphere sphere;  // around all below
-    std::uint32_t first = 0, count = 0;  // of members() below; 0 for none
+    Sphere sphere;                                   // around all below
+    std::uint32_t first = 0, count = 0;              // of members() below; 0 for none
     std::uint32_t first_child = 0, child_count = 0;  // nodes; 0 for a leaf
   };
 
@@ -33,7 +33,9 @@ class Groves {
   explicit Groves(std::span<const Sphere> spheres);
 
   std::span<const Node> nodes() const { return nodes_; }  // the root first; children come later
-  std::span<const std::uint32_t> members() const { return members_; }  // numbers of spheres, in Morton's order
+  std::span<const std::uint32_t> members() const {
+    return members_;
+  }  // numbers of spheres, in Morton's order
   /// The nodes with about so many members each, that hold all of them once, in order.
   std::vector<std::uint32_t> parts(std::size_t about) const;
 

@@ -104,7 +104,8 @@ void Budget::took(double milliseconds) {
     samples_ = one ? many : 1, error_ = one ? most_of_many(worst_) : 1.f, agreed_ = 0;
     return;
   }
-  const double ratio = std::clamp(milliseconds / milliseconds_, .5, 16.);  // the first picture of a large forest may take long
+  const double ratio =
+      std::clamp(milliseconds / milliseconds_, .5, 16.);  // the first picture of a large forest may take long
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), least, most);
 }
 

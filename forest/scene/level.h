@@ -29,7 +29,8 @@ struct Detail {
   // Branches thinner than this many pixels are drawn as wide, as many of them as cover the same area: whole branches stand
   // for their like. 0: all are drawn as they are. A picture of one sample cannot draw less than a pixel.
   float thinnest = 0.f;
-  float fog = 0.f;  // strength of the depth cue, as View::fog: what is seen through it may be wrong by more; 0: none
+  float fog =
+      0.f;  // strength of the depth cue, as View::fog: what is seen through it may be wrong by more; 0: none
 };
 
 /// What depth takes away: light falls to 1 / e over `length` from `start` on; µm along the view.
@@ -40,9 +41,7 @@ struct Fog {
   float end() const { return start + 7.f * length; }
   /// How many times larger an error may be that is seen through it: contrast counts as its root, and no error as four times
   /// what it is.
-  float forgives(float depth) const {
-    return std::clamp(std::exp(.5f * (depth - start) / length), 1.f, 4.f);
-  }
+  float forgives(float depth) const { return std::clamp(std::exp(.5f * (depth - start) / length), 1.f, 4.f); }
 };
 
 /// Where somebody looks on a flat screen, and how far beside it things are seen. Degrees are those of the viewer, whose sight

@@ -236,7 +236,7 @@ fovea = [240 * y + x for y in range(94, 106) for x in range(114, 126)]
 assert all(gazed[i] == first[i] for i in fovea)
 assert sum(a != b for a, b in zip(gazed, plain)) > .3 * covered
 told = json.load(open("at30.json"))
-assert told["activity"]["neurons"] == 7 and told["activity"]["flashes"] >= 1, told
+assert 0 < told["activity"]["neurons"] <= 7 and told["activity"]["flashes"] >= 1, told
 assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))["activity"] is None
 film = [pixels(f"film/{i:05}.png") for i in range(4)]
 assert all(a != b for a, b in zip(film, film[1:]))

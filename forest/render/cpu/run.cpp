@@ -141,7 +141,8 @@ FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
     const float dx = r.qx[i] - r.px[i], dy = r.qy[i] - r.py[i], length = std::sqrt(dx * dx + dy * dy);
     const bool shorter = length < thinnest, none = !(length > 1e-3f);
     const float scale = .5f * thinnest / larger(length, 1e-3f), mx = .5f * (r.px[i] + r.qx[i]),
-                my = .5f * (r.py[i] + r.qy[i]), hx = none ? .5f * thinnest : scale * dx, hy = none ? 0.f : scale * dy;
+                my = .5f * (r.py[i] + r.qy[i]), hx = none ? .5f * thinnest : scale * dx,
+                hy = none ? 0.f : scale * dy;
     r.px[i] = shorter ? mx - hx : r.px[i], r.py[i] = shorter ? my - hy : r.py[i];
     r.qx[i] = shorter ? mx + hx : r.qx[i], r.qy[i] = shorter ? my + hy : r.qy[i];
     r.mean_width[i] *= shorter ? length / thinnest : 1.f;

@@ -32,7 +32,8 @@ struct Picture {
   Standing standing(const frame::Item& item) const {
     if (geometry.straw(item)) return {to_camera, to_camera * -eye};
     const frame::Instance& i = geometry.instances[item.instance];
-    return {to_camera * Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix(), to_camera * (Vec3(i.x, i.y, i.z) - eye)};
+    return {to_camera * Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix(),
+            to_camera * (Vec3(i.x, i.y, i.z) - eye)};
   }
 };
 
