@@ -66,8 +66,8 @@ void enclose(Brick& brick, std::span<const frame::Segment> straws, std::span<con
 }  // namespace
 
 std::uint32_t Brick::shown(float magnification) const {
-  const float share =
-      float(FOREST_MEAN_STRETCH) * width * magnification * std::min(1.f, length * magnification);
+  const float share = float(FOREST_MEAN_STRETCH / FOREST_STRAW_WIDTH) * width * magnification *
+                      std::min(1.f, length * magnification / float(FOREST_STRAW_LENGTH));
   return first_by_rank[std::size_t(std::clamp(std::ceil(share * 32.f), 0.f, 32.f))] & all();
 }
 

@@ -36,8 +36,11 @@ struct Brick {
       0.f;  // radius of a sphere around its centre that holds the neurons of all of its straws, whole, µm
   std::uint32_t reserved = 0;
 
-  /// How large what a straw stands for may look, µm: from far it is a dot of its area.
-  float error() const { return std::min(width, std::sqrt(width * length)); }
+  /// How large what a straw stands for may look, µm: all straws are drawn where the thinnest line is as wide.
+  float error() const {
+    return std::min(width / float(FOREST_STRAW_WIDTH),
+                    std::sqrt(width * length / float(FOREST_STRAW_WIDTH * FOREST_STRAW_LENGTH)));
+  }
   Sphere sphere() const { return {{x, y, z}, radius}; }
   Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], sphere()); }
   std::uint32_t all() const { return segment_count >= 32 ? 0xffffffffu : (1u << segment_count) - 1u; }

@@ -136,24 +136,24 @@ FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Ve
 
 FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
-  const float thinnest = c.thinnest;
+  const float shortest = float(FOREST_STRAW_LENGTH) * c.thinnest;
   for (std::size_t i = 0; i < count; ++i) {
     const float dx = r.qx[i] - r.px[i], dy = r.qy[i] - r.py[i], length = std::sqrt(dx * dx + dy * dy);
-    const bool shorter = length < thinnest, none = !(length > 1e-3f);
-    const float scale = .5f * thinnest / larger(length, 1e-3f), mx = .5f * (r.px[i] + r.qx[i]),
-                my = .5f * (r.py[i] + r.qy[i]), hx = none ? .5f * thinnest : scale * dx,
+    const bool shorter = length < shortest, none = !(length > 1e-3f);
+    const float scale = .5f * shortest / larger(length, 1e-3f), mx = .5f * (r.px[i] + r.qx[i]),
+                my = .5f * (r.py[i] + r.qy[i]), hx = none ? .5f * shortest : scale * dx,
                 hy = none ? 0.f : scale * dy;
     r.px[i] = shorter ? mx - hx : r.px[i], r.py[i] = shorter ? my - hy : r.py[i];
     r.qx[i] = shorter ? mx + hx : r.qx[i], r.qy[i] = shorter ? my + hy : r.qy[i];
-    r.mean_width[i] *= shorter ? length / thinnest : 1.f;
+    r.mean_width[i] *= shorter ? length / shortest : 1.f;
   }
 }
 
-FOREST_CLONES void prepare_lines(const frame::Constants& c, float spread, Run& r) {
+FOREST_CLONES void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r) {
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
-  const float thinnest = c.thinnest, per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
+  const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);

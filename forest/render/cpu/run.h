@@ -70,11 +70,12 @@ void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
 /// From the coordinates of their neuron to pixels: camera = turn · p + at.
 void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light, Run& r);
 
-/// Straws that are shorter than the thinnest line is wide get as long, and fewer of them are drawn: from far they are dots.
+/// Straws shorter than FOREST_STRAW_LENGTH times what the thinnest line is wide get as long, and fewer of them are drawn.
 void lengthen(const frame::Constants& c, Run& r);
 
 /// What lines need, after draw_line in render/opengl/shaders/common.glsl.
-void prepare_lines(const frame::Constants& c, float spread, Run& r);
+/// @param thinnest  as Constants::thinnest
+void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r);
 
 /// What a length at this depth is divided by to be seen.
 inline float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }

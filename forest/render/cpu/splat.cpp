@@ -150,8 +150,10 @@ class Gatherer {
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
     project(c, turn, at, picture_.light, r_);
-    if (picture_.geometry.straw(item)) lengthen(c, r_);
-    if (kind == Kind::lines || any_thin()) prepare_lines(c, picture_.spread, r_);
+    const bool straws = picture_.geometry.straw(item);
+    if (straws) lengthen(c, r_);
+    if (kind == Kind::lines || any_thin())
+      prepare_lines(c, (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest, picture_.spread, r_);
     std::uint64_t added = 0;
     for (std::size_t i = 0; i < r_.count; ++i)
       added += r_.opacity[i] && (kind == Kind::lines ? add_stroke(i, chunk) : add_near(i, chunk));
@@ -160,7 +162,7 @@ class Gatherer {
   void add(const frame::Overlay& overlay, Chunk& chunk) {
     load(overlay, picture_, r_);
     project(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, picture_.light, r_);
-    prepare_lines(picture_.constants, picture_.spread, r_);
+    prepare_lines(picture_.constants, picture_.constants.thinnest, picture_.spread, r_);
     add_near(0, chunk);
   }
 

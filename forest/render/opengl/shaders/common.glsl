@@ -31,7 +31,7 @@ struct Capsule {
   uint entry;  // of the palette
   float rank;  // in [0, 1): a branch of width w < 1 pixel is drawn when w > rank
   float mean;  // radius of its branch; 0: as its own
-  bool straw;  // never shorter than it is wide
+  bool straw;
 };
 
 vec3 to_camera(vec3 world) {
@@ -192,10 +192,11 @@ int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit)));
 void draw_line(Capsule c) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
   vec2 d = q - p;
-  float drawn_length = length(d), shorter = 1.0;  // a straw shorter than it is wide is drawn longer, and fewer of them
-  if (c.straw && drawn_length < view.thinnest) {
-    shorter = drawn_length / view.thinnest;
-    d = drawn_length > 1e-3 ? d / shorter : vec2(view.thinnest, 0.0);
+  float thinnest = c.straw ? FOREST_STRAW_WIDTH * view.thinnest : view.thinnest, shortest = FOREST_STRAW_LENGTH * view.thinnest;
+  float drawn_length = length(d), shorter = 1.0;
+  if (c.straw && drawn_length < shortest) {
+    shorter = drawn_length / shortest;
+    d = drawn_length > 1e-3 ? d / shorter : vec2(shortest, 0.0);
     vec2 middle = 0.5 * (p + q);
     p = middle - 0.5 * d;
     q = middle + 0.5 * d;
@@ -206,11 +207,11 @@ void draw_line(Capsule c) {
   float width = width_in_pixels(c) * stretch;
   float rank = c.rank + 1.0 / 512.0;
   bool single = view.subframes == 1u;
-  if (width < view.thinnest && c.mean > 0.0) {
+  if (width < thinnest && c.mean > 0.0) {
     // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
-    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / view.thinnest, 1.0);
+    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / thinnest, 1.0);
     if (share <= rank) return;
-    width = single ? floor(view.thinnest + 1.0 - rank / share) : width / share;
+    width = single ? floor(thinnest + 1.0 - rank / share) : width / share;
   } else if (single) {
     width = floor(width + 1.0 - rank);
     if (width < 1.0) return;
