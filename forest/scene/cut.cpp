@@ -189,7 +189,7 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
     if (!(groups >> g & 1u) || first >= c.segment_count) continue;
     const Sphere around = placed(c.group(g));
     Judged judged(look, around);
-    if (!look.in_sight(sight, judged.seen())) continue;
+    if (!sight.eye.may_see(judged.seen())) continue;
     const std::uint32_t drawn = shown(judged.seen()) >> first & 255u;
     if (!drawn) continue;
     if (judged.hidden(sight))
@@ -229,7 +229,8 @@ std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
       Cut& cut = cuts[s];
-      if (!look.in_sight(sight, seen)) return;
+      // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
+      if (!sight.eye.may_see(seen)) return;
       if (at == from) may_see |= 1u << s;
       if (judged.left_out(look, sight, {LeftOut::cluster, index, at, 0}, cut)) {
       } else if (!c.is_leaf() && depth + 2 <= open.size() &&
