@@ -17,7 +17,8 @@ namespace {
 using Json = nlohmann::ordered_json;
 
 constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
-constexpr std::array<std::string_view, 6> kind_names{"any", "dots", "lines", "capsules", "somata", "skin"};
+constexpr std::array<std::string_view, 7> kind_names{"any",    "dots", "lines", "capsules",
+                                                     "somata", "skin", "bricks"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
