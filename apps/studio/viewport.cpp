@@ -17,9 +17,9 @@
 namespace forest::studio {
 namespace {
 
-constexpr int rest_milliseconds = 200;      // a view that stands still so long is drawn in full
-constexpr float slice_milliseconds = 60.f;  // of refining between two looks at the mouse
-constexpr float glide_seconds = .7f;
+constexpr int rest_milliseconds = 200;                    // a view that stands still so long is drawn in full
+constexpr float slice_milliseconds = 60.f;                // of refining between two looks at the mouse
+constexpr float glide_seconds = .7f, key_seconds = 2.5f;  // of a glide; between views of a path
 constexpr float tap_seconds = .05f;            // of flight that a tap on a key makes, however short
 constexpr float turn_pixels_a_second = 400.f;  // of the arrow keys
 constexpr float reach = 3.f;                   // a click so many pixels beside a branch means it
@@ -109,7 +109,19 @@ void Viewport::touch() {
 void Viewport::glide_to(const frame::Camera& camera) {
   scene::View to = settings_.view;
   to.camera = camera;
-  glide_ = Glide{scene::CameraPath({settings_.view, to}), camera, {}};
+  glide_ = Glide{scene::CameraPath({settings_.view, to}), camera, glide_seconds};
+  glide_->clock.start();
+  touch();
+}
+
+void Viewport::fly_along(std::vector<scene::View> views) {
+  for (scene::View& view : views) {
+    (void)scene::colour(targets_, view);  // or throws
+    view.activity = settings_.view.activity;
+  }
+  const frame::Camera end = views.back().camera;
+  const float seconds = key_seconds * float(std::max<std::size_t>(1, views.size() - 1));
+  glide_ = Glide{scene::CameraPath(std::move(views)), end, seconds, true};
   glide_->clock.start();
   touch();
 }
@@ -222,11 +234,15 @@ void Viewport::advance(float seconds) {
     window_ = step;
   }
   if (glide_) {
-    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_seconds);
+    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_->seconds);
     const bool there = t >= 1.f;
-    const frame::Camera camera = there ? glide_->end : glide_->path.at(t).camera;
-    if (there) glide_.reset();
-    set_camera(camera);
+    Settings next = settings_;
+    if (glide_->whole)
+      next.view = glide_->path.at(std::min(t, 1.f)), next.view.activity = settings_.view.activity;
+    else
+      next.view.camera = glide_->path.at(std::min(t, 1.f)).camera;
+    if (there) next.view.camera = glide_->end, glide_.reset();
+    change(next);
   }
   if (!flies()) return;
   Vec3 way = Vec3::Zero();
@@ -281,7 +297,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
-  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.cut().neurons;
+  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.neurons();
   figures_.samples = last, figures_.error = view.detail.error;
 }
 
@@ -289,7 +305,7 @@ bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
-  view.samples = layered() ? 1 : budget_.samples();
+  view.samples = budget_.samples();
   view.detail.error *= budget_.error(), view.detail.thinnest = budget_.thinnest();
   draw_part(view, 0, view.samples);
 }

@@ -132,6 +132,10 @@ void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> a
   }
 }
 
+bool Surfaces::has_values() const {
+  return std::ranges::any_of(list_, [](const One& one) { return !one.values.empty(); });
+}
+
 std::size_t Surfaces::triangles() const {
   std::size_t sum = 0;
   for (const One& one : list_) sum += one.mesh.triangles.size();

@@ -387,6 +387,22 @@ TEST_F(Window, ViewIsCopiedAndPasted) {
   EXPECT_EQ(scene::to_json(view_), scene::to_json(old));
 }
 
+TEST_F(Window, APathOfViewsIsFlownToItsEnd) {
+  scene::View end = view_;
+  end.camera.eye += Vec3(120, 40, -60);
+  end.colour_by = scene::ColourBy::layer;
+  const auto path = folder / "path.jsonl";
+  write_file(path, scene::to_json(view_) + "\n" + scene::to_json(end) + "\n");
+  key("ctrl+shift+k");
+  xdotool("search --sync --onlyvisible --name 'Path of views' windowfocus");
+  xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", path.string()));
+  key("Return");
+  for (int i = 0; i < 4 && view_.colour_by != end.colour_by; ++i)
+    finish();  // the first may be that of the dialog
+  EXPECT_EQ(view_.colour_by, end.colour_by);
+  EXPECT_LT((view_.camera.eye - end.camera.eye).norm(), 1.f);
+}
+
 TEST_F(Window, ControlsHaveKeys) {
   key("b");
   settle();
