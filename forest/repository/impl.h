@@ -34,8 +34,6 @@ inline std::size_t room(std::size_t count) { return count + 2; }
 inline int number_of(NeuronId id) { return int(id.value()); }
 
 std::string hash_of(std::string_view text);
-/// In the order of a run, so that the index of fingerprints grows at its end and not all over.
-std::string grown_fingerprint(const Grown& grown, std::uint64_t checksum);
 void check_name(std::string_view what, std::string_view name);  // throws Error when it is none
 
 // What a column of text, or of whole numbers, answered.
@@ -59,6 +57,7 @@ struct Repository::Impl {
   // Those last stored under: thousands of neurons have the same.
   std::pair<std::string, int> known_population, known_grammar;
   std::string known_hash;
+  std::optional<bool> older_grown;  // what holds_older_grown() found
 
   Impl(const std::string& at, std::shared_ptr<Database> open)
       : place(at), database(std::move(open)), sql(database->sql()) {}
@@ -67,7 +66,6 @@ struct Repository::Impl {
   static void refill(Database& database, int from);
   void refill_shapes();
   void refill_grammars();
-  void refill_fingerprints();
 
   /// Calls `body`; errors of the database become sentences.
   template <class Body>
@@ -150,6 +148,9 @@ struct Repository::Impl {
   int population(const std::string& name);
 
   std::optional<int> grammar(const Grown& grown);
+
+  /// Whether neurons were grown into it before version 7, under other fingerprints.
+  bool holds_older_grown();
 
   int keep_grammar(const std::string& name, std::string_view text);  // its id
   /// The id and version of a distribution of a population, by its id or 0.

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // Repositories of earlier versions, brought up to date where SQL alone does not do it (schema.h).
-#include <bit>
-
 #include <fmt/format.h>
 
 #include "forest/repository/impl.h"
@@ -14,7 +12,6 @@ void Repository::Impl::refill(Database& database, int from) {
   Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
   if (from < 3) impl.refill_shapes();
   if (from < 4) impl.refill_grammars();
-  if (from < 7) impl.refill_fingerprints();
 }
 
 /// Before version 3 a section was named by two numbers, before version 2 points were not packed.
@@ -46,26 +43,6 @@ void Repository::Impl::refill_grammars() {
         unescaped(ask<std::string>("select text from grammars where id = :id", id).value_or("")));
     sql << "update grammars set text = :text where id = :id", use(text), use(id);
   }
-}
-
-/// Before version 7 the fingerprint of a grown neuron was a hash of the same facts.
-void Repository::Impl::refill_fingerprints() {
-  const Answer found = database->ask(
-      "select n.id, n.checksum, g.name, g.hash, o.seed, o.number from neurons n join provenance o on "
-      "o.neuron "
-      "= n.id join grammars g on g.id = o.grammar order by n.id");
-  Ints id(found.rows.size());
-  Texts fingerprint(found.rows.size());
-  for (std::size_t i = 0; i < found.rows.size(); ++i) {
-    const auto& row = found.rows[i];
-    const auto number = [&](std::size_t column) {
-      return std::bit_cast<std::uint64_t>(number_in(row[column]));
-    };
-    id[i] = int(number_in(row[0]));
-    fingerprint[i] = grown_fingerprint({text_of(row[2]), text_of(row[3]), number(4), number(5)}, number(1));
-  }
-  if (!id.empty())
-    sql << "update neurons set fingerprint = :fingerprint where id = :id", use(fingerprint), use(id);
 }
 
 }  // namespace forest::repository

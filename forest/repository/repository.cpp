@@ -19,19 +19,23 @@ namespace forest::repository {
 
 namespace {
 
-/// Two neurons of a population with the same fingerprint came from the same source.
+/// Two neurons of a population with the same fingerprint came from the same source. Those of a run are in its order, so that
+/// the index of fingerprints grows at its end and not all over.
 std::string fingerprint(const Provenance& provenance, std::uint64_t checksum) {
-  if (const auto* grown = std::get_if<Grown>(&provenance)) return grown_fingerprint(*grown, checksum);
+  if (const auto* grown = std::get_if<Grown>(&provenance)) {
+    const std::string run = hash_of(fmt::format("{} {}", grown->grammar_hash, grown->seed));
+    return fmt::format("{}-{:08x}-{:016x}", run.substr(0, 16), grown->index, checksum);
+  }
   const std::string& hash = std::get<Traced>(provenance).hash;
   return hash.empty() ? hash_of(fmt::format("{}", checksum)) : hash;
 }
 
-}  // namespace
-
-std::string grown_fingerprint(const Grown& grown, std::uint64_t checksum) {
-  const std::string run = hash_of(fmt::format("{} {}", grown.grammar_hash, grown.seed));
-  return fmt::format("{}-{:08x}-{:016x}", run.substr(0, 16), grown.index, checksum);
+/// That of a grown neuron before version 7.
+std::string older_fingerprint(const Grown& grown, std::uint64_t checksum) {
+  return hash_of(fmt::format("{} {} {} {}", grown.grammar_hash, grown.seed, grown.index, checksum));
 }
+
+}  // namespace
 
 std::string hash_of(std::string_view text) { return hash_hex(std::as_bytes(std::span(text))); }
 
@@ -97,6 +101,13 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
       throw Error(fmt::format("{} has more than {} sections, which no repository holds", shown(neuron.name),
                               (1 << section_bits) - 1));
     insert.population = impl.population(neuron.population);
+    const auto stored_as = [&](const std::string& fingerprint) -> std::optional<Added> {
+      const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
+      const auto id = impl.ask<int>("select id " + same, insert.population, fingerprint);
+      if (!id) return std::nullopt;
+      return Added{NeuronId(std::size_t(*id)),
+                   *impl.ask<std::string>("select name " + same, insert.population, fingerprint), true};
+    };
     if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
       const auto grammar = impl.grammar(*grown);
       if (!grammar)
@@ -104,16 +115,14 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
             "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
             shown(grown->grammar), shown(neuron.name)));
       insert.grammar = *grammar;
+      if (impl.holds_older_grown())
+        if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
     }
     insert.name = neuron.name;
     for (int number = 2;;) {
       insert.id = impl.database->next_id("neurons");
       if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
-      const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
-      if (const auto there = impl.ask<int>("select id " + same, insert.population, insert.fingerprint))
-        return Added{NeuronId(std::size_t(*there)),
-                     *impl.ask<std::string>("select name " + same, insert.population, insert.fingerprint),
-                     true};
+      if (const auto there = stored_as(insert.fingerprint)) return *there;
       const auto other =
           impl.ask<int>("select id from neurons where population = :population and name = :name",
                         insert.population, insert.name);
@@ -196,6 +205,14 @@ std::optional<int> Repository::Impl::grammar(const Grown& grown) {
                                grown.grammar_hash, grown.grammar);
   if (number) known_hash = grown.grammar_hash, known_grammar = {grown.grammar, *number};
   return number;
+}
+
+bool Repository::Impl::holds_older_grown() {
+  if (!older_grown)
+    older_grown = ask<int>("select 1 from neurons n join provenance o on o.neuron = n.id where o.origin = "
+                           "'grown' and n.fingerprint not like '%-%' limit 1")
+                      .has_value();
+  return *older_grown;
 }
 
 Rows Repository::Impl::stored(NeuronId id, const char* points, const std::string& from) const {

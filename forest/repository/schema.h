@@ -272,7 +272,7 @@ create view metric as
     Migration{6, ""},
     // Measures of sections are whole numbers of picometres and square nanometres, which SQLite keeps in three or four bytes
     // instead of eight, and the views give them in micrometres. Points are packed from the end of the section they grow out
-    // of; those that are there stay. The program writes the fingerprints of grown neurons anew, in the order of their runs.
+    // of; those that are there stay, and so do the fingerprints of grown neurons, which now are in the order of their runs.
     Migration{7, R"sql(
 drop view section;
 drop view junction;
