@@ -29,7 +29,8 @@ Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
       chooser_(forest_),
       renderer_(make_renderer(drawer)),
       foveated_(forest_, [drawer] { return make_renderer(drawer); }),
-      outline_(scene::outline(forest_)) {
+      outline_(scene::outline(forest_)),
+      dressing_(forest_) {
   renderer_->load(forest_.geometry());
 }
 
@@ -52,9 +53,9 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   if (view.detail.gaze) {
     drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter,
                                  [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
-                                   surfaces_.show(frame, *colouring_, playback_.has_value());
-                                   if (skin_ && view.skin)
-                                     skin_->show(frame, near, eye, *colouring_, painter);
+                                   dressing_.put_on(frame, view, near, eye, *colouring_,
+                                                    playback_.has_value(), painter);
+                                   drawn.synapses += dressing_.chosen.balls.size();
                                  });
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
@@ -69,12 +70,10 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
-  surfaces_.show(frame, *colouring_, playback_.has_value());
-  if (skin_ && view.skin) {
-    start = Clock::now();
-    skin_->show(frame, cut, eye, *colouring_, painter);
-    drawn.cull += milliseconds_since(start);
-  }
+  start = Clock::now();
+  dressing_.put_on(frame, view, cut, eye, *colouring_, playback_.has_value(), painter);
+  drawn.cull += milliseconds_since(start);
+  drawn.synapses = dressing_.chosen.balls.size();
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
@@ -101,6 +100,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.samples = plan.samples;
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
+    if (plan.synapses) view.synapses = *plan.synapses;
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {
       view.activity = activity;

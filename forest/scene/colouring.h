@@ -19,6 +19,8 @@ struct View;
 
 enum class ColourBy : std::uint8_t { type, layer, kind, neuron, target, depth };
 enum class Background : std::uint8_t { dark, light };
+/// What the colours of synapses mean (synapses.h): whether they excite, or whose they are; none: they are not shown.
+enum class SynapseColour : std::uint8_t { none, sign, target };
 
 /// A branch of one neuron: the section and all that grows out of it; soma_section means the whole neuron.
 struct Branch {
@@ -66,6 +68,8 @@ Colouring colour(const Forest& forest, ColourBy by, Background background);
 /// Palette entry for highlights: bright, used by overlays.
 inline constexpr std::uint32_t highlight_entry = 127;
 inline constexpr std::uint32_t outline_entry = 126;
+/// From here on entries are no neuron's: synapses, marks.
+inline constexpr std::uint32_t first_reserved_entry = 120;
 
 /// Linear light of 0xrrggbb.
 Vec3 light_of(std::uint32_t rgb);

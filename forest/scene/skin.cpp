@@ -39,6 +39,18 @@ Sphere around(const BranchCone& c) {
           .5f * (c.shape.b - c.shape.a).norm() + std::max(c.shape.radius_a, c.shape.radius_b)};
 }
 
+// Depth of a sphere's farthest point.
+float farthest_depth(const Eye& eye, const Sphere& s) {
+  return eye.nearest_depth({s.centre, 0.f}) + s.radius;
+}
+
+// Pixels a µm where a sphere is nearest, but for what lies so near that it has no skin.
+float magnification_of(const Eye& eye, const Sphere& s) {
+  const float magnification = eye.magnification(s);
+  return eye.camera().orthographic() ? magnification
+                                     : magnification * std::min(1.f, eye.nearest_depth(s) / skin_nearest);
+}
+
 bool meet(const Sphere& a, const Sphere& b) { return (a.centre - b.centre).norm() <= a.radius + b.radius; }
 
 }  // namespace
@@ -99,7 +111,8 @@ struct Skin::Shape {
     for (std::size_t i = 0; i < forest.instances().size(); ++i)
       if (forest.instances()[i].morphology == which) {
         const auto type = forest.types()[i];
-        return type < forest.circuit().types.size() && forest.circuit().types[type].excitatory;
+        const auto& types = forest.circuit().types;
+        return type < types.size() && types[type].excitatory && !types[type].glia;
       }
     return false;
   }
@@ -376,8 +389,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         const BranchCone one{
             {c.a + from * (c.b - c.a), c.a + to * (c.b - c.a), radius(from), radius(to)}, 0, 0};
         const Sphere ball = place(around(one));
-        if (eye.frustum().may_see(ball))
-          parts.push_back({one.shape, eye.magnification(ball), of.widths[whole.branch], near.share});
+        if (eye.frustum().may_see(ball) && farthest_depth(eye, ball) > skin_nearest)
+          parts.push_back({one.shape, magnification_of(eye, ball), of.widths[whole.branch], near.share});
       }
     }
   }
@@ -387,11 +400,12 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     double expected = 0.;
     for (const Stretch& part : parts) {
       if (part.width * part.magnification < skin_begins * part.share * coarser) continue;
-      // Not more than fill the picture.
+      // Half of them are averted; and not more than fill the picture.
       const double voxel = double(voxel_pixels * coarser * part.share);
-      expected += std::min(expected_triangles({{part.cone, 0, 0}},
-                                              voxel_of(level_at(part.magnification, coarser * part.share))),
-                           25. * pixels / (voxel * voxel));
+      expected +=
+          std::min(.5 * expected_triangles({{part.cone, 0, 0}},
+                                           voxel_of(level_at(part.magnification, coarser * part.share))),
+                   25. * pixels / (voxel * voxel));
     }
     if (expected <= double(limits.triangles)) break;
     coarser *= float(std::clamp(std::sqrt(expected / double(limits.triangles)), 1.05, 2.));
@@ -407,14 +421,14 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
                           std::span<const std::uint32_t> segments) -> void {
       const PieceLattice grid{of.origin, voxel_of(level)};
       const Sphere ball = grid.around(cell), seen = place(ball);
-      if (!eye.frustum().may_see(seen)) return;
+      if (!eye.frustum().may_see(seen) || !(farthest_depth(eye, seen) > skin_nearest)) return;
       std::vector<std::uint32_t> here;
       for (const std::uint32_t segment : segments)
         if (meet(ball, around(of.cones[segment])) &&
             signed_distance(ball.centre, of.cones[segment].shape) < ball.radius)
           here.push_back(segment);
       if (here.empty()) return;
-      const float magnification = eye.magnification(seen);
+      const float magnification = magnification_of(eye, seen);
       if (level < level_at(magnification, coarser * list[n].share)) {
         for (std::int64_t child = 0; child < 8; ++child)
           self(self, level + 1,
@@ -441,6 +455,18 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   // The nearest of them, as many as the limit allows. Those that are not there are made, a few at once.
   constexpr std::size_t at_once = 8;
   shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
+  // Whether nothing of a piece faces the eye: capsules, which the skin lies around, hide it.
+  const auto averted = [&](const Made& made, std::uint32_t instance) {
+    const Placed place(instances[instance]);
+    const Vec3 back = eye.camera().axes().col(2),
+               from = place.turn.transpose() * (eye.camera().eye - place.position),
+               to_eye = place.turn.transpose() * back;
+    const bool parallel = eye.camera().orthographic();
+    for (std::size_t v = 0; v < made.piece.normals.size(); ++v)
+      if (made.piece.normals[v].dot(parallel ? to_eye : Vec3(from - made.piece.mesh.positions[v])) > 0.f)
+        return false;
+    return true;
+  };
   std::vector<std::pair<const Wanted*, Made*>> used;
   std::size_t triangles = 0;
   for (auto one = wanted.begin(); one != wanted.end(); ++one) {
@@ -468,7 +494,7 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
       continue;
     }
     const std::size_t more = found->second->piece.mesh.triangles.size();
-    if (more == 0) continue;
+    if (more == 0 || averted(*found->second, list[one->near].instance)) continue;
     if (triangles + more > limits.triangles) break;
     triangles += more;
     found->second->used = picture_;
@@ -527,6 +553,10 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
                            : 0.f;
       if (made->width[v] < 0.f)
         presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
+      if (!eye.camera().orthographic())
+        presence *= smooth_step(
+            skin_nearest, skin_near,
+            eye.nearest_depth({place.position + place.turn * made->piece.mesh.positions[v], 0.f}));
       entries_[k][v] = std::uint8_t(entry);
       presence_[k][v] = std::uint8_t(std::lround(presence * float(opacity)));
       seen[k] |= char(presence_[k][v] > 0);
