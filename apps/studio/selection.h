@@ -12,6 +12,7 @@
 #include "forest/core/bounds.h"
 #include "forest/frame/frame.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/synapses.h"
 
 namespace forest::studio {
 
@@ -38,6 +39,10 @@ struct Fact {
 std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection);
 /// The same for a machine, {"neuron": 12, …}: lengths in µm.
 nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& selection);
+
+/// Of a synapse: what it does, who makes it and where it comes from.
+std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse);
+nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse);
 
 inline constexpr std::uint32_t section_entry = 125;  // palette entry of the picked section
 inline constexpr std::size_t most_marks = 50'000;  // capsules of a highlight; the section itself comes first
