@@ -25,17 +25,20 @@ scene::Colouring alone(scene::Colouring colouring) {
 
 }  // namespace
 
+bool Dressing::wanted(const scene::View& view, const scene::Colouring& colouring) const {
+  return (!surfaces.empty() && surfaces.visibility > 0.f) || (view.skin && (skinned || forced(colouring))) ||
+         (synapses && view.synapses != scene::SynapseColour::none);
+}
+
 void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut,
                       const scene::Eye& eye, const scene::Colouring& colouring, bool playing,
                       const scene::Chooser::Painter& painter, const DressingLimits& limits) {
+  rest();
   surfaces.show(frame, colouring, playing);
   if (view.skin && skinned)
     skin.show(frame, cut, eye, colouring, painter, limits.skin);
   else if (view.skin && forced(colouring))
     skin.show(frame, cut, eye, alone(colouring), painter, limits.skin);
-  else
-    skin.rest();
-  chosen = {};
   if (!synapses) return;
   const bool taken = playing && view.synapses == scene::SynapseColour::target;
   chosen =

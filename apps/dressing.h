@@ -27,11 +27,15 @@ struct Dressing {
   std::optional<scene::Synapses> synapses;  // none: nothing is known of any
   scene::Synapses::Choice chosen;           // those of the last picture
 
+  /// Whether a picture of the view shows anything of them.
+  bool wanted(const scene::View& view, const scene::Colouring& colouring) const;
   /// Adds them to a frame composed of `cut`, as the view wants them. The frame must not outlive this object, or its next call.
   /// @param playing  activity takes the palette entries of branches
   void put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut, const scene::Eye& eye,
               const scene::Colouring& colouring, bool playing, const scene::Chooser::Painter& painter,
               const DressingLimits& limits = {});
+  /// A picture without any of them.
+  void rest() { skin.rest(), chosen = {}; }
 };
 
 }  // namespace forest

@@ -3,6 +3,8 @@
 
 #include <chrono>
 
+#include "forest/core/parallel.h"
+
 namespace forest {
 namespace {
 
@@ -26,41 +28,56 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     layers_.back()->renderer->load(forest_.geometry());
   }
   figures_ = {};
-  std::vector<const frame::Image*> pictures;
+  auto start = Clock::now();
+  std::vector<scene::Eye> eyes;
+  std::vector<frame::Viewport> viewports;
+  std::vector<scene::Chooser*> choosers;
+  for (std::size_t i = 0; i < plan.size(); ++i) {
+    viewports.push_back({float(plan[i].width), float(plan[i].height)});
+    eyes.emplace_back(view.camera, viewports[i], scene::detail_for(view, plan[i], width, height));
+    choosers.push_back(&layers_[i]->chooser);
+  }
+  if (first == 0) scene::Chooser::choose(choosers, eyes, viewports, colouring.shown(), painter);
+  std::vector<frame::Frame> frames;
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
-    Drawn& drawn = *layers_[i];
-    auto start = Clock::now();
-    const frame::Viewport viewport{float(layer.width), float(layer.height)};
-    const scene::Eye eye(view.camera, viewport, scene::detail_for(view, layer, width, height));
-    if (first == 0) drawn.chooser.choose(eye, viewport, colouring.shown(), painter);
-    figures_.cull += milliseconds_since(start);
-    frame::Frame frame =
-        scene::compose(forest_, view, colouring, drawn.chooser.cut(), layer.width, layer.height, overlays);
+    const scene::View shown = scene::view_for(view, layer);
+    frame::Frame& frame = frames.emplace_back(
+        scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height, overlays));
     frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
     frame.glass = glass;
-    frame.first_subframe = first, frame.last_subframe = last;
-    drawn.chooser.complete(frame);
-    if (dress) dress(frame, drawn.chooser.cut(), eye);
-    const frame::Timing timing = drawn.renderer->draw(frame);
-    drawn.chooser.remember(drawn.renderer->seen());
-    figures_.draw += timing.draw, figures_.resolve += timing.resolve;
-    figures_.drawn += timing.drawn;
-    figures_.segments += drawn.chooser.segments();
-    figures_.layer_segments.push_back(drawn.chooser.segments());
-    figures_.neurons = std::max(figures_.neurons, drawn.chooser.cut().neurons);
-    start = Clock::now();
-    if (const frame::Image* image = drawn.renderer->image()) {
-      pictures.push_back(image);
-    } else {
-      drawn.image = drawn.renderer->read();
-      pictures.push_back(&drawn.image);
-    }
-    figures_.unite += milliseconds_since(start);
+    if (view.samples > 1) frame.first_subframe = first, frame.last_subframe = last;
+    choosers[i]->complete(frame);
   }
-  const auto start = Clock::now();
+  figures_.cull = milliseconds_since(start);
+
+  start = Clock::now();
+  std::vector<frame::Timing> timings(plan.size());
+  const auto draw_layer = [&](std::size_t i) {
+    render::Renderer& renderer = *layers_[i]->renderer;
+    if (dress) dress(frames[i], choosers[i]->cut(), eyes[i]);
+    timings[i] = renderer.draw(frames[i]);
+    choosers[i]->remember(renderer.seen());
+    if (!renderer.image()) layers_[i]->image = renderer.read();
+  };
+  if (!painter && !dress && layers_.front()->renderer->concurrent())
+    parallel_for(plan.size(), 1, draw_layer);
+  else
+    for (std::size_t i = 0; i < plan.size(); ++i) draw_layer(i);
+  figures_.draw = milliseconds_since(start);
+
+  start = Clock::now();
+  std::vector<const frame::Image*> pictures;
+  for (std::size_t i = 0; i < plan.size(); ++i) {
+    figures_.drawn += timings[i].drawn;
+    figures_.segments += choosers[i]->segments();
+    figures_.layer_segments.push_back(choosers[i]->segments());
+    figures_.neurons = std::max(figures_.neurons, choosers[i]->neurons());
+    const frame::Image* image = layers_[i]->renderer->image();
+    pictures.push_back(image ? image : &layers_[i]->image);
+  }
   scene::unite(view, plan, pictures, width, height, whole_);
-  figures_.unite += milliseconds_since(start);
+  figures_.unite = milliseconds_since(start);
   return whole_;
 }
 

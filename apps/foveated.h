@@ -23,13 +23,14 @@ class Foveated {
   using Dresser = std::function<void(frame::Frame&, const scene::Cut&, const scene::Eye&)>;
 
   struct Figures {
-    double cull = 0., draw = 0., resolve = 0., unite = 0.;  // milliseconds
-    std::uint64_t segments = 0;                             // chosen, of all layers
-    std::uint64_t drawn = 0;                                // of them, as frame::Timing has it
-    std::uint32_t neurons = 0;                              // in sight, of the layer that sees most
-    std::vector<std::uint64_t> layer_segments;              // the same of each, finest first
+    double cull = 0., draw = 0., unite = 0.;    // milliseconds
+    std::uint64_t segments = 0;                 // chosen, of all layers
+    std::uint64_t drawn = 0;                    // of them, as frame::Timing has it
+    std::uint32_t neurons = 0;                  // in sight, of the layer that sees most
+    std::vector<std::uint64_t> layer_segments;  // the same of each, finest first
   };
   /// Its subframes [first, last) of view.samples, as frame::Frame has them.
+  /// Layers are chosen together, and drawn at the same time where their renderers can and there is neither painter nor dresser.
   const frame::Image& draw(const scene::View& view, std::uint32_t width, std::uint32_t height,
                            const scene::Colouring& colouring, std::span<const frame::Overlay> overlays = {},
                            const std::optional<frame::Glass>& glass = {}, std::uint32_t first = 0,

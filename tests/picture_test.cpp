@@ -88,50 +88,55 @@ TEST_P(Picture, LooksAsItDid) {
 INSTANTIATE_TEST_SUITE_P(Golden, Picture, ::testing::ValuesIn(goldens),
                          [](const auto& golden) { return std::string(golden.param.name); });
 
-// A walk with a memory of what was hidden, and a leap in it, shows what a walk without one shows.
-TEST(Chooser, ItsMemoryChangesNoPixel) {
+// Draws views with a memory of what was hidden in those before, and compares each with one drawn without.
+class Remembered {
+ public:
+  Remembered() { renderer_.load(forest.geometry()); }
+  void expect_the_same(const scene::View& view, const scene::Colouring& colouring) {
+    const frame::Viewport viewport{float(width), float(height)};
+    const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
+    const scene::Cut cut = scene::choose(forest, eye, viewport, colouring.shown());
+    renderer_.draw(scene::compose(forest, view, colouring, cut, width, height));
+    const frame::Image plain = renderer_.read();
+    const scene::Cut& guessed = chooser_.choose(eye, viewport, colouring.shown());
+    frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
+    chooser_.complete(frame);
+    renderer_.draw(frame);
+    chooser_.remember(renderer_.seen());
+    EXPECT_EQ(renderer_.read().pixels, plain.pixels);
+    left_out += guessed.left_out.size();
+    revealed += chooser_.segments() - guessed.segments;
+  }
+
   const scene::Forest forest =
       scene::Forest::from_bytes(scene::pack(testing::sample_circuit(300), testing::sample_neurons()));
-  const scene::CameraPath path = scene::walk(forest);
-  const scene::Colouring colouring = scene::colour(forest, scene::ColourBy::type, scene::Background::dark);
-  const frame::Viewport viewport{float(width), float(height)};
-  render::CpuRenderer renderer;
-  renderer.load(forest.geometry());
-  scene::Chooser chooser(forest);
-  std::size_t left_out = 0, revealed = 0;
-  for (const float t : {.5f, .505f, .51f, .52f, .9f, .91f, .1f}) {
+  std::size_t left_out = 0, revealed = 0;  // in all pictures
+
+ private:
+  scene::Chooser chooser_{forest};
+  render::CpuRenderer renderer_;
+};
+
+TEST(Chooser, ItsMemoryChangesNoPixel) {
+  Remembered pictures;
+  const scene::CameraPath path = scene::walk(pictures.forest);
+  const scene::Colouring colouring =
+      scene::colour(pictures.forest, scene::ColourBy::type, scene::Background::dark);
+  for (const float t : {.5f, .505f, .51f, .52f, .9f, .91f, .1f})  // with a leap
     for (const std::uint32_t samples : {1u, 3u}) {
       SCOPED_TRACE(t);
       scene::View view = path.at(t);
       view.samples = samples;
-      const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-      const scene::Cut cut = scene::choose(forest, eye, viewport);
-      renderer.draw(scene::compose(forest, view, colouring, cut, width, height));
-      const frame::Image plain = renderer.read();
-      const scene::Cut& guessed = chooser.choose(eye, viewport);
-      frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
-      chooser.complete(frame);
-      renderer.draw(frame);
-      chooser.remember(renderer.seen());
-      EXPECT_EQ(renderer.read().pixels, plain.pixels);
-      left_out += guessed.left_out.size();
-      revealed += chooser.segments() - guessed.segments;
+      pictures.expect_the_same(view, colouring);
     }
-  }
-  EXPECT_GT(left_out, 50u);
-  EXPECT_GT(revealed, 0u);
+  EXPECT_GT(pictures.left_out, 50u);
+  EXPECT_GT(pictures.revealed, 0u);
 }
 
 // Nor when neurons come, go and become transparent: what stood before others may be gone in the next picture.
 TEST(Chooser, ItsMemoryChangesNoPixelWhateverIsShown) {
-  const scene::Forest forest =
-      scene::Forest::from_bytes(scene::pack(testing::sample_circuit(300), testing::sample_neurons()));
-  const scene::Targets targets(forest);
-  const frame::Viewport viewport{float(width), float(height)};
-  render::CpuRenderer renderer;
-  renderer.load(forest.geometry());
-  scene::Chooser chooser(forest);
-  std::size_t left_out = 0;
+  Remembered pictures;
+  const scene::Targets targets(pictures.forest);
   for (const char* shown :
        {R"([])", R"([{"name":"first","visible":false}])", R"([{"name":"all","opacity":0.3}])",
         R"([{"name":"first","opacity":{"basal":0.1}},{"name":"lower","kind":"dots"}])",
@@ -139,25 +144,14 @@ TEST(Chooser, ItsMemoryChangesNoPixelWhateverIsShown) {
         R"([{"name":"all","kind":"somata"}])", R"([])"})
     for (const std::uint32_t samples : {1u, 3u, 17u}) {
       SCOPED_TRACE(shown);
-      scene::View view = scene::walk(forest).at(.5f);
+      scene::View view = scene::walk(pictures.forest).at(.5f);
       view.targets =
           scene::parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"targets":)") + shown + "}")
               .targets;
       view.samples = samples;
-      const scene::Colouring colouring = scene::colour(targets, view);
-      const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-      const scene::Cut cut = scene::choose(forest, eye, viewport, nullptr, colouring.shown());
-      renderer.draw(scene::compose(forest, view, colouring, cut, width, height));
-      const frame::Image plain = renderer.read();
-      const scene::Cut& guessed = chooser.choose(eye, viewport, colouring.shown());
-      frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
-      chooser.complete(frame);
-      renderer.draw(frame);
-      chooser.remember(renderer.seen());
-      EXPECT_EQ(renderer.read().pixels, plain.pixels);
-      left_out += guessed.left_out.size();
+      pictures.expect_the_same(view, scene::colour(targets, view));
     }
-  EXPECT_GT(left_out, 50u);
+  EXPECT_GT(pictures.left_out, 50u);
 }
 
 }  // namespace

@@ -14,6 +14,8 @@
 #include "forest/core/error.h"
 #include "forest/render/renderer.h"
 
+#include "tests/small_scene.h"
+
 namespace forest::render {
 
 using Maker = std::unique_ptr<Renderer> (*)();
@@ -24,33 +26,16 @@ class SurfaceLaws : public testing::TestWithParam<Maker> {
 
 namespace {
 
-// One neuron at the origin with the given segments, seen from z = 100 µm; 1 µm is about 2.75 pixels.
-struct Fixture {
+// All of its segments as one item.
+struct Fixture : SmallScene {
   std::unique_ptr<Renderer> renderer;
-  std::vector<frame::Segment> segments;
-  std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
-  std::vector<frame::State> states{{}};
-  std::vector<frame::Item> items;
-  frame::Frame frame;
 
-  explicit Fixture(Maker make) : renderer(make()) {
-    frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
-    frame.width = frame.height = 200;
-    frame.palette.fill(Vec3(1, 0, 0));
-    frame.states = states;
-    frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
-    frame.style.halo = 0.f;
-  }
+  explicit Fixture(Maker make) : renderer(make()) {}
   void add(const Vec3& a, const Vec3& b, float radius) {
-    const std::uint32_t half = std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(radius)));
-    segments.push_back({a.x(), a.y(), a.z(), half | half << 16, b.x(), b.y(), b.z(), 3});
+    add_segment(a, b, radius, radius);
     items.assign(1, {0, 0, frame::first_segments(segments.size()), 0, 0, 0, 0, 200});
   }
-  frame::Image draw() {
-    renderer->load({segments, instances});
-    renderer->draw(frame);
-    return renderer->read();
-  }
+  frame::Image draw() { return drawn_by(*renderer); }
 };
 
 double red_area(const frame::Image& image) {  // in pixels, by coverage
@@ -718,7 +703,8 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   const std::vector<frame::Item> first{{0, 0, 1, 0, 0, 0, 0, 200}}, second{{0, 1, 1, 0, 0, 0, 0, 200}};
   f.frame.capsules = first;
   int asked = 0;
-  f.frame.rest = [&](const frame::DepthMap& seen) {
+  f.frame.rest = [&](const frame::DepthMap& seen, std::uint32_t round) {
+    if (round > 0) return frame::Lists{};
     ++asked;
     EXPECT_EQ(seen.width, 25u);
     EXPECT_EQ(seen.depths.size(), 625u);
@@ -732,6 +718,32 @@ TEST_P(RendererLaws, WhatIsRevealedBelongsToThePicture) {
   EXPECT_EQ(f.draw().pixels, whole.pixels);
   EXPECT_GE(asked, 1);  // once for all subframes that are drawn together
   EXPECT_EQ(f.renderer->seen().depths.size(), 625u);
+}
+
+TEST_P(RendererLaws, AStrawLiesInTheWorldAndLooksAsItsOwner) {
+  Fixture f(GetParam());
+  f.frame.subframes = 16;
+  f.frame.palette[8 * 5 + 3] = Vec3(1, .2f, .1f), f.frame.palette[8 * 2 + 3] = Vec3(.1f, .2f, 1);
+  f.add({-20, 3, 0}, {15, -8, 0}, 1.f);
+  f.add({-20, -12, 0}, {15, 12, -30}, 1.f);
+  f.instances = {{0, 0, 0, 0, 0, 0, 0, 1}, {0, 0, 0, 0, 0, 0, 0, 1}};
+  f.frame.lines = f.items;
+  const auto draw = [&](std::span<const frame::Item> items, std::span<const frame::Instance> instances,
+                        std::span<const frame::State> states, std::span<const frame::Owner> owners) {
+    f.renderer->load({f.segments, instances, owners});
+    f.frame.lines = items, f.frame.states = states;
+    f.renderer->draw(f.frame);
+    return f.renderer->read();
+  };
+  const std::vector<frame::State> states{{.colour_class = 5}, {.colour_class = 2}};
+  const std::vector<frame::Item> apart{{0, 0, 1, 0, 0, 0, 0, 200}, {1, 1, 1, 0, 0, 0, 0, 200}},
+      straws{{FOREST_IN_WORLD, 0, 3, 0, 0, 0, 0, 200}};
+  const frame::Image expected = draw(apart, f.instances, states, {});
+  // Instances that stand elsewhere do not matter.
+  const std::vector<frame::Instance> elsewhere{{500, 0, 0, 0, 0, 0, 0, 1}, {0, 0, 900, 0, 0, 0, 0, 1}};
+  const std::vector<frame::Owner> owners{{0, 0}, {1, 1}};
+  EXPECT_EQ(draw(straws, elsewhere, states, owners).pixels, expected.pixels);
+  EXPECT_THROW(draw(straws, elsewhere, states, std::span(owners).last(1)), Error);
 }
 
 TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
@@ -779,8 +791,9 @@ TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
   EXPECT_EQ(channels(f.draw()), before);
   f.frame.bands = {};
   // What is revealed brings its own, also when the picture is drawn several times.
-  f.frame.rest = [&](const frame::DepthMap&) {
+  f.frame.rest = [&](const frame::DepthMap&, std::uint32_t round) {
     frame::Lists more;
+    if (round > 0) return more;
     more.capsules = dot, more.entries.capsules = others;
     return more;
   };

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/io/film.h"
 #include "forest/io/png.h"
+#include "forest/scene/colour_bar.h"
 
 namespace forest::cli {
 namespace {
@@ -51,15 +52,19 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     };
   auto start = Clock::now();
   if (view.detail.gaze) {
-    drawn.image = foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter,
-                                 [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
-                                   dressing_.put_on(frame, view, near, eye, *colouring_,
-                                                    playback_.has_value(), painter);
-                                   drawn.synapses += dressing_.chosen.balls.size();
-                                 });
+    Foveated::Dresser dress;
+    if (dressing_.wanted(view, *colouring_))
+      dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
+        dressing_.put_on(frame, view, near, eye, *colouring_, playback_.has_value(), painter);
+        drawn.synapses += dressing_.chosen.balls.size();
+      };
+    else
+      dressing_.rest();
+    drawn.image =
+        foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
-    drawn.cull = f.cull, drawn.draw = f.draw, drawn.resolve = f.resolve, drawn.read = f.unite;
+    drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;
     drawn.segments = f.segments, drawn.reached = f.drawn, drawn.neurons = f.neurons;
     return drawn;
   }
@@ -77,12 +82,26 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
-  drawn.neurons = cut.neurons;
+  drawn.neurons = chooser_.neurons();
   drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;
   start = Clock::now();
   drawn.image = renderer_->read();
   drawn.read = milliseconds_since(start);
   return drawn;
+}
+
+void Artist::explain(const scene::View& view, frame::Image& image) const {
+  std::vector<scene::ColourBar> bars;
+  if (playback_) {
+    const scene::ActivityView look = view.activity.value_or(playback_->view());
+    bars.push_back(
+        scene::bar_of(look, look.time.value_or(playback_->begin()), playback_->activity().facts().units));
+  }
+  if (dressing_.surfaces.has_values()) {
+    const auto [low, high] = dressing_.surfaces.shown_range();
+    bars.push_back({.map = dressing_.surfaces.map, .low = low, .high = high});
+  }
+  scene::paint(image, bars, view.background);
 }
 
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
@@ -93,6 +112,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   io::Film film(file, plan.width, plan.height, plan.frames_per_second);
   if (!plan.pictures.empty()) std::filesystem::create_directories(plan.pictures);
   FilmFigures figures;
+  std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;
   artist.set_window(picture_ms);
   progress.begin("filming", std::size_t(count));
@@ -106,18 +126,20 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
       view.activity = activity;
       view.activity->time = plan.from + i * picture_ms;
     }
-    const Drawn drawn = artist.draw(view, plan.width, plan.height);
-    if (drawn.segments && drawn.image.covered == 0.)
-      throw Error(
-          fmt::format("picture {} of the film shows nothing though {} segments were drawn; the OpenGL driver "
-                      "({}) may be at fault",
-                      i, drawn.segments, artist.renderer()));
+    Drawn drawn = artist.draw(view, plan.width, plan.height);
+    segments += drawn.segments;
     figures.covered += drawn.image.covered / count;
+    if (plan.legend) artist.explain(view, drawn.image);
     film.add(drawn.image.pixels);
     if (!plan.pictures.empty())
       io::write_png(plan.pictures / fmt::format("{:05}.png", i), plan.width, plan.height, drawn.image.pixels);
     progress.advance();
   }
+  if (segments && figures.covered == 0.)
+    throw Error(
+        fmt::format("the film shows nothing though {} segments were drawn; the OpenGL driver ({}) may be at "
+                    "fault, try --renderer cpu",
+                    segments, artist.renderer()));
   film.finish();
   progress.end();
   figures.pictures = std::uint32_t(count);
@@ -144,6 +166,11 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
     throw Error(fmt::format("{}: holds no time {} ms; it runs from {} to {} ms", options.file.string(), time,
                             playback.begin(), playback.end()));
   view.activity->time = time;
+}
+
+void add_legend(CLI::App& command, bool& legend) {
+  command.add_flag("!--no-legend", legend,
+                   "Leave out what the colours of values mean (small pictures do so by themselves)");
 }
 
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {

@@ -39,6 +39,8 @@ class Artist {
   /// A view with a gaze is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  /// Draws into a picture what its colours mean: values of the simulation and of surfaces. Small pictures stay as they are.
+  void explain(const scene::View& view, frame::Image& image) const;
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
   /// From now on these surfaces are in the pictures, too.
@@ -85,12 +87,14 @@ struct FilmPlan {
   double seconds = 5.;
   std::optional<scene::Scanpath> gaze;     // replayed from its begin; none: that of the views
   std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
+  bool legend = false;                     // Artist::explain
   std::vector<scene::Appearance> targets;  // after those of the path's views
   std::optional<scene::SynapseColour> synapses;  // none: as the path's views say
   double from = 0., rate = 0.;                   // of activity: ms at the first picture, ms a second of film
 };
 
-/// Films what a path shows, with activity as it goes on when it is given a look. Throws Error when not a single pixel was covered in a picture that should show the forest.
+/// Films what a path shows, with activity as it goes on when it is given a look. Throws Error when no picture shows anything of
+/// a forest that it should show.
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
                  const std::filesystem::path& file, Progress& progress,
                  const std::optional<scene::ActivityView>& activity = {});
@@ -105,6 +109,9 @@ void add_activity(CLI::App& command, ActivityOptions& options, const char* name,
 /// Lets the artist play the file, if one was given; and the view, which may say how, be of a time that the file holds. Throws
 /// Error when it is not, or when the activity is of another circuit.
 void play(Artist& artist, const ActivityOptions& options, scene::View& view);
+
+/// --no-legend, where pictures may have one.
+void add_legend(CLI::App& command, bool& legend);
 
 /// "1920x1080" to numbers; throws Error.
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);

@@ -259,14 +259,11 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_activity(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  const auto whole = [&](const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
-                         std::uint64_t high) {
-    must_be_whole(*command.add_option(name, value, help)->capture_default_str(), low, high);
-  };
-  whole("--neurons", options->neurons, "Neurons reported", 1, 1'000'000);
-  whole("--compartments", options->compartments, "Of each neuron", 1, 100'000);
-  whole("--steps", options->steps, "Steps; 1,000 take some 10 GB of disk at the size given", 64, 1'000'000);
-  whole("--seeks", options->seeks, "How often each is measured", 1, 100'000);
+  add_whole(command, "--neurons", options->neurons, "Neurons reported", 1, 1'000'000);
+  add_whole(command, "--compartments", options->compartments, "Of each neuron", 1, 100'000);
+  add_whole(command, "--steps", options->steps, "Steps; 1,000 take some 10 GB of disk at the size given", 64,
+            1'000'000);
+  add_whole(command, "--seeks", options->seeks, "How often each is measured", 1, 100'000);
   command.add_option("--folder", options->folder, "Where the file is made, and removed")
       ->capture_default_str();
   command.add_option(

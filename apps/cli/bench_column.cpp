@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/io/png.h"
 #include "forest/reports/synthetic.h"
 
 #include "apps/cli/artist.h"
@@ -29,12 +30,13 @@ struct Options {
   std::uint32_t neurons = 10000, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
-  double budget = 30.;  // milliseconds a picture
+  double budget = scene::Budget::usual;
   std::string size = "1280x720";
   Drawer drawer = Drawer::automatic;
   bool activity = false;
   std::uint32_t compartments = 1500, steps = 64;
   std::filesystem::path folder = std::filesystem::temp_directory_path();
+  std::filesystem::path out;  // none: no picture is kept
 };
 
 /// Once around the column, at the distance from which all of it is seen, rising and sinking a little.
@@ -55,7 +57,7 @@ struct Part {
 
 /// Draws `frames` pictures of a moving camera; the acceptable error follows the budget.
 Part measure(Artist& artist, const Options& options, const std::function<scene::View(float)>& view_at,
-             Console& console) {
+             const char* name, Console& console) {
   const auto [width, height] = parse_size(options.size);
   scene::Budget budget(options.budget);
   Part part;
@@ -89,6 +91,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     part.error += double(budget.error()) / options.frames,
         part.samples += double(view.samples) / options.frames;
     budget.took(1000. * seconds);
+    if (!options.out.empty() && i + 1 == options.frames)
+      io::write_png(options.out / fmt::format("{}.png", name), width, height, drawn.image.pixels);
     console.progress().advance();
   }
   console.progress().end();
@@ -133,6 +137,7 @@ double changing(Artist& artist, const Options& options, scene::View view) {
 }
 
 void run(const Options& options, Console& console) {
+  if (!options.out.empty()) std::filesystem::create_directories(options.out);
   const GrownColumn column = planted_column(options.neurons, options.seed, console);
   const scene::Forest forest =
       scene::Forest::from_bytes(scene::pack(column.circuit, column.neurons, console.progress()));
@@ -150,10 +155,10 @@ void run(const Options& options, Console& console) {
     changes = changing(artist, options, first);
   }
   const Part outside = measure(
-      artist, options, [&](float t) { return around(forest, t); }, console);
+      artist, options, [&](float t) { return around(forest, t); }, "around", console);
   const scene::CameraPath path = scene::walk(forest);
   const Part inside = measure(
-      artist, options, [&](float t) { return path.at(.5f + .5f * t); }, console);
+      artist, options, [&](float t) { return path.at(.5f + .5f * t); }, "inside", console);
   const std::uint64_t peak = peak_bytes();
 
   const auto json_of = [&](const Part& p) {
@@ -219,16 +224,12 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_column(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons,
-            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_planted(command, options->neurons);
   add_whole(command, "--frames", options->frames, "Pictures drawn outside, and as many inside", 2, 100'000);
   must_be_whole(
       *command.add_option("--samples", options->samples, "Samples a pixel, instead of what the budget says"),
       1, 1024);
-  command
-      .add_option("--budget", options->budget, "Milliseconds a picture may take before less detail is chosen")
-      ->check(CLI::Range(1., 10000.))
-      ->capture_default_str();
+  add_budget(command, options->budget);
   add_size(command, options->size);
   add_renderer(command, options->drawer);
   command.add_flag("--activity", options->activity,
@@ -244,6 +245,7 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
       8, 100'000);
   command.add_option("--folder", options->folder, "Where the activity file is made, and removed")
       ->capture_default_str();
+  command.add_option("--out", options->out, "Folder for the last picture of each part");
   add_seed(command, options->seed, "Of the neurons and their places");
   return [options, &console] { run(*options, console); };
 }

@@ -49,7 +49,7 @@ scene::Scanpath looking_about(double milliseconds, std::uint64_t seed) {
 
 struct Part {
   std::string name;
-  double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., unite = 0., covered = 0.;
+  double frames = 0., seconds = 0., cull = 0., draw = 0., unite = 0., covered = 0.;
   std::uint64_t segments = 0,
                 whole_segments = 0;          // chosen for the pictures compared, with and without a gaze
   std::uint64_t drawn = 0, whole_drawn = 0;  // of them, neither hidden nor beside what is wanted
@@ -104,7 +104,7 @@ class Bench {
       if (i > 0) {  // the first has nothing to go by
         const Foveated::Figures& f = foveated_.figures();
         part.frames += 1, part.seconds += seconds, part.took.push_back(1000. * seconds);
-        part.cull += f.cull, part.draw += f.draw, part.resolve += f.resolve, part.unite += f.unite;
+        part.cull += f.cull, part.draw += f.draw, part.unite += f.unite;
         part.covered += image.covered;
       }
       if (i % every == every - 1) {
@@ -115,8 +115,7 @@ class Bench {
       console_.progress().advance();
     }
     console_.progress().end();
-    for (double* sum : {&part.cull, &part.draw, &part.resolve, &part.unite, &part.covered})
-      *sum /= part.frames;
+    for (double* sum : {&part.cull, &part.draw, &part.unite, &part.covered}) *sum /= part.frames;
     if (part.covered < .005)
       throw Error(fmt::format("{}: the pictures show nothing; nothing was measured", name));
     return part;
@@ -186,34 +185,32 @@ void run(const Options& options, Console& console) {
   for (const Part& p : parts) {
     least_ratio = std::min(least_ratio, p.ratio()), least_rate = std::min(least_rate, p.per_second());
     differ += p.fovea_differ;
-    json["parts"].push_back(
-        {{"part", p.name},
-         {"ratio", p.ratio()},
-         {"ratio_chosen", p.ratio_chosen()},
-         {"drawn", p.drawn / p.compared},
-         {"drawn_without", p.whole_drawn / p.compared},
-         {"frames_per_second", p.per_second()},
-         {"slowest_ms", p.slowest()},
-         {"segments", p.segments / p.compared},
-         {"layers", p.layers},
-         {"segments_without", p.whole_segments / p.compared},
-         {"fovea_pixels", p.fovea_pixels},
-         {"fovea_differ", p.fovea_differ},
-         {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}, {"unite", p.unite}}},
-         {"covered", p.covered}});
+    json["parts"].push_back({{"part", p.name},
+                             {"ratio", p.ratio()},
+                             {"ratio_chosen", p.ratio_chosen()},
+                             {"drawn", p.drawn / p.compared},
+                             {"drawn_without", p.whole_drawn / p.compared},
+                             {"frames_per_second", p.per_second()},
+                             {"slowest_ms", p.slowest()},
+                             {"segments", p.segments / p.compared},
+                             {"layers", p.layers},
+                             {"segments_without", p.whole_segments / p.compared},
+                             {"fovea_pixels", p.fovea_pixels},
+                             {"fovea_differ", p.fovea_differ},
+                             {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
+                             {"covered", p.covered}});
     rows.push_back({p.name, fmt::format("{:.1f}", p.per_second()), fmt::format("{:.1f}", p.cull),
-                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.resolve),
-                    fmt::format("{:.1f}", p.unite), fmt::format("{}", p.drawn / p.compared),
-                    fmt::format("{}", p.whole_drawn / p.compared), fmt::format("{:.1f}", p.ratio()),
-                    fmt::format("{:.1f}", p.ratio_chosen()),
+                    fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.unite),
+                    fmt::format("{}", p.drawn / p.compared), fmt::format("{}", p.whole_drawn / p.compared),
+                    fmt::format("{:.1f}", p.ratio()), fmt::format("{:.1f}", p.ratio_chosen()),
                     fmt::format("{} of {}", p.fovea_differ, p.fovea_pixels)});
   }
   json["ratio_min"] = least_ratio, json["frames_per_second_min"] = least_rate, json["fovea_differ"] = differ;
   console.print(json);
   console.say(fmt::format("{} neurons, {} segments, {}, {}", bench.forest().instances().size(),
                           bench.forest().segment_total(), options.size, bench.renderer()));
-  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "resolve ms", "unite ms", "segments",
-                 "without gaze", "ratio", "of those chosen", "pixels of the fovea that differ"},
+  console.table({"camera and gaze", "frames/s", "cull ms", "draw ms", "unite ms", "segments", "without gaze",
+                 "ratio", "of those chosen", "pixels of the fovea that differ"},
                 rows);
 }
 
@@ -221,17 +218,10 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_gaze(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command
-      .add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
-      ->check(CLI::Range(10, 10'000'000))
-      ->capture_default_str();
-  command.add_option("--frames", options->frames, "Pictures of each part")
-      ->check(CLI::Range(2, 100000))
-      ->capture_default_str();
-  command
-      .add_option("--compared", options->compared, "Of them, how many are compared with those without a gaze")
-      ->check(CLI::Range(1, 100000))
-      ->capture_default_str();
+  add_planted(command, options->neurons);
+  add_whole(command, "--frames", options->frames, "Pictures of each part", 2, 100'000);
+  add_whole(command, "--compared", options->compared,
+            "Of them, how many are compared with those without a gaze", 1, 100'000);
   must_be_within(*command
                       .add_option("--slope", options->slope,
                                   "Arc minutes by which the smallest angle resolved grows a degree")

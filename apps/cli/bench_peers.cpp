@@ -49,7 +49,7 @@ constexpr std::uint32_t settling = 15;         // pictures in which the budget f
 struct Options {
   std::uint32_t neurons = 1000, frames = 6, samples = 16;
   std::optional<std::uint32_t> quick_samples;
-  double budget = 100.;
+  double budget = scene::Budget::usual;
   std::uint64_t seed = 1;
   std::string size = "1280x720", python = "/usr/bin/python3";
   std::vector<std::string> modes{"lines", "impostors", "tubes"};
@@ -392,18 +392,13 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_peers(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  add_whole(command, "--neurons", options->neurons,
-            "Neurons planted, at the density of the recipe column-10000", 10, 10'000'000);
+  add_planted(command, options->neurons);
   add_whole(command, "--frames", options->frames, "Cameras of the dolly that are measured", 1, 250);
   add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
   must_be_whole(*command.add_option("--quick-samples", options->quick_samples,
                                     "Samples a pixel of ours, instead of what the budget says"),
                 1, 1024);
-  must_be_within(*command
-                      .add_option("--budget", options->budget,
-                                  "Milliseconds a picture of ours may take before less detail is chosen")
-                      ->capture_default_str(),
-                 1., 10000.);
+  add_budget(command, options->budget);
   command
       .add_option("--modes", options->modes, "What VTK draws: lines, impostors, tubes; separated by commas")
       ->delimiter(',')

@@ -101,13 +101,9 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_pick(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command
-      .add_option("--neurons", options->neurons, "Neurons planted, at the density of the recipe column-10000")
-      ->check(CLI::Range(10, 1'000'000))
-      ->capture_default_str();
-  command.add_option("--pixels", options->pixels, "Random pixels, of eight pictures in equal parts")
-      ->check(CLI::Range(8, 10'000'000))
-      ->capture_default_str();
+  add_planted(command, options->neurons);
+  add_whole(command, "--pixels", options->pixels, "Random pixels, of eight pictures in equal parts", 8,
+            10'000'000);
   add_size(command, options->size);
   add_seed(command, options->seed, "Of the neurons, their places and the pixels");
   return [options, &console] { run(*options, console); };

@@ -20,6 +20,7 @@
 #include "forest/statistics/metric.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -223,12 +224,8 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_repository(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command.add_option("--neurons", options->neurons, "Neurons to store")
-      ->capture_default_str()
-      ->check(CLI::Range(10u, 10'000'000u));
-  command.add_option("--sections", options->sections, "Sections of each")
-      ->capture_default_str()
-      ->check(CLI::Range(5u, 1'000'000u));
+  add_whole(command, "--neurons", options->neurons, "Neurons to store", 10, 10'000'000);
+  add_whole(command, "--sections", options->sections, "Sections of each", 5, 1'000'000);
   command.add_option("--folder", options->folder, "Where the repository is made, and removed again")
       ->check(CLI::ExistingDirectory);
   command.footer("Example:\n  brainforest bench repository --neurons 10000");

@@ -109,11 +109,8 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> bench_targets(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  must_be_whole(*command.add_option("--neurons", options->neurons, "Neurons planted")->capture_default_str(),
-                10, 10'000'000);
-  must_be_whole(
-      *command.add_option("--repeats", options->repeats, "Times each change is made")->capture_default_str(),
-      1, 100'000);
+  add_planted(command, options->neurons);
+  add_whole(command, "--repeats", options->repeats, "Times each change is made", 1, 100'000);
   add_size(command, options->size);
   add_renderer(command, options->drawer);
   add_seed(command, options->seed, "Of the neurons and their places");

@@ -11,6 +11,7 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/options.h"
 #include "apps/cli/planting.h"
 
 namespace forest::cli {
@@ -23,6 +24,11 @@ struct Share {
 constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
 
 }  // namespace
+
+void add_planted(CLI::App& command, std::uint32_t& neurons) {
+  add_whole(command, "--neurons", neurons, "Neurons planted, at the density of the recipe column-10000", 10,
+            10'000'000);
+}
 
 GrownColumn planted_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
   std::vector<circuit::Candidate> candidates;

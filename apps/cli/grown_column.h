@@ -8,9 +8,16 @@
 
 #include "forest/scene/forest.h"
 
+namespace CLI {
+class App;
+}
+
 namespace forest::cli {
 
 class Console;
+
+/// --neurons, how many a benchmark plants.
+void add_planted(CLI::App& command, std::uint32_t& neurons);
 
 struct GrownColumn {
   circuit::Circuit circuit;

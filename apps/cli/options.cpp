@@ -67,6 +67,14 @@ void add_size(CLI::App& command, std::string& size, bool even) {
       });
 }
 
+void add_budget(CLI::App& command, double& milliseconds) {
+  must_be_within(*command
+                      .add_option("--budget", milliseconds,
+                                  "Milliseconds a picture may take before less detail is chosen")
+                      ->capture_default_str(),
+                 1., 10000.);
+}
+
 void add_force(CLI::App& command, bool& force) {
   command.add_flag("--force", force, "Replace files that are there and hold something else");
 }

@@ -28,6 +28,9 @@ void add_size(CLI::App& command, std::string& size, bool even = false);
 /// --force, for verbs that refuse to replace files (Overwrites, files.h).
 void add_force(CLI::App& command, bool& force);
 
+/// --budget, of pictures that follow one another (scene::Budget).
+void add_budget(CLI::App& command, double& milliseconds);
+
 /// An option for a whole number in a range, with its default.
 void add_whole(CLI::App& command, const char* name, std::uint32_t& value, const char* help, std::uint64_t low,
                std::uint64_t high);

@@ -46,6 +46,18 @@ scene::View default_view(const scene::Forest& forest, const scene::Surfaces& sur
   return scene::overview(forest);
 }
 
+// A picture without anything in it may be wanted; nobody should have to guess why it is so.
+std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
+  if (artist.forest().instances().empty()) return "the forest has no neurons, so the picture shows none";
+  return drawn.segments
+             ? fmt::format(
+                   "the picture shows nothing though {} segments were drawn; they may be hidden or lie "
+                   "just beside it, or {} is at fault: try --renderer cpu",
+                   drawn.segments, artist.renderer())
+             : "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by "
+               "--view";
+}
+
 }  // namespace
 
 std::function<void()> render(CLI::App& command, Console& console) {
@@ -53,7 +65,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::filesystem::path forest, out;
     std::string view, size = "1920x1080";
     std::vector<float> gaze;
-    bool outline = false;
+    bool outline = false, legend = true;
     SurfaceOptions surfaces;
     bool skin = false;
     SynapseOptions synapses;
@@ -85,6 +97,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
       ->check(CLI::Range(0., 1.))
       ->type_name("X Y");
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
+  add_legend(command, options->legend);
   add_renderer(command, options->drawer);
   return [options, &console] {
     const auto [width, height] = parse_size(options->size);
@@ -109,7 +122,9 @@ std::function<void()> render(CLI::App& command, Console& console) {
       artist.show(std::move(*synapses));
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view);
-    const Drawn drawn = artist.draw(view, width, height, options->outline);
+    Drawn drawn = artist.draw(view, width, height, options->outline);
+    if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
+    if (options->legend) artist.explain(view, drawn.image);
     io::write_png(options->out, width, height, drawn.image.pixels);
     nlohmann::ordered_json activity;
     if (artist.playback())
@@ -186,6 +201,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--pictures", options->plan.pictures, "Also write every picture into this folder");
+  options->plan.legend = true;
+  add_legend(command, options->plan.legend);
   add_renderer(command, options->drawer);
   command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
   return [options, &console] {
@@ -219,6 +236,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
     const FilmFigures figures =
         film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);
+    if (figures.covered == 0.)
+      console.warn(
+          "the film shows nothing: no neuron that is visible lies in its views; give others by --view");
     console.print({{"file", options->out.string()},
                    {"pictures", figures.pictures},
                    {"frames_per_second", figures.pictures / figures.seconds},

@@ -98,6 +98,7 @@ int run(const Options& options, int& argc, char** argv) {
   format.setVersion(4, 5);
   format.setProfile(QSurfaceFormat::CoreProfile);
   format.setSwapInterval(1);
+  format.setOption(QSurfaceFormat::ResetNotification);  // a card that is reset is told, and ends nothing
   QSurfaceFormat::setDefaultFormat(format);
   qInstallMessageHandler(on_qt_message);
   QApplication application(argc, argv);

@@ -159,7 +159,7 @@ std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selecti
       marks.push_back({cone.a, cone.b, 1.12f * std::max(cone.radius_a, cone.radius_b) + .05f, entry});
     }
   };
-  mark(true, section_entry);
+  mark(true, scene::section_entry);
   mark(false, scene::highlight_entry);
   return marks;
 }

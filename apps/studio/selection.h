@@ -44,10 +44,9 @@ nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& sel
 std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse);
 nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse);
 
-inline constexpr std::uint32_t section_entry = 125;  // palette entry of the picked section
 inline constexpr std::size_t most_marks = 50'000;  // capsules of a highlight; the section itself comes first
 
-/// Capsules a little thicker than the branches: the picked section as section_entry, the rest as highlight_entry.
+/// Capsules a little thicker than the branches: the picked section as scene::section_entry, the rest as highlight_entry.
 std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection);
 /// A sphere around the subarbor, in the world.
 Sphere around(const scene::Forest& forest, const Selection& selection);

@@ -17,9 +17,9 @@
 namespace forest::studio {
 namespace {
 
-constexpr int rest_milliseconds = 200;      // a view that stands still so long is drawn in full
-constexpr float slice_milliseconds = 60.f;  // of refining between two looks at the mouse
-constexpr float glide_seconds = .7f;
+constexpr int rest_milliseconds = 200;                    // a view that stands still so long is drawn in full
+constexpr float slice_milliseconds = 60.f;                // of refining between two looks at the mouse
+constexpr float glide_seconds = .7f, key_seconds = 2.5f;  // of a glide; between views of a path
 constexpr float tap_seconds = .05f;              // of flight that a tap on a key makes, however short
 constexpr float turn_pixels_a_second = 400.f;    // of the arrow keys
 constexpr std::size_t moving_synapses = 60'000;  // drawn at most while the view moves
@@ -47,8 +47,8 @@ std::vector<frame::Overlay> visible(std::vector<frame::Overlay> marks, const fra
   const Vec3 forward = -camera.axes().col(2);
   for (frame::Overlay& mark : marks) {
     const float depth = std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(forward));
-    mark.radius = std::max(mark.radius,
-                           (mark.colour == section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
+    mark.radius = std::max(
+        mark.radius, (mark.colour == scene::section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
   }
   return marks;
 }
@@ -112,7 +112,19 @@ void Viewport::touch() {
 void Viewport::glide_to(const frame::Camera& camera) {
   scene::View to = settings_.view;
   to.camera = camera;
-  glide_ = Glide{scene::CameraPath({settings_.view, to}), camera, {}};
+  glide_ = Glide{scene::CameraPath({settings_.view, to}), camera, glide_seconds};
+  glide_->clock.start();
+  touch();
+}
+
+void Viewport::fly_along(std::vector<scene::View> views) {
+  for (scene::View& view : views) {
+    (void)scene::colour(targets_, view);  // or throws
+    view.activity = settings_.view.activity;
+  }
+  const frame::Camera end = views.back().camera;
+  const float seconds = key_seconds * float(std::max<std::size_t>(1, views.size() - 1));
+  glide_ = Glide{scene::CameraPath(std::move(views)), end, seconds, true};
   glide_->clock.start();
   touch();
 }
@@ -259,11 +271,15 @@ void Viewport::advance(float seconds) {
     window_ = step;
   }
   if (glide_) {
-    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_seconds);
+    const float t = float(glide_->clock.elapsed()) / (1000.f * glide_->seconds);
     const bool there = t >= 1.f;
-    const frame::Camera camera = there ? glide_->end : glide_->path.at(t).camera;
-    if (there) glide_.reset();
-    set_camera(camera);
+    Settings next = settings_;
+    if (glide_->whole)
+      next.view = glide_->path.at(std::min(t, 1.f)), next.view.activity = settings_.view.activity;
+    else
+      next.view.camera = glide_->path.at(std::min(t, 1.f)).camera;
+    if (there) next.view.camera = glide_->end, glide_.reset();
+    change(next);
   }
   if (!flies()) return;
   Vec3 way = Vec3::Zero();
@@ -288,7 +304,8 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
                     {float(w), float(h)}, colouring_.shown(), painter);
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
-  if (playback_) std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != section_entry; });
+  if (playback_)
+    std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != scene::section_entry; });
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
@@ -308,11 +325,15 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   dressing_.skinned = settings_.skin;
   dressing_.surfaces.visibility = settings_.surfaces ? settings_.surface_opacity : 0.f;
   figures_.synapses = figures_.triangles = 0;
-  const auto dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
-    dressing_.put_on(to, view, cut, eye, colouring, playback_.has_value(), painter, limits);
-    figures_.synapses += dressing_.chosen.balls.size(),
-        figures_.triangles += dressing_.skin.figures().triangles;
-  };
+  Foveated::Dresser dress;
+  if (dressing_.wanted(view, colouring))
+    dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
+      dressing_.put_on(to, view, cut, eye, colouring, playback_.has_value(), painter, limits);
+      figures_.synapses += dressing_.chosen.balls.size(),
+          figures_.triangles += dressing_.skin.figures().triangles;
+    };
+  else
+    dressing_.rest();
   if (layered()) {
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
     united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter, dress);
@@ -324,11 +345,13 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
   frame.glass = glass;
   chooser_.complete(frame);
-  dress(frame, chooser_.cut(), scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)));
+  if (dress)
+    dress(frame, chooser_.cut(),
+          scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)));
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
-  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.cut().neurons;
+  figures_.segments = chooser_.segments(), figures_.neurons = chooser_.neurons();
   figures_.samples = last, figures_.error = view.detail.error;
 }
 
@@ -336,7 +359,7 @@ bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
-  view.samples = layered() ? 1 : budget_.samples();
+  view.samples = budget_.samples();
   view.detail.error *= budget_.error(), view.detail.thinnest = budget_.thinnest();
   // What is not there yet is made once the view stands still.
   draw_part(view, 0, view.samples, {.skin = {.new_pieces = 0}, .synapses = moving_synapses});

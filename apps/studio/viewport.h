@@ -40,6 +40,9 @@ class Viewport final : public QOpenGLWidget {
   void change(const Settings& settings);
   /// Glides there, slow in and slow out.
   void glide_to(const frame::Camera& camera);
+  /// Through recorded views, as a film of them goes; a hand on the picture ends it. The simulation goes on by itself. Throws
+  /// Error, and stays, for a target that is not there.
+  void fly_along(std::vector<scene::View> views);
   /// Glides to where the selected subarbor, or without one the whole forest, fills the picture.
   void centre();
 
@@ -120,7 +123,9 @@ class Viewport final : public QOpenGLWidget {
   struct Glide {
     scene::CameraPath path;
     frame::Camera end;
-    QElapsedTimer clock;
+    float seconds;
+    bool whole = false;  // whole views, not cameras alone
+    QElapsedTimer clock{};
   };
 
   void set_camera(const frame::Camera& camera);
@@ -163,9 +168,9 @@ class Viewport final : public QOpenGLWidget {
   Stage stage_ = Stage::moving;
   std::uint32_t refined_ = 0;  // samples that are drawn of the picture that is shown
   float sample_milliseconds_ = 20.f;
-  float milliseconds_ = 0.f;   // of a moving picture, smoothed
-  scene::Budget budget_{45.};  // of a moving picture
-  int warming_up_ = 2;         // the first pictures make programs and buffers: they are no measure
+  float milliseconds_ = 0.f;  // of a moving picture, smoothed
+  scene::Budget budget_;      // of a moving picture
+  int warming_up_ = 2;        // the first pictures make programs and buffers: they are no measure
   Figures figures_;
   QTimer rest_;         // runs out when the view has stood still
   QElapsedTimer tick_;  // since the last step of flight

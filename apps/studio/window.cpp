@@ -176,6 +176,8 @@ void Window::add_menus() {
       {"&File", "Add the view to a &path…", "Ctrl+K",
        "Appends the view as a line to a file that 'brainforest movie --path' films",
        [this] { record_view(); }},
+      {"&File", "Pla&y a path…", "Ctrl+Shift+K", "Flies through the views of such a file; a click ends it",
+       [this] { play_path(); }},
       {"&File", "Save &traces…", "Ctrl+T", "The histories of clamped compartments as a table (CSV)",
        [this] { save_traces(); }},
       {"&File", "&Quit", "Ctrl+Q", "Close the window; its panels are remembered", [this] { close(); }},
@@ -308,6 +310,18 @@ void Window::record_view() {
     return;
   }
   statusBar()->showMessage(tr("The view was added to %1").arg(path_), 3000);
+}
+
+void Window::play_path() {
+  const QString path =
+      QFileDialog::getOpenFileName(this, tr("Path of views"), path_, tr("Views (*.jsonl);;All files (*)"),
+                                   nullptr, QFileDialog::DontUseNativeDialog);
+  if (path.isEmpty()) return;
+  try {
+    viewport_->fly_along(read_views(path.toStdString()));
+  } catch (const std::exception& error) {
+    QMessageBox::warning(this, tr("Path of views"), QString::fromUtf8(error.what()));
+  }
 }
 
 void Window::paste_view() {

@@ -47,6 +47,7 @@ class Window final : public QMainWindow {
   void copy_view();
   void paste_view();
   void record_view();
+  void play_path();
   void save_picture(bool as_seen);
   void explain();
   // Asks for a file and opens it; says what is wrong with it.

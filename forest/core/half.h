@@ -13,4 +13,7 @@ namespace forest {
   return std::bit_cast<float>((bits & 0x7fff) << 13) * 0x1p112f;
 }
 
+/// The half-precision number nearest to a value, in the low 16 bits.
+std::uint32_t to_half(float value);
+
 }  // namespace forest

@@ -1,10 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/parallel.h"
 
+#include <array>
+
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
 #include <tbb/parallel_for.h>
 #include <tbb/parallel_pipeline.h>
+#include <tbb/parallel_sort.h>
 
 namespace forest {
 
@@ -16,21 +19,27 @@ void parallel_ranges(std::size_t count, std::size_t grain,
 
 void detail::in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
                       const std::function<void(std::size_t, void*)>& take) {
-  using Made = std::pair<std::size_t, std::shared_ptr<void>>;
   using tbb::filter_mode;
   constexpr std::size_t ahead = 64;
+  // Number i waits in place i % ahead, which i - ahead has left by then. Here, and not with the pipeline, which forgets what is
+  // on its way when somebody throws.
+  std::array<std::shared_ptr<void>, ahead> made;
   std::size_t next = 0;
   tbb::parallel_pipeline(
       ahead,
       tbb::make_filter<void, std::size_t>(filter_mode::serial_in_order, [&](tbb::flow_control& control) {
         if (next == count) control.stop();
         return next++;
-      }) & tbb::make_filter<std::size_t, Made>(filter_mode::parallel, [&](std::size_t i) {
-        return Made(i, make(i));
-      }) & tbb::make_filter<Made, void>(filter_mode::serial_in_order, [&](const Made& made) {
-        take(made.first, made.second.get());
+      }) & tbb::make_filter<std::size_t, std::size_t>(filter_mode::parallel, [&](std::size_t i) {
+        made[i % ahead] = make(i);
+        return i;
+      }) & tbb::make_filter<std::size_t, void>(filter_mode::serial_in_order, [&](std::size_t i) {
+        const std::shared_ptr<void> taken = std::move(made[i % ahead]);
+        take(i, taken.get());
       }));
 }
+
+void parallel_sort(std::span<Keyed> numbers) { tbb::parallel_sort(numbers.begin(), numbers.end()); }
 
 ThreadLimit::ThreadLimit(unsigned threads) {
   if (threads) control_ = new tbb::global_control(tbb::global_control::max_allowed_parallelism, threads);

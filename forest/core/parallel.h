@@ -4,8 +4,11 @@
 #pragma once
 
 #include <cstddef>
+#include <cstdint>
 #include <functional>
 #include <memory>
+#include <span>
+#include <utility>
 
 namespace forest {
 
@@ -36,6 +39,10 @@ void parallel_in_order(std::size_t count, Make&& make, Take&& take) {
       count, [&](std::size_t i) { return std::make_shared<T>(make(i)); },
       [&](std::size_t i, void* made) { take(i, std::move(*static_cast<T*>(made))); });
 }
+
+/// Sorted by the first number, then by the second.
+using Keyed = std::pair<std::uint64_t, std::uint64_t>;
+void parallel_sort(std::span<Keyed> numbers);
 
 /// Limits every parallel loop for as long as the object lives; 0 means all cores.
 class ThreadLimit {

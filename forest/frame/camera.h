@@ -29,6 +29,7 @@ struct Camera {
   /// µm that a pixel covers at a depth, for a picture `height` pixels high.
   float pixel_size(float height, float depth) const;
   bool orthographic() const { return projection == Projection::orthographic; }
+  bool operator==(const Camera&) const = default;
 };
 
 /// A picture's pixels as seen by a camera: x to the right, y down, (0, 0) the upper left corner.

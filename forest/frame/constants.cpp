@@ -4,15 +4,12 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/half.h"
+
 namespace forest::frame {
 namespace {
 
-std::uint32_t half_pair(float a, float b) {
-  const auto half = [](float value) {
-    return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)));
-  };
-  return half(a) | half(b) << 16;
-}
+std::uint32_t half_pair(float a, float b) { return to_half(a) | to_half(b) << 16; }
 
 }  // namespace
 

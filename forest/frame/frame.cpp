@@ -110,7 +110,9 @@ bool transparent(const Frame& frame) {
 void check(const Lists& lists, const Geometry& geometry) {
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     for (const Item& item : list) {
-      require(item.instance < geometry.instances.size(), "an item names an instance that is not there");
+      require(geometry.straw(item) ? item.first_segment >= geometry.segments.size() - geometry.owners.size()
+                                   : item.instance < geometry.instances.size(),
+              "an item names an instance that is not there");
       require(unpacked(item.state).colour_class < 16, "a colour class must be below 16");
       require(item.first_segment + std::size_t(std::bit_width(item.drawn)) <= geometry.segments.size(),
               "an item names segments that are not there");

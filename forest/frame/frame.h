@@ -22,10 +22,17 @@ namespace forest::frame {
 struct Geometry {
   std::span<const Segment> segments;
   std::span<const Instance> instances;
+  std::span<const Owner> owners = {};  // of the last segments, which lie in the world
+
+  bool straw(const Item& item) const { return item.instance == FOREST_IN_WORLD; }
+  /// Of a straw.
+  const Owner& owner(std::size_t segment) const {
+    return owners[segment - (segments.size() - owners.size())];
+  }
 };
 
 /// Primitives that a neuron may be drawn with, however large it is in the picture.
-enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin };
+enum class Kind : std::uint8_t { any, dots, lines, capsules, somata, skin, bricks };
 
 /// How a neuron is shown, or a branch of it: 4 bytes, so that changing thousands costs nothing. Renderers read the colour
 /// class and the opacity; the rest has been obeyed by whoever made the lists.
@@ -131,13 +138,16 @@ struct Lists {
   std::span<const Item> capsules;  // runs near enough to have a surface
   std::span<const Band> bands;     // the last one ends at the ends of the lists; none: all is one band
   Entries entries;                 // where colours change along branches
+
+  bool empty() const { return dots.empty() && lines.empty() && capsules.empty(); }
 };
 
 /// How far one sees: of every square of FOREST_TILE pixels, in rows from the top, the depth of its farthest pixel (µm,
-/// along the view); infinite where a pixel shows nothing.
+/// along the view); infinite where a pixel shows nothing. Of a picture of which only an area is wanted, those of that may be all.
 struct DepthMap {
   std::uint32_t width = 0, height = 0;  // squares
   std::vector<float> depths;
+  std::uint32_t left = 0, top = 0;  // squares of the picture before the first
 };
 
 /// A clear rectangle in the world, through which what lies behind is seen tinted.
@@ -170,9 +180,11 @@ struct Frame : Lists {
   std::span<const Ball> balls;
   std::span<const Surface> surfaces;
   std::optional<Glass> glass;
-  /// What the scene left out as probably hidden, and shows after all: asked for in every subframe, or once for those that are
-  /// drawn together, when the lists are drawn, with how far one sees then. What it returns must stay valid until it is asked again. May be empty.
-  std::function<Lists(const DepthMap&)> rest;
+  /// What the scene left out as probably hidden, or as far, and shows after all. Asked in rounds 0, 1, 2 … in every subframe, or
+  /// once for those that are drawn together: when the lists are drawn, then when what was returned before is, each time with how far
+  /// one sees then, until nothing comes back. A map without squares asks for all at once. What it returns must stay valid until
+  /// it is asked again. May be empty.
+  std::function<Lists(const DepthMap&, std::uint32_t round)> rest;
 };
 
 /// 8-bit sRGB, rows from the top, 4 bytes a pixel (alpha 255).

@@ -28,9 +28,15 @@ struct Instance {
   float qx, qy, qz, qw;
 };
 
-/// A run of segments of one neuron to be drawn: one entry of a cut.
-struct Item {
+/// Whose branch a straw stands for: a segment in the world that is drawn in place of many (scene/brick.h).
+struct Owner {
   uint instance;
+  uint segment;  // an original one
+};
+
+/// A run of segments of one neuron to be drawn, or of straws: one entry of a cut.
+struct Item {
+  uint instance;  // FOREST_IN_WORLD: straws, each of which has its Owner's state
   uint first_segment;
   uint drawn;             // bit i: segment first_segment + i is drawn
   uint state;             // 0: as its instance; else a State of its own, its bytes from the lowest on
@@ -81,9 +87,15 @@ struct Constants {
 #define FOREST_DEPTH_MAX 1048574.0
 #define FOREST_KEY_EMPTY 0xffffffffu
 
+#define FOREST_IN_WORLD 0xffffffffu
+
 // Lines are drawn across the axis of the screen that they run along less: in a direction between, they measure this many
 // times their width there, on the mean over directions (4/pi ln(1 + sqrt 2)).
 #define FOREST_MEAN_STRETCH 1.1222
+// A straw that stands for many is drawn no thinner, and no shorter, than so many times the thinnest line: its area is that of
+// a dot as wide, and it shows where branches run.
+#define FOREST_STRAW_WIDTH 0.5
+#define FOREST_STRAW_LENGTH 2.0
 #define FOREST_CLUSTER_SIZE 32u
 #define FOREST_GROUP 256u  // threads of a workgroup that draws
 

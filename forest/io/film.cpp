@@ -1,6 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/film.h"
 
+#include <algorithm>
+#include <cstdio>
+#include <exception>
+
 extern "C" {
 #include <libavcodec/avcodec.h>
 #include <libavformat/avformat.h>
@@ -38,10 +42,40 @@ struct Film::State {
   AVPacket* packet = nullptr;
   SwsContext* colours = nullptr;
   std::int64_t count = 0;
+  std::uint64_t at = 0, end = 0;  // where the muxer writes, and how far the file reaches
+  std::exception_ptr refused;     // by the disk
 
   explicit State(const std::filesystem::path& wanted) : file(wanted), path(wanted) {}
 
+  // The muxer writes into the file that has no name yet, so that a program that is killed leaves nothing behind.
+  static int write(void* to, std::uint8_t* bytes, int size) {
+    State& s = *static_cast<State*>(to);
+    try {
+      s.file.overwrite(s.at, std::as_bytes(std::span(bytes, std::size_t(size))));
+    } catch (...) {  // not through FFmpeg
+      s.refused = std::current_exception();
+      return AVERROR(EIO);
+    }
+    s.at += std::uint64_t(size);
+    s.end = std::max(s.end, s.at);
+    return size;
+  }
+  static std::int64_t seek(void* to, std::int64_t offset, int whence) {
+    State& s = *static_cast<State*>(to);
+    if (whence & AVSEEK_SIZE) return std::int64_t(s.end);
+    s.at = std::uint64_t(offset) + (whence == SEEK_CUR ? s.at : whence == SEEK_END ? s.end : 0);
+    return std::int64_t(s.at);
+  }
+  void open() {
+    constexpr int room = 1 << 16;
+    auto* buffer = static_cast<unsigned char*>(av_malloc(room));
+    format->pb = avio_alloc_context(buffer, room, 1, this, nullptr, &State::write, &State::seek);
+    if (!format->pb) av_free(buffer), fail("made");
+    format->flags |= AVFMT_FLAG_CUSTOM_IO;
+  }
+
   [[noreturn]] void fail(const std::string& what, int code = 0) const {
+    if (refused) std::rethrow_exception(refused);
     char reason[AV_ERROR_MAX_STRING_SIZE] = "";
     if (code) av_strerror(code, reason, sizeof reason);
     throw Error(path.string() + ": the film cannot be " + what +
@@ -67,7 +101,7 @@ struct Film::State {
     av_frame_free(&frame);
     avcodec_free_context(&encoder);
     if (format) {
-      if (format->pb) avio_closep(&format->pb);
+      if (format->pb) av_freep(&format->pb->buffer), avio_context_free(&format->pb);
       avformat_free_context(format);
     }
   }
@@ -80,8 +114,7 @@ Film::Film(const std::filesystem::path& path, std::uint32_t width, std::uint32_t
   s.width = width, s.height = height;
   if (width % 2 || height % 2 || !width || !height) s.fail("made: its width and height must be even");
   av_log_set_level(AV_LOG_QUIET);
-  const char* part = s.file.path().c_str();
-  if (const int code = avformat_alloc_output_context2(&s.format, nullptr, "mp4", part); code < 0)
+  if (const int code = avformat_alloc_output_context2(&s.format, nullptr, "mp4", nullptr); code < 0)
     s.fail("made", code);
   for (const Codec& row : codecs) {
     const AVCodec* codec = avcodec_find_encoder_by_name(row.name);
@@ -108,7 +141,7 @@ Film::Film(const std::filesystem::path& path, std::uint32_t width, std::uint32_t
   s.stream->time_base = s.encoder->time_base;
   s.format->flags |= AVFMT_FLAG_BITEXACT;
   avcodec_parameters_from_context(s.stream->codecpar, s.encoder);
-  if (const int code = avio_open(&s.format->pb, part, AVIO_FLAG_WRITE); code < 0) s.fail("opened", code);
+  s.open();
   if (const int code = avformat_write_header(s.format, nullptr); code < 0) s.fail("written", code);
   s.packet = av_packet_alloc();
   s.frame = av_frame_alloc();
@@ -141,7 +174,8 @@ void Film::finish() {
   if (const int code = avcodec_send_frame(s.encoder, nullptr); code < 0) s.fail("encoded", code);
   s.drain();
   if (const int code = av_write_trailer(s.format); code < 0) s.fail("written", code);
-  if (const int code = avio_closep(&s.format->pb); code < 0) s.fail("written", code);
+  avio_flush(s.format->pb);
+  if (const int code = s.format->pb->error; code < 0) s.fail("written", code);
   s.file.commit();
 }
 

@@ -83,6 +83,21 @@ TEST(NodeSetsFile, CutOffAnywhereItIsRefused) {
     EXPECT_THAT(refused(whole.substr(0, length)), HasSubstr("is no JSON")) << length;
 }
 
+/// Kept inputs of the fuzzer: each once did harm or leads far into the reader.
+TEST(NodeSetsFile, TheFuzzersCorpusIsReadOrRefused) {
+  std::size_t read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(FOREST_SOURCE_DIR "/fuzz/corpus/node_sets")) {
+    SCOPED_TRACE(entry.path().filename().string());
+    try {
+      const NodeSets sets = read_node_sets(entry.path());
+      EXPECT_EQ(to_json(parse_node_sets(to_json(sets), "again")), to_json(sets));
+      ++read;
+    } catch (const InputError&) {
+    }
+  }
+  EXPECT_GE(read, 2u);
+}
+
 TEST(NodeSetsFile, ThoseOfOtherProgramsAreRead) {
   const auto folder = real_data("sonata");
   if (!folder) GTEST_SKIP() << "real data is not here";

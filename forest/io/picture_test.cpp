@@ -79,6 +79,9 @@ TEST(Film, IsAFileOnlyWhenFinishedAndTheSameEachTime) {
       for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = std::uint8_t(i * 3 + std::size_t(f) * 5);
       film.add(pixels);
     }
+    for (const auto& entry :
+         std::filesystem::directory_iterator(path.parent_path()))  // nothing that a kill would leave
+      EXPECT_FALSE(entry.path().filename().string().starts_with("unfinished"));
     if (finish) film.finish();
   };
   make(folder() / "unfinished.mp4", false);

@@ -317,7 +317,7 @@ class Assembler {
     std::vector<std::uint32_t> asked;  // morphologies
     for (const std::uint32_t i : not_centred_) asked.push_back(circuit_.instances[i].morphology);
     std::ranges::sort(asked);
-    asked.erase(std::ranges::unique(asked).begin(), asked.end());
+    asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
     std::vector<Vec3> centres(files_.size());
     parallel_for(asked.size(), 1,
                  [&](std::size_t i) { centres[asked[i]] = centre(io::read(files_[asked[i]]).morphology); });

@@ -101,8 +101,9 @@ std::string printable(std::string_view word) {
 }
 
 Vec3 micrometres(const Vec3& millimetres, const std::string& name) {
-  constexpr float farthest = 1e5f;                       // mm
-  if (!(millimetres.cwiseAbs().maxCoeff() <= farthest))  // also where one is not a number
+  constexpr float farthest = 1e5f;  // mm
+  if (!(millimetres.array().abs() <= farthest)
+           .all())  // each by itself: a maximum may pass over what is no number
     throw InputError(name, 0, "has a vertex that is nowhere (not a number, or farther than 100 m); mend it");
   return millimetres * 1000.f;
 }

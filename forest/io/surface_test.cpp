@@ -249,11 +249,13 @@ TEST(Surface, WhatCannotBeIsRefusedWithOneSentence) {
   EXPECT_EQ(surface_error(bytes), "s: triangle 3 names vertex 4 of 4; get the whole file");
   bytes.replace(bytes.size() - 4, 4, big_endian(0xffffffffu));
   EXPECT_NE(surface_error(bytes), "");
-  for (const float wrong : {NAN, INFINITY, -2e8f}) {
-    bytes = freesurfer_surface();
-    bytes.replace(3 + 28 + 8 + 1, 4, big_endian(wrong));
-    EXPECT_NE(surface_error(bytes), "") << wrong;
-  }
+  for (const float wrong : {NAN, INFINITY, -2e8f})
+    for (std::size_t i = 0; i < 12; ++i) {
+      bytes = freesurfer_surface();
+      bytes.replace(bytes.size() - 96 + 4 * i, 4, big_endian(wrong));
+      EXPECT_NE(surface_error(bytes).find("a vertex that is nowhere"), std::string::npos)
+          << wrong << " at " << i;
+    }
   EXPECT_NE(surface_error("\xff\xff\xfe"
                           "a\n\n" +
                           big_endian(0u) + big_endian(0u)),
@@ -288,6 +290,17 @@ TEST(Surface, WhatCannotBeIsRefusedWithOneSentence) {
   std::string deep = "<GIFTI>";
   for (int i = 0; i < 200'000; ++i) deep += "<a>";
   EXPECT_NE(surface_error(deep), "");
+}
+
+/// Kept inputs of the fuzzer: each once crashed a reader or leads far into one.
+TEST(Surface, TheFuzzersCorpusIsReadOrRefused) {
+  std::size_t read = 0;
+  for (const auto& entry : std::filesystem::directory_iterator(FOREST_SOURCE_DIR "/fuzz/corpus/surface")) {
+    SCOPED_TRACE(entry.path().filename().string());
+    const MappedFile file(entry.path());
+    read += surface_error(std::string(file.text())).empty() + values_error(std::string(file.text())).empty();
+  }
+  EXPECT_GE(read, 9u);  // those that it began with
 }
 
 TEST(Surface, RealFilesAreWhatTheirAtlasesSay) {

@@ -21,6 +21,8 @@ class Renderer {
   virtual const frame::Image* image() const { return nullptr; }
   /// How far one saw in the last subframe of the last frame, before its `rest` was drawn; empty when it had none.
   virtual const frame::DepthMap& seen() const = 0;
+  /// Whether renderers of this kind may draw at the same time, each on any thread.
+  virtual bool concurrent() const { return false; }
   /// Who draws, for people ("llvmpipe (LLVM 15.0.6, 256 bits)").
   virtual std::string name() const = 0;
 };

@@ -1,27 +1,86 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/chooser.h"
 
+#include <algorithm>
+#include <cmath>
+
 namespace forest::scene {
+
+// How far it is looked, round by round: to where an earlier picture ended nearly everywhere, beyond the last bits of it, and to
+// the end. What is near hides most of what is far, and then nobody has to choose it.
+Chooser::Horizons Chooser::horizons_of(const frame::DepthMap& seen) {
+  constexpr std::array<float, 3> shares{.6f, .85f, .98f};
+  constexpr float least = 100.f;  // µm: an eye within a bush is told little of where it is going
+  Horizons horizons{INFINITY, INFINITY, INFINITY};
+  std::vector<float> depths;
+  for (const float depth : seen.depths)
+    if (std::isfinite(depth)) depths.push_back(depth);
+  for (std::size_t i = 0; i < shares.size() && !depths.empty(); ++i) {
+    const auto nth = depths.begin() + std::ptrdiff_t(shares[i] * float(depths.size() - 1));
+    std::nth_element(depths.begin(), nth, depths.end());
+    horizons[i] = std::max(*nth, least * float(1u << i));
+  }
+  return horizons;
+}
+
+// When nothing is known yet.
+Chooser::Horizons Chooser::first_horizons(const Forest& forest, const Eye& eye) {
+  if (forest.groves().nodes().empty()) return {INFINITY, INFINITY, INFINITY};
+  const float nearest = eye.nearest_depth(forest.groves().nodes().front().sphere);
+  return {nearest + 150.f, nearest + 300.f, nearest + 600.f};
+}
 
 const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
                            Painter painter) {
-  eye_ = eye, viewport_ = viewport, shown_ = shown, painter_ = std::move(painter);
-  revealed_segments_ = drawings_ = 0;
-  cut_ = scene::choose(forest_, eye, viewport, before_ ? &*before_ : nullptr, shown);
-  if (painter_) painter_(cut_, eye);
+  Chooser* one[] = {this};
+  choose(one, {&eye, 1}, {&viewport, 1}, shown, painter);
   return cut_;
 }
 
+void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
+                     std::span<const frame::Viewport> viewports, const Shown& shown, const Painter& painter) {
+  const auto& first = choosers.front()->eye_;
+  std::vector<Sight> sights;
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    Chooser& c = *choosers[i];
+    if (!c.before_) c.horizons_ = first_horizons(c.forest_, eyes[i]);
+    // One that was not asked for a while knows what another camera saw.
+    const bool knows = c.before_ && first && c.eye_->camera() == first->camera();
+    sights.push_back({eyes[i], knows ? &*c.before_ : nullptr, c.horizons_[0]});
+  }
+  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown);
+  for (std::size_t i = 0; i < choosers.size(); ++i) {
+    Chooser& c = *choosers[i];
+    c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
+    c.revealed_segments_ = c.revealed_neurons_ = c.drawings_ = 0;
+    c.cut_ = std::move(cuts[i]);
+    if (painter) painter(c.cut_, eyes[i]);
+  }
+}
+
 void Chooser::complete(frame::Frame& frame) {
-  frame.rest = [this](const frame::DepthMap& seen) {
-    revealed_ = revealed(forest_, *eye_, viewport_, cut_.left_out, Occluders(seen, eye_->camera(), viewport_),
-                         shown_);
+  frame.rest = [this](const frame::DepthMap& seen, std::uint32_t round) {
+    if (round == 0) round_ = 0, ++drawings_;
+    const Occluders now(seen, eye_->camera(), viewport_);
+    do {
+      const std::span<const LeftOut> left = round_ ? revealed_.left_out : cut_.left_out;
+      if (left.empty()) return frame::Lists{};
+      // A map of nothing hides nothing: there is no use in rounds.
+      const bool rounds = !seen.depths.empty() && round_ + 1 < horizons_.size();
+      const float horizon = rounds ? horizons_[round_ + 1] : INFINITY;
+      revealed_ = revealed(forest_, {*eye_, &now, horizon}, left, shown_);
+      revealed_neurons_ += revealed_.neurons;
+      ++round_;
+    } while (revealed_.lists().empty());
     if (painter_) painter_(revealed_, *eye_);
-    revealed_segments_ += revealed_.segments, ++drawings_;
+    revealed_segments_ += revealed_.segments;
     return revealed_.lists();
   };
 }
 
-void Chooser::remember(const frame::DepthMap& seen) { before_.emplace(seen, eye_->camera(), viewport_); }
+void Chooser::remember(const frame::DepthMap& seen) {
+  before_.emplace(seen, eye_->camera(), viewport_);
+  horizons_ = horizons_of(seen);
+}
 
 }  // namespace forest::scene

@@ -3,6 +3,8 @@
 // again once the rest is drawn. The pictures are those that would be drawn without a guess; they are drawn sooner.
 #pragma once
 
+#include <array>
+#include <cmath>
 #include <functional>
 #include <optional>
 
@@ -20,6 +22,10 @@ class Chooser {
   /// The cut of the next picture; valid until the one after it. What `shown` points to must last until it is drawn.
   const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {},
                     Painter painter = {});
+  /// The same for parts of one view, seen by one camera, all at once: chooser i, of the same forest, for eye i and viewport i.
+  static void choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
+                     std::span<const frame::Viewport> viewports, const Shown& shown = {},
+                     const Painter& painter = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);
@@ -28,6 +34,9 @@ class Chooser {
 
   /// Of the last picture, all subframes' mean: chosen and revealed.
   std::uint64_t segments() const { return cut_.segments + (drawings_ ? revealed_segments_ / drawings_ : 0); }
+  std::uint32_t neurons() const {
+    return cut_.neurons + std::uint32_t(drawings_ ? revealed_neurons_ / drawings_ : 0);
+  }
 
  private:
   Forest forest_;
@@ -35,9 +44,14 @@ class Chooser {
   frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
+  using Horizons = std::array<float, 3>;  // µm along the view
+  static Horizons horizons_of(const frame::DepthMap& seen);
+  static Horizons first_horizons(const Forest& forest, const Eye& eye);
+  Horizons horizons_{INFINITY, INFINITY, INFINITY};
+  std::size_t round_ = 0;  // of those after the cut
   Painter painter_;
   Cut cut_, revealed_;
-  std::uint64_t revealed_segments_ = 0, drawings_ = 0;
+  std::uint64_t revealed_segments_ = 0, revealed_neurons_ = 0, drawings_ = 0;
 };
 
 }  // namespace forest::scene

@@ -10,6 +10,7 @@
 #include <numbers>
 #include <numeric>
 
+#include "forest/core/half.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::scene {
@@ -451,8 +452,6 @@ class Sketch {
       dropped_reach_;  // how far what was dropped there reached; negative where nothing was
 };
 
-std::uint32_t half(float value) { return Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(value)); }
-
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
@@ -504,12 +503,12 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
   low.fill(Vec4::Constant(INFINITY)), high.fill(Vec4::Constant(-INFINITY));
   std::uint32_t count = 0;
   for (const Strip& s : drawing.strips_of(draft)) {
-    const std::uint32_t meta = s.kind | s.rank << 8 | half(s.mean) << 16;
+    const std::uint32_t meta = s.kind | s.rank << 8 | to_half(s.mean) << 16;
     const Vec4* a = &drawing.vertices[s.first];
-    std::uint32_t radius = half(a->w());
+    std::uint32_t radius = to_half(a->w());
     for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
       const Vec4& b = drawing.vertices[i];
-      const std::uint32_t next_radius = half(b.w());
+      const std::uint32_t next_radius = to_half(b.w());
       out.segments.push_back({a->x(), a->y(), a->z(), radius | next_radius << 16, b.x(), b.y(), b.z(), meta});
       out.places[out.segments.size() - 1] = middle(drawing.places[i - 1], drawing.places[i]);
       const float thickest = std::max(a->w(), b.w());
@@ -537,21 +536,6 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
       reach(drawing.vertices[i]);
     }
   return drawn;
-}
-
-// As Cluster::group unpacks it; never smaller than the sphere given.
-std::uint32_t packed(const Sphere& sphere, const Sphere& of_cluster) {
-  const float unit = std::max(of_cluster.radius, 1e-6f) / 127.f;
-  std::uint32_t bits = 0;
-  Vec3 centre;
-  for (int i = 0; i < 3; ++i) {
-    const float steps =
-        std::clamp(std::round((sphere.centre[i] - of_cluster.centre[i]) / unit), -127.f, 127.f);
-    bits |= (std::uint32_t(int(steps)) & 255u) << (8 * i);
-    centre[i] = of_cluster.centre[i] + steps * unit;
-  }
-  const float radius = sphere.radius + (sphere.centre - centre).norm();
-  return bits | std::uint32_t(std::clamp(std::ceil(radius * 1.0001f / unit), 0.f, 255.f)) << 24;
 }
 
 // Of every section, as section_length and section_area have them, found together.
@@ -809,7 +793,8 @@ ClusterTree build_clusters(const Morphology& m) {
               .children = {index(d.children[0]), index(d.children[1])},
               .leaf_first = d.leaf_first,
               .leaf_count = d.leaf_count};
-    std::ranges::transform(drawn[i].groups, c.groups, [&](const Sphere& g) { return packed(g, sphere); });
+    std::ranges::transform(drawn[i].groups, c.groups,
+                           [&](const Sphere& g) { return packed_group(g, sphere); });
     std::ranges::copy(drawn[i].visible, c.visible);
     tree.clusters.push_back(c);
   }

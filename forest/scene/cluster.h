@@ -18,6 +18,7 @@
 #include "forest/frame/layout.h"
 #include "forest/morphology/morphology.h"
 #include "forest/reports/layout.h"
+#include "forest/scene/group.h"
 
 namespace forest::scene {
 
@@ -46,13 +47,8 @@ struct Cluster {
     return all();
   }
   std::uint32_t all() const { return frame::first_segments(segment_count); }
-  /// The sphere around the segments [8 i, 8 i + 8) drawn. Packed: its centre from that of the cluster, a signed byte a
-  /// coordinate in 127ths of the cluster's radius, and its radius, a byte in 127ths.
-  Sphere group(std::uint32_t i) const {
-    const float unit = radius / 127.f;
-    const auto at = [&](int shift) { return float(std::int8_t(groups[i] >> shift & 255)) * unit; };
-    return {{x + at(0), y + at(8), z + at(16)}, float(groups[i] >> 24) * unit};
-  }
+  /// The sphere around the segments [8 i, 8 i + 8) drawn.
+  Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], {{x, y, z}, radius}); }
   static constexpr float magnifications[8] = {.05f, .1f, .17f, .25f, .35f, .5f, .8f, 1.5f};
 };
 static_assert(sizeof(Cluster) == 96);

@@ -15,7 +15,6 @@
 namespace forest::scene {
 namespace {
 
-constexpr std::size_t class_count = 15;  // the entries of the last one are for surfaces and overlays
 constexpr std::size_t most_hues = 60'000, most_rows = 250;
 constexpr std::size_t depth_steps = 10;
 constexpr std::uint32_t grey = 0xBBBBBB;
@@ -340,9 +339,9 @@ class Painter {
     for (std::size_t i = 0; i < seen.size(); ++i)
       if (seen[i]) used.push_back(i);
     std::vector<std::size_t> kept = used;
-    if (kept.size() > class_count) {
+    if (kept.size() > colour_classes) {
       std::ranges::stable_sort(kept, std::greater(), [&](std::size_t i) { return seen[i]; });
-      kept.resize(class_count);
+      kept.resize(colour_classes);
       std::ranges::sort(kept);
     }
     std::vector<std::uint8_t> class_of(seen.size());

@@ -82,7 +82,8 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
     bool as_line;
   };
   std::vector<std::vector<Piece>> pieces(forest_.instances().size());
-  for (const frame::Item& i : cut.lines) pieces[i.instance].push_back({&i, true});
+  for (const frame::Item& i : cut.lines)
+    if (i.instance != FOREST_IN_WORLD) pieces[i.instance].push_back({&i, true});
   for (const frame::Item& i : cut.capsules) pieces[i.instance].push_back({&i, false});
   const float focal = camera.focal(viewport.height);
   std::vector<Connections> found(pieces.size());

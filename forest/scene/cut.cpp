@@ -11,36 +11,88 @@
 #include "forest/scene/placed.h"
 
 namespace forest::scene {
+
+// It begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
+Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
+  constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
+  const Bounds& bounds = forest.soma_bounds();
+  if (!(strength > 0.f) || bounds.empty()) return {};
+  const float extent = .5f * bounds.extent().norm() + 100.f;
+  const float depth = -camera.axes().col(2).dot(bounds.centre() - camera.eye);
+  const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
+  // Within the forest one sees a hundred micrometres or two, whatever its size.
+  const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
+  const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
+  return {std::max(20.f, depth - size),
+          (length + inside * (std::min(length, seen_inside) - length)) / strength};
+}
+
 namespace {
 
 constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is drawn as a capsule
 constexpr float group_limit =
-    12.f;  // groups of a cluster of a larger radius, in pixels, are looked at one by one
-constexpr std::size_t chunk = 64;  // neurons; fixed, so that the result does not depend on threads
+    12.f;               // groups of a cluster of a larger radius, in pixels, are looked at one by one
+constexpr int few = 8;  // segments of a cluster; its groups are not looked at for so few
+constexpr std::size_t left_out_at_once = 64, neurons_at_once = 64,
+                      bricks_at_least = 128;  // fixed, so that the result does not depend on threads
 
 frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t drawn, const Sphere& sphere) {
   return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
 }
 
-// Whether its branches are so thin that they are drawn as lines.
-bool is_thin(const Cluster& c, float magnification, const Detail& detail) {
-  return 2.f * c.thickness * magnification <= detail.surface_width;
-}
-
-constexpr std::uint32_t soma = 0xffffffffu;  // LeftOut::cluster
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
-// What is looked at, and what is known to be hidden.
+// What is looked at, by whom, and what is known to be hidden.
 struct Look {
   const Forest& forest;
-  const Eye& eye;
-  const frame::Frustum& frustum;
-  const Occluders* occluders;  // may be null
-  bool keep;                   // what they hide
+  std::span<const Sight> sights;
+  bool keep;  // what is hidden
   const Shown& shown;
+  Fog fog = fog_of(forest, sights.front().eye.camera(), sights.front().eye.detail().fog);
+  bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
 
+  std::uint32_t all() const { return frame::first_segments(std::uint32_t(sights.size())); }
   frame::State state(std::uint32_t index) const {
     return shown.states.empty() ? frame::State{} : shown.states[index];
+  }
+  bool in_sight(const Sight& sight, const Seen& seen) const {
+    return seen.nearest < fog.end() && sight.eye.may_see(seen);
+  }
+  // For the eye, through what fog there is.
+  bool good_enough(const Sight& sight, const Seen& seen, float error) const {
+    return sight.eye.good_enough(seen, error) ||
+           (seen.nearest > fog.start && sight.eye.good_enough(seen, error / fog.forgives(seen.nearest)));
+  }
+
+  bool has_straws() const { return !forest.bricks().empty(); }
+  // Whether straws that are so large, µm, do for what lies within: as large as the thinnest line that is drawn for its like, or
+  // small within a pixel. They are no worse than thinning is, but a drawing of every branch is better.
+  bool straws_do(const Sight& sight, const Seen& seen, float size) const {
+    const Detail& d = sight.eye.detail();
+    return good_enough(sight, seen, size * d.error / std::max(d.thinnest, .125f * d.error));
+  }
+  bool straws_do(const Sight& sight, const Seen& seen) const {
+    return has_straws() && straws_do(sight, seen, forest.bricks().back().error());
+  }
+  // For which of some sights a neuron is drawn by straws.
+  std::uint32_t far(std::uint32_t index, std::uint32_t of_sights) const {
+    const frame::State s = state(index);
+    if (!has_straws() || !s.is(frame::State::visible) || s.is(frame::State::parted)) return 0;
+    if (s.kind == frame::Kind::bricks) return of_sights;
+    if (s.kind != frame::Kind::any) return 0;
+    const Seen seen = sights.front().eye.see(forest.spheres()[index]);
+    std::uint32_t result = 0;
+    for (std::uint32_t rest = of_sights; rest; rest &= rest - 1)
+      if (const auto i = std::size_t(std::countr_zero(rest)); straws_do(sights[i], seen)) result |= 1u << i;
+    return result;
+  }
+
+ private:
+  bool plainly() const {
+    std::uint32_t kinds = 0, flags = frame::State::visible, parted = 0;
+    for (const frame::State& s : shown.states)
+      kinds |= std::uint32_t(s.kind), flags &= s.flags, parted |= s.flags;
+    return !kinds && flags && !(parted & frame::State::parted);
   }
 };
 
@@ -49,6 +101,7 @@ void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
   if (!run.drawn) return;
   switch (kind) {
     case frame::Kind::somata:
+    case frame::Kind::bricks:
       return;
     case frame::Kind::dots:
       for (std::uint32_t drawn = run.drawn; drawn; drawn &= drawn - 1) {
@@ -85,74 +138,122 @@ void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const
   }
 }
 
-// Of a cluster that is good enough, these groups.
-void choose_groups(const Look& look, std::uint32_t index, std::uint32_t at, std::uint32_t groups,
-                   const Placed& placed, const Sphere& sphere, Cut& cut) {
-  const Cluster& c = look.forest.clusters()[at];
-  const float magnification = look.eye.magnification(sphere);
-  const Detail& detail = look.eye.detail();
-  const frame::Kind kind = look.state(index).kind;
-  const bool thin = is_thin(c, magnification, detail);
-  const std::uint32_t shown = detail.thinnest > 0.f ? c.visible_at(magnification / detail.thinnest) : c.all();
-  if (groups == every_group && sphere.radius * magnification <= group_limit)
-    return add(cut, item(index, c.first_segment, shown, sphere), kind, thin);
-  std::uint32_t hidden = 0;
-  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
-    const std::uint32_t first = g * Cluster::group_size, drawn = shown >> first & 255u;
-    if (!drawn || !(groups >> g & 1u)) continue;
-    const Sphere around = placed(c.group(g));
-    if (!look.frustum.may_see(around)) continue;
-    if (look.occluders && look.occluders->hide(around))
-      hidden |= 1u << g;
-    else
-      add(cut, item(index, c.first_segment + first, drawn, around), kind, thin);
+// A sphere as all sights see it, and as the camera of the pictures before saw it; that once somebody asks.
+class Judged {
+ public:
+  Judged(const Look& look, const Sphere& sphere)
+      : sphere_(sphere), seen_(look.sights.front().eye.see(sphere)) {}
+
+  const Seen& seen() const { return seen_; }
+  bool hidden(const Sight& sight) {
+    if (!sight.before) return false;
+    if (!before_) before_ = sight.before->see(sphere_);
+    return sight.before->hide(*before_);
   }
-  if (hidden && look.keep) cut.left_out.push_back({index, at, hidden});
+  // Whether it is left out for now, or for good.
+  bool left_out(const Look& look, const Sight& sight, const LeftOut& what, Cut& cut) {
+    const bool far = seen_.nearest > sight.horizon;
+    if (!far && !hidden(sight)) return false;
+    if (far || look.keep) cut.left_out.push_back(what);
+    return true;
+  }
+
+ private:
+  const Sphere& sphere_;
+  Seen seen_;
+  std::optional<Seen> before_;
+};
+
+// Calls take(i) for each of a set of sights, a bit for each.
+void each_of(std::uint32_t sights, auto&& take) {
+  for (; sights; sights &= sights - 1) take(std::size_t(std::countr_zero(sights)));
 }
 
-void choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from, Cut& cut) {
+// Of a cluster that is good enough, these groups.
+void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, std::uint32_t at,
+                   std::uint32_t groups, const Placed& placed, const Sphere& sphere, const Seen& seen,
+                   Cut& cut) {
+  const Cluster& c = look.forest.clusters()[at];
+  const frame::Kind kind = look.state(index).kind;
+  const auto shown = [&](const Seen& where) {
+    const float thinnest = sight.eye.detail().thinnest;
+    return thinnest > 0.f ? c.visible_at(sight.eye.magnification(where) / thinnest) : c.all();
+  };
+  const std::uint32_t all = shown(seen);
+  if (groups == every_group &&
+      (std::popcount(all) <= few || sphere.radius * sight.eye.magnification(seen) <= group_limit))
+    return add(cut, item(index, c.first_segment, all, sphere), kind, sight.eye.thin(seen, c.thickness));
+  std::uint32_t hidden = 0;
+  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
+    const std::uint32_t first = g * Cluster::group_size;
+    if (!(groups >> g & 1u) || first >= c.segment_count) continue;
+    const Sphere around = placed(c.group(g));
+    Judged judged(look, around);
+    if (!sight.eye.may_see(judged.seen())) continue;
+    const std::uint32_t drawn = shown(judged.seen()) >> first & 255u;
+    if (!drawn) continue;
+    if (judged.hidden(sight))
+      hidden |= 1u << g;
+    else
+      add(cut, item(index, c.first_segment + first, drawn, around), kind,
+          sight.eye.thin(judged.seen(), c.thickness));
+  }
+  if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, hidden});
+}
+
+// For each sight, from one cluster on; returns which of them may see it.
+std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from,
+                              std::uint32_t of_sights, std::span<Cut> cuts) {
   const Placed placed(look.forest.instances()[index]);
   const auto clusters = look.forest.clusters();
-  const Eye& eye = look.eye;
   const frame::State state = look.state(index);
   const bool parted =
       state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
   const auto states =
       parted ? section_states(look.forest, look.shown, index) : std::vector<const frame::State*>();
-  if (state.kind == frame::Kind::somata && !parted) return;
-  std::uint32_t open[64];
-  int depth = 0;
-  open[depth++] = from;
+  if (state.kind == frame::Kind::somata && !parted) return of_sights;
+  struct Open {
+    std::uint32_t cluster, sights;  // those for which its parent was too coarse
+  };
+  std::array<Open, 64> open;
+  std::size_t depth = 0;
+  std::uint32_t may_see = 0;
+  open[depth++] = {from, of_sights};
   while (depth) {
-    const std::uint32_t at = open[--depth];
+    const auto [at, sights] = open[--depth];
     const Cluster& c = clusters[at];
     const Sphere sphere = placed(c);
-    if (!look.frustum.may_see(sphere)) continue;
-    if (look.occluders && look.occluders->hide(sphere)) {
-      if (look.keep) cut.left_out.push_back({index, at, 0});
-      continue;
-    }
-    if (!c.is_leaf() && depth + 2 <= 64 && (parted || !eye.good_enough(sphere, c.error))) {
-      open[depth++] = c.children[1];
-      open[depth++] = c.children[0];
-      continue;
-    }
-    if (parted)
-      add_parts(look, index, c, sphere, is_thin(c, eye.magnification(sphere), eye.detail()), states, cut);
-    else
-      choose_groups(look, index, at, every_group, placed, sphere, cut);
+    Judged judged(look, sphere);
+    const Seen& seen = judged.seen();
+    std::uint32_t finer = 0;
+    each_of(sights, [&](std::size_t s) {
+      const Sight& sight = look.sights[s];
+      Cut& cut = cuts[s];
+      // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
+      if (!sight.eye.may_see(seen)) return;
+      if (at == from) may_see |= 1u << s;
+      if (judged.left_out(look, sight, {LeftOut::cluster, index, at, 0}, cut)) {
+      } else if (!c.is_leaf() && depth + 2 <= open.size() &&
+                 (parted || !look.good_enough(sight, seen, c.error))) {
+        finer |= 1u << s;
+      } else if (parted) {
+        add_parts(look, index, c, sphere, sight.eye.thin(seen, c.thickness), states, cut);
+      } else {
+        choose_groups(look, sight, index, at, every_group, placed, sphere, seen, cut);
+      }
+    });
+    if (!finer) continue;
+    open[depth++] = {c.children[1], finer};
+    open[depth++] = {c.children[0], finer};
   }
+  return may_see;
 }
 
-void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
+void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
   const frame::Instance& instance = look.forest.instances()[index];
   const Neuron& neuron = look.forest.neurons()[instance.morphology];
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
-  if (!(neuron.soma_radius > 0.f) || !look.frustum.may_see(sphere)) return;
-  if (look.occluders && look.occluders->hide(sphere)) {
-    if (look.keep) cut.left_out.push_back({index, soma, 0});
-    return;
-  }
+  if (!(neuron.soma_radius > 0.f)) return;
   frame::Item ball = item(index, neuron.first_segment, 1, sphere);
   const frame::State state = look.state(index);
   if (state.is(frame::State::parted)) {
@@ -160,38 +261,157 @@ void choose_soma(const Look& look, std::uint32_t index, Cut& cut) {
       if (part.section == soma_section) ball.state = frame::packed(part.state);
     if (!(ball.state ? frame::unpacked(ball.state) : state).is(frame::State::visible)) return;
   }
-  const bool large = neuron.soma_radius * look.eye.magnification(sphere) > dot_limit;
-  (large ? cut.capsules : cut.dots).push_back(ball);
-  ++cut.segments;
+  Judged judged(look, sphere);
+  each_of(sights, [&](std::size_t s) {
+    const Sight& sight = look.sights[s];
+    if (!look.in_sight(sight, judged.seen())) return;
+    if (judged.left_out(look, sight, {LeftOut::soma, index, 0, 0}, cuts[s])) return;
+    const bool large = neuron.soma_radius * sight.eye.magnification(judged.seen()) > dot_limit;
+    (large ? cuts[s].capsules : cuts[s].dots).push_back(ball);
+    ++cuts[s].segments;
+  });
 }
 
-void choose_neuron(const Look& look, std::uint32_t index, Cut& cut) {
+void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
   if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
-  const std::uint64_t before = cut.segments;
-  choose_clusters(look, index, neuron.first_cluster, cut);
-  choose_soma(look, index, cut);
-  cut.neurons += cut.segments > before;
+  if (const std::uint32_t far = look.far(index, sights)) {
+    each_of(far, [&](std::size_t s) { cuts[s].neurons += 1; });
+    if (!(sights &= ~far)) return;
+  }
+  std::array<std::uint64_t, most_sights> before;
+  std::ranges::transform(cuts, before.begin(), &Cut::segments);
+  // The soma lies within its root.
+  choose_soma(look, index, choose_clusters(look, index, neuron.first_cluster, sights, cuts), cuts);
+  for (std::size_t s = 0; s < cuts.size(); ++s) cuts[s].neurons += cuts[s].segments > before[s];
+}
+
+struct Open {
+  std::uint32_t number, sights;  // of a grove or a brick; those that are to look at it
+};
+
+// The neurons of a grove, and of all below it.
+void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
+  const Groves& groves = look.forest.groves();
+  std::vector<Open> open{from};
+  while (!open.empty()) {
+    const auto [at, sights] = open.back();
+    open.pop_back();
+    const Groves::Node& node = groves.nodes()[at];
+    Judged judged(look, node.sphere);
+    std::uint32_t within = 0;
+    each_of(sights, [&](std::size_t s) {
+      const Sight& sight = look.sights[s];
+      if (!look.in_sight(sight, judged.seen())) return;
+      if (look.plain && look.straws_do(sight, judged.seen())) {
+        cuts[s].neurons += node.count;
+        return;
+      }
+      if (!judged.left_out(look, sight, {LeftOut::grove, 0, at, 0}, cuts[s])) within |= 1u << s;
+    });
+    if (!within) continue;
+    for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back({node.first_child + c, within});
+    if (node.child_count) continue;
+    for (const std::uint32_t i : groves.members().subspan(node.first, node.count))
+      choose_neuron(look, i, within, cuts);
+  }
+}
+
+// Of a brick, these groups of straws, but for those whose neurons are near.
+void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint32_t groups, Cut& cut) {
+  const Brick& b = look.forest.bricks()[at];
+  const Sight& sight = look.sights[s];
+  const Sphere sphere = b.sphere();
+  const float magnification = sight.eye.magnification(sphere), thinnest = sight.eye.detail().thinnest;
+  std::uint32_t shown = thinnest > 0.f ? b.shown(magnification / thinnest) : b.all();
+  const Sphere wide{sphere.centre, b.neurons};
+  if (!look.plain || !look.straws_do(sight, sight.eye.see(wide))) {
+    const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
+    for (std::uint32_t rest = shown; rest; rest &= rest - 1)
+      if (const int i = std::countr_zero(rest); !look.far(owners[std::size_t(i)].instance, 1u << s))
+        shown &= ~(1u << i);
+  }
+  const auto put = [&](std::uint32_t drawn, const Sphere& around) {
+    if (!drawn) return;
+    cut.lines.push_back(item(FOREST_IN_WORLD, b.first_segment, drawn, around));
+    cut.segments += std::uint32_t(std::popcount(drawn));
+  };
+  if (groups == every_group && sphere.radius * magnification <= group_limit) return put(shown, sphere);
+  std::uint32_t hidden = 0;
+  for (std::uint32_t g = 0; g < Brick::group_count; ++g) {
+    const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
+    if (!drawn || !(groups >> g & 1u)) continue;
+    const Sphere around = b.group(g);
+    Judged judged(look, around);
+    if (!look.in_sight(sight, judged.seen())) continue;
+    if (judged.hidden(sight))
+      hidden |= 1u << g;
+    else
+      put(drawn, around);
+  }
+  if (hidden && look.keep) cut.left_out.push_back({LeftOut::brick, 0, at, hidden});
+}
+
+void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
+  const auto bricks = look.forest.bricks();
+  std::vector<Open> open{from};
+  while (!open.empty()) {
+    const auto [at, sights] = open.back();
+    open.pop_back();
+    const Brick& b = bricks[at];
+    const Sphere sphere = b.sphere();
+    Judged judged(look, sphere);
+    const Seen& seen = judged.seen();
+    std::uint32_t finer = 0;
+    each_of(sights, [&](std::size_t s) {
+      const Sight& sight = look.sights[s];
+      if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s]))
+        return;
+      if (b.child_count && !look.straws_do(sight, seen, b.error()))
+        finer |= 1u << s;
+      else if (!look.plain ||
+               look.straws_do(sight, seen))  // else its neurons, which are nearer, are near, too
+        choose_straws(look, s, at, every_group, cuts[s]);
+    });
+    if (!finer) continue;
+    for (std::uint32_t c = b.child_count; c-- > 0;) open.push_back({b.first_child + c, finer});
+  }
+}
+
+// Bricks that hold all others.
+std::vector<std::uint32_t> parts_of(std::span<const Brick> bricks) {
+  std::vector<std::uint32_t> parts;
+  if (!bricks.empty()) parts.push_back(0);
+  while (!parts.empty() && parts.size() < bricks_at_least && bricks[parts.front()].child_count) {
+    std::vector<std::uint32_t> next;
+    for (const std::uint32_t at : parts)
+      for (std::uint32_t c = 0; c < bricks[at].child_count; ++c) next.push_back(bricks[at].first_child + c);
+    parts = std::move(next);
+  }
+  return parts;
 }
 
 void append(auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); }
 
-// What `choose_one(i, cut)` adds for each i below `count`, in this order.
-Cut in_chunks(std::size_t count, auto&& choose_one) {
-  std::vector<Cut> parts((count + chunk - 1) / chunk);
-  parallel_for(parts.size(), 1, [&](std::size_t p) {
-    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i) choose_one(i, parts[p]);
+// What `choose_one(i, cuts)` adds to each of so many cuts for each i below `count`, in this order; `chunk` of them at a time.
+std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_one) {
+  std::vector<Cut> parts((count + chunk - 1) / chunk * cuts);
+  parallel_for(parts.size() / cuts, 1, [&](std::size_t p) {
+    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i)
+      choose_one(i, std::span(parts).subspan(p * cuts, cuts));
   });
-  Cut whole;
-  for (const Cut& part : parts) {
-    append(whole.dots, part.dots);
-    append(whole.lines, part.lines);
-    append(whole.capsules, part.capsules);
-    append(whole.left_out, part.left_out);
-    whole.segments += part.segments;
-    whole.neurons += part.neurons;
-  }
+  std::vector<Cut> whole(cuts);
+  parallel_for(cuts, 1, [&](std::size_t c) {
+    for (std::size_t p = c; p < parts.size(); p += cuts) {
+      append(whole[c].dots, parts[p].dots);
+      append(whole[c].lines, parts[p].lines);
+      append(whole[c].capsules, parts[p].capsules);
+      append(whole[c].left_out, parts[p].left_out);
+      whole[c].segments += parts[p].segments;
+      whole[c].neurons += parts[p].neurons;
+    }
+  });
   return whole;
 }
 
@@ -232,6 +452,13 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
   return bands;
 }
 
+// From near to far, in bands.
+void arrange(Cut& cut, const Eye& eye) {
+  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
+               capsules = sort_near_to_far(cut.capsules, eye);
+  cut.bands = bands_of(dots, lines, capsules);
+}
+
 }  // namespace
 
 std::vector<const frame::State*> section_states(const Forest& forest, const Shown& shown,
@@ -253,31 +480,52 @@ std::vector<const frame::State*> section_states(const Forest& forest, const Show
   return states;
 }
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Occluders* before,
-           const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), before, true, shown};
-  Cut cut = in_chunks(forest.instances().size(),
-                      [&](std::size_t i, Cut& part) { choose_neuron(look, std::uint32_t(i), part); });
-  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
-               capsules = sort_near_to_far(cut.capsules, eye);
-  cut.bands = bands_of(dots, lines, capsules);
-  return cut;
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown) {
+  const Look look{forest, sights, true, shown};
+  const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
+  std::vector<Cut> cuts =
+      in_chunks(groves.size() + bricks.size(), 1, sights.size(), [&](std::size_t i, std::span<Cut> parts) {
+        if (i < groves.size())
+          choose_grove(look, {groves[i], look.all()}, parts);
+        else
+          choose_bricks(look, {bricks[i - groves.size()], look.all()}, parts);
+      });
+  parallel_for(cuts.size(), 1, [&](std::size_t s) { arrange(cuts[s], sights[s].eye); });
+  return cuts;
 }
 
-Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport&, std::span<const LeftOut> left_out,
-             const Occluders& now, const Shown& shown) {
-  const Look look{forest, eye, eye.frustum(), &now, false, shown};
-  return in_chunks(left_out.size(), [&](std::size_t i, Cut& part) {
-    const auto [instance, cluster, groups] = left_out[i];
-    if (cluster == soma) {
-      choose_soma(look, instance, part);
-    } else if (groups) {
-      const Placed placed(forest.instances()[instance]);
-      choose_groups(look, instance, cluster, groups, placed, placed(forest.clusters()[cluster]), part);
-    } else {
-      choose_clusters(look, instance, cluster, part);
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Shown& shown) {
+  const Sight sight{eye};
+  return std::move(choose(forest, std::span(&sight, 1), shown).front());
+}
+
+Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown) {
+  const Look look{forest, std::span(&now, 1), false, shown};
+  const auto reveal = [&](std::size_t n, std::span<Cut> cuts) {
+    const LeftOut& l = left_out[n];
+    switch (l.what) {
+      case LeftOut::grove:
+        return choose_grove(look, {l.number, 1}, cuts);
+      case LeftOut::soma:
+        return choose_soma(look, l.instance, 1, cuts);
+      case LeftOut::brick:
+        return l.groups ? choose_straws(look, 0, l.number, l.groups, cuts.front())
+                        : choose_bricks(look, {l.number, 1}, cuts);
+      case LeftOut::cluster:
+        break;
     }
-  });
+    if (!l.groups) {
+      choose_clusters(look, l.instance, l.number, 1, cuts);
+      return;
+    }
+    const Placed placed(forest.instances()[l.instance]);
+    const Sphere sphere = placed(forest.clusters()[l.number]);
+    choose_groups(look, now, l.instance, l.number, l.groups, placed, sphere, now.eye.see(sphere),
+                  cuts.front());
+  };
+  Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
+  arrange(cut, now.eye);
+  return cut;
 }
 
 }  // namespace forest::scene

@@ -2,6 +2,7 @@
 // The choice of what is drawn: for every neuron in sight the coarsest clusters that are good enough for the eye.
 #pragma once
 
+#include <cmath>
 #include <optional>
 #include <span>
 #include <vector>
@@ -13,11 +14,14 @@
 
 namespace forest::scene {
 
-/// What was left out because an earlier picture hid it: a cluster and all below it, some of the groups that a cluster draws,
-/// or a soma.
+/// What was left out because an earlier picture hid it, or because it is far: a cluster or a brick and all below it, some of the groups that it
+/// draws, a soma, or the neurons of a grove.
 struct LeftOut {
-  std::uint32_t instance = 0, cluster = 0;  // 0xffffffff: the soma
-  std::uint32_t groups = 0;                 // bit i: group i of the cluster; 0: all of it, and all below
+  enum What : std::uint32_t { cluster, soma, grove, brick };
+  What what = cluster;
+  std::uint32_t instance = 0;  // of a cluster or a soma
+  std::uint32_t number = 0;    // of the cluster, the grove or the brick
+  std::uint32_t groups = 0;    // bit i: group i; 0: all of it, and all below
 };
 
 /// A branch that is shown otherwise than its neuron: a section and all that grows out of it.
@@ -40,7 +44,7 @@ struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
   std::uint64_t segments = 0;  // drawn
-  std::uint32_t neurons = 0;   // in sight
+  std::uint32_t neurons = 0;   // in sight; of those that are straws, in a part of the forest that is
   std::vector<LeftOut> left_out;
   // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
   struct Entries {
@@ -55,14 +59,28 @@ struct Cut {
   }
 };
 
-/// Pure: depends on its arguments alone, and is the same at any number of threads.
-/// @param before  what an earlier picture hid, as a guess: it goes to `left_out`. Null: everything in sight is chosen
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-           const Occluders* before = nullptr, const Shown& shown = {});
+/// The depth cue of a picture.
+/// @param strength  as Detail::fog
+Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength);
 
-/// Of what was left out, that which `now`, of the same view with all else drawn, does not hide. Drawn besides, the
-/// picture is the one without any guess.
-Cut revealed(const Forest& forest, const Eye& eye, const frame::Viewport& viewport,
-             std::span<const LeftOut> left_out, const Occluders& now, const Shown& shown = {});
+/// One of the pictures that are chosen for together: parts of one view, seen by one camera, at sizes of their own (fovea.h).
+struct Sight {
+  const Eye& eye;
+  // What a picture shows; what it hides is left out. Null: nothing is hidden. All were seen by one camera, which may be an earlier one.
+  const Occluders* before = nullptr;
+  float horizon = INFINITY;  // µm along the view: what begins beyond is left out
+};
+inline constexpr std::size_t most_sights = 32;
+
+/// What is drawn for each sight, the same as for it alone, in one walk over the forest.
+/// Pure: depends on its arguments alone, and is the same at any number of threads.
+/// @param sights  what they leave out goes to `left_out`: earlier pictures are a guess
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {});
+Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
+
+/// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its
+/// horizon is left out again. Drawn besides until nothing is left out, it gives the picture without any guess.
+Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out,
+             const Shown& shown = {});
 
 }  // namespace forest::scene

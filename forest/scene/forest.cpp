@@ -15,6 +15,7 @@
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/scene/forest_layout.h"
+#include "forest/scene/placed.h"
 
 namespace forest::scene {
 namespace {
@@ -51,6 +52,8 @@ struct Forest::Data {
   circuit::Circuit circuit;
   circuit::NodeNames nodes;
   Bounds soma_bounds;
+  std::vector<Sphere> spheres;
+  Groves groves;
   std::uint64_t segment_total = 0, bytes = 0;
 
   template <class T>
@@ -70,6 +73,10 @@ std::span<const std::uint32_t> Forest::section_of_segment() const {
 }
 std::span<const SectionFacts> Forest::sections() const { return data_->as<SectionFacts>(Part::sections); }
 std::span<const reports::Place> Forest::places() const { return data_->as<reports::Place>(Part::places); }
+std::span<const Brick> Forest::bricks() const { return data_->as<Brick>(Part::bricks); }
+std::span<const frame::Owner> Forest::owners() const { return data_->as<frame::Owner>(Part::owners); }
+std::span<const Sphere> Forest::spheres() const { return data_->spheres; }
+const Groves& Forest::groves() const { return data_->groves; }
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
@@ -139,15 +146,15 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     throw InputError(name, 0, "has a damaged description" + again);
   }
   require(f.neurons().size() == data->circuit.morphologies.size() &&
-              f.places().size() == f.segments().size() && f.types().size() == f.instances().size() &&
-              f.layers().size() == f.instances().size(),
+              f.places().size() + f.owners().size() == f.segments().size() &&
+              f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
           wrong);
   const auto clusters = f.clusters();
   parallel_for(clusters.size(), 1024, [&](std::size_t own) {
     const Cluster& c = clusters[own];
     require(c.segment_count <= frame::cluster_size &&
-                within(c.first_segment, c.segment_count, f.segments().size()) &&
-                within(c.leaf_first, c.leaf_count, f.segments().size()),
+                within(c.first_segment, c.segment_count, f.places().size()) &&
+                within(c.leaf_first, c.leaf_count, f.places().size()),
             wrong);
     for (const auto child : c.children)  // children come later, so a walk ends
       require(c.is_leaf() ? child == 0 : child > own && child < clusters.size(), wrong);
@@ -160,7 +167,7 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
                 n.first_original == before.first_original + before.original_count &&
                 n.first_section == before.first_section + before.section_count &&
                 within(n.first_cluster, n.cluster_count, clusters.size()) &&
-                within(n.first_segment, n.original_count, f.segments().size()) &&
+                within(n.first_segment, n.original_count, f.places().size()) &&
                 within(n.first_original, n.original_count, f.section_of_segment().size()) &&
                 within(n.first_section, n.section_count, f.sections().size()) && std::isfinite(n.soma_radius),
             wrong);
@@ -189,6 +196,28 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     data->soma_bounds.add({instance.x, instance.y, instance.z});
     data->segment_total += f.neurons()[instance.morphology].original_count;
   }
+  const auto bricks = f.bricks();
+  parallel_for(bricks.size(), 1024, [&](std::size_t own) {
+    const Brick& b = bricks[own];
+    require(b.segment_count <= Brick::straws && b.first_segment >= f.places().size() &&
+                within(b.first_segment, b.segment_count, f.segments().size()) &&
+                within(b.first_child, b.child_count, bricks.size()) &&
+                (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
+                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) &&
+                b.radius >= 0.f && b.width > 0.f && b.length > 0.f,
+            wrong);
+  });
+  parallel_for(f.owners().size(), 4096, [&](std::size_t i) {
+    require(f.owners()[i].instance < f.instances().size() && f.owners()[i].segment < f.places().size(),
+            wrong);
+  });
+  data->spheres.resize(f.instances().size());
+  parallel_for(f.instances().size(), 1024, [&](std::size_t i) {
+    const Placed placed(f.instances()[i]);
+    const Neuron& n = f.neurons()[f.instances()[i].morphology];
+    data->spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
+  });
+  data->groves = Groves(data->spheres);
   circuit::NodeNames& nodes = data->nodes;
   if (nodes.runs.empty()) nodes = {{data->circuit.name}, {{0, 0, 0, std::uint32_t(f.instances().size())}}};
   std::uint64_t named = 0;

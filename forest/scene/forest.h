@@ -15,7 +15,9 @@
 #include "forest/core/progress.h"
 #include "forest/frame/frame.h"
 #include "forest/morphology/morphology.h"
+#include "forest/scene/brick.h"
 #include "forest/scene/cluster.h"
+#include "forest/scene/grove.h"
 
 namespace forest::scene {
 
@@ -76,17 +78,22 @@ class Forest {
   std::span<const Neuron> neurons() const;
   std::span<const std::uint32_t> section_of_segment() const;
   std::span<const SectionFacts> sections() const;
-  std::span<const reports::Place> places() const;  // of every segment: the middle of what it stands for
-  std::span<const std::uint32_t> types() const;    // of every instance: index in circuit().types
-  std::span<const std::uint32_t> layers() const;   // of every instance: index in circuit().layers
+  std::span<const reports::Place> places()
+      const;  // of every segment that is no straw: the middle of what it stands for
+  std::span<const Brick> bricks() const;  // the one around all first; none in a forest without branches
+  std::span<const frame::Owner> owners() const;   // of the straws, which are the last segments
+  std::span<const std::uint32_t> types() const;   // of every instance: index in circuit().types
+  std::span<const std::uint32_t> layers() const;  // of every instance: index in circuit().layers
 
   /// Names, types, layers and radius; its instances are left empty, they are above.
   const circuit::Circuit& circuit() const;
   const circuit::NodeNames& nodes() const;  // of all instances, in their order
   const Bounds& soma_bounds() const;        // of all soma centres
+  std::span<const Sphere> spheres() const;  // of every instance: around all that belongs to it
+  const Groves& groves() const;             // of these spheres
   std::uint64_t segment_total() const;      // original segments of all instances, as if each were stored
   std::uint64_t bytes() const;              // of the file
-  frame::Geometry geometry() const { return {segments(), instances()}; }
+  frame::Geometry geometry() const { return {segments(), instances(), owners()}; }
 
  private:
   struct Data;

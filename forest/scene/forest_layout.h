@@ -14,7 +14,7 @@ static_assert(std::endian::native == std::endian::little,
               "the forest file is little-endian, as the graphics card is");
 
 inline constexpr std::array<char, 8> magic{'B', 'F', 'O', 'R', 'E', 'S', 'T', '\n'};
-inline constexpr std::uint32_t version = 3;
+inline constexpr std::uint32_t version = 4;
 inline constexpr std::size_t alignment = 64;
 
 // In the order of the file.
@@ -29,6 +29,8 @@ enum Part : std::uint32_t {
   layers,
   text,
   places,
+  bricks,
+  owners,
   part_count
 };
 inline constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment),
@@ -40,7 +42,9 @@ inline constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(fram
                                                                      4,
                                                                      4,
                                                                      1,
-                                                                     sizeof(reports::Place)};
+                                                                     sizeof(reports::Place),
+                                                                     sizeof(Brick),
+                                                                     sizeof(frame::Owner)};
 
 struct Entry {
   std::uint32_t part, element_size;

@@ -56,10 +56,13 @@ std::vector<SectionFacts> facts_of(const Morphology& m) {
   return facts;
 }
 
+constexpr std::size_t pieces_in_all = 1 << 20;  // 40 MB stay in memory until all neurons are known
+
 /// One neuron on its way: all that is said of it, numbers counted from its own beginning.
 struct Made {
   ClusterTree tree;
   std::vector<SectionFacts> facts;
+  Pieces pieces;
 };
 
 /// Where the file goes: into memory or on a disk.
@@ -150,20 +153,28 @@ class Packer {
     add(Part::sections, made.facts);
     add(Part::places, tree.places);
     originals_.push_back(n.original_count);
+    first_segments_.push_back(n.first_segment);
+    pieces_.push_back(std::move(made.pieces));
   }
 
   PackFigures finish(const circuit::Circuit& c, const circuit::NodeNames& nodes) {
     PackFigures figures;
     for (const std::uint32_t count : originals_) figures.segments += count;
+    std::vector<frame::Instance> instances;
+    instances.reserve(c.instances.size());
     for (const circuit::Instance& i : c.instances) {
       const Quat q = i.orientation;
-      const frame::Instance instance{i.position.x(), i.position.y(), i.position.z(), i.morphology,
-                                     q.x(),          q.y(),          q.z(),          q.w()};
-      add(Part::instances, instance);
+      instances.push_back(
+          {i.position.x(), i.position.y(), i.position.z(), i.morphology, q.x(), q.y(), q.z(), q.w()});
       add(Part::types, i.type);
       add(Part::layers, i.layer);
       figures.segment_total += originals_[i.morphology];
     }
+    const Bricks bricks = build_bricks(instances, pieces_, first_segments_, next(Part::segments));
+    add(Part::instances, instances);
+    add(Part::segments, bricks.straws);
+    add(Part::bricks, bricks.bricks);
+    add(Part::owners, bricks.owners);
     const std::string description = describe(c, nodes);
     add(Part::text, description);
     for (std::uint32_t p = 0; p < part_count; ++p) {
@@ -208,7 +219,9 @@ class Packer {
   std::array<std::uint64_t, part_count> offsets_{}, counts_{};
   std::array<BlockHash, part_count> hashes_;
   std::array<Waiting, part_count> waiting_;
-  std::vector<std::uint32_t> originals_;  // how many original segments each neuron has
+  std::vector<std::uint32_t> originals_,
+      first_segments_;  // how many original segments each neuron has, and which
+  std::vector<Pieces> pieces_;
 };
 
 PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource& source, Progress& progress,
@@ -216,11 +229,19 @@ PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource
   circuit::check(c);
   progress.begin("packing", c.morphologies.size());
   Packer packer(out);
+  const std::size_t pieces =
+      std::clamp<std::size_t>(pieces_in_all / std::max<std::size_t>(c.morphologies.size(), 1), 16, 256);
   parallel_in_order(
       c.morphologies.size(),
       [&](std::size_t i) {
         const Morphology m = source(i);
-        return Made{build_clusters(m), facts_of(m)};
+        Made made{build_clusters(m), facts_of(m), {}};
+        made.pieces = pieces_of(std::span(made.tree.segments).first(made.tree.original_count), pieces);
+        if (!made.tree.clusters.empty()) {
+          const Cluster& root = made.tree.clusters.front();
+          made.pieces.sphere = {{root.x, root.y, root.z}, root.radius};
+        }
+        return made;
       },
       [&](std::size_t, Made made) {
         packer.add(std::move(made));

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 
 #include "forest/core/clones.h"
 #include "forest/core/parallel.h"
@@ -11,6 +12,7 @@ namespace forest::scene {
 namespace {
 
 constexpr std::uint32_t coarsest = 8;
+constexpr std::uint32_t coarse_samples = 4;
 constexpr float fade = .2f;  // of the eccentricity at which a layer ends: how far it reaches into the next
 constexpr float least_fade = .5f;  // degrees
 constexpr float margin = 6.f;      // pixels of a layer around what is shown of it: rims look two pixels far
@@ -66,10 +68,12 @@ frame::Area hole_of(const Gaze& gaze, float eccentricity, const Layer& layer, fl
           bound(high.x(), width, layer.width), bound(high.y(), height, layer.height)};
 }
 
+constexpr std::uint8_t whole_share = 128;  // of what is mixed
+
 // How columns (or rows) of the picture lie between those of a layer.
 struct Between {
   std::vector<std::uint32_t> first;  // of two neighbours
-  std::vector<float> share;          // of the second
+  std::vector<std::uint8_t> share;   // of the second
   Between(std::uint32_t size, const Layer& layer, std::uint32_t layer_size, std::uint32_t low,
           std::uint32_t high)
       : first(size), share(size) {
@@ -77,20 +81,40 @@ struct Between {
       const float at = std::clamp(in_layer(float(i) + .5f, float(size), float(layer_size), layer.scale) - .5f,
                                   float(low), std::max(float(low), float(high) - 1.f));
       first[i] = std::min(std::uint32_t(at), std::max(low, high >= 2 ? high - 2 : 0));
-      share[i] = std::clamp(at - float(first[i]), 0.f, 1.f);
+      share[i] = std::uint8_t(std::clamp(at - float(first[i]), 0.f, 1.f) * float(whole_share) + .5f);
     }
   }
 };
 
-using Colour = Eigen::Array4f;
-
-// a + share × (b - a), byte by byte; and back to bytes. Flat loops become vector instructions.
-FOREST_CLONES void mix(const std::uint8_t* a, const std::uint8_t* b, float share, std::size_t count,
-                       float* out) {
-  for (std::size_t i = 0; i < count; ++i) out[i] = float(a[i]) + share * (float(b[i]) - float(a[i]));
+// a + share × (b - a), byte by byte: of all the same share, or of each its own. Flat loops become vector instructions.
+FOREST_CLONES void mix(const std::uint8_t* a, const std::uint8_t* b, std::uint8_t share, std::size_t count,
+                       std::uint8_t* out) {
+  const auto other = std::uint16_t(whole_share - share);
+  for (std::size_t i = 0; i < count; ++i)
+    out[i] = std::uint8_t(std::uint16_t(a[i] * other + b[i] * share + whole_share / 2) / whole_share);
 }
-FOREST_CLONES void to_bytes(const float* from, std::size_t count, std::uint8_t* out) {
-  for (std::size_t i = 0; i < count; ++i) out[i] = std::uint8_t(std::int32_t(from[i] + .5f));
+FOREST_CLONES void mix(const std::uint8_t* a, const std::uint8_t* b, const std::uint8_t* shares,
+                       std::size_t count, std::uint8_t* out) {
+  for (std::size_t i = 0; i < count; ++i)
+    out[i] = std::uint8_t(
+        std::uint16_t(a[i] * std::uint16_t(whole_share - shares[i]) + b[i] * shares[i] + whole_share / 2) /
+        whole_share);
+}
+
+// How much shows of a layer that fades between two cosines of the eccentricity, at pixels of a row: `way` leads to the first of them,
+// the next are one farther to the right each. Four bytes a pixel.
+FOREST_CLONES void shares_of(const Vec3& way, const Vec3& ahead, float none, float full, std::size_t count,
+                             std::uint8_t* out) {
+  const float x = way.x(), side = way.y() * way.y() + way.z() * way.z(),
+              along = way.y() * ahead.y() + way.z() * ahead.z(), ahead_x = ahead.x();
+  const float scale = float(whole_share) / (full - none);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float at = x + float(std::int32_t(i));
+    const float share = ((at * ahead_x + along) / std::sqrt(at * at + side) - none) * scale;
+    const float within = share < 0.f ? 0.f : share > float(whole_share) ? float(whole_share) : share;
+    const auto all = std::uint32_t(std::int32_t(within + .5f)) * 0x01010101u;
+    std::memcpy(out + 4 * i, &all, 4);
+  }
 }
 
 }  // namespace
@@ -147,13 +171,24 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
 
 Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
+  detail.fog = view.fog;
   detail.thinnest = thinnest_of(view);
   detail.area = layer.area;
+  if (layer.hole != frame::Area{}) detail.hole = layer.hole;
   if (detail.gaze)
     detail.gaze =
         Vec2(in_layer(detail.gaze->x() * float(width), float(width), float(layer.width), layer.scale),
              in_layer(detail.gaze->y() * float(height), float(height), float(layer.height), layer.scale));
   return detail;
+}
+
+View view_for(const View& view, const Layer& layer) {
+  View shown = view;
+  if (layer.scale <= 1.f) return shown;
+  shown.halo /= layer.scale;
+  shown.detail.thinnest = thinnest_of(view);
+  if (shown.samples == 1) shown.samples = coarse_samples;
+  return shown;
 }
 
 void unite(const View& view, std::span<const Layer> layers, std::span<const frame::Image* const> pictures,
@@ -162,11 +197,13 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
   whole.pixels.resize(std::size_t(width) * height * 4);
   whole.covered = pictures.back()->covered;
   const Gaze gaze(view.camera, {float(width), float(height)}, detail_for(view, width, height));
+  // Of the picture, what shows anything of a layer, and how.
   struct Source {
     const frame::Image& picture;
     Between columns, rows;
-    std::uint32_t left, right, top, bottom;  // of the picture
-    float full, none;                        // cosines of the eccentricities between which it fades
+    std::vector<std::uint8_t> shares;  // of the columns, four a pixel
+    std::uint32_t left, right, top, bottom;
+    float full, none;  // cosines of the eccentricities between which it fades
   };
   std::vector<Source> sources;
   for (std::size_t i = layers.size(); i-- > 0;) {  // the coarsest first, the others over it
@@ -174,49 +211,59 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
     const frame::Area& a = layer.area;
     const frame::Area part = std::isinf(layer.gone) ? frame::Area{0, 0, width, height}
                                                     : within(gaze, layer.gone, float(width), float(height));
+    if (part.left >= part.right || part.top >= part.bottom) continue;
     const auto cosine = [](float eccentricity) {
       return std::isinf(eccentricity) ? -2.f : std::cos(radians(std::min(eccentricity, 179.f)));
     };
-    sources.push_back({*pictures[i], Between(width, layer, layer.width, a.left, a.right),
-                       Between(height, layer, layer.height, a.top, a.bottom), part.left, part.right, part.top,
-                       part.bottom, cosine(layer.until), cosine(layer.gone)});
+    Source& s = sources.emplace_back(Source{*pictures[i],
+                                            Between(width, layer, layer.width, a.left, a.right),
+                                            Between(height, layer, layer.height, a.top, a.bottom),
+                                            {},
+                                            part.left,
+                                            part.right,
+                                            part.top,
+                                            part.bottom,
+                                            cosine(layer.until),
+                                            cosine(layer.gone)});
+    for (const std::uint8_t share : s.columns.share) s.shares.insert(s.shares.end(), 4, share);
   }
   const Vec3 ahead = gaze.direction();
   parallel_ranges(height, rows_at_once, [&](std::size_t begin, std::size_t end) {
-    std::vector<Colour> row(width), mixed;
+    // A row of a layer, its pixels that are the neighbours of the picture's, those mixed, and how much of each shows.
+    std::vector<std::uint8_t> mixed, shares(4 * std::size_t(width)), colours(4 * std::size_t(width));
+    std::vector<std::uint32_t> lefts(width), rights(width);
+    const auto bytes = [](const std::vector<std::uint32_t>& pixels) {
+      return reinterpret_cast<const std::uint8_t*>(pixels.data());
+    };
     for (std::size_t y = begin; y < end; ++y) {
+      std::uint8_t* row = &whole.pixels[4 * y * width];
       for (const Source& s : sources) {
-        if (y < s.top || y >= s.bottom || s.left >= s.right) continue;
+        if (y < s.top || y >= s.bottom) continue;
+        const std::size_t count = s.right - s.left;
         // The layer's two rows mixed, then its columns.
         const std::uint32_t first = s.columns.first[s.left],
                             last = std::min(s.columns.first[s.right - 1] + 2, s.picture.width);
-        mixed.resize(s.picture.width);
+        mixed.resize(4 * std::size_t(last - first));
         const std::size_t upper = s.rows.first[y],
                           lower = std::min<std::size_t>(upper + 1, s.picture.height - 1);
-        const float down = s.rows.share[y];
-        const std::uint8_t* source = s.picture.pixels.data();
         const std::size_t pitch = 4 * std::size_t(s.picture.width);
-        mix(source + upper * pitch + 4 * first, source + lower * pitch + 4 * first, down, 4 * (last - first),
-            mixed[first].data());
-        const Vec3 middle = gaze.way_to({.5f * float(s.left + s.right), float(y) + .5f});
-        const auto colour_at = [&](std::uint32_t x) -> Colour {
-          const std::uint32_t i = s.columns.first[x];
-          const Colour a = mixed[i], b = mixed[std::min(i + 1, last - 1)];
-          return a + s.columns.share[x] * (b - a);
-        };
-        if (s.none < -1.f) {
-          for (std::uint32_t x = s.left; x < s.right; ++x) row[x] = colour_at(x);
-          continue;
+        const std::uint8_t* source = s.picture.pixels.data() + 4 * std::size_t(first);
+        mix(source + upper * pitch, source + lower * pitch, s.rows.share[y], mixed.size(), mixed.data());
+        const std::uint32_t* columns = &s.columns.first[s.left];
+        for (std::size_t i = 0; i < count; ++i) {
+          const std::size_t at = columns[i] - first, next = std::min<std::size_t>(at + 1, last - first - 1);
+          std::memcpy(&lefts[i], &mixed[4 * at], 4);
+          std::memcpy(&rights[i], &mixed[4 * next], 4);
         }
-        const float from = float(s.left + s.right) * .5f - .5f;
-        for (std::uint32_t x = s.left; x < s.right; ++x) {
-          const Vec3 way(middle.x() + float(x) - from, middle.y(), middle.z());
-          const float cosine = way.dot(ahead) / way.norm();
-          const float share = std::clamp((cosine - s.none) / (s.full - s.none), 0.f, 1.f);
-          if (share > 0.f) row[x] += share * (colour_at(x) - row[x]);
-        }
+        std::uint8_t* to = row + 4 * std::size_t(s.left);
+        const bool fades = s.none >= -1.f;
+        mix(bytes(lefts), bytes(rights), &s.shares[4 * std::size_t(s.left)], 4 * count,
+            fades ? colours.data() : to);
+        if (!fades) continue;
+        shares_of(gaze.way_to({float(s.left) + .5f, float(y) + .5f}), ahead, s.none, s.full, count,
+                  shares.data());
+        mix(to, colours.data(), shares.data(), 4 * count, to);
       }
-      to_bytes(row[0].data(), 4 * std::size_t(width), &whole.pixels[4 * y * width]);
     }
   });
 }

@@ -28,6 +28,10 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
 /// The view's detail for drawing a layer: the gaze in its pixels, and only its area.
 Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std::uint32_t height);
 
+/// The view as a layer shows it. Rims around nearer branches measure some of its pixels, so they are as much weaker as those are larger,
+/// and the picture is as bright; and where a moving picture has one sample a pixel, large pixels have four, lest they are seen as squares.
+View view_for(const View& view, const Layer& layer);
+
 /// One picture of the layers' pictures, bilinearly enlarged. Up to the first layer's `until` it is that layer, pixel by pixel.
 void unite(const View& view, std::span<const Layer> layers, std::span<const frame::Image* const> pictures,
            std::uint32_t width, std::uint32_t height, frame::Image& whole);

@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/fovea.h"
 
+#include <bit>
+#include <set>
+
 #include <gtest/gtest.h>
 
 #include "forest/core/random.h"
+#include "forest/scene/path.h"
 
 #include "tests/sample_forest.h"
 
@@ -129,6 +133,21 @@ TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
     }
 }
 
+TEST(Layers, WithLargerPixelsHaveWeakerRimsAndMoreThanOneSample) {
+  View view = view_with_gaze({.5f, .5f});
+  view.halo = .8f;
+  for (const std::uint32_t samples : {1u, 16u}) {
+    view.samples = samples;
+    for (const Layer& layer : layers_of(view, width, height)) {
+      const View shown = view_for(view, layer);
+      EXPECT_NEAR(shown.halo * layer.scale, .8f, 1e-5f);
+      EXPECT_EQ(shown.samples, samples > 1 ? samples : layer.scale > 1.f ? 4u : 1u);
+      EXPECT_EQ(thinnest_of(shown), thinnest_of(view));  // as many branches, however many samples
+      EXPECT_EQ(shown.camera, view.camera);
+    }
+  }
+}
+
 TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
   const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(), testing::sample_neurons()));
   View view = overview(forest);
@@ -144,7 +163,21 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
   EXPECT_LT(fine.segments, all.segments);
   const Gaze gaze(view.camera, viewport, detail_for(view, width, height));
   std::size_t looked_at = 0;
+  const auto straws_looked_at = [&](const Cut& cut) {
+    std::set<std::uint32_t> straws;
+    for (const frame::Item& item : cut.lines)
+      for (std::uint32_t rest = item.instance == FOREST_IN_WORLD ? item.drawn : 0; rest; rest &= rest - 1) {
+        const std::uint32_t number = item.first_segment + std::uint32_t(std::countr_zero(rest));
+        const frame::Segment& s = forest.segments()[number];
+        const Vec3 at =
+            frame::project(view.camera, viewport, .5f * (Vec3(s.ax, s.ay, s.az) + Vec3(s.bx, s.by, s.bz)));
+        if (gaze.eccentricity(at.head<2>()) <= view.detail.fovea) straws.insert(number);
+      }
+    return straws;
+  };
+  EXPECT_EQ(straws_looked_at(fine), straws_looked_at(all));
   for (const frame::Item& item : all.lines) {
+    if (item.instance == FOREST_IN_WORLD) continue;
     const Vec3 at = frame::project(view.camera, viewport, {item.x, item.y, item.z});
     if (gaze.eccentricity(at.head<2>()) > view.detail.fovea) continue;
     ++looked_at;
@@ -153,7 +186,95 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
              other.drawn == item.drawn;
     }));
   }
-  EXPECT_GT(looked_at, 5u);
+  EXPECT_GT(looked_at + straws_looked_at(all).size(), 5u);
+}
+
+TEST(Layers, ChosenTogetherAreWhatEachChoosesAlone) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(200), testing::sample_neurons()));
+  const CameraPath path = walk(forest);
+  for (const float t : {0.f, .5f, .9f}) {
+    SCOPED_TRACE(t);
+    View view = path.at(t);
+    view.detail.gaze = Vec2(.4f, .6f);
+    view.samples = 1;
+    std::vector<Eye> eyes;
+    std::vector<Sight> sights;
+    for (const Layer& layer : layers_of(view, width, height))
+      eyes.emplace_back(view.camera, frame::Viewport{float(layer.width), float(layer.height)},
+                        detail_for(view, layer, width, height));
+    ASSERT_GT(eyes.size(), 2u);
+    for (const Eye& eye : eyes) sights.push_back({eye});
+    const std::vector<Cut> together = choose(forest, sights);
+    ASSERT_EQ(together.size(), eyes.size());
+    for (std::size_t i = 0; i < eyes.size(); ++i) {
+      const Cut alone = choose(forest, eyes[i], {});
+      const auto same = [](const std::vector<frame::Item>& a, const std::vector<frame::Item>& b) {
+        return std::ranges::equal(a, b, [](const frame::Item& x, const frame::Item& y) {
+          return x.instance == y.instance && x.first_segment == y.first_segment && x.drawn == y.drawn;
+        });
+      };
+      EXPECT_TRUE(same(together[i].dots, alone.dots));
+      EXPECT_TRUE(same(together[i].lines, alone.lines));
+      EXPECT_TRUE(same(together[i].capsules, alone.capsules));
+      EXPECT_EQ(together[i].segments, alone.segments);
+      EXPECT_EQ(together[i].neurons, alone.neurons);
+      EXPECT_EQ(together[i].bands.size(), alone.bands.size());
+    }
+  }
+}
+
+// What an eye sees of a sphere: all of it within its reach, and nothing that the planes of the frustum exclude.
+TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
+  Random random(4);
+  const auto any = [&](double most) {
+    return Vec3(float(random.uniform(-most, most)), float(random.uniform(-most, most)),
+                float(random.uniform(-most, most)));
+  };
+  const frame::Viewport viewport{640.f, 360.f};
+  for (int i = 0; i < 400; ++i) {
+    frame::Camera camera{.eye = any(50.), .target = any(50.)};
+    if (i % 2) camera.projection = frame::Projection::orthographic;
+    Detail detail;
+    detail.area = frame::Area{200, 50, 500, 250};
+    if (i % 3) detail.hole = frame::Area{300, 100, 400, 200};
+    const Eye eye(camera, viewport, detail);
+    const Sphere sphere{any(100.), float(random.uniform(.1, 20.))};
+    const Seen seen = eye.see(sphere);
+    const float focal = camera.focal(viewport.height);
+    bool wanted = false;
+    for (int k = 0; k < 60; ++k) {
+      const Vec3 point = sphere.centre + sphere.radius * any(1.).normalized();
+      const Vec3 pixel = frame::project(camera, viewport, point);
+      if (pixel.z() < camera.near) continue;
+      if (seen.known) {
+        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(),
+                  1.001f * focal * seen.reach + .01f);
+        EXPECT_GE(pixel.z(), seen.nearest - 1e-3f);
+      }
+      const auto in = [&](const frame::Area& a) {
+        return pixel.x() >= float(a.left) && pixel.x() < float(a.right) && pixel.y() >= float(a.top) &&
+               pixel.y() < float(a.bottom);
+      };
+      wanted |= in(*detail.area) && !(detail.hole && in(*detail.hole));
+    }
+    if (wanted) {
+      EXPECT_TRUE(eye.may_see(seen));
+    }
+    if (eye.may_see(seen)) {
+      EXPECT_TRUE(frame::Frustum(camera, viewport, *detail.area)
+                      .may_see({sphere.centre, 1.001f * sphere.radius + .01f}));
+    }
+  }
+}
+
+TEST(Eye, WantsNothingOfTheHole) {
+  Detail detail;
+  detail.hole = frame::Area{300, 160, 340, 200};
+  const Eye eye({.eye = {0, 0, 0}, .target = {0, 0, -1}}, {640.f, 360.f}, detail);
+  EXPECT_FALSE(eye.may_see(eye.see({{0, 0, -100}, .5f})));
+  EXPECT_TRUE(eye.may_see(eye.see({{0, 0, -100}, 20.f})));
+  EXPECT_TRUE(eye.may_see(eye.see({{10, 0, -100}, .5f})));
+  EXPECT_TRUE(eye.may_see(eye.see({{0, 0, 0}, .5f})));  // around the eye: anywhere
 }
 
 }  // namespace

@@ -44,28 +44,45 @@ Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Det
       detail_(detail),
       frustum_(detail.area ? frame::Frustum(camera, viewport, *detail.area)
                            : frame::Frustum(camera, viewport)),
-      axes_(camera.axes()),
+      viewer_(camera),
       focal_(camera.focal(viewport.height)),
       middle_(.5f * viewport.width, .5f * viewport.height),
-      gaze_(camera, viewport, detail) {}
-
-float Eye::nearest_depth(const Sphere& sphere) const {
-  const float depth = -axes_.col(2).dot(sphere.centre - camera_.eye);
-  return std::max(depth - sphere.radius, camera_.near);
+      gaze_(camera, viewport, detail),
+      most_acceptable_(detail.error) {
+  const frame::Area& area =
+      detail.area.value_or(frame::Area{0, 0, std::uint32_t(viewport.width), std::uint32_t(viewport.height)});
+  const Vec2 low(float(area.left), float(area.top)), high(float(area.right), float(area.bottom));
+  low_ = (low - middle_) / focal_, high_ = (high - middle_) / focal_;
+  const auto length = [&](float slope) {
+    return camera.orthographic() ? 1.f : std::sqrt(1.f + slope * slope);
+  };
+  low_length_ = low_.unaryExpr(length), high_length_ = high_.unaryExpr(length);
+  if (!detail.gaze) return;
+  for (const Vec2& corner : {low, high, Vec2(low.x(), high.y()), Vec2(high.x(), low.y())})
+    most_acceptable_ =
+        std::max(most_acceptable_, detail.error * gaze_.resolved(gaze_.eccentricity(corner), detail));
 }
 
-float Eye::acceptable(const Sphere& sphere) const {
-  if (!detail_.gaze) return detail_.error;
-  const Vec3 p = axes_.transpose() * (sphere.centre - camera_.eye);
-  const float depth = -p.z(), nearest = depth - sphere.radius;
-  float scale = focal_, reach = focal_ * sphere.radius;
-  if (!camera_.orthographic()) {
-    if (!(nearest > camera_.near)) return detail_.error;
-    scale /= depth;
-    reach *= p.norm() / (depth * nearest);  // as scene/occlusion.cpp
-  }
+bool Eye::may_see(const Seen& seen) const {
+  // Distances from the planes through the borders of what is wanted, as in frame::Frustum.
+  const float across = camera_.orthographic() ? 1.f : seen.at.z();
+  const Vec2 at(seen.at.x(), -seen.at.y());
+  if (!(seen.at.z() >= -seen.radius &&
+        ((at - across * low_).array() >= -seen.radius * low_length_.array()).all() &&
+        ((across * high_ - at).array() >= -seen.radius * high_length_.array()).all()))
+    return false;
+  if (!detail_.hole || !seen.known) return true;
+  const frame::Area& hole = *detail_.hole;
+  const Vec2 place = middle_ + focal_ * seen.place;
+  const float reach = focal_ * seen.reach + margin;
+  return !(place.x() - reach >= float(hole.left) && place.y() - reach >= float(hole.top) &&
+           place.x() + reach <= float(hole.right) && place.y() + reach <= float(hole.bottom));
+}
+
+float Eye::acceptable(const Seen& seen) const {
+  if (!detail_.gaze || !seen.known) return detail_.error;
   const float eccentricity =
-      gaze_.eccentricity(middle_ + Vec2(scale * p.x(), -scale * p.y())) - gaze_.angle(reach + margin);
+      gaze_.eccentricity(middle_ + focal_ * seen.place) - gaze_.angle(focal_ * seen.reach + margin);
   if (eccentricity <= detail_.fovea) return detail_.error;
   return detail_.error * std::max(1.f, gaze_.resolved(eccentricity, detail_));
 }
@@ -87,7 +104,8 @@ void Budget::took(double milliseconds) {
     samples_ = one ? many : 1, error_ = one ? most_of_many(worst_) : 1.f, agreed_ = 0;
     return;
   }
-  const double ratio = std::clamp(milliseconds / milliseconds_, .5, 2.);
+  const double ratio =
+      std::clamp(milliseconds / milliseconds_, .5, 16.);  // the first picture of a large forest may take long
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), least, most);
 }
 

@@ -3,9 +3,11 @@
 #pragma once
 
 #include <algorithm>
+#include <cmath>
 #include <optional>
 
 #include "forest/frame/camera.h"
+#include "forest/scene/seen.h"
 
 namespace forest::scene {
 
@@ -20,11 +22,26 @@ struct Detail {
   float screen =
       0.f;  // degrees that the picture's height takes in the viewer's sight; 0: as many as the field of view
   std::optional<frame::Area> area = {};  // only these pixels are wanted; none: all
-  float surface_width =
-      3.f;  // branches wider than this many pixels are drawn as capsules, thinner ones as lines
+  std::optional<frame::Area> hole = {};  // … and of them not these
+  // Branches wider than this many pixels are drawn as capsules, thinner ones as lines. Pixels at the gaze: elsewhere as many times
+  // more as the acceptable error is.
+  float surface_width = 3.f;
   // Branches thinner than this many pixels are drawn as wide, as many of them as cover the same area: whole branches stand
   // for their like. 0: all are drawn as they are. A picture of one sample cannot draw less than a pixel.
   float thinnest = 0.f;
+  float fog =
+      0.f;  // strength of the depth cue, as View::fog: what is seen through it may be wrong by more; 0: none
+};
+
+/// What depth takes away: light falls to 1 / e over `length` from `start` on; µm along the view.
+struct Fog {
+  float start = 0.f, length = INFINITY;
+
+  /// Beyond this less than a grey level of 255 is left of anything, on the darkest background.
+  float end() const { return start + 7.f * length; }
+  /// How many times larger an error may be that is seen through it: contrast counts as its root, and no error as four times
+  /// what it is.
+  float forgives(float depth) const { return std::clamp(std::exp(.5f * (depth - start) / length), 1.f, 4.f); }
 };
 
 /// Where somebody looks on a flat screen, and how far beside it things are seen. Degrees are those of the viewer, whose sight
@@ -66,27 +83,47 @@ class Eye {
   const Detail& detail() const { return detail_; }
   const frame::Frustum& frustum() const { return frustum_; }  // of what is wanted of the picture
 
+  /// The same for all eyes whose cameras are the same, whatever the size of their pictures.
+  Seen see(const Sphere& sphere) const { return viewer_(sphere); }
+  /// Whether anything of it may be in what is wanted of the picture.
+  bool may_see(const Seen& seen) const;
+
   /// Depth along the view of the nearest point of a sphere, never less than the near distance, µm.
-  float nearest_depth(const Sphere& sphere) const;
+  float nearest_depth(const Sphere& sphere) const { return nearest_depth(see(sphere)); }
+  float nearest_depth(const Seen& seen) const { return std::max(seen.nearest, camera_.near); }
   /// Pixels that a length of 1 µm covers at the nearest point of the sphere.
-  float magnification(const Sphere& sphere) const {
-    return camera_.orthographic() ? focal_ : focal_ / nearest_depth(sphere);
+  float magnification(const Sphere& sphere) const { return magnification(see(sphere)); }
+  float magnification(const Seen& seen) const {
+    return camera_.orthographic() ? focal_ : focal_ / nearest_depth(seen);
   }
   /// Acceptable error in pixels for what lies within the sphere: that of its point nearest to the gaze.
-  float acceptable(const Sphere& sphere) const;
+  float acceptable(const Sphere& sphere) const { return acceptable(see(sphere)); }
+  float acceptable(const Seen& seen) const;
   /// Whether something in `sphere`, wrong by `error` µm, may be shown so.
-  bool good_enough(const Sphere& sphere, float error) const {
-    return error * magnification(sphere) <= acceptable(sphere);
+  bool good_enough(const Sphere& sphere, float error) const { return good_enough(see(sphere), error); }
+  bool good_enough(const Seen& seen, float error) const {
+    const float wrong = error * magnification(seen);
+    // Most are by far good enough, or are not anywhere.
+    return wrong <= detail_.error || (wrong <= most_acceptable_ && wrong <= acceptable(seen));
+  }
+  /// Whether branches of this radius, µm, are so thin there that they are drawn as lines.
+  bool thin(const Seen& seen, float radius) const {
+    const float width = 2.f * radius * magnification(seen), wrong = width / detail_.surface_width;
+    return wrong <= 1.f ||
+           (wrong * detail_.error <= most_acceptable_ && wrong * detail_.error <= acceptable(seen));
   }
 
  private:
   frame::Camera camera_;
   Detail detail_;
   frame::Frustum frustum_;
-  Mat3 axes_;
+  Viewer viewer_;
   float focal_;
   Vec2 middle_;  // of the picture, pixels
+  // What is wanted, as Seen::place has it, and what the distances from its borders are to be divided by to be µm.
+  Vec2 low_, high_, low_length_, high_length_;
   Gaze gaze_;
+  float most_acceptable_;  // error anywhere in what is wanted, pixels
 };
 
 /// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as stills have
@@ -94,8 +131,12 @@ class Eye {
 /// ones smaller.
 class Budget {
  public:
+  /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
+  static constexpr double usual = 30.;
+
   /// @param worst  error that is accepted at most, pixels
-  explicit Budget(double milliseconds, float worst = 6.f) : milliseconds_(milliseconds), worst_(worst) {}
+  explicit Budget(double milliseconds = usual, float worst = 6.f)
+      : milliseconds_(milliseconds), worst_(worst) {}
   std::uint32_t samples() const { return samples_; }
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.

@@ -17,14 +17,10 @@ constexpr float tile = float(FOREST_TILE);
 Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport)
     : width_(map.width),
       height_(map.height),
-      eye_(camera.eye),
-      orthographic_(camera.orthographic()),
-      near_(camera.near),
+      viewer_(camera),
       focal_(camera.focal(viewport.height)),
-      centre_x_(.5f * viewport.width),
-      centre_y_(.5f * viewport.height) {
-  to_camera_ = camera.axes().transpose();
-  to_camera_.row(2) *= -1.f;
+      centre_x_(.5f * viewport.width - tile * float(map.left)),
+      centre_y_(.5f * viewport.height - tile * float(map.top)) {
   if (map.depths.empty()) return;
   squares_.push_back(map.depths);
   for (std::uint32_t side = 1; 2 * side <= std::min(width_, height_); side *= 2) {
@@ -63,16 +59,10 @@ float Occluders::farthest(std::uint32_t left, std::uint32_t top, std::uint32_t r
   }
 }
 
-bool Occluders::hide(const Sphere& sphere) const {
-  if (squares_.empty()) return false;
-  const Vec3 p = to_camera_ * (sphere.centre - eye_);
-  const float depth = p.z(), nearest = depth - sphere.radius;
-  if (!(nearest > near_)) return false;
-  // A point at distance r from the centre is seen at most f · r · |p| / (depth · nearest) beside it.
-  const float scale = orthographic_ ? focal_ : focal_ / depth;
-  const float spread = orthographic_ ? 1.f : std::sqrt(p.squaredNorm()) / nearest;
-  const float reach = scale * sphere.radius * spread + margin;
-  const float x = centre_x_ + scale * p.x(), y = centre_y_ - scale * p.y();
+bool Occluders::hide(const Seen& seen) const {
+  if (squares_.empty() || !seen.known) return false;
+  const float reach = focal_ * seen.reach + margin;
+  const float x = centre_x_ + focal_ * seen.place.x(), y = centre_y_ + focal_ * seen.place.y();
   const float wide = float(width_) * tile, high = float(height_) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;
   constexpr float tiles = 1.f / tile;
@@ -80,7 +70,7 @@ bool Occluders::hide(const Sphere& sphere) const {
              top = std::uint32_t(std::max(y - reach, 0.f) * tiles);
   const auto right = std::min(std::uint32_t(std::min(x + reach, wide) * tiles), width_ - 1),
              bottom = std::min(std::uint32_t(std::min(y + reach, high) * tiles), height_ - 1);
-  return farthest(left, top, right, bottom) * depth_step < nearest;
+  return farthest(left, top, right, bottom) * depth_step < seen.nearest;
 }
 
 }  // namespace forest::scene

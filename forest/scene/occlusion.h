@@ -4,8 +4,8 @@
 
 #include <vector>
 
-#include "forest/core/bounds.h"
 #include "forest/frame/frame.h"
+#include "forest/scene/seen.h"
 
 namespace forest::scene {
 
@@ -16,20 +16,20 @@ class Occluders {
   /// @param map  of a picture of that size, as the camera saw it
   Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport);
 
-  /// Whether everything within the sphere lies behind what the picture shows. False for what was beside the picture,
+  /// A sphere as that camera saw it.
+  Seen see(const Sphere& sphere) const { return viewer_(sphere); }
+  /// Whether everything within a sphere, seen by see(), lies behind what the picture shows. False for what was beside the picture,
   /// too near or in doubt: only true is certain.
-  bool hide(const Sphere& sphere) const;
+  bool hide(const Seen& seen) const;
 
  private:
   float farthest(std::uint32_t left, std::uint32_t top, std::uint32_t right, std::uint32_t bottom) const;
 
   std::uint32_t width_ = 0, height_ = 0;  // tiles
   std::vector<std::vector<float>>
-      squares_;     // of side 2^k, by their upper left tile; cut at the picture's edge
-  Mat3 to_camera_;  // rows: right, up, forward
-  Vec3 eye_;
-  bool orthographic_;
-  float near_, focal_, centre_x_, centre_y_;
+      squares_;  // of side 2^k, by their upper left tile; cut at the picture's edge
+  Viewer viewer_;
+  float focal_, centre_x_, centre_y_;  // the middle from the map's upper left corner, pixels
 };
 
 }  // namespace forest::scene

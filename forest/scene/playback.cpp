@@ -34,6 +34,21 @@ std::uint32_t end_of(const Forest& forest, const Neuron& n) {
   return end;
 }
 
+// Calls take(at, instance, first, count) for what an item draws: segments that follow one another, those between that are not
+// drawn too, of which the first is number `at` of the item; straws are of a neuron each, and have the colour of the segment
+// that they come from.
+void each_run(const frame::Geometry& geometry, const frame::Item& item, auto&& take) {
+  if (!geometry.straw(item)) {
+    take(0, item.instance, item.first_segment, std::uint32_t(std::bit_width(item.drawn)));
+    return;
+  }
+  for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1) {
+    const auto at = std::uint32_t(std::countr_zero(drawn));
+    const frame::Owner& owner = geometry.owner(item.first_segment + std::size_t(at));
+    take(at, owner.instance, owner.segment, 1);
+  }
+}
+
 // Whether segments [first, first + count) are among `size` of a shape that begins at `begin`.
 bool within(std::uint32_t first, std::uint32_t count, std::uint32_t begin, std::size_t size) {
   return first >= begin && std::size_t(first - begin) + count <= size;
@@ -187,13 +202,16 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   for (const std::uint32_t i : in_sight_) shown_[i] = {};
   in_sight_.clear();
   figures_ = {};
+  const frame::Geometry geometry = forest_.geometry();
   for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
     for (const frame::Item& item : *list) {
       figures_.segments += std::uint64_t(std::popcount(item.drawn));
-      if (Shown& s = shown_[item.instance]; !s.in_sight) {
-        s.in_sight = true;
-        in_sight_.push_back(item.instance);
-      }
+      each_run(geometry, item, [&](std::uint32_t, std::uint32_t instance, std::uint32_t, std::uint32_t) {
+        if (Shown& s = shown_[instance]; !s.in_sight) {
+          s.in_sight = true;
+          in_sight_.push_back(instance);
+        }
+      });
     }
   read(eye, options, step_at(time));
   find_spikes(time, view, options);
@@ -207,7 +225,10 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
     out.assign(list.size() * each, std::uint8_t(no_value_entry));
     parallel_ranges(list.size(), 512, [&](std::size_t from, std::size_t to) {
       for (std::size_t i = from; i < to; ++i)
-        paint(list[i], entry_of, view, time, options.window, &out[i * each]);
+        each_run(geometry, list[i],
+                 [&](std::uint32_t at, std::uint32_t instance, std::uint32_t first, std::uint32_t count) {
+                   paint(instance, first, count, entry_of, view, time, options.window, &out[i * each + at]);
+                 });
     });
   };
   paint_list(cut.dots, 1, entries.dots);
@@ -267,15 +288,14 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
   figures_.flashes = spikes_.size();
 }
 
-void Playback::paint(const frame::Item& item, const std::array<std::uint8_t, 256>& entry_of,
-                     const ActivityView& view, double time, double window, std::uint8_t* out) const {
-  const Shown& s = shown_[item.instance];
-  const Shape& shape = shapes_[forest_.instances()[item.instance].morphology];
-  const auto count =
-      std::uint32_t(std::bit_width(item.drawn));  // those between that are not drawn have entries, too
-  if (!within(item.first_segment, count, shape.first_segment, shape.distance.size())) return;
-  const std::size_t first = item.first_segment - shape.first_segment;
-  if (const std::uint32_t row = row_of_[item.instance]; row != none) {
+void Playback::paint(std::uint32_t instance, std::uint32_t first_segment, std::uint32_t count,
+                     const std::array<std::uint8_t, 256>& entry_of, const ActivityView& view, double time,
+                     double window, std::uint8_t* out) const {
+  const Shown& s = shown_[instance];
+  const Shape& shape = shapes_[forest_.instances()[instance].morphology];
+  if (!within(first_segment, count, shape.first_segment, shape.distance.size())) return;
+  const std::size_t first = first_segment - shape.first_segment;
+  if (const std::uint32_t row = row_of_[instance]; row != none) {
     const auto& value = tables_[activity_.rows()[row].layout].value[std::size_t(s.level)];
     for (std::uint32_t i = 0; i < count; ++i)
       if (const std::uint32_t v = value[first + i]; v != none) out[i] = entry_of[codes_[s.first + v]];

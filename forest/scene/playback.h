@@ -79,8 +79,10 @@ class Playback {
 
   void read(const Eye& eye, const PlaybackOptions& options, std::uint64_t step);
   void find_spikes(double time, const ActivityView& view, const PlaybackOptions& options);
-  void paint(const frame::Item& item, const std::array<std::uint8_t, 256>& entry_of, const ActivityView& view,
-             double time, double window, std::uint8_t* out) const;
+  /// Segments [first, first + count) of a neuron.
+  void paint(std::uint32_t instance, std::uint32_t first_segment, std::uint32_t count,
+             const std::array<std::uint8_t, 256>& entry_of, const ActivityView& view, double time,
+             double window, std::uint8_t* out) const;
 
   Forest forest_;
   reports::Activity activity_;

@@ -121,9 +121,16 @@ TEST(Places, OfCoarseSegmentsLieWithinTheirError) {
   EXPECT_GT(coarse, 100u);
 }
 
+// Of what segment `i` of an item shows: straws have owners.
+frame::Owner source_of(const Sample& sample, const frame::Item& item, std::uint32_t i) {
+  return item.instance == FOREST_IN_WORLD ? sample.forest.geometry().owner(item.first_segment + i)
+                                          : frame::Owner{item.instance, item.first_segment + i};
+}
+
 // What a segment should show, found the long way.
-std::uint32_t expected(const Sample& sample, const Activity& activity, std::uint32_t instance,
-                       std::uint32_t segment, std::uint64_t step, const ActivityView& view) {
+std::uint32_t expected(const Sample& sample, const Activity& activity, const frame::Owner& source,
+                       std::uint64_t step, const ActivityView& view) {
+  const auto [instance, segment] = source;
   const auto row = activity.row_of_instance(instance);
   if (!row) return no_value_entry;
   const auto layout = activity.layout(activity.rows()[*row].layout);
@@ -153,7 +160,7 @@ TEST(Playback, EverySegmentHasTheColourOfItsCompartmentAtEveryLevelOfShape) {
     std::set<std::uint32_t> colours;
     std::size_t seen = 0;
     for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
-      ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 40, view));
+      ASSERT_EQ(entry, expected(sample, activity, source_of(sample, item, i), 40, view));
       colours.insert(entry);
       ++seen;
     });
@@ -274,8 +281,8 @@ TEST(Playback, WhatIsNoNumberAndWhoWasNotReportedIsNeutral) {
   playback.colour(cut, eye, view, {.pixels = 0.f});
   std::size_t neutral = 0, other = 0;
   for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
-    ASSERT_EQ(entry, expected(sample, activity, item.instance, item.first_segment + i, 0, view));
-    if (item.instance == 29) {
+    ASSERT_EQ(entry, expected(sample, activity, source_of(sample, item, i), 0, view));
+    if (source_of(sample, item, i).instance == 29) {
       EXPECT_EQ(entry, no_value_entry);
     }
     ++(entry == no_value_entry ? neutral : other);
@@ -424,7 +431,7 @@ TEST(Playback, APickedSegmentHasItsHistory) {
     const auto compartment = playback.compartment(instance, neuron.first_segment + i);
     ASSERT_TRUE(compartment);
     const float value = reports::trace(activity, compartment->row, compartment->index).values[40];
-    const auto entry = expected(sample, activity, instance, neuron.first_segment + i, 40, view);
+    const auto entry = expected(sample, activity, {instance, neuron.first_segment + i}, 40, view);
     EXPECT_EQ(std::uint32_t(std::lround(std::clamp((value + 80.f) / 100.f, 0.f, 1.f) * 95.f)), entry);
   }
   EXPECT_FALSE(playback.compartment(99, 0));

@@ -104,7 +104,7 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
           fmt::format("'{}, {}' is no place of the gaze; leave both empty in a blink", cells[1], cells[2]));
     Vec2 place{float(*x), float(*y)};
     if (pixels) place.array() /= size->array();
-    if (!(place.cwiseAbs().maxCoeff() <= 100.f))
+    if (!(place.array().abs() <= 100.f).all())
       refuse(
           fmt::format("{}, {} lies a hundred pictures beside the picture; are these pixels? name the columns "
                       "x_px and y_px then",

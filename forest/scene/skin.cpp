@@ -455,19 +455,46 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   // The nearest of them, as many as the limit allows. Those that are not there are made, a few at once.
   constexpr std::size_t at_once = 8;
   shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
-  // Whether nothing of a piece faces the eye: capsules, which the skin lies around, hide it.
-  const auto averted = [&](const Made& made, std::uint32_t instance) {
-    const Placed place(instances[instance]);
-    const Vec3 back = eye.camera().axes().col(2),
-               from = place.turn.transpose() * (eye.camera().eye - place.position),
-               to_eye = place.turn.transpose() * back;
-    const bool parallel = eye.camera().orthographic();
-    for (std::size_t v = 0; v < made.piece.normals.size(); ++v)
-      if (made.piece.normals[v].dot(parallel ? to_eye : Vec3(from - made.piece.mesh.positions[v])) > 0.f)
-        return false;
-    return true;
+  const auto state_at = [&](const Near& near, std::uint32_t branch) {
+    const frame::State* part = near.parts.empty() || branch == 0 ? nullptr : near.parts[branch - 1];
+    return part ? *part : state_of(near.instance);
   };
-  std::vector<std::pair<const Wanted*, Made*>> used;
+  // How much of the skin is there at a vertex, 0–1.
+  const auto presence_at = [&](const Made& made, std::size_t v, const Near& near, const Placed& place) {
+    const std::uint32_t branch =
+        shapes_.at(instances[near.instance].morphology)->cones[made.segment[v]].branch;
+    const frame::State state = state_at(near, branch);
+    const float share = share_of(state.kind) * coarser * (branch ? 1.f : 2.f);
+    if (!(share > 0.f) || !state.is(frame::State::visible)) return 0.f;
+    const Sphere at{place.position + place.turn * made.piece.mesh.positions[v], 0.f};
+    const float magnification = eye.magnification(at);
+    float presence =
+        smooth_step(skin_begins * share, skin_complete * share, std::abs(made.width[v]) * magnification);
+    if (made.width[v] < 0.f)
+      presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
+    if (!eye.camera().orthographic()) presence *= smooth_step(skin_nearest, skin_near, eye.nearest_depth(at));
+    return presence;
+  };
+  // Whether anything of a piece is there and faces the eye: what is averted is hidden by the capsules that it lies around.
+  const auto shows = [&](const Made& made, const Near& near) {
+    const Placed place(instances[near.instance]);
+    const Vec3 from = place.turn.transpose() * (eye.camera().eye - place.position),
+               back = place.turn.transpose() * eye.camera().axes().col(2);
+    for (std::size_t v = 0; v < made.piece.normals.size(); ++v) {
+      const Vec3 to_eye = eye.camera().orthographic() ? back : Vec3(from - made.piece.mesh.positions[v]);
+      if (made.piece.normals[v].dot(to_eye) > 0.f && presence_at(made, v, near, place) > 0.f) return true;
+    }
+    return false;
+  };
+  for (Near& near : list)
+    if (state_of(near.instance).is(frame::State::parted))
+      near.parts = section_states(forest_, shown, near.instance);
+  struct Used {
+    const Wanted* one;
+    Made* made;
+    float share;  // towards the limit less of a piece is there, so that none is seen to go
+  };
+  std::vector<Used> used;
   std::size_t triangles = 0;
   for (auto one = wanted.begin(); one != wanted.end(); ++one) {
     if (!made_.contains(one->key)) {
@@ -494,23 +521,19 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
       continue;
     }
     const std::size_t more = found->second->piece.mesh.triangles.size();
-    if (more == 0 || averted(*found->second, list[one->near].instance)) continue;
+    if (!shows(*found->second, list[one->near])) continue;
     if (triangles + more > limits.triangles) break;
     triangles += more;
     found->second->used = picture_;
-    used.emplace_back(&*one, found->second.get());
+    used.push_back({&*one, found->second.get(),
+                    1.f - smooth_step(.5f, 1.f, float(double(triangles) / double(limits.triangles)))});
   }
-
-  // What each shows.
-  for (Near& near : list)
-    if (state_of(near.instance).is(frame::State::parted))
-      near.parts = section_states(forest_, shown, near.instance);
 
   // Activity colours segments: those that vertices are nearest to, in runs as a list has them.
   Cut runs;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> run_of;  // instance, segment / cluster_size
   if (painter) {
-    for (const auto& [one, made] : used) {
+    for (const auto& [one, made, share] : used) {
       const std::uint32_t instance = list[one->near].instance;
       const std::uint32_t base = forest_.neurons()[instances[instance].morphology].first_segment;
       for (const std::uint32_t segment : made->segment) {
@@ -526,17 +549,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   entries_.resize(used.size()), presence_.resize(used.size());
   std::vector<char> seen(used.size());
   parallel_for(used.size(), 1, [&](std::size_t k) {
-    const auto& [one, made] = used[k];
+    const auto& [one, made, share] = used[k];
     const Near& near = list[one->near];
     const Placed place(instances[near.instance]);
-    const frame::State whole = state_of(near.instance);
     const Shape& of = *shapes_.at(std::get<0>(one->key));
     const std::size_t count = made->segment.size();
     entries_[k].resize(count), presence_[k].resize(count);
     for (std::size_t v = 0; v < count; ++v) {
       const std::uint32_t branch = of.cones[made->segment[v]].branch;
-      const frame::State* part = near.parts.empty() || branch == 0 ? nullptr : near.parts[branch - 1];
-      const frame::State state = part ? *part : whole;
+      const frame::State state = state_at(near, branch);
       std::uint32_t entry = state.colour_class * 8u + made->kind[v];
       const std::uint32_t opacity = (state.opacity * frame.opacities[entry] + 127u) / 255u;
       if (runs.entries) {
@@ -544,27 +565,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         const std::size_t run = run_of.at({near.instance, segment / frame::cluster_size});
         entry = runs.entries->capsules[run * frame::cluster_size + segment % frame::cluster_size];
       }
-      const float magnification =
-          eye.magnification({place.position + place.turn * made->piece.mesh.positions[v], 0.f});
-      const float share = share_of(state.kind) * coarser * (branch ? 1.f : 2.f);
-      float presence = share > 0.f && state.is(frame::State::visible)
-                           ? smooth_step(skin_begins * share, skin_complete * share,
-                                         std::abs(made->width[v]) * magnification)
-                           : 0.f;
-      if (made->width[v] < 0.f)
-        presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
-      if (!eye.camera().orthographic())
-        presence *= smooth_step(
-            skin_nearest, skin_near,
-            eye.nearest_depth({place.position + place.turn * made->piece.mesh.positions[v], 0.f}));
       entries_[k][v] = std::uint8_t(entry);
-      presence_[k][v] = std::uint8_t(std::lround(presence * float(opacity)));
+      presence_[k][v] =
+          std::uint8_t(std::lround(share * presence_at(*made, v, near, place) * float(opacity)));
       seen[k] |= char(presence_[k][v] > 0);
     }
   });
   for (std::size_t k = 0; k < used.size(); ++k) {
     if (!seen[k]) continue;
-    const auto& [one, made] = used[k];
+    const auto& [one, made, share] = used[k];
     frame::Surface& s = shown_.emplace_back();
     s.positions = made->piece.mesh.positions, s.normals = made->piece.normals;
     s.entries = entries_[k], s.presence = presence_[k];

@@ -37,7 +37,7 @@ inline constexpr float skin_gap = .1f * voxel_pixels;  // pixels
 
 struct SkinLimits {
   std::size_t triangles =
-      400'000;  // of a picture, those of averted pieces aside: towards it voxels and the widths above grow; what is too much is left out, the farthest first
+      400'000;  // of a picture, pieces aside of which nothing faces the eye: towards it voxels and the widths above grow; what is too much is left out, the farthest first
   std::size_t new_pieces =
       1u << 20;  // made for one picture, the nearest first; others are left out until the next
 };

@@ -2,12 +2,11 @@
 #include "forest/scene/slice_picture.h"
 
 #include <algorithm>
-#include <array>
-#include <string_view>
 
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
+#include "forest/scene/lettering.h"
 
 namespace forest::scene {
 namespace {
@@ -116,49 +115,24 @@ class Paper {
   std::vector<float> covered_;
 };
 
-// What a scale bar's label needs, five columns of seven rows each, the highest bit to the left.
-struct Glyph {
-  char letter;
-  std::array<std::uint8_t, 7> rows;
-};
-constexpr Glyph glyphs[] = {{'0', {14, 17, 19, 21, 25, 17, 14}}, {'1', {4, 12, 4, 4, 4, 4, 14}},
-                            {'2', {14, 17, 1, 2, 4, 8, 31}},     {'5', {31, 16, 30, 1, 1, 17, 14}},
-                            {'u', {0, 0, 17, 17, 19, 29, 16}},   {'m', {0, 0, 26, 21, 21, 21, 21}},
-                            {'n', {0, 0, 22, 25, 17, 17, 17}},   {' ', {0, 0, 0, 0, 0, 0, 0}}};
-
-Shape rectangle(double left, double top, double right, double bottom) {
-  return {{left, top}, {right, top}, {right, bottom}, {left, bottom}};
-}
-
 struct ScaleBar {
-  double length;      // µm
-  std::string label;  // u for µ
+  double length;  // µm
+  std::string label;
 };
 ScaleBar scale_bar_of(const SlicePicture& picture) {
   const double length = scale_bar_length(.2 * picture.width_pixels * picture.pixel());
   if (length < 1.) return {length, fmt::format("{:.0f} nm", 1000. * length)};
   return {length,
-          length < 1000. ? fmt::format("{:.0f} um", length) : fmt::format("{:.0f} mm", length / 1000.)};
+          length < 1000. ? fmt::format("{:.0f} µm", length) : fmt::format("{:.0f} mm", length / 1000.)};
 }
 
-std::vector<Shape> scale_bar_shapes(const SlicePicture& picture) {
+void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Vec3& ink) {
   const ScaleBar bar = scale_bar_of(picture);
-  const double dot = std::max(1., std::round(picture.height_pixels / 360.));  // a pixel of a letter
-  const double margin = 12. * dot, left = margin, bottom = picture.height_pixels - margin;
-  std::vector<Shape> shapes{rectangle(left, bottom - 3. * dot, left + bar.length / picture.pixel(), bottom)};
-  double x = left;
-  for (const char letter : bar.label) {
-    const auto* glyph = std::ranges::find(glyphs, letter, &Glyph::letter);
-    if (glyph == std::end(glyphs)) continue;
-    for (int row = 0; row < 7; ++row)
-      for (int column = 0; column < 5; ++column)
-        if (glyph->rows[std::size_t(row)] >> (4 - column) & 1) {
-          const double l = x + column * dot, t = bottom - (13. - row) * dot;
-          shapes.push_back(rectangle(l, t, l + dot, t + dot));
-        }
-    x += 6. * dot;
-  }
-  return shapes;
+  const float height = std::max(7.f, std::round(float(image.height) / 60.f)), margin = 1.7f * height,
+              bottom = float(image.height) - margin, top = bottom - .4f * height;
+  const Vec3 colour = ink.unaryExpr(&srgb);
+  fill(image, {margin, top, margin + float(bar.length / picture.pixel()), bottom}, colour);
+  Lettering{.height = height, .colour = colour}.write(image, bar.label, margin, top - .7f * height);
 }
 
 }  // namespace
@@ -191,7 +165,6 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
   });
   frame::Image image{std::uint32_t(width), std::uint32_t(height),
                      std::vector<std::uint8_t>(width * height * 4, 255), 0.};
-  const auto bar = picture.scale_bar ? scale_bar_shapes(picture) : std::vector<Shape>();
   parallel_for((height + rows_at_once - 1) / rows_at_once, 1, [&](std::size_t band) {
     const std::size_t first = band * rows_at_once, last = std::min(height, first + rows_at_once);
     Paper paper(width, first, last, ground.paper);
@@ -212,12 +185,12 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
       for (std::size_t k = end; k-- > i;) fill(k, false);
       i = end;
     }
-    for (const Shape& shape : bar) paper.fill(shape, ground.ink);
     for (std::size_t i = 0; i < paper.pixels().size(); ++i)
       for (int c = 0; c < 3; ++c)
         image.pixels[4 * (first * width + i) + std::size_t(c)] =
             std::uint8_t(std::lround(255.f * srgb(paper.pixels()[i][c])));
   });
+  if (picture.scale_bar) paint_scale_bar(image, picture, ground.ink);
   return image;
 }
 
@@ -255,8 +228,7 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     svg += "\"/></g>\n";
   }
   if (picture.scale_bar) {
-    ScaleBar bar = scale_bar_of(picture);
-    if (const auto u = bar.label.find('u'); u != std::string::npos) bar.label.replace(u, 1, "µ");
+    const ScaleBar bar = scale_bar_of(picture);
     const double margin = .035 * picture.height, bottom = picture.height - margin;
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"

@@ -51,7 +51,7 @@ std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing)
   std::bitset<16> used;
   for (const frame::State& state : colouring.states) used.set(state.colour_class & 15);
   for (const Part& part : colouring.parts) used.set(part.state.colour_class & 15);
-  for (std::uint32_t entry = 0; entry < first_reserved_entry; ++entry)
+  for (std::uint32_t entry = 0; entry < synapse_entry; ++entry)
     if (playing ? entry >= flash_entry + flash_steps : !used[entry / 8]) list.push_back(std::uint8_t(entry));
   return list;
 }
@@ -130,6 +130,10 @@ void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> a
     one.areas.push_back(found != places.end() && float(found->first) == key ? found->second
                                                                             : std::uint16_t(0));
   }
+}
+
+bool Surfaces::has_values() const {
+  return std::ranges::any_of(list_, [](const One& one) { return !one.values.empty(); });
 }
 
 std::size_t Surfaces::triangles() const {

@@ -47,6 +47,7 @@ class Surfaces {
   bool empty() const { return list_.empty(); }
   const Bounds& bounds() const { return bounds_; }
   std::size_t triangles() const;
+  bool has_values() const;  // that colour one of them by `map`
   /// The view from a side in which all of it is as large as fits.
   /// @param aspect  width of the picture over its height
   frame::Camera camera(Side side, float aspect) const;

@@ -416,7 +416,8 @@ Synapses Synapses::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   const auto all = data->as<Synapse>(Table::synapses);
   try {
     const auto text = data->as<char>(Table::text);
-    for (const Json& p : Json::parse(text.begin(), text.end()).at("projections")) {
+    const Json description = Json::parse(text.begin(), text.end());
+    for (const Json& p : description.at("projections")) {
       ProjectionFacts facts{p.at("name"), p.at("source"), p.at("target"), p.at("first"), p.at("count")};
       const std::uint64_t next =
           data->projections.empty()

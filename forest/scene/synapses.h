@@ -111,9 +111,7 @@ class Synapses {
   std::shared_ptr<const Data> data_;
 };
 
-/// Palette entries of synapses: by sign, in the order of circuit::Sign.
-inline constexpr std::uint32_t synapse_entry = 120;
-/// Their colours on a background.
+/// Their colours on a background: entries from synapse_entry on, in the order of circuit::Sign.
 void paint_synapses(frame::Palette& palette, Background background);
 /// What they mean.
 std::vector<LegendEntry> synapse_legend(Background background);

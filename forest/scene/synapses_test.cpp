@@ -153,12 +153,12 @@ TEST(Synapses, ChosenAreThoseThatEachOneByItselfIs) {
 
 TEST(Synapses, CostIsBoundedAndTheAreaKept) {
   const Sample s;
-  const Eye eye = s.eye({0, 300, 150}, {0, 300, 0});
+  const Eye eye = s.eye({0, 300, 600}, {0, 300, 0});
   const auto all = s.synapses.choose(eye, s.colouring, SynapseColour::sign);
-  const auto some = s.synapses.choose(eye, s.colouring, SynapseColour::sign, 300);
+  const auto some = s.synapses.choose(eye, s.colouring, SynapseColour::sign, 600);
   EXPECT_GT(all.balls.size(), 1000u);
-  EXPECT_LT(some.balls.size(), 600u);
-  EXPECT_GT(some.balls.size(), 100u);
+  EXPECT_LT(some.balls.size(), 900u);
+  EXPECT_GT(some.balls.size(), 200u);
   double a = 0., b = 0.;
   for (const frame::Ball& ball : all.balls) a += double(ball.radius * ball.radius);
   for (const frame::Ball& ball : some.balls) b += double(ball.radius * ball.radius);

@@ -162,7 +162,7 @@ TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
     view.colour_by =
         parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":")") + word + "\"}").colour_by;
     const Colouring c = colour(targets, view);
-    const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, nullptr, c.shown());
+    const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
     EXPECT_NO_THROW(frame::check(compose(f, view, c, cut, 320, 200), f.geometry())) << word;
     EXPECT_GT(cut.segments, 100u);
   }
@@ -177,7 +177,7 @@ TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
     view.targets.push_back({.name = "",
                             .branch = Branch{i},
                             .visible = {},
-                            .colour = i < 15 ? i << 4 : 0xff0000 + i,
+                            .colour = i < 14 ? i << 4 : 0xff0000 + i,
                             .colour_by = {},
                             .kind = {},
                             .opacity = {},
@@ -186,7 +186,7 @@ TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
   const Colouring c = colour(targets, view);
   for (std::uint32_t i = 0; i < 30; ++i) {
     const Vec3 shown = c.palette[8 * c.states[i].colour_class + 4];
-    EXPECT_EQ(shown.x() > .5f, i >= 15) << i;
+    EXPECT_EQ(shown.x() > .5f, i >= 14) << i;
   }
 }
 
@@ -198,7 +198,7 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   const Cut whole = choose(f, eye, {320, 200});
   view.targets = with(R"([{"name":"first","visible":false}])").targets;
   const Colouring c = colour(targets, view);
-  const Cut half = choose(f, eye, {320, 200}, nullptr, c.shown());
+  const Cut half = choose(f, eye, {320, 200}, c.shown());
   EXPECT_LT(half.segments, whole.segments);
   for (const auto& list : {half.dots, half.lines, half.capsules})
     for (const frame::Item& item : list) EXPECT_EQ(f.types()[item.instance], 1u);
@@ -216,7 +216,7 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   EXPECT_GT(hidden, 5);
   view.targets = with(R"([{"name":"all","visible":false}])").targets;
   const Colouring nothing = colour(targets, view);
-  const Cut empty = choose(f, eye, {320, 200}, nullptr, nothing.shown());
+  const Cut empty = choose(f, eye, {320, 200}, nothing.shown());
   EXPECT_EQ(empty.segments, 0u);
   EXPECT_TRUE(empty.left_out.empty());
 }
@@ -229,7 +229,7 @@ TEST(Appearance, AKindIsDrawnWithItsOwnPrimitives) {
   const auto cut_of = [&](const std::string& kind) {
     view.targets = with(R"([{"name":"all","kind":")" + kind + "\"}]").targets;
     const Colouring c = colour(targets, view);
-    return choose(f, eye, {320, 200}, nullptr, c.shown());
+    return choose(f, eye, {320, 200}, c.shown());
   };
   const Cut lines = cut_of("lines"), capsules = cut_of("capsules"), dots = cut_of("dots"),
             somata = cut_of("somata");
@@ -257,7 +257,7 @@ TEST(Appearance, ABranchIsShownByItself) {
                       R"(,"visible":true,"colour":"#00ff00","opacity":0.5}])")
                      .targets;
   Colouring c = colour(targets, view);
-  const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, nullptr, c.shown());
+  const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
   std::multiset<std::uint32_t> drawn, expected;
   for (const auto& list : {cut.dots, cut.lines, cut.capsules})
     for (const frame::Item& item : list) {
@@ -274,7 +274,7 @@ TEST(Appearance, ABranchIsShownByItself) {
   // A target that is named later shows the whole neuron again.
   view.targets.push_back(with(R"([{"name":"all","visible":true,"opacity":1}])").targets[0]);
   c = colour(targets, view);
-  const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, nullptr, c.shown());
+  const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
   EXPECT_EQ(again.neurons, 40u);
   EXPECT_EQ(c.parts[0].state.opacity, 255);
   EXPECT_THAT(refused([&] {

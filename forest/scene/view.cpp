@@ -16,10 +16,9 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
-
 constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", "neuron", "target", "depth"};
-constexpr std::array<std::string_view, 6> kind_names{"any", "dots", "lines", "capsules", "somata", "skin"};
+constexpr std::array<std::string_view, 7> kind_names{"any",    "dots", "lines", "capsules",
+                                                     "somata", "skin", "bricks"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
 constexpr std::array<std::string_view, 3> synapse_colour_names{"none", "sign", "target"};
 constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
@@ -357,6 +356,7 @@ float thinnest_of(const View& view) {
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
   detail.thinnest = thinnest_of(view);
+  detail.fog = view.fog;
   if (detail.gaze) detail.gaze = Vec2(detail.gaze->x() * float(width), detail.gaze->y() * float(height));
   return detail;
 }
@@ -381,19 +381,8 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
     s.background_top = light_of(0x0E1420), s.background_bottom = light_of(0x05070C),
     s.fog_colour = light_of(0x0A0F1A);
   }
-  // Fog begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
-  const Bounds& bounds = forest.soma_bounds();
-  if (view.fog > 0.f && !bounds.empty()) {
-    const Mat3 axes = view.camera.axes();
-    const float extent = .5f * bounds.extent().norm() + 100.f;
-    const float depth = -axes.col(2).dot(bounds.centre() - view.camera.eye);
-    const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
-    s.fog_start = std::max(20.f, depth - size);
-    // Within the forest one sees a hundred micrometres or two, whatever its size.
-    const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
-    const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
-    s.fog_length = (length + inside * (std::min(length, seen_inside) - length)) / view.fog;
-  }
+  if (const Fog fog = fog_of(forest, view.camera, view.fog); std::isfinite(fog.length))
+    s.fog_start = fog.start, s.fog_length = fog.length;
   return f;
 }
 

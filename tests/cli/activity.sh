@@ -72,7 +72,7 @@ PY
 $python report.py run.h5
 "$program" activity run.h5 --circuit column --spikes run.h5 --out run.activity --json >packed.json
 "$program" clamp run.activity --neuron 0 6 3 --section 0 3 5 --position 0.5 1 0.3 --csv traces.csv --json >clamped.json
-"$program" raster run.activity --out raster.png --size 300x70 --from 10 --to 140 --json >raster.json
+"$program" raster run.activity --out raster.png --size 300x70 --from 10 --to 140 --plain --json >raster.json
 $python - <<'PY'
 import csv, h5py, json, struct
 packed, clamped, raster = (json.load(open(name)) for name in ("packed.json", "clamped.json", "raster.json"))
@@ -99,6 +99,15 @@ grep -q '^ *2 *0' out.txt
 
 refuses 'traces.csv' "$program" clamp run.activity --neuron 2 --csv traces.csv  # another table is not replaced unasked
 "$program" clamp run.activity --neuron 2 --csv traces.csv --force >/dev/null
+
+# With axes the colours take less room, and what they mean stands beside them; too small a picture has no room for it.
+"$program" raster run.activity --out axes.png --size 600x400 --json >axes.json
+"$program" raster run.activity --out plain.png --size 600x400 --plain --json >plain.json
+cmp -s axes.png plain.png && { echo "axes make no difference"; exit 1; }
+$python -c '
+import struct
+for name in ("axes", "plain"): assert struct.unpack(">II", open(name + ".png", "rb").read()[16:24]) == (600, 400)'
+refuses 'a picture of 120x50 leaves no room for axes; give a larger --size, or --plain' "$program" raster run.activity --out no.png --size 120x50
 
 # What is no number stays so, what is beyond the range is told.
 $python report.py odd.h5 40 nan=1 high=70
@@ -227,11 +236,22 @@ fovea = [240 * y + x for y in range(94, 106) for x in range(114, 126)]
 assert all(gazed[i] == first[i] for i in fovea)
 assert sum(a != b for a, b in zip(gazed, plain)) > .3 * covered
 told = json.load(open("at30.json"))
-assert told["activity"]["neurons"] == 7 and told["activity"]["flashes"] >= 1, told
+assert 0 < told["activity"]["neurons"] <= 7 and told["activity"]["flashes"] >= 1, told
 assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))["activity"] is None
 film = [pixels(f"film/{i:05}.png") for i in range(4)]
 assert all(a != b for a, b in zip(film, film[1:]))
 PY
+# A picture that is large enough says what its colours mean, a small one does not; with --no-legend none does.
+large() {  # name, words…
+  local name=$1
+  shift
+  "$program" render few.forest --view "$view}}" --activity run.activity --time 10 --size 640x400 -o "$name.png" "$@" >/dev/null
+}
+large legend
+large bare --no-legend
+draw bare_small "" --time 10 --no-legend
+cmp bare_small.png at10.png
+cmp -s legend.png bare.png && { echo "there is no colour bar"; exit 1; }
 refuses 'run.activity: holds no time 400 ms; it runs from 0 to 149.5 ms' "$program" render few.forest --activity run.activity --time 400 -o no.png
 "$program" plant --recipe few.toml --repo cells.db --seed 3 --out turned >/dev/null
 "$program" pack turned -o turned.forest >/dev/null

@@ -65,6 +65,13 @@ assert a < .02 and .1 < c < .8 and .25 * c < b < .65 * c, (a, b, c)  # two sides
 "$program" movie a.forest --surface lh.pial --surface-opacity .3 --seconds .2 --size 160x120 -o a.mp4 >/dev/null
 [[ $(head -c 8 a.mp4 | tail -c 4) == ftyp ]] || fail "a.mp4 is no MP4 file"
 
+# What the colours of values mean is in the picture, unless somebody wants it without.
+"$program" render lh.pial --overlay lh.curv -o with.png --size 640x480 --renderer cpu >/dev/null
+"$program" render lh.pial --overlay lh.curv -o without.png --size 640x480 --renderer cpu --no-legend >/dev/null
+cmp -s with.png without.png && fail "there is no colour bar"
+for wish in "" --no-legend; do "$program" render lh.pial -o no_values$wish.png --size 640x480 --renderer cpu $wish >/dev/null; done
+cmp no_values.png no_values--no-legend.png || fail "a surface without values has a colour bar"
+
 refuses "cut off" "$program" render lh.short -o x.png
 refuses "2 values and the surface has" "$program" render lh.pial --overlay few.txt -o x.png
 refuses "2 overlays are given and 1" "$program" render lh.pial --overlay few.txt --overlay few.txt -o x.png

@@ -93,7 +93,7 @@ class Canvas {
   std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
   Level fine_, coarse_;              // tiles, and tiles of tiles
 
-  bool whole(std::int32_t tx, std::int32_t ty) const;
+  bool whole(const Square& tiles) const;
   std::uint32_t far_in_tile(std::int32_t tx, std::int32_t ty) const;
 };
 

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <utility>
 
 #include "forest/render/cpu/canvas.h"
 #include "forest/render/cpu/run.h"
@@ -39,138 +38,276 @@ struct Hits {
 
 /// Every place of the picture (pixels) meets the capsule with its own ray: as draw_capsule in
 /// render/opengl/shaders/capsule.glsl.
-template <int lanes>
-[[gnu::always_inline]] inline void meet(const frame::Constants& c, const Vec3& light, const Body& body,
-                                        const float* x, const float* y, Hits<lanes>& hits) {
-  const float ax = body.a.x(), ay = body.a.y(), az = body.a.z(), bx = body.b.x(), by = body.b.y(),
-              bz = body.b.z(), ux = body.u.x(), uy = body.u.y(), uz = body.u.z(), lx = light.x(),
-              ly = light.y(), lz = light.z();
-  const float ra = body.ra, rb = body.rb, s = body.s, c2 = body.c2, cosine = body.cosine;
-  const float begin = s * ra, end = body.length + s * rb;  // of the cone's surface, along the axis
-  const float per_focal = 1.f / c.focal, near = c.near, converge = c.converge, parallel = c.parallel,
-              centre_x = c.centre_x, centre_y = c.centre_y;
-  const float per_ra = 1.f / larger(ra, 1e-9f), per_rb = 1.f / larger(rb, 1e-9f);
-  const std::int32_t cone = body.nested ? 0 : 1;
-  FOREST_LANES
-  for (int lane = 0; lane < lanes; ++lane) {
-    const float beside = (x[lane] - centre_x) * per_focal, above = (centre_y - y[lane]) * per_focal;
-    const float slope_x = converge * beside, slope_y = converge * above;
-    // From where the rays begin, which for an orthographic camera is beside the eye.
-    const float sax = ax - parallel * beside, sbx = bx - parallel * beside, say = ay - parallel * above,
-                sby = by - parallel * above;
-    const float dz = 1.f / std::sqrt(slope_x * slope_x + slope_y * slope_y + 1.f), dx = slope_x * dz,
-                dy = slope_y * dz;
-    const float shift = sax * dx + say * dy + az * dz;
-    const float ox = shift * dx - sax, oy = shift * dy - say, oz = shift * dz - az;
-    const float o2 = ox * ox + oy * oy + oz * oz, ou = ox * ux + oy * uy + oz * uz,
-                du = dx * ux + dy * uy + dz * uz;
-    const float k0 = ra - s * ou, k1 = -s * du;
-    const float A = c2 * (1.f - du * du) - k1 * k1, B = -c2 * ou * du - k0 * k1,
-                C = c2 * (o2 - ou * ou) - k0 * k0, root = B * B - A * C;
-    const float local = (-B - std::sqrt(larger(root, 0.f))) / larger(A, 1e-9f), along = ou + local * du;
-    const float t_cone = local + shift;
-    const bool on_cone =
-        (cone != 0) & (root >= 0.f) & (A > 1e-9f) & (along >= begin) & (along <= end) & (t_cone > 0.f);
-    const float wx = ox + local * dx - along * ux, wy = oy + local * dy - along * uy,
-                wz = oz + local * dz - along * uz;
-    const float facing_cone =
-        cosine * (wx * lx + wy * ly + wz * lz) / std::sqrt(larger(wx * wx + wy * wy + wz * wz, 1e-30f)) +
-        s * (ux * lx + uy * ly + uz * lz);
-    // The spheres at its ends.
-    const float shift_b = sbx * dx + sby * dy + bz * dz;
-    const float qx = shift_b * dx - sbx, qy = shift_b * dy - sby, qz = shift_b * dz - bz;
-    const float ha = ra * ra - o2, hb = rb * rb - (qx * qx + qy * qy + qz * qz);
-    const float ta = shift - std::sqrt(larger(ha, 0.f)), tb = shift_b - std::sqrt(larger(hb, 0.f));
-    const bool on_a = (ha >= 0.f) & (ta > 0.f), on_b = (hb >= 0.f) & (tb > 0.f);
-    const bool take_b = on_b & (!on_a | (tb < ta));
-    const float t_sphere = take_b ? tb : ta;
-    const float facing_sphere =
-        take_b ? ((tb * dx - sbx) * lx + (tb * dy - sby) * ly + (tb * dz - bz) * lz) * per_rb
-               : ((ta * dx - sax) * lx + (ta * dy - say) * ly + (ta * dz - az) * lz) * per_ra;
-    const bool within = (cone == 0) | (root >= 0.f);  // the cone, within which both spheres lie
-    const bool hit = on_cone | (within & (on_a | on_b));
-    const float t = on_cone ? t_cone : t_sphere, facing = on_cone ? facing_cone : facing_sphere;
-    hits.code[lane] = depth_code(larger(t * dz, near));
-    hits.shade[lane] = .5f + .5f * facing;
-    hits.hit[lane] = hit ? 1u : 0u;
+void meet(const frame::Constants& c, const Vec3& light, const Body& body, const float* x, const float* y,
+          Hits<4>& hits);
+void meet(const frame::Constants& c, const Vec3& light, const Body& body, const float* x, const float* y,
+          Hits<8>& hits);
+void meet(const frame::Constants& c, const Vec3& light, const Body& body, const float* x, const float* y,
+          Hits<16>& hits);
+
+// One lane of many, or what all lanes share.
+[[gnu::always_inline]] inline float lane_of(const float* values, int lane) { return values[lane]; }
+[[gnu::always_inline]] inline float lane_of(float value, int) { return value; }
+
+/// A capsule in perspective as a whole. With the ray of a pixel as (X, Y, 1), what decides whether it meets a cone or a sphere
+/// is of second degree in X and Y, for the outline of either is a conic; all else, but for the roots, of first. Found once, in
+/// double precision and about a pixel in its middle, where the terms are small: a place costs a third of what its own ray
+/// does, and what differs is a thousandth of the radius.
+class Silhouette {
+ public:
+  /// Whether the eye is far enough away and beside the axis for it.
+  static bool fits(const frame::Constants& c, const Body& body, float nearest_code) {
+    if (c.parallel > 0.f || !(nearest_code > 0.f)) return false;
+    const auto beside = [&](const Vec3& at, float radius) {
+      const float distance2 = at.squaredNorm(), along = at.dot(body.u);
+      return along * along < (.94f - 3.f * radius * radius / distance2) * distance2;  // 14 degrees and more
+    };
+    return body.nested || (beside(body.a, body.ra) && beside(body.b, body.rb));
   }
-}
+
+  /// @param p, q  its ends on the picture
+  Silhouette(const frame::Constants& c, const Vec3& light, const Body& body, const Vec2& p, const Vec2& q)
+      : nested_(body.nested),
+        x_(std::floor(.5f * (p.x() + q.x()))),
+        y_(std::floor(.5f * (p.y() + q.y()))),
+        s_(body.s),
+        c2_(body.c2),
+        ra_(body.ra),
+        begin_(body.s * body.ra),
+        end_(body.length + body.s * body.rb) {
+    using Vec = Eigen::Vector3d;
+    const Map map{1. / double(c.focal),
+                  {(double(x_) - double(c.centre_x)) / double(c.focal),
+                   (double(c.centre_y) - double(y_)) / double(c.focal), 1.}};
+    const Vec a = body.a.cast<double>(), b = body.b.cast<double>(), l = light.cast<double>();
+    square_ = map.conic(Vec::Zero(), -1., Vec::Zero(), 0.);
+    lit_ = map.slant(l);
+    const auto ball = [&](const Vec& at, double radius) {
+      return Ball{map.conic(at, at.squaredNorm() - radius * radius, Vec::Zero(), 0.), map.slant(at),
+                  float(at.dot(l)), 1.f / std::max(float(radius), 1e-9f)};
+    };
+    if (nested_) {
+      balls_[0] = balls_[1] = body.ra > body.rb ? ball(a, double(body.ra)) : ball(b, double(body.rb));
+      return;
+    }
+    balls_ = {ball(a, double(body.ra)), ball(b, double(body.rb))};
+    const Vec axis = b - a;
+    const double length = axis.norm(), s = (double(body.ra) - double(body.rb)) / length, c2 = 1. - s * s,
+                 from = double(body.ra) * s;
+    const Vec u = axis / length;
+    // With v from a to a point of the ray, the cone is c² v·v - (v·u)² + 2 ra s v·u = ra².
+    const double au = a.dot(u),
+                 C = c2 * a.squaredNorm() - au * au - 2. * from * au - double(body.ra) * double(body.ra);
+    const Vec B = c2 * a - (au + from) * u;
+    root_ = map.conic(B, c2 * C, u, C);
+    half_ = map.slant(B), along_ = map.slant(u);
+    at_axis_ = float(au), at_light_ = float(a.dot(l)), lit_axis_ = float(u.dot(l));
+  }
+
+  /// @param x, y  places, pixels
+  template <int lanes>
+  [[gnu::always_inline]] void meet(const float* x, const auto& y, float near, Hits<lanes>& hits) const {
+    float z[lanes], facing[lanes];
+    std::uint32_t within[lanes], last[lanes], beside = 1;
+    if (nested_) {
+      FOREST_LANES
+      for (int k = 0; k < lanes; ++k) z[k] = facing[k] = 0.f, within[k] = 1, last[k] = 0, hits.hit[k] = 0;
+    } else {
+      beside = 0;
+      const float s = s_, c2 = c2_, ra = ra_, begin = begin_, end = end_;
+      FOREST_LANES
+      for (int k = 0; k < lanes; ++k) {
+        const float dx = x[k] - x_, dy = lane_of(y, k) - y_;
+        const float root = root_(dx, dy), du = along_(dx, dy), A = c2 * square_(dx, dy) - du * du;
+        const float t = (half_(dx, dy) - std::sqrt(larger(root, 0.f))) / larger(A, 1e-9f),
+                    along = t * du - at_axis_;
+        const bool in = root >= 0.f, on_cone = in & (along >= begin) & (along <= end);
+        z[k] = t;
+        // Of the normal across the axis, whose length there is that of the taper.
+        facing[k] = c2 * (t * lit_(dx, dy) - at_light_ - along * lit_axis_) / larger(ra - s * along, 1e-9f) +
+                    s * lit_axis_;
+        hits.hit[k] = on_cone ? 1u : 0u;
+        within[k] = in ? 1u : 0u;
+        last[k] = along > end ? 1u : 0u;
+        beside |= within[k] & ~hits.hit[k];
+      }
+    }
+    if (beside) {  // those met by the sphere at one end
+      const Ball &first = balls_[0], &second = balls_[1];
+      FOREST_LANES
+      for (int k = 0; k < lanes; ++k) {
+        const float dx = x[k] - x_, dy = lane_of(y, k) - y_;
+        const bool b = last[k] != 0;
+        const float root_a = first.root(dx, dy), root_b = second.root(dx, dy), root = b ? root_b : root_a;
+        const float half_a = first.half(dx, dy), half_b = second.half(dx, dy), half = b ? half_b : half_a;
+        const float t = (half - std::sqrt(larger(root, 0.f))) / square_(dx, dy);
+        const float at_light = b ? second.at_light : first.at_light,
+                    per_radius = b ? second.per_radius : first.per_radius;
+        const bool cone = hits.hit[k] != 0;
+        z[k] = cone ? z[k] : t;
+        facing[k] = cone ? facing[k] : (t * lit_(dx, dy) - at_light) * per_radius;
+        hits.hit[k] |= (within[k] != 0) & (root >= 0.f) ? 1u : 0u;
+      }
+    }
+    FOREST_LANES
+    for (int k = 0; k < lanes; ++k) {
+      hits.code[k] = depth_code(larger(z[k], near));
+      hits.shade[k] = .5f + .5f * facing[k];
+    }
+  }
+
+ private:
+  // What changes evenly over the picture, by pixels beside the middle; and what does so in second degree.
+  struct Slant {
+    float one, x, y;
+    [[gnu::always_inline]] float operator()(float dx, float dy) const { return one + dy * y + dx * x; }
+  };
+  struct Conic {
+    float one, x, y, xx, xy, yy;
+    [[gnu::always_inline]] float operator()(float dx, float dy) const {
+      return one + dy * (y + dy * yy) + dx * (x + dy * xy + dx * xx);
+    }
+  };
+  // From pixels beside the middle to rays (X, Y, 1).
+  struct Map {
+    double step;
+    Eigen::Vector3d middle;
+    Slant slant(const Eigen::Vector3d& v) const {
+      return {float(v.dot(middle)), float(step * v.x()), float(-step * v.y())};
+    }
+    // Of (v·ray)² - p ray² + w (u·ray)².
+    Conic conic(const Eigen::Vector3d& v, double p, const Eigen::Vector3d& u, double w) const {
+      const double vm = v.dot(middle), um = u.dot(middle);
+      const Eigen::Vector3d at = vm * v - p * middle + w * um * u;
+      return {float(at.dot(middle)),
+              float(2. * step * at.x()),
+              float(-2. * step * at.y()),
+              float(step * step * (v.x() * v.x() - p + w * u.x() * u.x())),
+              float(-2. * step * step * (v.x() * v.y() + w * u.x() * u.y())),
+              float(step * step * (v.y() * v.y() - p + w * u.y() * u.y()))};
+    }
+  };
+  struct Ball {
+    Conic root;
+    Slant half;
+    float at_light, per_radius;
+  };
+
+  bool nested_;
+  float x_, y_;  // its middle, pixels
+  float s_, c2_, ra_, begin_, end_;
+  float at_axis_ = 0.f, at_light_ = 0.f, lit_axis_ = 0.f;
+  Conic square_{}, root_{};
+  Slant half_{}, along_{}, lit_{};
+  std::array<Ball, 2> balls_{};
+};
+
+inline constexpr int rows_at_once = 8;
 
 /// Two discs of the picture and all between them: where a capsule is seen.
 class Outline {
  public:
+  /// From where to where it reaches in each of some rows; left > right beside it.
+  struct Rows {
+    float left[rows_at_once], right[rows_at_once];
+  };
+
   /// @param exact  nothing reaches beyond the discs; else, as before the eye, a little does
   Outline(const Vec2& p, const Vec2& q, float rp, float rq, bool exact)
       : p_(p), q_(q), rp_(rp), rq_(rq), exact_(exact) {
     const Vec2 between = q - p;
-    const float distance = between.norm(), sine = distance > 0.f ? (rp - rq) / distance : 2.f;
+    const float rise = between.y(), distance = between.norm(),
+                sine = distance > 0.f ? (rp - rq) / distance : 2.f;
+    per_rise_ = 1.f / (rise < 0.f ? std::min(rise, -1e-3f) : std::max(rise, 1e-3f));
     if (std::abs(sine) >= 1.f) return;  // one lies within the other
     const Vec2 along = between / distance, beside(-along.y(), along.x());
     const float cosine = std::sqrt(1.f - sine * sine);
     for (const float side : {-1.f, 1.f}) {
       const Vec2 normal = sine * along + side * cosine * beside;
-      tangents_[side > 0.f] = {p + rp * normal, q + rq * normal};
+      const Vec2 from = p + rp * normal, to = q + rq * normal;
+      if (from.y() == to.y()) continue;
+      const float slope = (to.x() - from.x()) / (to.y() - from.y());
+      tangents_[side > 0.f] = {from.x() - slope * from.y(), slope, std::min(from.y(), to.y()),
+                               std::max(from.y(), to.y())};
     }
-    apart_ = true;
   }
   float top() const { return std::min(p_.y() - rp_, q_.y() - rq_); }
   float bottom() const { return std::max(p_.y() + rp_, q_.y() + rq_); }
   /// Which part of the way from p to q has discs that may reach a height; 0 to 1.
-  std::pair<float, float> part(float y) const {
-    const float rise = q_.y() - p_.y(), reach = std::max(rp_, rq_);
-    if (std::abs(rise) <= 1e-3f) return {0.f, 1.f};
-    const float from = (y - reach - p_.y()) / rise, to = (y + reach - p_.y()) / rise;
-    return {std::clamp(std::min(from, to), 0.f, 1.f), std::clamp(std::max(from, to), 0.f, 1.f)};
+  [[gnu::always_inline]] void part(float y, float& from, float& to) const {
+    const float reach = larger(rp_, rq_), middle = (y - p_.y()) * per_rise_,
+                beside = reach * std::abs(per_rise_);
+    from = smaller(larger(middle - beside, 0.f), 1.f), to = smaller(larger(middle + beside, 0.f), 1.f);
   }
-  /// From where to where it reaches at a height; empty (left > right) beside it.
-  std::pair<float, float> across(float y) const {
-    std::pair<float, float> range{INFINITY, -INFINITY};
-    const auto add = [&](float left, float right) {
-      range = {std::min(range.first, left), std::max(range.second, right)};
-    };
+  /// Of the rows from the height `y` on.
+  [[gnu::always_inline]] void across(float y, Rows& rows) const {
+    const float px = p_.x(), py = p_.y(), dx = q_.x() - p_.x(), qx = q_.x(), qy = q_.y(), rp = rp_, rq = rq_;
     if (!exact_) {
-      const auto [from, to] = part(y);
-      for (const float t : {from, to}) {
-        const float x = p_.x() + t * (q_.x() - p_.x()), w = std::max(rp_, rq_);
-        add(x - w, x + w);
+      const float wide = larger(rp, rq);
+      FOREST_LANES
+      for (int k = 0; k < rows_at_once; ++k) {
+        float from, to;
+        part(y + float(k), from, to);
+        rows.left[k] = px + smaller(from * dx, to * dx) - wide;
+        rows.right[k] = px + larger(from * dx, to * dx) + wide;
       }
-      return range;
+      return;
     }
-    for (const auto& [centre, radius] : {std::pair(p_, rp_), std::pair(q_, rq_)})
-      if (const float h = radius * radius - (y - centre.y()) * (y - centre.y()); h >= 0.f)
-        add(centre.x() - std::sqrt(h), centre.x() + std::sqrt(h));
-    if (apart_)
-      for (const auto& [a, b] : tangents_)
-        if ((a.y() - y) * (b.y() - y) <= 0.f && a.y() != b.y()) {
-          const float x = a.x() + (y - a.y()) / (b.y() - a.y()) * (b.x() - a.x());
-          add(x, x);
-        }
-    return range;
+    const Tangent &s = tangents_[0], &t = tangents_[1];
+    FOREST_LANES
+    for (int k = 0; k < rows_at_once; ++k) {
+      const float at = y + float(k);
+      const float hp = rp * rp - (at - py) * (at - py), hq = rq * rq - (at - qy) * (at - qy),
+                  wp = std::sqrt(larger(hp, 0.f)), wq = std::sqrt(larger(hq, 0.f));
+      const float xs = s.at + at * s.slope, xt = t.at + at * t.slope;
+      const bool on_p = hp >= 0.f, on_q = hq >= 0.f, on_s = (at >= s.top) & (at <= s.bottom),
+                 on_t = (at >= t.top) & (at <= t.bottom);
+      rows.left[k] = smaller(smaller(on_p ? px - wp : 1e9f, on_q ? qx - wq : 1e9f),
+                             smaller(on_s ? xs : 1e9f, on_t ? xt : 1e9f));
+      rows.right[k] = larger(larger(on_p ? px + wp : -1e9f, on_q ? qx + wq : -1e9f),
+                             larger(on_s ? xs : -1e9f, on_t ? xt : -1e9f));
+    }
   }
 
  private:
+  // A line x = at + slope y that touches both discs, between these heights.
+  struct Tangent {
+    float at = 0.f, slope = 0.f, top = INFINITY, bottom = -INFINITY;
+  };
+
   Vec2 p_, q_;
-  float rp_, rq_;
-  bool exact_, apart_ = false;
-  std::array<std::pair<Vec2, Vec2>, 2> tangents_;
+  float rp_, rq_, per_rise_;
+  bool exact_;
+  std::array<Tangent, 2> tangents_;
 };
 
+/// How far beside their middles the spheres of a capsule's ends are seen, pixels.
+struct Reach {
+  float a, b;
+  bool exact;  // they are small beside their distance, and not far from the middle of the picture
+
+  Reach(const frame::Constants& c, const Vec3& at_a, const Vec3& at_b, float ra, float rb) {
+    const auto small = [&](const Vec3& at, float radius) {
+      return c.parallel > 0.f || (radius < .25f * at.z() && at.squaredNorm() < 2.5f * at.z() * at.z());
+    };
+    exact = small(at_a, ra) && small(at_b, rb);
+    const auto of = [&](const Vec3& at, float radius) {
+      if (c.parallel > 0.f) return c.focal * radius;
+      return c.focal * radius *
+             (exact ? at.norm() / (at.z() * (at.z() - radius))  // as scene/occlusion.cpp
+                    : 1.05f / std::max(at.z() - .5f * radius, c.near));
+    };
+    a = of(at_a, ra), b = of(at_b, rb);
+  }
+};
+inline float margin_of(float spread) { return 1.f + 1.4143f * spread; }
+
 /// Where a capsule, whose ends lie at p and q on the picture, may be seen by any sample of a pixel, by its middle.
-/// The discs are exact where spheres are small beside their distance and not far from the middle of the picture.
 inline Outline outline_of(const frame::Constants& c, float spread, const Vec2& p, const Vec2& q,
                           const Body& body) {
-  const auto small = [&](const Vec3& at, float radius) {
-    return c.parallel > 0.f || (radius < .25f * at.z() && at.squaredNorm() < 2.5f * at.z() * at.z());
-  };
-  const bool exact = small(body.a, body.ra) && small(body.b, body.rb);
-  const float margin = 1.f + 1.4143f * spread;
-  const auto reach = [&](const Vec3& at, float radius) {
-    if (c.parallel > 0.f) return margin + c.focal * radius;
-    return margin + c.focal * radius *
-                        (exact ? at.norm() / (at.z() * (at.z() - radius))  // as scene/occlusion.cpp
-                               : 1.05f / std::max(at.z() - .5f * radius, c.near));
-  };
-  return {p, q, reach(body.a, body.ra), reach(body.b, body.rb), exact};
+  const Reach reach(c, body.a, body.b, body.ra, body.rb);
+  const float margin = margin_of(spread);
+  return {p, q, margin + reach.a, margin + reach.b, reach.exact};
 }
 
 /// Where every sample of a pixel certainly meets it, by the pixel's middle.

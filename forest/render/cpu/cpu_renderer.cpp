@@ -64,9 +64,10 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
       s.surfaces.draw(s.picture, f.surfaces, s.canvas);
     }
     timing.drawn = s.splatter.draw(s.picture, f, s.canvas, f.surfaces.empty());
-    if (f.rest) {
+    for (std::uint32_t round = 0; f.rest; ++round) {
       s.seen = s.canvas.depth_map();
-      const frame::Lists more = f.rest(s.seen);
+      const frame::Lists more = f.rest(s.seen, round);
+      if (more.empty()) break;
       frame::check(more, s.picture.geometry);
       timing.drawn += s.splatter.draw(s.picture, more, s.canvas, false);
     }

@@ -21,6 +21,7 @@ class CpuRenderer final : public Renderer {
   frame::Image read() override;
   const frame::Image* image() const override;
   const frame::DepthMap& seen() const override;
+  bool concurrent() const override { return true; }
   std::string name() const override;
 
  private:

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/capsule.h"
@@ -68,7 +69,7 @@ struct Solid {
   std::uint8_t entry, opacity;
   std::uint32_t key;
 
-  Solid(const frame::Constants& c, const Run& r, std::size_t i, float width)
+  Solid(const frame::Constants& c, const Run& r, std::size_t i)
       : a(r.ax[i], r.ay[i], r.az[i]),
         b(r.bx[i], r.by[i], r.bz[i]),
         ra(r.ra[i]),
@@ -79,16 +80,16 @@ struct Solid {
         qy(r.qy[i]),
         code_a(r.code_a[i]),
         code_b(r.code_b[i]),
-        reach(1.f + 1.05f * width),
         entry(std::uint8_t(r.entry[i])),
         opacity(std::uint8_t(r.opacity[i])),
         key(r.key[i]) {
+    const Reach beside(c, a, b, ra, rb);
+    reach = std::max(beside.a, beside.b);
     const float depth = std::min(a.z() - ra, b.z() - rb);
     nearest = depth > c.near ? depth_code(depth) : 0.f;
   }
   Box box(float spread) const {
-    if (nearest == 0.f) return {-INFINITY, -INFINITY, INFINITY, INFINITY};
-    const float all = reach + spread;
+    const float all = reach + margin_of(spread);
     return {std::min(px, qx) - all, std::min(py, qy) - all, std::max(px, qx) + all, std::max(py, qy) + all};
   }
   float nearest_code() const { return nearest; }
@@ -188,6 +189,7 @@ template <int S>
       const std::uint32_t depth = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), 0);
       const float past = at - length;
       for (std::int32_t row = low; row < high; ++row) {
+        if (steep ? window.pixel_before(row, x, depth) : window.pixel_before(x, row, depth)) continue;
         const float from_middle = float(row) - y;
         Keys<S> keys;
         FOREST_LANES
@@ -232,36 +234,64 @@ template <int S>
   const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
   const float reach = std::max(wp, wq) * stretch + spread * (1.f + std::abs(slope));
   const std::uint32_t entry = r.entry, subframe = c.subframe;
+  const auto share_at = [&](float step) __attribute__((always_inline)) {
+    return smaller(larger(step * per_dx, 0.f), 1.f);
+  };
   for (std::int32_t x = first; x < last; ++x) {
-    float centre[S], inverse[S], depth[S];
-    std::uint32_t within[S];
-    const float column = float(x) + .5f - px;
-    FOREST_LANES
-    for (int k = 0; k < S; ++k) {
-      const float step = column - along[k], share = smaller(larger(step * per_dx, 0.f), 1.f);
-      centre[k] = py + across[k] + slope * step;
-      inverse[k] = 1.f / ((wp + share * (wq - wp)) * stretch);
-      depth[k] = za + share * (zb - za);
-      within[k] = (step >= -over) & (step < dx + over);
-    }
-    const float middle = py + slope * column;
+    const float column = float(x) + .5f - px, middle = py + slope * column;
     const std::int32_t low = clipped(std::ceil(middle - reach - .5f), edges.low, edges.high),
                        high = clipped(std::ceil(middle + reach - .5f), edges.low, edges.high);
-    const std::uint32_t nearest = key_of(larger(smaller(depth[0], depth[S - 1]) - bulge - 1.f, 0.f), 0);
-    for (std::int32_t y = low; y < high; ++y) {
-      const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
-      if (S == 1 && window.seen(at_x, at_y) < nearest) continue;
-      const float noise = noise_at(at_x, at_y, subframe);
-      Keys<S> keys;
+    const float z_before = za + share_at(column - spread) * (zb - za),
+                z_after = za + share_at(column + spread) * (zb - za);
+    const std::uint32_t nearest = key_of(larger(smaller(z_before, z_after) - bulge - 1.f, 0.f), 0);
+    if constexpr (S == 1) {  // pixels across, beside one another
+      constexpr std::int32_t lanes = 8;
+      const float share = share_at(column), inverse = 1.f / ((wp + share * (wq - wp)) * stretch);
+      for (std::int32_t y = low; y < high; y += lanes) {
+        const std::int32_t count = std::min(lanes, high - y);
+        std::uint32_t behind = 0;
+        for (std::int32_t k = 0; k < count; ++k)
+          behind |=
+              !(steep ? window.pixel_before(y + k, x, nearest) : window.pixel_before(x, y + k, nearest));
+        if (!behind) continue;
+        std::uint32_t keys[lanes];
+        FOREST_LANES
+        for (int k = 0; k < lanes; ++k) {
+          const float t = (float(y + k) + .5f - middle) * inverse, h = std::sqrt(larger(1.f - t * t, 0.f));
+          const float noise = noise_at(steep ? y + k : x, steep ? x : y + k, subframe);
+          const std::uint32_t payload = payload_of(entry, .5f + t * lit_side + h * lit_front, noise);
+          const std::uint32_t key = key_of(larger(z_before - bulge * h, 0.f), payload);
+          keys[k] = (t >= -1.f) & (t < 1.f) ? key : FOREST_KEY_EMPTY;
+        }
+        for (std::int32_t k = 0; k < count; ++k)
+          steep ? window.put(y + k, x, {keys[k]}) : window.put(x, y + k, {keys[k]});
+      }
+    } else {
+      float centre[S], inverse[S], depth[S];
+      std::uint32_t within[S];
       FOREST_LANES
       for (int k = 0; k < S; ++k) {
-        const float t = (float(y) + .5f - centre[k]) * inverse[k], h = std::sqrt(larger(1.f - t * t, 0.f));
-        const bool covered = (within[k] != 0) & (t >= -1.f) & (t < 1.f);
-        const std::uint32_t payload =
-            payload_of(entry, .5f + t * lit_side + h * lit_front, fraction(noise + samples.turn[k]));
-        keys[k] = covered ? key_of(larger(depth[k] - bulge * h, 0.f), payload) : FOREST_KEY_EMPTY;
+        const float step = column - along[k], share = share_at(step);
+        centre[k] = py + across[k] + slope * step;
+        inverse[k] = 1.f / ((wp + share * (wq - wp)) * stretch);
+        depth[k] = za + share * (zb - za);
+        within[k] = (step >= -over) & (step < dx + over);
       }
-      window.put(at_x, at_y, keys);
+      for (std::int32_t y = low; y < high; ++y) {
+        const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
+        if (window.pixel_before(at_x, at_y, nearest)) continue;
+        const float noise = noise_at(at_x, at_y, subframe);
+        Keys<S> keys;
+        FOREST_LANES
+        for (int k = 0; k < S; ++k) {
+          const float t = (float(y) + .5f - centre[k]) * inverse[k], h = std::sqrt(larger(1.f - t * t, 0.f));
+          const bool covered = (within[k] != 0) & (t >= -1.f) & (t < 1.f);
+          const std::uint32_t payload =
+              payload_of(entry, .5f + t * lit_side + h * lit_front, fraction(noise + samples.turn[k]));
+          keys[k] = covered ? key_of(larger(depth[k] - bulge * h, 0.f), payload) : FOREST_KEY_EMPTY;
+        }
+        window.put(at_x, at_y, keys);
+      }
     }
   }
 }
@@ -273,69 +303,91 @@ template <int S>
   const frame::Constants& c = picture.constants;
   const Body body(r.a, r.b, r.ra, r.rb);
   const Vec2 p(r.px, r.py), q(r.qx, r.qy);
+  const bool whole = Silhouette::fits(c, body, r.nearest);
+  std::optional<Silhouette> silhouette;
+  if (whole) silhouette.emplace(c, picture.light, body, p, q);
+  const auto meet_row = [&](const float* x, float y, Hits<lanes>& hits) __attribute__((always_inline)) {
+    if (whole) return silhouette->meet<lanes>(x, y, c.near, hits);
+    float ys[lanes];
+    for (float& one : ys) one = y;
+    meet(c, picture.light, body, x, ys, hits);
+  };
   const Outline outline = outline_of(c, picture.spread, p, q, body), inner = inner_outline_of(c, p, q, body);
   const Square& s = window.square();
   const std::int32_t first = clipped(std::floor(outline.top()), s.top, s.bottom),
                      last = clipped(std::ceil(outline.bottom()), s.top, s.bottom);
-  const float thickest = std::max(body.ra, body.rb), from = 1.f / body.a.z(), to = 1.f / body.b.z();
+  // An even surface's inverse depth changes evenly over the picture.
+  const float thickest = std::max(body.ra, body.rb), per_z = 1.f / std::min(body.a.z(), body.b.z()),
+              from = c.parallel > 0.f ? per_z : 1.f / body.a.z(),
+              to = c.parallel > 0.f ? per_z : 1.f / body.b.z();
   const std::uint32_t entry = r.entry, subframe = c.subframe;
-  for (std::int32_t y = first; y < last; ++y) {
-    const float at = float(y) + .5f;
-    const auto [left, right] = outline.across(at);
-    if (!(left < right)) continue;
-    const auto [begin, end] = outline.part(at);
-    const float depth = c.parallel > 0.f
-                            ? std::min(body.a.z(), body.b.z())
-                            : 1.f / std::max(from + begin * (to - from), from + end * (to - from));
-    const std::uint32_t nearest = key_of(depth_code(std::max(depth * .9999f - thickest, c.near)), 0);
-    const std::int32_t low = clipped(std::floor(left), s.left, s.right),
-                       high = clipped(std::ceil(right), s.left, s.right);
-    const auto [inner_left, inner_right] = S > 1 ? inner.across(at) : std::pair(0.f, 0.f);
-    for (std::int32_t x = low & -lanes; x < high; x += lanes) {
-      if (window.before(x, y, nearest)) continue;
-      float px[lanes], py[lanes];
-      FOREST_LANES
-      for (int k = 0; k < lanes; ++k) px[k] = float(x + k) + .5f, py[k] = at;
-      Hits<lanes> hits;
-      const bool single = S == 1 || (px[lanes - 1] >= inner_left && px[0] <= inner_right);
-      if (single) meet<lanes>(c, picture.light, body, px, py, hits);
-      if constexpr (S == 1) {
-        std::uint32_t row[lanes];
+  for (std::int32_t top = first; top < last; top += rows_at_once) {
+    Outline::Rows rows, inner_rows;
+    outline.across(float(top) + .5f, rows);
+    if constexpr (S > 1) inner.across(float(top) + .5f, inner_rows);
+    std::uint32_t nearest[rows_at_once];
+    FOREST_LANES
+    for (int k = 0; k < rows_at_once; ++k) {
+      float begin, end;
+      outline.part(float(top + k) + .5f, begin, end);
+      const float depth = 1.f / larger(from + begin * (to - from), from + end * (to - from));
+      nearest[k] = key_of(depth_code(larger(depth * .9999f - thickest, c.near)), 0);
+    }
+    for (std::int32_t row = 0; row < std::min(rows_at_once, last - top); ++row) {
+      const std::int32_t y = top + row;
+      if (!(rows.left[row] < rows.right[row])) continue;
+      const std::int32_t low = clipped(std::floor(rows.left[row]), s.left, s.right),
+                         high = clipped(std::ceil(rows.right[row]), s.left, s.right);
+      for (std::int32_t x = low & -lanes; x < high; x += lanes) {
+        if (window.before(x, y, nearest[row])) continue;
+        const float at = float(y) + .5f;
+        float px[lanes];
         FOREST_LANES
-        for (int k = 0; k < lanes; ++k) {
-          const bool wanted = (hits.hit[k] != 0) & (x + k >= low) & (x + k < high);
-          const std::uint32_t key =
-              key_of(hits.code[k], payload_of(entry, hits.shade[k], noise_at(x + k, y, subframe)));
-          row[k] = wanted ? key : FOREST_KEY_EMPTY;
-        }
-        window.put_row(x, y, row);
-        continue;
-      }
-      for (std::int32_t n = std::max(low - x, 0); n < std::min(lanes, high - x); ++n) {
-        const float noise = noise_at(x + n, y, subframe);
-        Keys<S> keys;
-        if (S == 1 || (px[n] >= inner_left && px[n] <= inner_right)) {
-          const std::uint32_t hit = hits.hit[n];
+        for (int k = 0; k < lanes; ++k) px[k] = float(x + k) + .5f;
+        Hits<lanes> hits;
+        if constexpr (S == 1) {
+          meet_row(px, at, hits);
+          std::uint32_t keys[lanes];
           FOREST_LANES
-          for (int k = 0; k < S; ++k) {
+          for (int k = 0; k < lanes; ++k) {
             const std::uint32_t key =
-                key_of(hits.code[n], payload_of(entry, hits.shade[n], fraction(noise + samples.turn[k])));
-            keys[k] = hit ? key : FOREST_KEY_EMPTY;
+                key_of(hits.code[k], payload_of(entry, hits.shade[k], noise_at(x + k, y, subframe)));
+            keys[k] = hits.hit[k] ? key : FOREST_KEY_EMPTY;
           }
+          window.put_row(x, y, keys);
         } else {
-          float sx[S], sy[S];
-          FOREST_LANES
-          for (int k = 0; k < S; ++k) sx[k] = px[n] - samples.x[k], sy[k] = py[n] - samples.y[k];
-          Hits<S> seen;
-          meet<S>(c, picture.light, body, sx, sy, seen);
-          FOREST_LANES
-          for (int k = 0; k < S; ++k) {
-            const std::uint32_t key =
-                key_of(seen.code[k], payload_of(entry, seen.shade[k], fraction(noise + samples.turn[k])));
-            keys[k] = seen.hit[k] ? key : FOREST_KEY_EMPTY;
+          const float inner_left = inner_rows.left[row], inner_right = inner_rows.right[row];
+          if (px[lanes - 1] >= inner_left && px[0] <= inner_right) meet_row(px, at, hits);
+          for (std::int32_t n = std::max(low - x, 0); n < std::min(lanes, high - x); ++n) {
+            const float noise = noise_at(x + n, y, subframe);
+            Keys<S> keys;
+            if (px[n] >= inner_left && px[n] <= inner_right) {  // one ray for all samples
+              const std::uint32_t hit = hits.hit[n];
+              FOREST_LANES
+              for (int k = 0; k < S; ++k) {
+                const std::uint32_t key =
+                    key_of(hits.code[n], payload_of(entry, hits.shade[n], fraction(noise + samples.turn[k])));
+                keys[k] = hit ? key : FOREST_KEY_EMPTY;
+              }
+            } else {
+              float sx[S], sy[S];
+              FOREST_LANES
+              for (int k = 0; k < S; ++k) sx[k] = px[n] - samples.x[k], sy[k] = at - samples.y[k];
+              Hits<S> seen;
+              if (whole)
+                silhouette->meet<S>(sx, static_cast<const float*>(sy), c.near, seen);
+              else
+                meet(c, picture.light, body, sx, sy, seen);
+              FOREST_LANES
+              for (int k = 0; k < S; ++k) {
+                const std::uint32_t key =
+                    key_of(seen.code[k], payload_of(entry, seen.shade[k], fraction(noise + samples.turn[k])));
+                keys[k] = seen.hit[k] ? key : FOREST_KEY_EMPTY;
+              }
+            }
+            window.put(x + n, y, keys);
           }
         }
-        window.put(x + n, y, keys);
       }
     }
   }

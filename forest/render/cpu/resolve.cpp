@@ -24,17 +24,64 @@ double srgb(double light) {
   return light <= .0031308 ? 12.92 * light : 1.055 * std::pow(light, 1. / 2.4) - .055;
 }
 
-// 255 × sRGB of light 0–1.
-float encoded(float light) {
-  static const auto table = [] {
-    std::array<float, steps + 2> t{};
+// 255 × sRGB of light 0–1, in even steps.
+using Codes = std::array<float, steps + 2>;
+const Codes& codes() {
+  static const Codes table = [] {
+    Codes t{};
     for (std::size_t i = 0; i < t.size(); ++i)
       t[i] = float(255. * std::min(1., srgb(double(i) / double(steps))));
     return t;
   }();
+  return table;
+}
+
+[[gnu::always_inline]] inline float encoded(const float* table, float light) {
   const float at = smaller(larger(light, 0.f), 1.f) * float(steps);
-  const auto i = std::size_t(at);
+  const auto i = std::int32_t(at);
   return table[i] + (at - float(i)) * (table[i + 1] - table[i]);
+}
+
+// Pixels that follow one another in a row, to be shown: what their samples' light and coverage are multiplied by.
+struct Exposed {
+  std::size_t pixels;
+  std::int32_t x, y;  // of the first
+  std::uint32_t subframe;
+  float exposure, share;
+};
+
+// From sums to bytes; `light` is scratch.
+FOREST_CLONES void show(const Exposed& e, const float* table, const std::int32_t* __restrict sums,
+                        float* __restrict light, std::uint8_t* __restrict bytes) {
+  const float exposure = e.exposure, share = e.share;
+  for (std::size_t i = 0; i < 4 * e.pixels; ++i) light[i] = encoded(table, float(sums[i]) * exposure);
+  for (std::size_t i = 0; i < e.pixels; ++i) {
+    const float noise = noise_at(e.x + std::int32_t(i), e.y, e.subframe);
+    for (std::size_t j = 0; j < 3; ++j)
+      bytes[4 * i + j] = std::uint8_t(std::int32_t(smaller(light[4 * i + j] + noise, 255.f)));
+    bytes[4 * i + 3] = std::uint8_t(std::int32_t(255.f * float(sums[4 * i + 3]) * share + .5f));
+  }
+}
+
+// Which pixels have nothing at any sample that is wanted.
+template <int S>
+[[gnu::always_inline]] inline void find_empty_of(const std::uint32_t* keys, std::size_t pixels,
+                                                 const std::uint32_t* ignored, std::uint8_t* empty) {
+  for (std::size_t x = 0; x < pixels; ++x, keys += S) {
+    std::uint32_t all = FOREST_KEY_EMPTY;
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) all &= keys[k] | ignored[k];
+    empty[x] = all == FOREST_KEY_EMPTY;
+  }
+}
+FOREST_CLONES void find_empty(int samples, const std::uint32_t* keys, std::size_t pixels,
+                              const std::uint32_t* ignored, std::uint8_t* empty) {
+  if (samples == 1)
+    find_empty_of<1>(keys, pixels, ignored, empty);
+  else if (samples == 4)
+    find_empty_of<4>(keys, pixels, ignored, empty);
+  else
+    find_empty_of<16>(keys, pixels, ignored, empty);
 }
 
 FOREST_CLONES void octaves_of(const std::uint32_t* keys, std::size_t count, float* octaves) {
@@ -179,6 +226,9 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
     for (std::size_t e = 0; e < palette.size(); ++e) channels[i][e] = palette[e][Eigen::Index(i)];
   const bool tinted = c.glass_opacity > 0.f;
   const float share = 1.f / float(so_far), exposure = c.exposure * share / unit;
+  const float* table = codes().data();
+  std::array<std::uint32_t, most_samples> ignored{};
+  for (int k = 0; k < samples; ++k) ignored[std::size_t(k)] = wanted >> k & 1 ? 0u : ~0u;
   const std::int32_t left = std::int32_t(area.left), right = std::int32_t(area.right),
                      high = std::int32_t(area.bottom - area.top),
                      columns = std::max(row_at_once / samples, 64),
@@ -192,9 +242,11 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
                        end_x = std::min(right, begin_x + columns);
     const auto S = std::size_t(samples), pixels = std::size_t(end_x - begin_x),
                row_size = (pixels + 2 * beside) * S;
-    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S);
+    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S),
+        light(4 * pixels);
     std::vector<std::uint32_t> keys((rows_at_once + 2 * beside) * row_size);
     std::vector<std::int32_t> row_sums(4 * pixels);
+    std::vector<std::uint8_t> empty(pixels);
     // Rows and columns around the block; the picture's edges are repeated.
     const std::int32_t low = std::max(begin_x - beside, 0), up = std::min(end_x + beside, width);
     for (std::int32_t k = 0; k < end_y - begin_y + 2 * beside; ++k) {
@@ -212,35 +264,22 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
       const std::uint32_t* row_keys = &keys[(k + beside) * row_size + beside * S];
       Shading shading{{}, row_keys, samples, c.halo, c.fog_start, c.fog_length};
       for (std::size_t i = 0; i < 5; ++i) shading.rows[i] = &octaves[(k + i) * row_size + beside * S];
-      const auto empty = [&](std::size_t x) {
-        std::uint32_t all = FOREST_KEY_EMPTY;
-        for (std::size_t i = x * S; i < (x + 1) * S; ++i)
-          all &= row_keys[i] | (wanted >> (i - x * S) & 1 ? 0u : ~0u);
-        return all == FOREST_KEY_EMPTY;
-      };
+      find_empty(samples, row_keys, pixels, ignored.data(), empty.data());
       const Vec3 sky = top + (float(y) + .5f) / float(height) * (bottom - top);
       std::int32_t sky_sum[3];
       for (int i = 0; i < 3; ++i) sky_sum[i] = fixed(sky[i]) * std::popcount(wanted);
       float sky_code[3];
-      for (int i = 0; i < 3; ++i) sky_code[i] = encoded(float(sky_sum[i]) * exposure);
+      for (int i = 0; i < 3; ++i) sky_code[i] = encoded(table, float(sky_sum[i]) * exposure);
       const auto row_at = std::size_t(y) * std::size_t(width) + std::size_t(begin_x);
-      const auto show = [&](std::size_t x, const std::int32_t* sum) {
-        std::uint8_t* pixel = &image.pixels[4 * (row_at + x)];
-        const float noise = noise_at(begin_x + std::int32_t(x), y, so_far - 1);
-        for (std::size_t i = 0; i < 3; ++i)
-          pixel[i] = std::uint8_t(smaller(encoded(float(sum[i]) * exposure) + noise, 255.f));
-        pixel[3] = std::uint8_t(255.f * float(sum[3]) * share + .5f);
-        alpha += pixel[3];
-      };
       // Runs of pixels in which something is drawn, and what lies between.
       for (std::size_t x = 0; x < pixels;) {
         const std::size_t from = x;
-        const bool nothing = empty(x);
+        const bool nothing = empty[x];
         std::size_t gap = 0;
         if (nothing)
-          while (x < pixels && empty(x)) ++x;
+          while (x < pixels && empty[x]) ++x;
         else
-          for (; x < pixels && gap < 16; ++x) gap = empty(x) ? gap + 1 : 0;
+          for (; x < pixels && gap < 16; ++x) gap = empty[x] ? gap + 1 : 0;
         if (nothing && at_once && !tinted) {
           for (std::size_t i = from; i < x; ++i) {
             std::uint8_t* pixel = &image.pixels[4 * (row_at + i)];
@@ -267,8 +306,11 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
           for (std::size_t i = 0; i < 4 * (x - from); ++i)
             to[i] = before[i] = (first ? 0 : before[i]) + to[i];
         }
-        if (last)
-          for (std::size_t i = from; i < x; ++i) show(i, to + 4 * (i - from));
+        if (!last) continue;
+        std::uint8_t* bytes = &image.pixels[4 * (row_at + from)];
+        show({x - from, begin_x + std::int32_t(from), y, so_far - 1, exposure, share}, table, to,
+             light.data(), bytes);
+        for (std::size_t i = 3; i < 4 * (x - from); i += 4) alpha += bytes[i];
       }
     }
     covered += alpha;

@@ -14,11 +14,22 @@
 namespace forest::render::cpu {
 namespace {
 
-// Of a run that is loaded, what is transparent.
-void mark_transparent(const Picture& picture, const frame::Item& item, const frame::State& state, Run& r) {
-  for (std::size_t i = 0; i < r.count; ++i) {
-    r.opacity[i] = (state.opacity * picture.opacities[r.entry[i]] + 127u) / 255u;
-    if (r.opacity[i] < 255) r.key[i] = frame::forest_branch_key(item.instance, r.meta[i]);
+// Segment `i` of a run that is loaded, where something is transparent.
+void mark_transparent(const Picture& picture, std::uint32_t instance, const frame::State& state, Run& r,
+                      std::size_t i) {
+  r.opacity[i] = (state.opacity * picture.opacities[r.entry[i]] + 127u) / 255u;
+  if (r.opacity[i] < 255) r.key[i] = frame::forest_branch_key(instance, r.meta[i]);
+}
+
+// Straws are of a neuron each.
+void load_owners(const Picture& picture, const frame::Item& item, Run& r) {
+  std::size_t i = 0;
+  for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1, ++i) {
+    const std::uint32_t instance =
+        picture.geometry.owner(item.first_segment + std::size_t(std::countr_zero(drawn))).instance;
+    const frame::State state = picture.states[instance];
+    r.entry[i] += state.colour_class * 8u;
+    if (picture.transparent) mark_transparent(picture, instance, state, r, i);
   }
 }
 
@@ -26,7 +37,8 @@ void mark_transparent(const Picture& picture, const frame::Item& item, const fra
 
 void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r) {
   const frame::Segment* segments = &picture.geometry.segments[item.first_segment];
-  const frame::State state = picture.state_of(item);
+  const bool straws = picture.geometry.straw(item);
+  const frame::State state = straws ? frame::State{} : picture.state_of(item);
   const std::uint32_t colour = state.colour_class * 8u;
   // Which lines are drawn for their like does not change from sample to sample.
   const float turn = picture.constants.thinnest > 0.f ? 0.f : golden * float(picture.constants.subframe);
@@ -43,7 +55,10 @@ void load(const Picture& picture, const frame::Item& item, const std::uint8_t* e
     r.meta[i] = s.meta;
     r.opacity[i] = 255;
   }
-  if (picture.transparent) mark_transparent(picture, item, state, r);
+  if (straws)
+    load_owners(picture, item, r);
+  else if (picture.transparent)
+    for (std::size_t i = 0; i < r.count; ++i) mark_transparent(picture, item.instance, state, r, i);
   if (entries) {
     std::size_t i = 0;
     for (std::uint32_t drawn = item.drawn; drawn; drawn &= drawn - 1)
@@ -119,11 +134,26 @@ FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Ve
   }
 }
 
-FOREST_CLONES void prepare_lines(const frame::Constants& c, float spread, Run& r) {
+FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
+  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const float shortest = float(FOREST_STRAW_LENGTH) * c.thinnest;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float dx = r.qx[i] - r.px[i], dy = r.qy[i] - r.py[i], length = std::sqrt(dx * dx + dy * dy);
+    const bool shorter = length < shortest, none = !(length > 1e-3f);
+    const float scale = .5f * shortest / larger(length, 1e-3f), mx = .5f * (r.px[i] + r.qx[i]),
+                my = .5f * (r.py[i] + r.qy[i]), hx = none ? .5f * shortest : scale * dx,
+                hy = none ? 0.f : scale * dy;
+    r.px[i] = shorter ? mx - hx : r.px[i], r.py[i] = shorter ? my - hy : r.py[i];
+    r.qx[i] = shorter ? mx + hx : r.qx[i], r.qy[i] = shorter ? my + hy : r.qy[i];
+    r.mean_width[i] *= shorter ? length / shortest : 1.f;
+  }
+}
+
+FOREST_CLONES void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r) {
   const std::size_t count = (r.count + 7) & ~std::size_t(7);
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
-  const float thinnest = c.thinnest, per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
+  const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);

@@ -24,6 +24,17 @@ struct Picture {
   frame::State state_of(const frame::Item& item) const {
     return item.state ? frame::unpacked(item.state) : states[item.instance];
   }
+  /// Where an item's neuron stands, as camera = turn · p + at.
+  struct Standing {
+    Mat3 turn;
+    Vec3 at;
+  };
+  Standing standing(const frame::Item& item) const {
+    if (geometry.straw(item)) return {to_camera, to_camera * -eye};
+    const frame::Instance& i = geometry.instances[item.instance];
+    return {to_camera * Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix(),
+            to_camera * (Vec3(i.x, i.y, i.z) - eye)};
+  }
 };
 
 inline constexpr std::size_t run = FOREST_CLUSTER_SIZE;
@@ -59,8 +70,12 @@ void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
 /// From the coordinates of their neuron to pixels: camera = turn · p + at.
 void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light, Run& r);
 
+/// Straws shorter than FOREST_STRAW_LENGTH times what the thinnest line is wide get as long, and fewer of them are drawn.
+void lengthen(const frame::Constants& c, Run& r);
+
 /// What lines need, after draw_line in render/opengl/shaders/common.glsl.
-void prepare_lines(const frame::Constants& c, float spread, Run& r);
+/// @param thinnest  as Constants::thinnest
+void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r);
 
 /// What a length at this depth is divided by to be seen.
 inline float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }

@@ -132,7 +132,7 @@ constexpr std::size_t ahead = 3, things_ahead = 6;
 void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
   const auto* at = reinterpret_cast<const char*>(&geometry.segments[item.first_segment]);
   for (std::size_t i = 0; i < 8; i += 2) __builtin_prefetch(at + i * sizeof(frame::Segment));
-  __builtin_prefetch(&geometry.instances[item.instance]);
+  if (!geometry.straw(item)) __builtin_prefetch(&geometry.instances[item.instance]);
 }
 
 // Brings things to the picture, but for what is hidden already.
@@ -146,14 +146,14 @@ class Gatherer {
   std::uint64_t add(const frame::Item& item, const std::uint8_t* entries, Kind kind, Chunk& chunk) {
     const frame::Constants& c = picture_.constants;
     if (const Extent e(picture_, item); !item.drawn || hidden(e.box, e.nearest_code)) return 0;
-    const frame::Instance& instance = picture_.geometry.instances[item.instance];
-    const Mat3 turn =
-        picture_.to_camera * Quat(instance.qw, instance.qx, instance.qy, instance.qz).toRotationMatrix();
-    const Vec3 at = picture_.to_camera * (Vec3(instance.x, instance.y, instance.z) - picture_.eye);
+    const auto [turn, at] = picture_.standing(item);
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
     project(c, turn, at, picture_.light, r_);
-    prepare_lines(c, picture_.spread, r_);
+    const bool straws = picture_.geometry.straw(item);
+    if (straws) lengthen(c, r_);
+    if (kind == Kind::lines || any_thin())
+      prepare_lines(c, (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest, picture_.spread, r_);
     std::uint64_t added = 0;
     for (std::size_t i = 0; i < r_.count; ++i)
       added += r_.opacity[i] && (kind == Kind::lines ? add_stroke(i, chunk) : add_near(i, chunk));
@@ -162,7 +162,7 @@ class Gatherer {
   void add(const frame::Overlay& overlay, Chunk& chunk) {
     load(overlay, picture_, r_);
     project(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, picture_.light, r_);
-    prepare_lines(picture_.constants, picture_.spread, r_);
+    prepare_lines(picture_.constants, picture_.constants.thinnest, picture_.spread, r_);
     add_near(0, chunk);
   }
   void add(const frame::Ball& ball, std::uint32_t number, Chunk& chunk) const {
@@ -180,26 +180,37 @@ class Gatherer {
   bool hidden(const Box& b, float nearest_code) const {
     return canvas_.hidden(whole_, b.left, b.top, b.right, b.bottom, nearest_code);
   }
-  template <class Thing>
-  bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
-    const Box b = thing.box(picture_.spread);
-    if (hidden(b, thing.nearest_code())) return false;
+  // Adds make() to a list if something may be seen of what lies in a box.
+  bool put(const Box& b, float nearest_code, auto& list, std::vector<Chunk::Range>& ranges,
+           auto&& make) const {
+    if (hidden(b, nearest_code)) return false;
     const Square s = canvas_.touched(b.left, b.top, b.right, b.bottom);
     if (s.left > s.right || s.top > s.bottom) return false;
-    list.push_back(thing);
+    list.push_back(make());
     ranges.push_back(
         {std::int16_t(s.left), std::int16_t(s.top), std::int16_t(s.right), std::int16_t(s.bottom)});
     return true;
   }
+  template <class Thing>
+  bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
+    return put(thing.box(picture_.spread), thing.nearest_code(), list, ranges, [&] { return thing; });
+  }
   bool add_stroke(std::size_t i, Chunk& chunk) const {
-    return r_.line_width[i] > 0.f && put(Stroke(r_, i), chunk.strokes, chunk.ranges_of_strokes);
+    return r_.line_width[i] > 0.f &&
+           put({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.nearest[i], chunk.strokes,
+               chunk.ranges_of_strokes, [&] { return Stroke(r_, i); });
+  }
+  // Of near ones, what is less than that wide at both ends is a line.
+  static constexpr float thin = .75f;
+  bool any_thin() const {
+    return std::any_of(r_.width, r_.width + r_.count, [](float width) { return width < 2.f * thin; });
   }
   bool add_near(std::size_t i, Chunk& chunk) const {
     if (r_.width[i] < 0.f) return false;
     const frame::Constants& c = picture_.constants;
     const float width = c.focal * std::max(r_.ra[i] / lens(c, r_.az[i]), r_.rb[i] / lens(c, r_.bz[i]));
-    if (width < .75f) return add_stroke(i, chunk);
-    return put(Solid(c, r_, i, width), chunk.solids, chunk.ranges_of_solids);
+    if (width < thin) return add_stroke(i, chunk);
+    return put(Solid(c, r_, i), chunk.solids, chunk.ranges_of_solids);
   }
   // The one segment of a dot.
   std::uint64_t add_beads(const frame::Item& item, const Mat3& turn, const Vec3& at, Chunk& chunk) {

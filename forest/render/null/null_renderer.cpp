@@ -7,7 +7,7 @@ void NullRenderer::load(const frame::Geometry& geometry) { geometry_ = geometry;
 
 frame::Timing NullRenderer::draw(const frame::Frame& frame) {
   frame::check(frame, geometry_);
-  if (frame.rest) frame::check(frame.rest(seen_), geometry_);
+  if (frame.rest) frame::check(frame.rest({}, 0), geometry_);
   width_ = frame.width, height_ = frame.height;
   return {};
 }

@@ -26,6 +26,32 @@ using frame::Segment;
 // What shaders wrote is read by others as storage or as texels.
 constexpr GLbitfield written_for_readers = GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT;
 
+std::string driver() {
+  const auto* name =
+      reinterpret_cast<const char*>(glGetString(GL_RENDERER));  // none when the context is gone
+  return name ? name : "no longer there";
+}
+
+GLint limit(GLenum name) {
+  GLint value = 0;
+  glGetIntegerv(name, &value);
+  return value;
+}
+
+std::size_t texel_size(GLenum format) {
+  switch (format) {
+    case GL_RGBA32UI:
+    case GL_RGBA32F:
+      return 16;
+    case GL_RG8UI:
+      return 2;
+    case GL_R8UI:
+      return 1;
+    default:
+      return 4;
+  }
+}
+
 // A buffer on the device that grows and never shrinks.
 class Buffer {
  public:
@@ -48,8 +74,15 @@ class Buffer {
     if (!values.empty()) glNamedBufferSubData(name_, 0, GLsizeiptr(values.size_bytes()), values.data());
   }
   void bind(GLuint slot) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, slot, name_); }
-  /// For reading as a texture of `format`, at a unit of shaders/common.glsl.
+  /// For reading as a texture of `format`, at a unit of shaders/common.glsl. Throws Error where the driver would read only
+  /// the beginning, which it would not say.
   void bind_texels(GLuint unit, GLenum format) {
+    const std::size_t most = std::size_t(limit(GL_MAX_TEXTURE_BUFFER_SIZE));
+    if (size_ > most * texel_size(format))
+      throw Error(fmt::format(
+          "this forest or picture is too large for the graphics driver ({}), which reads {} bytes of "
+          "a list of {}; take a smaller picture, or --renderer cpu",
+          driver(), most * texel_size(format), size_));
     if (!texels_) glCreateTextures(GL_TEXTURE_BUFFER, 1, &texels_);
     glTextureBuffer(texels_, format, name_);
     glBindTextureUnit(unit, texels_);
@@ -79,8 +112,8 @@ class Program {
     char log[4096] = "";
     glGetShaderInfoLog(shader, sizeof log, nullptr, log);
     if (!log[0]) glGetProgramInfoLog(name_, sizeof log, nullptr, log);
-    throw Error(fmt::format("the shader '{}' was not accepted by this OpenGL driver ({}): {}", title,
-                            reinterpret_cast<const char*>(glGetString(GL_RENDERER)), log));
+    throw Error(
+        fmt::format("the shader '{}' was not accepted by this OpenGL driver ({}): {}", title, driver(), log));
   }
   ~Program() { glDeleteProgram(name_); }
   Program(const Program&) = delete;
@@ -124,6 +157,26 @@ struct SurfaceBuffers {
   }
 };
 
+// Throws Error when what was drawn since the last time cannot be relied on.
+void check_driver() {
+  // A card that was reset, taken out or put to sleep draws nothing from then on, and says so here alone.
+  if (glGetGraphicsResetStatus() != GL_NO_ERROR)
+    throw Error(
+        "the graphics card was reset by its driver and has lost the forest; start again, or draw on the "
+        "processor with --renderer cpu");
+  if (const GLenum error = glGetError())
+    throw Error(
+        error == GL_OUT_OF_MEMORY
+            ? fmt::format(
+                  "the graphics driver ({}) has too little memory for this forest and picture; take a "
+                  "smaller picture, or --renderer cpu",
+                  driver())
+            : fmt::format(
+                  "the graphics driver ({}) reports error 0x{:x} after drawing; install a newer one, or "
+                  "draw on the processor with --renderer cpu",
+                  driver(), error));
+}
+
 double milliseconds_since(std::chrono::steady_clock::time_point start) {
   return std::chrono::duration<double, std::milli>(std::chrono::steady_clock::now() - start).count();
 }
@@ -151,8 +204,8 @@ struct OpenGLRenderer::Device {
   Buffer mesh_looks;
   std::vector<std::uint8_t> looks;  // of every vertex: palette entry, presence
   Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, states, palette, overlay_segments, ball_segments, uniforms, keys, sums, image,
-      queue, large_queue, tiles;
+  Buffer segments, instances, owners, states, palette, overlay_segments, ball_segments, uniforms, keys, sums,
+      image, queue, large_queue, tiles;
   ListSet lists{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}},
       rest{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}};
   List overlays{&Drawing::capsules, FOREST_OVERLAY, {}},
@@ -226,6 +279,7 @@ struct OpenGLRenderer::Device {
     tiles.reserve((pixels / 32 + width + height + 64) * 4);
     large_queue.reserve(16 + 4 * std::size_t(large_capacity));
     instances.bind_texels(1, GL_RGBA32UI);
+    owners.bind_texels(10, GL_RG32UI);
     keys.bind_texels(3, GL_R32UI);
     states.bind_texels(4, GL_RGBA8UI);
     palette.bind_texels(5, GL_RGBA32F);
@@ -339,10 +393,11 @@ struct OpenGLRenderer::Device {
       find_tiles();
     }
     draw_bands(lists, f.bands, f.surfaces.empty());
-    if (f.rest) {
+    for (std::uint32_t round = 0; f.rest; ++round) {
       find_tiles();
       read_depths();
-      const frame::Lists more = f.rest(seen);
+      const frame::Lists more = f.rest(seen, round);
+      if (more.empty()) break;
       frame::check(more, geometry);
       upload(rest, more);
       draw_bands(rest, more.bands, false);
@@ -385,8 +440,9 @@ struct OpenGLRenderer::Device {
 OpenGLRenderer::OpenGLRenderer() {
   if (epoxy_gl_version() < 45)
     throw Error(fmt::format(
-        "OpenGL 4.5 is needed and this driver has {}.{}; install a newer driver or use Mesa's llvmpipe",
-        epoxy_gl_version() / 10, epoxy_gl_version() % 10));
+        "OpenGL 4.5 is needed for its compute shaders and this driver ({}) has {}.{}; install a newer one "
+        "(libgl1-mesa-dri has one for every computer)",
+        driver(), epoxy_gl_version() / 10, epoxy_gl_version() % 10));
   device_ = std::make_unique<Device>();
 }
 
@@ -395,7 +451,7 @@ OpenGLRenderer::~OpenGLRenderer() {
   glDeleteFramebuffers(1, &device_->framebuffer);
 }
 
-std::string OpenGLRenderer::name() const { return reinterpret_cast<const char*>(glGetString(GL_RENDERER)); }
+std::string OpenGLRenderer::name() const { return driver(); }
 
 bool OpenGLRenderer::on_processor() const {
   const std::string driver = name();
@@ -407,6 +463,7 @@ void OpenGLRenderer::load(const frame::Geometry& geometry) {
   device_->geometry = geometry;
   device_->segments.upload(geometry.segments);
   device_->instances.upload(geometry.instances);
+  device_->owners.upload(geometry.owners);
 }
 
 frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
@@ -435,9 +492,7 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
     timing.resolve += milliseconds_since(start);
   }
   std::erase_if(d.meshes, [](const auto& known) { return !known.second.used; });
-  if (const GLenum error = glGetError())
-    throw Error(
-        fmt::format("OpenGL reports error 0x{:x} after drawing; there may be too little memory", error));
+  check_driver();
   return timing;
 }
 
@@ -445,6 +500,7 @@ frame::Image OpenGLRenderer::read() {
   const Device& d = *device_;
   frame::Image image{d.width, d.height, std::vector<std::uint8_t>(std::size_t(d.width) * d.height * 4)};
   glGetNamedBufferSubData(d.image.name(), 0, GLsizeiptr(image.pixels.size()), image.pixels.data());
+  check_driver();
   double covered = 0.;
   for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
     covered += image.pixels[i];

@@ -527,7 +527,7 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   };
   add(f);
   if (f.rest) {
-    const frame::Lists rest = f.rest(seen_);  // all of it
+    const frame::Lists rest = f.rest({}, 0);  // all of it
     frame::check(rest, geometry_);
     add(rest);
   }
@@ -539,16 +539,19 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
   const auto capsule_of = [&](const Drawn& drawn, std::uint32_t index, Capsule& c) {
     const Item& item = *drawn.item;
     const Segment& s = geometry_.segments[item.first_segment + index];
-    const frame::Instance& i = geometry_.instances[item.instance];
+    const bool straw = geometry_.straw(item);
+    const std::uint32_t instance =
+        straw ? geometry_.owner(item.first_segment + index).instance : item.instance;
+    const frame::Instance i = straw ? frame::Instance{0, 0, 0, 0, 0, 0, 0, 1} : geometry_.instances[instance];
     const Quat turn(i.qw, i.qx, i.qy, i.qz);
     const Vec3 at(i.x, i.y, i.z);
     c.a = eye.seen(at + turn * Vec3(s.ax, s.ay, s.az));
     c.b = eye.seen(at + turn * Vec3(s.bx, s.by, s.bz));
     c.ra = from_half(s.radii), c.rb = from_half(s.radii >> 16);
-    const frame::State state = item.state ? frame::unpacked(item.state) : f.states[item.instance];
+    const frame::State state = item.state ? frame::unpacked(item.state) : f.states[instance];
     c.entry = std::uint8_t(state.colour_class * 8u + (s.meta & 7u));
     c.opacity = (state.opacity * f.opacities[c.entry] + 127u) / 255u;
-    c.key = frame::forest_branch_key(item.instance, s.meta);
+    c.key = frame::forest_branch_key(instance, s.meta);
     if (drawn.entries) c.entry = drawn.entries[index];
     return c.opacity > 0 && project(eye, c);
   };

@@ -10,38 +10,22 @@
 #include "forest/core/random.h"
 #include "forest/geometry/round_cone.h"
 
+#include "tests/small_scene.h"
+
 namespace forest::render {
 namespace {
 
-// One neuron at the origin, seen from z = 100 µm; 1 µm is about 2.75 pixels there.
-struct Fixture {
+// Each of its segments as an item of its own, all of them capsules.
+struct Fixture : SmallScene {
   ReferenceRenderer renderer;
-  std::vector<frame::Segment> segments;
-  std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
-  std::vector<frame::State> states{{}};
-  std::vector<frame::Item> items;
-  frame::Frame frame;
 
-  Fixture() {
-    frame.camera = {.eye = {0, 0, 100}, .target = {0, 0, 0}, .field_of_view = 40.f};
-    frame.width = frame.height = 200;
-    frame.palette.fill(Vec3(1, 0, 0));
-    frame.states = states;
-    frame.style.background_top = frame.style.background_bottom = Vec3::Zero();
-    frame.style.halo = 0.f;
-  }
   void add(const Vec3& a, const Vec3& b, float ra, float rb) {
-    const auto half = [](float r) {
-      return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(r)));
-    };
-    segments.push_back({a.x(), a.y(), a.z(), half(ra) | half(rb) << 16, b.x(), b.y(), b.z(), 3});
+    add_segment(a, b, ra, rb);
     items.push_back({0, std::uint32_t(segments.size() - 1), 1, 0, 0, 0, a.z(), 200});
   }
   frame::Image draw() {
     frame.capsules = items;
-    renderer.load({segments, instances});
-    renderer.draw(frame);
-    return renderer.read();
+    return drawn_by(renderer);
   }
   double scale() const {
     return frame.camera.focal(float(frame.height)) / 100.;
@@ -218,7 +202,7 @@ TEST(ReferenceRenderer, WhatTheSceneLeftOutIsDrawnToo) {
   const auto all = f.items;
   f.items.resize(1);
   EXPECT_NE(f.draw().pixels, image.pixels);
-  f.frame.rest = [&](const frame::DepthMap& seen) {
+  f.frame.rest = [&](const frame::DepthMap& seen, std::uint32_t) {
     EXPECT_TRUE(seen.depths.empty());
     frame::Lists rest;
     rest.capsules = std::span(all).last(1);

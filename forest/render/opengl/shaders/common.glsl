@@ -11,6 +11,7 @@ layout(binding = 5) uniform samplerBuffer palette;          // linear, and 0–2
 layout(binding = 6) uniform usamplerBuffer queue_seen;
 layout(binding = 7) uniform usamplerBuffer large_seen;
 layout(binding = 8) uniform usamplerBuffer tiles_seen;
+layout(binding = 10) uniform usamplerBuffer owners;         // of the straws, which are the last segments: instance, segment
 layout(binding = 9) uniform usamplerBuffer entries;         // of this list's segments, where FOREST_ENTRIES
 
 layout(std430, binding = 0) buffer Keys { uint keys[]; };
@@ -30,6 +31,7 @@ struct Capsule {
   uint entry;  // of the palette
   float rank;  // in [0, 1): a branch of width w < 1 pixel is drawn when w > rank
   float mean;  // radius of its branch; 0: as its own
+  bool straw;
 };
 
 vec3 to_camera(vec3 world) {
@@ -107,6 +109,7 @@ bool fetch(uint item_index, uint index, out Capsule c) {
   c.b = uintBitsToFloat(at_b.xyz);
   c.ra = radii.x;
   c.rb = radii.y;
+  c.straw = item.x == FOREST_IN_WORLD && (view.flags & FOREST_OVERLAY) == 0u;
   if ((view.flags & FOREST_OVERLAY) != 0u) {  // in the world, entry in the meta word
     c.a = to_camera(c.a);
     c.b = to_camera(c.b);
@@ -128,10 +131,16 @@ bool fetch(uint item_index, uint index, out Capsule c) {
     c.rank = 0.0;
     c.mean = 0.0;
   } else {
-    vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
-    vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
-    c.a = to_camera(at + turned(q, c.a));
-    c.b = to_camera(at + turned(q, c.b));
+    if (item.x == FOREST_IN_WORLD) {
+      c.a = to_camera(c.a);
+      c.b = to_camera(c.b);
+      item.x = texelFetch(owners, int(item.y + index) - (textureSize(segments) / 2 - textureSize(owners))).x;
+    } else {
+      vec3 at = uintBitsToFloat(texelFetch(instances, int(2u * item.x)).xyz);
+      vec4 q = uintBitsToFloat(texelFetch(instances, int(2u * item.x + 1u)));
+      c.a = to_camera(at + turned(q, c.a));
+      c.b = to_camera(at + turned(q, c.b));
+    }
     c.mean = unpackHalf2x16(meta >> 16).x;
     uvec4 state = item.w == 0u ? texelFetch(states, int(item.x)) : (uvec4(item.w) >> uvec4(0u, 8u, 16u, 24u)) & 255u;
     c.entry = state.x * 8u + (meta & 7u);
@@ -195,17 +204,26 @@ int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit)));
 void draw_line(Capsule c) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
   vec2 d = q - p;
+  float thinnest = c.straw ? FOREST_STRAW_WIDTH * view.thinnest : view.thinnest, shortest = FOREST_STRAW_LENGTH * view.thinnest;
+  float drawn_length = length(d), shorter = 1.0;
+  if (c.straw && drawn_length < shortest) {
+    shorter = drawn_length / shortest;
+    d = drawn_length > 1e-3 ? d / shorter : vec2(shortest, 0.0);
+    vec2 middle = 0.5 * (p + q);
+    p = middle - 0.5 * d;
+    q = middle + 0.5 * d;
+  }
   bool steep = abs(d.y) > abs(d.x);
   float major = max(abs(d.x), abs(d.y));
   float stretch = major > 0.0 ? length(d) / major : 1.0;
   float width = width_in_pixels(c) * stretch;
   float rank = c.rank + 1.0 / 512.0;
   bool single = view.subframes == 1u;
-  if (width < view.thinnest && c.mean > 0.0) {
+  if (width < thinnest && c.mean > 0.0) {
     // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
-    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH / view.thinnest, 1.0);
+    float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / thinnest, 1.0);
     if (share <= rank) return;
-    width = single ? floor(view.thinnest + 1.0 - rank / share) : width / share;
+    width = single ? floor(thinnest + 1.0 - rank / share) : width / share;
   } else if (single) {
     width = floor(width + 1.0 - rank);
     if (width < 1.0) return;

@@ -1,0 +1,121 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/render/cpu/capsule.h"
+
+#include <gtest/gtest.h>
+
+#include "forest/core/random.h"
+
+namespace forest::render::cpu {
+namespace {
+
+constexpr int lanes = 16;
+
+// A picture of 1280×720, seen from the origin along z.
+frame::Constants picture() {
+  frame::Constants c{};
+  c.focal = 990.f, c.centre_x = 640.f, c.centre_y = 360.f;
+  c.near = .5f, c.converge = 1.f, c.parallel = 0.f;
+  c.width = 1280, c.height = 720;
+  return c;
+}
+
+Vec2 pixel_of(const frame::Constants& c, const Vec3& p) {
+  return {c.centre_x + c.focal * p.x() / p.z(), c.centre_y - c.focal * p.y() / p.z()};
+}
+
+struct Case {
+  Vec3 a, b;
+  float ra, rb;
+  Case(const frame::Constants& c, Random& random) {
+    const float depth = float(std::exp(random.uniform(std::log(5.), std::log(800.))));
+    const float pixels = float(std::exp(random.uniform(std::log(3.), std::log(150.))));
+    ra = pixels * depth / c.focal;
+    rb = ra * float(random.uniform(.3, 1.8));
+    a = depth * Vec3(float(random.uniform(-.6, .6)), float(random.uniform(-.35, .35)), 1.f);
+    const Vec3 way(float(random.normal()), float(random.normal()), float(random.normal()));
+    b = a + way.normalized() * ra * float(random.below(8) ? random.uniform(.2, 30.) : 0.);
+  }
+  float nearest_code(const frame::Constants& c) const {
+    const float depth = std::min(a.z() - ra, b.z() - rb);
+    return depth > c.near ? depth_code(depth) : 0.f;
+  }
+};
+
+TEST(Capsule, ItsSilhouetteIsWhatItsRaysMeet) {
+  const frame::Constants c = picture();
+  const Vec3 light = Vec3(.3f, .8f, -.5f).normalized();
+  Random random(3);
+  int fitting = 0, hit = 0, differing = 0, deeper = 0, brighter = 0;
+  for (int i = 0; i < 4000; ++i) {
+    const Case k(c, random);
+    const Body body(k.a, k.b, k.ra, k.rb);
+    if (!Silhouette::fits(c, body, k.nearest_code(c))) continue;
+    ++fitting;
+    const Vec2 p = pixel_of(c, k.a), q = pixel_of(c, k.b);
+    const Silhouette silhouette(c, light, body, p, q);
+    const float wide = c.focal * std::max(k.ra / k.a.z(), k.rb / k.b.z());
+    float x[lanes], y[lanes];
+    for (int lane = 0; lane < lanes; ++lane) {
+      const Vec2 at = p + float(random.uniform()) * (q - p);
+      x[lane] = at.x() + wide * float(random.uniform(-1.3, 1.3));
+      y[lane] = at.y() + wide * float(random.uniform(-1.3, 1.3));
+    }
+    Hits<lanes> seen, met;
+    silhouette.meet<lanes>(x, static_cast<const float*>(y), c.near, seen);
+    meet(c, light, body, x, y, met);
+    const float radius = 62400.f * std::max(k.ra, k.rb) / std::min(k.a.z(), k.b.z());  // in steps of depth
+    for (int lane = 0; lane < lanes; ++lane) {
+      hit += met.hit[lane] != 0;
+      if (seen.hit[lane] != met.hit[lane]) {
+        ++differing;
+      } else if (met.hit[lane]) {
+        deeper += std::abs(seen.code[lane] - met.code[lane]) > 3.f + .01f * radius;
+        brighter += std::abs(seen.shade[lane] - met.shade[lane]) > .01f;
+      }
+    }
+  }
+  EXPECT_GT(fitting, 3000);
+  EXPECT_GT(hit, 20000);
+  EXPECT_LT(differing, hit / 500);  // at the very rim
+  EXPECT_LT(deeper, hit / 500);
+  EXPECT_LT(brighter, hit / 500);
+}
+
+TEST(Capsule, ItsOutlineHoldsWhatItsRaysMeet) {
+  const frame::Constants c = picture();
+  Random random(5);
+  int inside = 0, beside = 0;
+  for (int i = 0; i < 2000; ++i) {
+    const Case k(c, random);
+    const Body body(k.a, k.b, k.ra, k.rb);
+    if (k.nearest_code(c) == 0.f || !Reach(c, k.a, k.b, k.ra, k.rb).exact) continue;
+    const Outline outline = outline_of(c, 0.f, pixel_of(c, k.a), pixel_of(c, k.b), body);
+    const float top = std::floor(std::max(outline.top(), -2000.f)), high = outline.bottom() - top;
+    if (!(high > 1.f && high < 4000.f)) continue;
+    for (int row = 0; row < 40; ++row) {
+      const float first = std::floor(top + high * float(random.uniform(-.1, 1.1))) + .5f;
+      Outline::Rows rows;
+      outline.across(first, rows);
+      float x[lanes], y[lanes];
+      for (int lane = 0; lane < lanes; ++lane) {
+        y[lane] = first + float(lane % rows_at_once);
+        const bool left = lane < rows_at_once;
+        x[lane] = left ? rows.left[lane] - .01f : rows.right[lane - rows_at_once] + .01f;
+      }
+      Hits<lanes> hits;
+      meet(c, Vec3(0, 0, -1), body, x, y, hits);
+      for (int lane = 0; lane < lanes; ++lane) beside += hits.hit[lane] && std::abs(x[lane]) < 1e6f;
+      for (int lane = 0; lane < rows_at_once; ++lane) {
+        const float middle = .5f * (rows.left[lane] + rows.right[lane]);
+        x[lane] = rows.left[lane] < rows.right[lane] ? middle : -1e9f;
+      }
+      meet(c, Vec3(0, 0, -1), body, x, y, hits);
+      for (int lane = 0; lane < rows_at_once; ++lane) inside += hits.hit[lane] != 0;
+    }
+  }
+  EXPECT_EQ(beside, 0);
+  EXPECT_GT(inside, 50000);
+}
+
+}  // namespace
+}  // namespace forest::render::cpu

@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/colour_bar.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+namespace forest::scene {
+namespace {
+
+// In heights of a letter.
+constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide = 20.f;
+
+std::size_t lines_of(const ColourBar& bar) {
+  return 1 + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
+}
+
+}  // namespace
+
+ColourBar bar_of(const ActivityView& activity, double time, const std::string& units) {
+  return {.map = activity.map,
+          .low = activity.low,
+          .high = activity.high,
+          .units = units,
+          .threshold = activity.threshold,
+          .title = fmt::format("{:.1f} ms", time),
+          .note = activity.speed > 0.f ? fmt::format("spikes: {:g} µm/ms", activity.speed) : ""};
+}
+
+void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters) {
+  const float steps = std::max(1.f, std::round(place.right - place.left));
+  for (float i = 0.f; i < steps; i += 1.f) {
+    const float t = (i + .5f) / steps, value = bar.low + t * (bar.high - bar.low);
+    const bool below = bar.threshold && value < *bar.threshold;
+    const float left = place.left + i;
+    fill(image, {left, place.top, left + 1.f, place.bottom},
+         below ? Vec3(.25f, .28f, .32f) : bar.map->screen(t));
+  }
+  const float base = place.bottom + 1.7f * letters.height;
+  const std::string high = fmt::format("{:.6g}", bar.high);
+  letters.write(image, fmt::format("{:.6g}", bar.low), place.left, base);
+  letters.write(image, high, place.right - letters.width(high), base);
+}
+
+bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background) {
+  const bool dark = background == Background::dark;
+  const Vec3 ground = dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f);
+  const float h = std::max(7.f, std::round(float(image.height) / 80.f));
+  const Lettering letters{.height = h, .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)};
+  float tall = 0.f;
+  for (const ColourBar& bar : bars)
+    tall += h * (margin + 2.f * padding + thick + line * float(lines_of(bar)));
+  if (bars.empty() || h * (wide + 2.f * padding) > .65f * float(image.width) ||
+      tall > .65f * float(image.height))
+    return false;
+  float top = h * margin;
+  for (const ColourBar& bar : bars) {
+    const float left = h * (margin + padding), right = left + h * wide;
+    const float bottom = top + h * (2.f * padding + thick + line * float(lines_of(bar)));
+    fill(image, {left - h * padding, top, right + h * padding, bottom}, ground, .62f);
+    float base = top + h * (padding + 1.f);
+    if (!bar.title.empty() || !bar.units.empty()) {
+      letters.write(image, bar.title, left, base);
+      letters.write(image, bar.units, right - letters.width(bar.units), base);
+      base += h * line;
+    }
+    const Box place{left, base - h, right, base - h + h * thick};
+    paint(image, bar, place, letters);
+    if (!bar.note.empty()) letters.write(image, bar.note, left, place.bottom + h * (1.7f + line));
+    top = bottom + h * margin;
+  }
+  return true;
+}
+
+}  // namespace forest::scene

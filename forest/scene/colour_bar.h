@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// What colours mean, in the picture itself: the colour map from its lowest to its highest value, with their unit.
+#pragma once
+
+#include <optional>
+#include <span>
+#include <string>
+
+#include "forest/scene/colour_map.h"
+#include "forest/scene/colouring.h"
+#include "forest/scene/lettering.h"
+#include "forest/scene/view.h"
+
+namespace forest::scene {
+
+struct ColourBar {
+  const ColourMap* map = &colour_maps().front();
+  float low = 0.f, high = 1.f;       // values at its ends
+  std::string units{};               // of them; may be empty
+  std::optional<float> threshold{};  // what is less is grey
+  std::string title{}, note{};       // above and below; may be empty
+};
+
+/// Of a simulation at a moment (ms).
+ColourBar bar_of(const ActivityView& activity, double time, const std::string& units);
+
+/// One below the other at the top left, on ground that lets the picture through. A picture that is too small to read them in
+/// (about 280 × 130 pixels for one bar) stays as it is.
+/// @return  whether they are in it
+bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background);
+
+/// The bar alone, without ground: its colours between `place`'s edges and its values below, which need twice the letters' height.
+void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters);
+
+}  // namespace forest::scene

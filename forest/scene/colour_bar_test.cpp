@@ -1,0 +1,39 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/colour_bar.h"
+
+#include <gtest/gtest.h>
+
+namespace forest::scene {
+namespace {
+
+frame::Image black(std::uint32_t width, std::uint32_t height) {
+  return {width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 4, 0), 0.};
+}
+
+TEST(ColourBar, ShowsTheMapAndGreyBelowTheThreshold) {
+  const ColourMap& map = *find_colour_map("viridis");
+  const ColourBar bar{.map = &map, .low = -80.f, .high = 20.f, .threshold = -55.f};
+  frame::Image image = black(120, 60);
+  paint(image, bar, {10.f, 10.f, 110.f, 20.f}, Lettering{.height = 8.f});
+  const auto at = [&](std::size_t x) -> Vec3 {
+    const std::uint8_t* p = &image.pixels[4 * (15 * 120 + x)];
+    return Vec3(p[0], p[1], p[2]) / 255.f;
+  };
+  EXPECT_LT((at(12) - Vec3(.25f, .28f, .32f)).norm(), .01f);
+  EXPECT_LT((at(109) - map.screen(.995f)).norm(), .02f);
+  EXPECT_LT((at(60) - map.screen(.505f)).norm(), .02f);
+}
+
+TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {
+  const ColourBar bars[] = {bar_of(ActivityView(), 12.5, "mV"), {.map = &colour_maps().front()}};
+  EXPECT_EQ(bars[0].title, "12.5 ms");
+  frame::Image small = black(160, 100), large = black(640, 480);
+  EXPECT_FALSE(paint(small, bars, Background::dark));
+  EXPECT_EQ(small.pixels, black(160, 100).pixels);
+  EXPECT_TRUE(paint(large, bars, Background::dark));
+  EXPECT_NE(large.pixels, black(640, 480).pixels);
+  EXPECT_FALSE(paint(large, {}, Background::light));
+}
+
+}  // namespace
+}  // namespace forest::scene
