@@ -5,6 +5,7 @@
 #include <atomic>
 #include <chrono>
 #include <fstream>
+#include <span>
 #include <thread>
 
 #include "forest/core/hash.h"
@@ -164,7 +165,7 @@ std::string as_version(int version) {
         "alter table sections rename column {0}_{1} to {0}; update sections set {0} = {0} / 1e6; ", column,
         column == std::string_view("area") ? "nm2" : "pm");
   const char* views = "create view section as select 1 as one; create view junction as select 1 as one; ";
-  if (version >= 5) return sql + views;  // points are not packed in either
+  if (version >= 5) return sql + views;
   sql +=
       "drop view metric; alter table neuron_metrics rename to later_metrics; "
       "create table neuron_metrics (metric integer not null, neuron integer not null, value double precision "
@@ -201,17 +202,29 @@ std::string as_version(int version) {
          "alter table sections drop column area; ";
 }
 
-/// Makes the tables of a file, or of a database on the server, those of an older version.
-bool made_older(const std::string& file, const std::string& name, int version, const std::string& besides = "") {
+/// Stores the points of neurons 1, 2, … as they are, since no older version packed them in today's way.
+std::string not_packed(std::span<const Morphology> neurons, bool is_file) {
+  std::string sql;
+  for (std::size_t i = 0; i < neurons.size(); ++i) {
+    sql += fmt::format("update points set packing = 0, data = {}", is_file ? "x'" : "'\\x");
+    for (const std::byte byte : std::as_bytes(neurons[i].points())) sql += fmt::format("{:02x}", int(byte));
+    sql += fmt::format("' where neuron = {};\n", i + 1);
+  }
+  return sql;
+}
+
+/// Makes the tables of a file, or of a database on the server, those of an older version, which holds these neurons.
+bool made_older(const std::string& file, const std::string& name, int version,
+                std::span<const Morphology> neurons, const std::string& besides = "") {
   const auto script = std::filesystem::temp_directory_path() / fmt::format("forest-older-{}.sql", ::getpid());
-  const std::string sql = as_version(version) + besides;
   const bool is_file = name.empty();
-  write_file(script, is_file ? fmt::format("begin;\n{}\npragma user_version = {};\ncommit;\n", sql, version)
-                             : fmt::format("{}\nupdate brainforest_schema set version = {};\n", sql, version));
+  const std::string sql = not_packed(neurons, is_file) + besides + as_version(version);
+  write_file(script, is_file
+                         ? fmt::format("begin;\n{}\npragma user_version = {};\ncommit;\n", sql, version)
+                         : fmt::format("{}\nupdate brainforest_schema set version = {};\n", sql, version));
   const bool made =
-      is_file
-          ? std::system(fmt::format("sqlite3 -bail '{}' <'{}'", file, script.string()).c_str()) == 0
-          : PostgresqlServer::get().run_file(script, name);
+      is_file ? std::system(fmt::format("sqlite3 -bail '{}' <'{}'", file, script.string()).c_str()) == 0
+              : PostgresqlServer::get().run_file(script, name);
   std::filesystem::remove(script);
   return made;
 }
@@ -234,7 +247,7 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
   for (const int version : {1, 2, 3, 4, 5, 6}) {
     std::string old_bytes, old_name;
     is_file() ? write_file(file_, new_bytes) : renew(newest);
-    ASSERT_TRUE(made_older(file_, name_, version));
+    ASSERT_TRUE(made_older(file_, name_, version, source));
     if (is_file()) old_bytes = bytes_of(file_);
     old_name = name_;
     for (int round = 0; round < 8; ++round) {
@@ -287,11 +300,13 @@ TEST_P(EveryDatabase, WhatWasGrownBeforeVersion7IsKnownAgainThoughItWasCorrected
     const auto sum = std::uint64_t(std::get<std::int64_t>(value("select checksum from neurons")));
     const std::string facts = fmt::format("{} 5 6 {}", grown.grammar_hash, sum);
     fingerprint = hash_hex(std::as_bytes(std::span(facts)));
-    repository.revise(std::vector<Revision>{
-        {.id = id, .version = repository.versions(std::vector{id})[0], .name = "b", .morphology = neuron(2)}});
+    repository.revise(std::vector<Revision>{{.id = id,
+                                             .version = repository.versions(std::vector{id})[0],
+                                             .name = "b",
+                                             .morphology = neuron(2)}});
   }
-  ASSERT_TRUE(
-      made_older(file_, name_, 6, fmt::format("update neurons set fingerprint = '{}'; ", fingerprint)));
+  ASSERT_TRUE(made_older(file_, name_, 6, std::vector{neuron(2)},
+                         fmt::format("update neurons set fingerprint = '{}';\n", fingerprint)));
   Repository repository = Repository::open(place_, Access::write);
   EXPECT_EQ(value("select fingerprint from neurons"), Answer::Value(fingerprint));
   const Added again = repository.add(neuron(1), {.name = "a", .provenance = grown});
@@ -312,7 +327,7 @@ TEST_P(EveryDatabase, TwoProgramsMayBringAnOlderRepositoryUpToDate) {
     Repository repository = Repository::open(place_, Access::write);
     for (std::size_t i = 0; i < source.size(); ++i) repository.add(source[i], called(std::to_string(i)));
   }
-  ASSERT_TRUE(made_older(file_, name_, 2));
+  ASSERT_TRUE(made_older(file_, name_, 2, source));
   std::array<pid_t, 4> children{};
   for (pid_t& child : children)
     child = in_child([&] {

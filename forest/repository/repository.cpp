@@ -209,8 +209,9 @@ std::optional<int> Repository::Impl::grammar(const Grown& grown) {
 
 bool Repository::Impl::holds_older_grown() {
   if (!older_grown)
-    older_grown = ask<int>("select 1 from neurons n join provenance o on o.neuron = n.id where o.origin = "
-                           "'grown' and n.fingerprint not like '%-%' limit 1")
+    older_grown = ask<int>(
+                      "select 1 from neurons n join provenance o on o.neuron = n.id where o.origin = "
+                      "'grown' and n.fingerprint not like '%-%' limit 1")
                       .has_value();
   return *older_grown;
 }
