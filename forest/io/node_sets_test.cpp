@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 
 #include "tests/real_data.h"
+#include "tests/refused.h"
 
 namespace forest::io {
 namespace {
@@ -40,12 +41,7 @@ TEST(NodeSetsFile, WhatIsWrittenIsReadAgain) {
 }
 
 std::string refused(const std::string& json) {
-  try {
-    parse_node_sets(json, "sets.json");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "not refused";
+  return forest::refused<InputError>([&] { parse_node_sets(json, "sets.json"); });
 }
 
 TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {

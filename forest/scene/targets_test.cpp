@@ -7,10 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "forest/core/error.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/view.h"
 
+#include "tests/refused.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -33,15 +33,6 @@ Members where(const Forest& forest, auto&& holds) {
   for (std::uint32_t i = 0; i < forest.instances().size(); ++i)
     if (holds(i)) members.push_back(i);
   return members;
-}
-
-std::string refused(auto&& what) {
-  try {
-    what();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "not refused";
 }
 
 TEST(Targets, AForestHasThemByItself) {
