@@ -35,6 +35,19 @@ Members where(const Forest& forest, auto&& holds) {
   return members;
 }
 
+TEST(Targets, NodeSetsOfACircuitStayWithTheForest) {
+  for (const bool named : {false, true}) {
+    circuit::NodeNames nodes{{}, {}, "{\"α\": {\"layer\": \"upper\"}}\n"};
+    if (named) nodes.populations = {"a"}, nodes.runs = {{0, 0, 7, 40}};
+    const Forest f = Forest::from_bytes(
+        pack(testing::sample_circuit(40), testing::sample_neurons(), Progress::none(), nodes));
+    EXPECT_EQ(f.nodes().sets, nodes.sets);
+    EXPECT_EQ(f.nodes().populations[0], named ? "a" : "column");
+    EXPECT_EQ(f.nodes().runs.front().first_node, named ? 7u : 0u);
+  }
+  EXPECT_EQ(sample().nodes().sets, "");
+}
+
 TEST(Targets, AForestHasThemByItself) {
   const Forest f = sample();
   const Targets targets(f);
