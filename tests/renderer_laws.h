@@ -21,7 +21,8 @@ namespace forest::render {
 using Maker = std::unique_ptr<Renderer> (*)();
 
 class RendererLaws : public testing::TestWithParam<Maker> {};
-class SurfaceLaws : public testing::TestWithParam<Maker> {};  // of triangles: the reference keeps them, too
+class SurfaceLaws : public testing::TestWithParam<Maker> {
+};  // of triangles and balls: the reference keeps them, too
 
 namespace {
 
@@ -253,6 +254,66 @@ std::array<std::uint8_t, 3> pixel_at(const frame::Frame& frame, const frame::Ima
   const Vec3 at = frame::project(frame.camera, {float(frame.width), float(frame.height)}, point);
   const std::size_t place = 4 * (std::size_t(at.y()) * image.width + std::size_t(at.x()));
   return {image.pixels[place], image.pixels[place + 1], image.pixels[place + 2]};
+}
+
+TEST_P(SurfaceLaws, BallsCoverTheirDiscsHoweverSmall) {
+  Fixture f(GetParam());
+  const double scale = f.frame.camera.focal(200.f) / 100.;
+  for (const float radius : {.02f, .1f, .3f, 1.f, 6.f}) {
+    std::vector<frame::Ball> balls;  // apart from one another, at many places within a pixel
+    for (int i = 0; i < 25; ++i)
+      balls.push_back({Vec3(-26.f + 13.07f * float(i % 5), -26.f + 13.13f * float(i / 5), 0.f), radius, 5});
+    f.frame.balls = balls;
+    f.frame.subframes = 64;
+    EXPECT_NEAR(red_area(f.draw()) / (25. * scale * scale * M_PI * double(radius) * double(radius)), 1.,
+                radius < .05f ? .25 : .05)
+        << radius;
+    f.frame.subframes = 1;
+    f.draw();  // is sound, too
+  }
+}
+
+TEST_P(SurfaceLaws, BallsHaveTheirColourAndAreHiddenByWhatIsNearer) {
+  for (const bool behind : {false, true}) {
+    Fixture f(GetParam());
+    f.frame.palette[5] = Vec3(0, 1, 0);
+    f.add({-20, 0, 0}, {20, 0, 0}, 4.f);
+    f.frame.capsules = f.items;
+    const std::vector<frame::Ball> balls{{Vec3(0, 0, behind ? -10.f : 10.f), 2.f, 5},
+                                         {Vec3(0, 30, 500), 9.f, 5}};
+    f.frame.balls = balls;
+    const frame::Image image = f.draw();
+    const std::size_t middle = 4 * (100 * 200 + 100);
+    EXPECT_EQ(image.pixels[middle] < image.pixels[middle + 1], !behind);
+    EXPECT_GT(image.pixels[middle] + image.pixels[middle + 1], 60);
+  }
+}
+
+TEST_P(SurfaceLaws, BallsShowAsFarAsTheyAreOpaque) {
+  for (const std::uint32_t subframes : {1u, 16u}) {
+    Fixture f(GetParam());
+    std::vector<frame::Ball> balls;
+    for (int i = 0; i < 100; ++i)
+      balls.push_back({Vec3(-30.f + 6.6f * float(i % 10), -30.f + 6.6f * float(i / 10), 0.f), 2.f, 5});
+    f.frame.balls = balls;
+    f.frame.subframes = subframes;
+    const double whole = red_area(f.draw());
+    for (frame::Ball& ball : balls) ball.opacity = 77;
+    EXPECT_NEAR(red_area(f.draw()) / whole, 77. / 255., .06) << subframes;
+    for (frame::Ball& ball : balls) ball.opacity = 0;
+    EXPECT_EQ(red_area(f.draw()), 0.);
+  }
+}
+
+TEST_P(SurfaceLaws, BallsThatAreNoneAreRefused) {
+  for (const frame::Ball& wrong : {frame::Ball{Vec3(NAN, 0, 0), 1.f, 5},
+                                   {Vec3::Zero(), -1.f, 5},
+                                   {Vec3::Zero(), INFINITY, 5},
+                                   {Vec3::Zero(), 1.f, 128}}) {
+    Fixture f(GetParam());
+    f.frame.balls = {&wrong, 1};
+    EXPECT_THROW(f.draw(), Error);
+  }
 }
 
 TEST_P(SurfaceLaws, ATriangleCoversItsPixels) {

@@ -42,8 +42,8 @@ TEST(SkinInPictures, ComesWithoutAJump) {
   };
   double before = 0., most = 0.;
   frame::Image bare;
-  // Nearer than 14 µm pieces still change by two grey levels from one step to the next: docs/scene/surfaces.md.
-  for (float distance = 120.f; distance > 14.2f; distance *= .97f) {
+  // Nearer than 15 µm pieces still change by two grey levels from one step to the next: docs/scene/surfaces.md.
+  for (float distance = 120.f; distance > 15.3f; distance *= .97f) {
     view.camera.eye = view.camera.target + distance * Vec3(.3f, .2f, 1.f).normalized();
     frame::Image here = picture(false);
     const double now = frame::change(picture(true), here);  // grey levels of 255

@@ -30,7 +30,8 @@ Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
       chooser_(forest_),
       renderer_(make_renderer(drawer)),
       foveated_(forest_, [drawer] { return make_renderer(drawer); }),
-      outline_(scene::outline(forest_)) {
+      outline_(scene::outline(forest_)),
+      dressing_(forest_) {
   renderer_->load(forest_.geometry());
 }
 
@@ -52,11 +53,13 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   auto start = Clock::now();
   if (view.detail.gaze) {
     Foveated::Dresser dress;
-    if (!surfaces_.empty() || (skin_ && view.skin))
+    if (dressing_.wanted(view, *colouring_))
       dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
-        surfaces_.show(frame, *colouring_, playback_.has_value());
-        if (skin_ && view.skin) skin_->show(frame, near, eye, *colouring_, painter);
+        dressing_.put_on(frame, view, near, eye, *colouring_, playback_.has_value(), painter);
+        drawn.synapses += dressing_.chosen.balls.size();
       };
+    else
+      dressing_.rest();
     drawn.image =
         foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
@@ -72,12 +75,10 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
   chooser_.complete(frame);
-  surfaces_.show(frame, *colouring_, playback_.has_value());
-  if (skin_ && view.skin) {
-    start = Clock::now();
-    skin_->show(frame, cut, eye, *colouring_, painter);
-    drawn.cull += milliseconds_since(start);
-  }
+  start = Clock::now();
+  dressing_.put_on(frame, view, cut, eye, *colouring_, playback_.has_value(), painter);
+  drawn.cull += milliseconds_since(start);
+  drawn.synapses = dressing_.chosen.balls.size();
   const frame::Timing timing = renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
   drawn.segments = chooser_.segments();
@@ -96,9 +97,9 @@ void Artist::explain(const scene::View& view, frame::Image& image) const {
     bars.push_back(
         scene::bar_of(look, look.time.value_or(playback_->begin()), playback_->activity().facts().units));
   }
-  if (surfaces_.has_values()) {
-    const auto [low, high] = surfaces_.shown_range();
-    bars.push_back({.map = surfaces_.map, .low = low, .high = high});
+  if (dressing_.surfaces.has_values()) {
+    const auto [low, high] = dressing_.surfaces.shown_range();
+    bars.push_back({.map = dressing_.surfaces.map, .low = low, .high = high});
   }
   scene::paint(image, bars, view.background);
 }
@@ -119,6 +120,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.samples = plan.samples;
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
+    if (plan.synapses) view.synapses = *plan.synapses;
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {
       view.activity = activity;

@@ -12,11 +12,10 @@
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
 #include "forest/scene/scanpath.h"
-#include "forest/scene/skin.h"
-#include "forest/scene/surfaces.h"
 #include "forest/scene/view.h"
 
 #include "apps/cli/drawer.h"
+#include "apps/dressing.h"
 #include "apps/foveated.h"
 
 namespace forest::cli {
@@ -27,6 +26,7 @@ struct Drawn {
   std::uint64_t segments = 0;                            // chosen
   std::uint64_t reached = 0;          // of them, neither hidden nor beside the picture; 0: unknown
   std::uint32_t neurons = 0;          // in sight and not hidden
+  std::uint64_t synapses = 0;         // drawn
   scene::Playback::Figures activity;  // of what was chosen first; zeros when nothing plays
   frame::Image image;
 };
@@ -44,10 +44,12 @@ class Artist {
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
   /// From now on these surfaces are in the pictures, too.
-  void show(scene::Surfaces surfaces) { surfaces_ = std::move(surfaces); }
+  void show(scene::Surfaces surfaces) { dressing_.surfaces = std::move(surfaces); }
   /// From now on neurons near the eye have skin, unless the view says otherwise.
-  void give_skin() { skin_.emplace(forest_); }
-  const scene::Skin* skin() const { return skin_ ? &*skin_ : nullptr; }
+  void give_skin() { dressing_.skinned = true; }
+  /// From now on these synapses are in the pictures, unless the view says otherwise.
+  void show(scene::Synapses synapses) { dressing_.synapses.emplace(std::move(synapses)); }
+  const scene::Skin& skin() const { return dressing_.skin; }
   /// ms that each picture stands for, for pictures that leave out steps.
   void set_window(double milliseconds) { window_ = milliseconds; }
   const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
@@ -64,8 +66,7 @@ class Artist {
   std::unique_ptr<render::Renderer> renderer_;
   Foveated foveated_;
   std::vector<frame::Overlay> outline_;
-  scene::Surfaces surfaces_;
-  std::optional<scene::Skin> skin_;
+  Dressing dressing_;
   std::optional<scene::Colouring> colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
   scene::Background coloured_for_ = scene::Background::dark;
@@ -88,7 +89,8 @@ struct FilmPlan {
   std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
   bool legend = false;                     // Artist::explain
   std::vector<scene::Appearance> targets;  // after those of the path's views
-  double from = 0., rate = 0.;             // of activity: ms at the first picture, ms a second of film
+  std::optional<scene::SynapseColour> synapses;  // none: as the path's views say
+  double from = 0., rate = 0.;                   // of activity: ms at the first picture, ms a second of film
 };
 
 /// Films what a path shows, with activity as it goes on when it is given a look. Throws Error when no picture shows anything of

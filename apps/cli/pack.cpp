@@ -10,9 +10,12 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/io/node_sets.h"
 #include "forest/io/sonata.h"
+#include "forest/io/sonata_edges.h"
 #include "forest/scene/forest.h"
+#include "forest/scene/synapses.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
@@ -45,23 +48,39 @@ std::string sets_of(const std::filesystem::path& file, Console& console) {
   }
 }
 
+// Packs the synapses of a circuit beside its forest file; returns how many. Without any there is no file.
+std::size_t pack_synapses(const std::filesystem::path& circuit, const io::SonataOutline& outline,
+                          const std::filesystem::path& out, std::vector<io::Warning>& warnings,
+                          Progress& progress) {
+  io::SonataEdges edges = io::read_edges(circuit, outline.circuit, outline.nodes);
+  std::ranges::move(edges.warnings, std::back_inserter(warnings));
+  std::size_t count = 0;
+  for (const auto& projection : edges.projections) count += projection.synapses.size();
+  if (count)
+    write_file(scene::Synapses::beside(out),
+               scene::Synapses::make(scene::Forest::open(out), edges.projections, progress));
+  return count;
+}
+
 }  // namespace
 
 std::function<void()> pack(CLI::App& command, Console& console) {
   struct Options {
     std::filesystem::path circuit, out;
-    bool verbose = false;
+    bool verbose = false, no_synapses = false;
   };
   const auto options = std::make_shared<Options>();
   command.add_option("circuit", options->circuit, "Folder of a SONATA circuit, or its configuration file")
       ->required();
   command.add_option("-o,--out", options->out, "The forest file")->required();
   command.add_flag("--verbose", options->verbose, "Say every oddity of the circuit's files");
+  command.add_flag("--no-synapses", options->no_synapses,
+                   "Leave out the synapses, which are packed beside the forest: column.synapses");
   return [options, &console] {
     const auto begin = std::chrono::steady_clock::now();
-    const io::SonataOutline outline = io::outline_sonata(options->circuit);
+    io::SonataOutline outline = io::outline_sonata(options->circuit);
     std::vector<std::vector<io::Warning>> oddities(outline.files.size());  // of their files
-    std::atomic<std::size_t> count = outline.warnings.size();
+    std::atomic<std::size_t> count = 0;
     const auto read = [&](std::size_t index) {
       io::ReadResult one = outline.morphology(index);
       count += one.warnings.size();
@@ -73,6 +92,10 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     const scene::PackFigures figures =
         scene::pack(outline.circuit, read, options->out, console.progress(), names);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const std::size_t synapses = options->no_synapses ? 0
+                                                      : pack_synapses(options->circuit, outline, options->out,
+                                                                      outline.warnings, console.progress());
+    count += outline.warnings.size();
     if (options->verbose) {
       for (const io::Warning& w : outline.warnings) console.warn(w.sentence);
       for (const auto& list : oddities)
@@ -86,6 +109,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
                    {"distinct", outline.files.size()},
                    {"segments", figures.segments},
                    {"planted_segments", figures.segment_total},
+                   {"synapses", synapses},
                    {"bytes", figures.bytes},
                    {"seconds", seconds},
                    {"segments_per_second", double(figures.segments) / seconds},

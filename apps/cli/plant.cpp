@@ -21,13 +21,20 @@ struct Options {
   std::string recipe, repo;
   std::filesystem::path out;
   std::uint64_t seed = 0;
+  std::uint32_t synapses = 0;
 };
 
 void run(const Options& options, Console& console) {
   const Planted planted =
       plant_from_repository(find_recipe(options.recipe), options.repo, options.seed, console.progress());
   const circuit::Circuit& circuit = planted.circuit;
-  io::write_sonata(options.out, circuit, planted.morphologies, console.progress());
+  std::vector<circuit::Projection> projections;
+  if (options.synapses)
+    projections.push_back(circuit::made_up_synapses(circuit, planted.morphologies,
+                                                    io::sonata_population(circuit), options.synapses,
+                                                    options.seed, console.progress()));
+  io::write_sonata(options.out, circuit, planted.morphologies, console.progress(), projections);
+  const std::size_t synapses = projections.empty() ? 0 : projections.front().synapses.size();
 
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;
@@ -42,10 +49,14 @@ void run(const Options& options, Console& console) {
                  {"radius", circuit.radius},
                  {"neurons", circuit.instances.size()},
                  {"morphologies", circuit.morphologies.size()},
+                 {"made_up_synapses", synapses},
                  {"planted", list}});
   console.table({"layer", "type", "neurons", "neurons/mm³"}, lines);
   console.say(fmt::format("\n{} neurons of {} shapes are planted in {}", circuit.instances.size(),
                           circuit.morphologies.size(), options.out.string()));
+  if (synapses)
+    console.say(fmt::format("{} synapses are made up: nobody measured them, they are there to be looked at",
+                            synapses));
 }
 
 }  // namespace
@@ -65,6 +76,9 @@ std::function<void()> plant(CLI::App& command, Console& console) {
                   "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")
       ->required()
       ->type_name("DIR");
+  add_whole(command, "--synapses", options->synapses,
+            "Make up so many synapses on each neuron, from others drawn by lot (docs/scene/synapses.md)", 0,
+            100'000);
   add_seed(command, options->seed, "The same seed plants the same circuit");
   return [options, &console] { run(*options, console); };
 }

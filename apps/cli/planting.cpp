@@ -62,6 +62,21 @@ std::vector<std::string> names_of(const std::vector<NeuronRow>& rows) {
   return names;
 }
 
+/// A type all of whose cells have no other processes than those of glia is glia, also when the recipe does not say so.
+void mark_glia(Planted& planted) {
+  std::vector<char> glial(planted.morphologies.size());
+  for (std::size_t i = 0; i < glial.size(); ++i) {
+    const auto sections = planted.morphologies[i].sections();
+    glial[i] = !sections.empty() &&
+               std::ranges::all_of(sections, [](const Section& s) { return s.kind == SectionKind::glia; });
+  }
+  std::vector<std::size_t> cells(planted.circuit.types.size()), of_glia(cells);
+  for (const circuit::Instance& i : planted.circuit.instances)
+    ++cells[i.type], of_glia[i.type] += glial[i.morphology] != 0;
+  for (std::size_t t = 0; t < cells.size(); ++t)
+    if (cells[t] && cells[t] == of_glia[t]) planted.circuit.types[t].glia = true;
+}
+
 }  // namespace
 
 circuit::Recipe find_recipe(const std::string& name_or_path) {
@@ -101,6 +116,7 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
     if (planted.morphologies.size() < planted.circuit.morphologies.size() &&
         planted.circuit.morphologies[planted.morphologies.size()] == names[i])
       planted.morphologies.push_back(neurons[i]);
+  mark_glia(planted);
   return planted;
 }
 

@@ -16,8 +16,10 @@
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
 #include "apps/cli/surface_options.h"
+#include "apps/cli/synapse_options.h"
 #include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
+#include "apps/surface_files.h"
 #include "apps/view_text.h"
 
 namespace forest::cli {
@@ -66,6 +68,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     bool outline = false, legend = true;
     SurfaceOptions surfaces;
     bool skin = false;
+    SynapseOptions synapses;
     std::optional<scene::Side> side;
     TargetOptions targets;
     Drawer drawer = Drawer::automatic;
@@ -77,6 +80,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_surfaces(command, options->surfaces);
   command.add_flag("--skin", options->skin,
                    "Neurons near the eye have a smooth skin and spines (takes seconds)");
+  add_synapses(command, options->synapses);
   command.add_option("--from", options->side, "Show all of the surfaces, from this side of the brain")
       ->transform(CLI::CheckedTransformer(sides))
       ->option_text("left|right|front|back|above|below")
@@ -114,6 +118,9 @@ std::function<void()> render(CLI::App& command, Console& console) {
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
     if (options->skin) artist.give_skin();
+    if (auto synapses = open_synapses(options->synapses, options->forest, forest))
+      artist.show(std::move(*synapses));
+    if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view);
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
@@ -129,10 +136,11 @@ std::function<void()> render(CLI::App& command, Console& console) {
     console.print({{"file", options->out.string()},
                    {"activity", activity},
                    {"surfaces", of_surfaces},
-                   {"skin_triangles", artist.skin() ? artist.skin()->figures().triangles : 0},
+                   {"skin_triangles", artist.skin().figures().triangles},
                    {"view", nlohmann::ordered_json::parse(scene::to_json(view))},
                    {"neurons", drawn.neurons},
                    {"segments", drawn.segments},
+                   {"synapses", drawn.synapses},
                    {"covered", drawn.image.covered},
                    {"milliseconds", {{"cull", drawn.cull}, {"draw", drawn.draw}, {"resolve", drawn.resolve}}},
                    {"renderer", artist.renderer()}});
@@ -153,6 +161,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     TargetOptions targets;
     SurfaceOptions surfaces;
     bool skin = false;
+    SynapseOptions synapses;
     Drawer drawer = Drawer::automatic;
     ActivityOptions activity;
     std::optional<double> rate;
@@ -173,6 +182,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   add_surfaces(command, options->surfaces);
   command.add_flag("--skin", options->skin,
                    "Neurons near the eye have a smooth skin and spines (takes seconds)");
+  add_synapses(command, options->synapses);
   command
       .add_option("--path", options->path,
                   "Key views from a file, one on each line, as the studio records them")
@@ -213,6 +223,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
     if (options->skin) artist.give_skin();
+    if (auto synapses = open_synapses(options->synapses, options->forest, forest))
+      artist.show(std::move(*synapses));
+    plan.synapses = options->synapses.colour;
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();

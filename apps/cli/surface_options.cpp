@@ -8,11 +8,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/core/file.h"
-#include "forest/io/surface.h"
-#include "forest/scene/colouring.h"
 
 #include "apps/cli/console.h"
+#include "apps/surface_files.h"
 
 namespace forest::cli {
 namespace {
@@ -62,8 +60,6 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
                      "Values at the ends of the colour map, LOW:HIGH; by default nearly all are within");
 }
 
-bool is_surface(const std::filesystem::path& file) { return io::may_be_surface(MappedFile(file).text()); }
-
 scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
   scene::Surfaces surfaces;
   if (!options.map.empty()) {
@@ -79,25 +75,8 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
   for (std::size_t i = 0; i < options.files.size(); ++i) {
     const float opacity =
         options.opacities.empty() ? 1.f : options.opacities[std::min(i, options.opacities.size() - 1)];
-    surfaces.add(io::read_surface(MappedFile(options.files[i]).text(), options.files[i].string()), opacity);
-    if (i >= options.overlays.size()) continue;
-    const std::string name = options.overlays[i].string();
-    const io::SurfaceValues read = io::read_surface_values(MappedFile(options.overlays[i]).text(), name);
-    try {
-      if (read.labels.empty()) {
-        surfaces.colour(read.values);
-        continue;
-      }
-      std::vector<scene::AreaColour> areas;
-      for (const io::SurfaceLabel& label : read.labels) {
-        if (label.alpha == 0.f) continue;
-        const auto byte = [&](int k) { return std::uint32_t(std::lround(255.f * label.colour[k])); };
-        areas.push_back({label.key, scene::light_of(byte(0) << 16 | byte(1) << 8 | byte(2))});
-      }
-      surfaces.colour(read.values, areas);
-    } catch (const Error& error) {
-      throw InputError(name, 0, error.what());
-    }
+    add_surface(surfaces, options.files[i], opacity);
+    if (i < options.overlays.size()) add_overlay(surfaces, options.overlays[i]);
   }
   if (options.opacities.size() > options.files.size())
     console.warn(fmt::format("{} of the opacities belong to no surface",

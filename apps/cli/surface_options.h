@@ -25,9 +25,6 @@ struct SurfaceOptions {
 /// --surface, --surface-opacity, --overlay, --colour-map, --range
 void add_surfaces(CLI::App& command, SurfaceOptions& options);
 
-/// Whether a file that was named as the forest is a surface of a cortex.
-bool is_surface(const std::filesystem::path& file);
-
 /// Reads all of them. Values that belong to no surface, and what cannot be read, throw Error.
 scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console);
 

@@ -22,7 +22,8 @@ namespace forest::cli {
 bool has_display() { return std::getenv("DISPLAY") || std::getenv("WAYLAND_DISPLAY"); }
 
 void open_studio(const std::filesystem::path& forest, const std::string& view,
-                 const std::vector<std::filesystem::path>& node_sets, const std::filesystem::path& activity) {
+                 const std::vector<std::filesystem::path>& node_sets, const std::filesystem::path& activity,
+                 const std::vector<std::string>& more) {
   if (!has_display())
     throw Error(
         "there is no display to open the studio on; make a picture with 'brainforest render' instead");
@@ -33,6 +34,7 @@ void open_studio(const std::filesystem::path& forest, const std::string& view,
   if (!view.empty()) words.insert(words.end(), {"--view", view});
   for (const auto& file : node_sets) words.insert(words.end(), {"--node-sets", file.string()});
   if (!activity.empty()) words.insert(words.end(), {"--activity", activity.string()});
+  words.insert(words.end(), more.begin(), more.end());
   std::vector<char*> arguments;
   for (std::string& word : words) arguments.push_back(word.data());
   arguments.push_back(nullptr);
@@ -47,16 +49,25 @@ std::function<void()> view(CLI::App& command, Console&) {
     std::filesystem::path forest, activity;
     std::string view;
     std::vector<std::filesystem::path> node_sets;
+    std::vector<std::string> surfaces, overlays;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("forest", options->forest, "Forest file")->required();
+  command.add_option("forest", options->forest, "Forest file, or the surface of a cortex")->required();
   command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
   add_node_sets(command, options->node_sets);
   command.add_option("--activity", options->activity, "An activity file to play");
+  command.add_option("--surface", options->surfaces, "Surface of a cortex to show, too")
+      ->allow_extra_args(false);
+  command
+      .add_option("--overlay", options->overlays, "Values or areas that colour the surfaces, in their order")
+      ->allow_extra_args(false);
   return [options] {
     MappedFile exists(options->forest);  // says so here rather than in a window
     if (!options->activity.empty()) MappedFile also(options->activity);
-    open_studio(options->forest, options->view, options->node_sets, options->activity);
+    std::vector<std::string> more;
+    for (const std::string& file : options->surfaces) more.insert(more.end(), {"--surface", file});
+    for (const std::string& file : options->overlays) more.insert(more.end(), {"--overlay", file});
+    open_studio(options->forest, options->view, options->node_sets, options->activity, more);
   };
 }
 

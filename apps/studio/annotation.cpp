@@ -148,7 +148,7 @@ void mark_selection(frame::Palette& palette, scene::Background background, bool 
       if (i != scene::highlight_entry && i != scene::outline_entry)
         palette[i] = .22f * palette[i] + .78f * back;
   }
-  palette[section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
+  palette[scene::section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
   palette[scene::highlight_entry] = light ? Vec3(.05f, .05f, .35f) : Vec3(.80f, .90f, 1.f);
 }
 

@@ -16,13 +16,15 @@
 #include "apps/studio/report.h"
 #include "apps/studio/theme.h"
 #include "apps/studio/window.h"
+#include "apps/surface_files.h"
 #include "apps/view_text.h"
 
 namespace forest::studio {
 namespace {
 
 struct Options {
-  std::filesystem::path forest, activity, screenshot;
+  std::filesystem::path forest, activity, synapses, screenshot;
+  std::vector<std::filesystem::path> surfaces, overlays;
   std::string view, size;
   std::vector<std::filesystem::path> node_sets;
   bool report = false;
@@ -51,13 +53,45 @@ QSize size_of(const std::string& text) {
   return {width, height};
 }
 
+scene::Surfaces read_surfaces(const std::vector<std::filesystem::path>& files,
+                              const std::vector<std::filesystem::path>& overlays) {
+  if (overlays.size() > files.size())
+    throw Error("there are more overlays than surfaces; an overlay colours the surface in its place");
+  scene::Surfaces surfaces;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    add_surface(surfaces, files[i]);
+    if (i < overlays.size()) add_overlay(surfaces, overlays[i]);
+  }
+  return surfaces;
+}
+
+// Those that were named, or that lie beside the forest; what lies there and is of another forest is told, not shown.
+std::optional<scene::Synapses> synapses_of(const Options& options, const scene::Forest& forest) {
+  if (!options.synapses.empty()) return scene::Synapses::open(options.synapses, forest);
+  const auto beside = scene::Synapses::beside(options.forest);
+  if (forest.instances().empty() || !std::filesystem::exists(beside)) return std::nullopt;
+  try {
+    return scene::Synapses::open(beside, forest);
+  } catch (const InputError& error) {
+    std::fprintf(stderr, "brainforest-studio: the synapses are not shown: %s\n", error.what());
+    return std::nullopt;
+  }
+}
+
 int run(const Options& options, int& argc, char** argv) {
-  const scene::Forest forest = scene::Forest::open(options.forest);
+  std::vector<std::filesystem::path> surface_files = options.surfaces;
+  const bool alone = is_surface(options.forest);
+  if (alone) surface_files.insert(surface_files.begin(), options.forest);
+  const scene::Forest forest = alone ? scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {}))
+                                     : scene::Forest::open(options.forest);
+  const scene::Surfaces surfaces = read_surfaces(surface_files, options.overlays);
   scene::View view = scene::overview(forest);
   view.camera.near = .5f;
+  if (alone) view.camera = surfaces.camera(surfaces.outside(), 1.6f), view.fog = 0.f;
   if (!options.view.empty()) view = read_view(options.view);
   std::optional<scene::Playback> playback;
   if (!options.activity.empty()) playback.emplace(scene::Playback::open(forest, options.activity));
+  std::optional<scene::Synapses> synapses = synapses_of(options, forest);
   const QSize size = options.size.empty() ? QSize() : size_of(options.size);
 
   QSurfaceFormat format;
@@ -81,6 +115,8 @@ int run(const Options& options, int& argc, char** argv) {
   Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets));
   if (size.isValid()) window.resize(size);
   if (options.report) report(window);
+  if (!surfaces.empty()) window.viewport().show(surfaces);
+  if (synapses) window.viewport().show(std::move(*synapses));
   if (playback) window.viewport().play(std::move(*playback));
   int status = 0;
   const auto end = [&](int code) { application.exit(status = code); };
@@ -118,12 +154,22 @@ int main(int argc, char** argv) {
   using namespace forest::studio;
   Options options;
   CLI::App app{"A window on a forest: orbit, fly, and ask any branch what it is.", "brainforest-studio"};
-  app.add_option("FOREST", options.forest, "A forest file, made by 'brainforest pack'")->required();
+  app.add_option("FOREST", options.forest,
+                 "A forest file, made by 'brainforest pack', or the surface of a cortex")
+      ->required();
   app.add_option("--view", options.view, "Begin with this view: a JSON file, or the text that Ctrl+C copies");
   app.add_option("--node-sets", options.node_sets,
                  "SONATA node sets, JSON files: names that targets may use besides the forest's own");
   app.add_option("--activity", options.activity,
                  "A simulation to play on the branches: an activity file, made by 'brainforest activity'");
+  app.add_option(
+      "--synapses", options.synapses,
+      "Synapses, made by 'brainforest pack'; by default those of column.synapses beside column.forest");
+  app.add_option("--surface", options.surfaces,
+                 "Surface of a cortex to show, too: GIFTI or FreeSurfer's lh.pial")
+      ->allow_extra_args(false);
+  app.add_option("--overlay", options.overlays, "Values or areas that colour the surfaces, in their order")
+      ->allow_extra_args(false);
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");

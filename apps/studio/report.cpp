@@ -29,7 +29,10 @@ void report(Window& window) {
   const Viewport* viewport = &window.viewport();
   QObject::connect(viewport, &Viewport::selected, viewport, [viewport] {
     const auto& selection = viewport->selection();
-    print({{"event", "selected"}, {"facts", selection ? to_json(viewport->forest(), *selection) : Json()}});
+    Json known = selection ? to_json(viewport->forest(), *selection) : Json();
+    if (const auto& synapse = viewport->selected_synapse())
+      known["synapse"] = to_json(*viewport->synapses(), *synapse);
+    print({{"event", "selected"}, {"facts", known}});
   });
   QObject::connect(&window, &Window::clamped, &window, [&window](double milliseconds) {
     Json names = Json::array();
@@ -49,6 +52,8 @@ void report(Window& window) {
            {"picture", picture},
            {"activity", activity},
            {"segments", f.segments},
+           {"synapses", f.synapses},
+           {"skin_triangles", f.triangles},
            {"neurons", f.neurons},
            {"samples", f.samples}});
   });

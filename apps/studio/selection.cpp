@@ -159,7 +159,7 @@ std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selecti
       marks.push_back({cone.a, cone.b, 1.12f * std::max(cone.radius_a, cone.radius_b) + .05f, entry});
     }
   };
-  mark(true, section_entry);
+  mark(true, scene::section_entry);
   mark(false, scene::highlight_entry);
   return marks;
 }
@@ -172,6 +172,71 @@ Sphere around(const scene::Forest& forest, const Selection& selection) {
     bounds.add(cone.b, cone.radius_b);
   }
   return {bounds.centre(), .5f * bounds.extent().norm()};
+}
+
+namespace {
+
+struct Contact {
+  const scene::Synapses& synapses;
+  const scene::Synapse& synapse;
+  std::uint32_t number;
+  const scene::ProjectionFacts& projection;
+
+  bool planted() const { return !(synapse.flags & scene::Synapse::outside); }
+};
+Contact contact(const scene::Synapses& all, std::uint32_t number) {
+  const scene::Synapse& synapse = all.all()[number];
+  return {all, synapse, number, all.projection(synapse)};
+}
+
+struct ContactRow {
+  const char* key;
+  const char* name;
+  const char* unit;
+  const char* hint;
+  Json (*value)(const Contact&);
+};
+const ContactRow contact_rows[] = {
+    {"synapse", "Synapse", "", "Its number among the edges of its population, from 0",
+     [](const Contact& c) { return Json(c.synapse.id - c.projection.first); }},
+    {"sign", "Sign", "", "Whether it excites or inhibits",
+     [](const Contact& c) { return Json(circuit::name_of(c.synapse.sign())); }},
+    {"source", "Source", "",
+     "The neuron whose axon makes it: its id, or its number in a population that is not planted",
+     [](const Contact& c) {
+       return c.planted() ? Json(c.synapse.source)
+                          : Json(fmt::format("{} {}", c.projection.source, c.synapse.source));
+     }},
+    {"source_type", "Source type", "", "Cell type of the source",
+     [](const Contact& c) {
+       const scene::Forest& forest = c.synapses.forest();
+       return c.planted() ? Json(forest.circuit().types[forest.types()[c.synapse.source]].name) : Json();
+     }},
+    {"target", "Target", "", "The neuron that it is on",
+     [](const Contact& c) { return Json(c.synapse.target); }},
+    {"along", "Along the section", "", "0 at its beginning, 1 at its end",
+     [](const Contact& c) { return Json(tidy(float(c.synapse.position) / 65535.f)); }},
+    {"projection", "Projection", "", "Population of edges, as the circuit names it; what is made up says so",
+     [](const Contact& c) { return Json(c.projection.name); }},
+};
+
+}  // namespace
+
+std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse) {
+  const Contact c = contact(synapses, synapse);
+  std::vector<Fact> known;
+  for (const ContactRow& row : contact_rows)
+    if (const Json value = row.value(c); !value.is_null())
+      known.push_back({row.name, row.unit, row.hint, in_words(value)});
+  return known;
+}
+
+nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse) {
+  const Contact c = contact(synapses, synapse);
+  Json json;
+  for (const ContactRow& row : contact_rows)
+    if (Json value = row.value(c); !value.is_null()) json[row.key] = std::move(value);
+  return json;
 }
 
 }  // namespace forest::studio

@@ -12,6 +12,7 @@
 #include "forest/core/bounds.h"
 #include "forest/frame/frame.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/synapses.h"
 
 namespace forest::studio {
 
@@ -39,10 +40,13 @@ std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection)
 /// The same for a machine, {"neuron": 12, …}: lengths in µm.
 nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& selection);
 
-inline constexpr std::uint32_t section_entry = 125;  // palette entry of the picked section
+/// Of a synapse: what it does, who makes it and where it comes from.
+std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse);
+nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse);
+
 inline constexpr std::size_t most_marks = 50'000;  // capsules of a highlight; the section itself comes first
 
-/// Capsules a little thicker than the branches: the picked section as section_entry, the rest as highlight_entry.
+/// Capsules a little thicker than the branches: the picked section as scene::section_entry, the rest as highlight_entry.
 std::vector<frame::Overlay> highlight(const scene::Forest& forest, const Selection& selection);
 /// A sphere around the subarbor, in the world.
 Sphere around(const scene::Forest& forest, const Selection& selection);

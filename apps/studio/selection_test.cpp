@@ -119,14 +119,14 @@ TEST_F(SelectionOfSample, HighlightHoldsTheBranchesAndTheSectionIsMarkedApart) {
     const Sphere sphere = around(forest, selection);
     std::size_t section = 0;
     for (const frame::Overlay& mark : marks) {
-      section += mark.colour == section_entry;
+      section += mark.colour == scene::section_entry;
       EXPECT_LE((mark.a - sphere.centre).norm(), sphere.radius * 1.001f + .01f);
       EXPECT_LE((mark.b - sphere.centre).norm(), sphere.radius * 1.001f + .01f);
     }
     EXPECT_GE(section, 1u);
     const RoundCone picked = scene::in_world(forest, selection.pick.instance, selection.pick.segment);
     EXPECT_TRUE(std::ranges::any_of(marks, [&](const frame::Overlay& mark) {
-      return mark.colour == section_entry && mark.a == picked.a && mark.b == picked.b &&
+      return mark.colour == scene::section_entry && mark.a == picked.a && mark.b == picked.b &&
              mark.radius > std::max(picked.radius_a, picked.radius_b);
     }));
   }

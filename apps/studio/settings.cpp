@@ -15,6 +15,7 @@ constexpr const char* group_names[] = {"Eye",    "Flight", "Gaze",  "Plane",
 constexpr const char* colour_words[] = {"Cell type", "Layer", "Kind of branch", "Neuron", "Target", "Depth"};
 constexpr const char* background_words[] = {"Dark", "Light"};
 constexpr const char* projection_words[] = {"Perspective", "Orthographic"};
+constexpr const char* synapse_words[] = {"Excitatory or inhibitory", "As their target"};
 constexpr const char* across_words[] = {"x", "y", "z", "Any direction"};
 
 constexpr double far = 1e6;  // µm
@@ -109,6 +110,9 @@ constexpr Number number_table[] = {
     {"Detail", "Samples", "", "a pixel", "Pictures averaged when the view stands still: 1 rough, 16 smooth",
      "Alt+M", 1, 1024, 4, 0, [](const S& s) { return float(s.view.samples); },
      [](S& s, float v) { s.view.samples = std::uint32_t(v); }},
+    {"Shown", "Surface opacity", "", "%", "Of the surfaces of a cortex: 100 hides what lies behind", "Alt+E",
+     0, 100, 10, 0, [](const S& s) { return 100.f * s.surface_opacity; },
+     [](S& s, float v) { s.surface_opacity = v / 100.f; }},
     {"Depth", "Fog", "", "×", "How fast what is far fades; 0 for none", "Alt+I", 0, 100, .25, 2,
      [](const S& s) { return s.view.fog; }, [](S& s, float v) { s.view.fog = v; }},
     {"Depth", "Halo", "", "×", "Dark rim around nearer branches; 0 for none", "Alt+J", 0, 10, .25, 2,
@@ -125,6 +129,9 @@ constexpr Choice choice_table[] = {
     {"Colour", "Colour by", "What a colour means; the legend names it", "C", colour_words,
      [](const S& s) { return int(s.view.colour_by); },
      [](S& s, int i) { s.view.colour_by = scene::ColourBy(i); }},
+    {"Colour", "Synapse colour", "What the colours of synapses mean", "Shift+Y", synapse_words,
+     [](const S& s) { return int(s.view.synapses == scene::SynapseColour::target); },
+     [](S& s, int i) { s.view.synapses = i ? scene::SynapseColour::target : scene::SynapseColour::sign; }},
     {"Colour", "Background", "Dark for the eye and film, light for print", "B", background_words,
      [](const S& s) { return int(s.view.background); },
      [](S& s, int i) { s.view.background = scene::Background(i); }},
@@ -149,6 +156,13 @@ constexpr Toggle toggle_table[] = {
      [](const S& s) { return s.plane; }, [](S& s, bool on) { s.plane = on; }},
     {"Depth", "Dim the rest", "The forest steps back while a branch is selected", "X",
      [](const S& s) { return s.dim; }, [](S& s, bool on) { s.dim = on; }},
+    {"Shown", "Synapses", "Where their branches are in sight, when a file of synapses is open", "Y",
+     [](const S& s) { return s.view.synapses != scene::SynapseColour::none; },
+     [](S& s, bool on) { s.view.synapses = on ? scene::SynapseColour::sign : scene::SynapseColour::none; }},
+    {"Shown", "Skin", "Neurons near the eye have a smooth skin and spines, once the view stands still", "N",
+     [](const S& s) { return s.skin; }, [](S& s, bool on) { s.skin = on; }},
+    {"Shown", "Surfaces", "Of a cortex, when some are open", "U", [](const S& s) { return s.surfaces; },
+     [](S& s, bool on) { s.surfaces = on; }},
     {"Shown", "Outline", "The column and the limits of its layers", "O", [](const S& s) { return s.outline; },
      [](S& s, bool on) { s.outline = on; }},
     {"Shown", "Legend", "What colours mean", "L", [](const S& s) { return s.legend; },

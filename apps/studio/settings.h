@@ -26,6 +26,9 @@ struct Settings {
   bool legend = true;         // what colours mean
   bool scale = true;          // scale bar and directions
   bool dim = true;            // the rest of the forest while a branch is selected
+  bool skin = false;          // of neurons near the eye; a target's that is forced to have one aside
+  bool surfaces = true;       // of a cortex, where some are open
+  float surface_opacity = 1.f;
 };
 
 /// The plane of intersection, `middle` being that of the forest.

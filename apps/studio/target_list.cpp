@@ -31,7 +31,8 @@ constexpr TargetColour colour_table[] = {
     {"By neuron", {}, ColourBy::neuron},
     {"By depth", {}, ColourBy::depth},
 };
-constexpr const char* kind_table[] = {"By size", "Dots", "Lines", "Capsules", "Somata alone"};
+constexpr const char* kind_table[] = {"By size",      "Dots", "Lines", "Capsules",
+                                      "Somata alone", "Skin", "Bricks"};
 
 bool same(const Appearance& a, const Appearance& b) { return a.name == b.name && a.branch == b.branch; }
 

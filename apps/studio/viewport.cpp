@@ -20,9 +20,11 @@ namespace {
 constexpr int rest_milliseconds = 200;                    // a view that stands still so long is drawn in full
 constexpr float slice_milliseconds = 60.f;                // of refining between two looks at the mouse
 constexpr float glide_seconds = .7f, key_seconds = 2.5f;  // of a glide; between views of a path
-constexpr float tap_seconds = .05f;            // of flight that a tap on a key makes, however short
-constexpr float turn_pixels_a_second = 400.f;  // of the arrow keys
-constexpr float reach = 3.f;                   // a click so many pixels beside a branch means it
+constexpr float tap_seconds = .05f;              // of flight that a tap on a key makes, however short
+constexpr float turn_pixels_a_second = 400.f;    // of the arrow keys
+constexpr std::size_t moving_synapses = 60'000;  // drawn at most while the view moves
+constexpr std::size_t still_pieces = 24;         // of skin, made between two looks at the mouse
+constexpr float reach = 3.f;                     // a click so many pixels beside a branch means it
 
 struct FlightKey {
   int key;
@@ -45,8 +47,8 @@ std::vector<frame::Overlay> visible(std::vector<frame::Overlay> marks, const fra
   const Vec3 forward = -camera.axes().col(2);
   for (frame::Overlay& mark : marks) {
     const float depth = std::max(0.f, (.5f * (mark.a + mark.b) - camera.eye).dot(forward));
-    mark.radius = std::max(mark.radius,
-                           (mark.colour == section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
+    mark.radius = std::max(
+        mark.radius, (mark.colour == scene::section_entry ? 1.9f : 1.3f) * camera.pixel_size(height, depth));
   }
   return marks;
 }
@@ -62,7 +64,8 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       chooser_(forest_),
       settings_{.view = view},
       colouring_(scene::colour(targets_, view)),
-      outline_(scene::outline(forest_)) {
+      outline_(scene::outline(forest_)),
+      dressing_(forest_) {
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
   setMinimumSize(240, 160);
@@ -129,13 +132,22 @@ void Viewport::fly_along(std::vector<scene::View> views) {
 void Viewport::centre() {
   const frame::Camera& camera = settings_.view.camera;
   if (selection_) return glide_to(centred_on(camera, around(forest_, *selection_)));
-  frame::Camera whole = scene::overview(forest_).camera;
-  whole.near = camera.near;
-  whole.field_of_view = camera.field_of_view;
-  glide_to(whole);
+  frame::Camera all = whole();
+  all.field_of_view = camera.field_of_view;
+  glide_to(all);
 }
 
-void Viewport::select(const std::optional<scene::Pick>& pick) {
+frame::Camera Viewport::whole() const {
+  if (forest_.instances().empty() && !dressing_.surfaces.empty())
+    return dressing_.surfaces.camera(dressing_.surfaces.outside(),
+                                     float(width()) / float(std::max(1, height())));
+  frame::Camera camera = scene::overview(forest_).camera;
+  camera.near = settings_.view.camera.near;
+  return camera;
+}
+
+void Viewport::select(const std::optional<scene::Pick>& pick, std::optional<std::uint32_t> synapse) {
+  selected_synapse_ = pick ? synapse : std::nullopt;
   selection_ = pick ? std::optional(studio::select(forest_, *pick)) : std::nullopt;
   highlight_ = selection_ ? highlight(forest_, *selection_) : std::vector<frame::Overlay>{};
   touch();
@@ -148,6 +160,31 @@ std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
   const auto exact =
       scene::pick(forest_, camera, in_points(), at, .5f / float(devicePixelRatioF()), colouring_.states);
   return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.states);
+}
+
+std::optional<std::pair<std::uint32_t, scene::Pick>> Viewport::pick_synapse(const QPointF& place) const {
+  if (!dressing_.synapses) return std::nullopt;
+  const Vec2 at = vec(place) + Vec2(.5f, .5f);
+  const auto found = scene::pick(dressing_.chosen, settings_.view.camera, in_points(), at, 1.5f);
+  if (!found) return std::nullopt;
+  const scene::Synapse& synapse = dressing_.synapses->all()[found->synapse];
+  const auto branch = scene::pick(forest_, settings_.view.camera, in_points(), at, 0.f, colouring_.states);
+  if (branch && branch->distance < found->distance - double(synapse.radius_um())) return std::nullopt;
+  const scene::Neuron& neuron = forest_.neurons()[forest_.instances()[synapse.target].morphology];
+  return std::pair(found->synapse, scene::Pick{synapse.target, neuron.first_segment + synapse.segment,
+                                               dressing_.synapses->section(synapse), found->distance});
+}
+
+void Viewport::show(scene::Synapses synapses) {
+  if (selected_synapse_) select(std::nullopt);
+  dressing_.chosen = {};
+  dressing_.synapses.emplace(std::move(synapses));
+  touch();
+}
+
+void Viewport::show(scene::Surfaces surfaces) {
+  dressing_.surfaces = std::move(surfaces);
+  touch();
 }
 
 void Viewport::play(scene::Playback playback) {
@@ -253,7 +290,8 @@ void Viewport::advance(float seconds) {
   set_camera(fly(look(settings_.view.camera, turn_pixels_a_second * seconds * turn), speed * seconds * way));
 }
 
-void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last) {
+void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
+                         const DressingLimits& limits) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
   scene::Chooser::Painter painter;
@@ -266,7 +304,8 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
                     {float(w), float(h)}, colouring_.shown(), painter);
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
-  if (playback_) std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != section_entry; });
+  if (playback_)
+    std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != scene::section_entry; });
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
@@ -283,9 +322,21 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
     const auto marks = scene::plane_marks(forest_, plane);
     overlays.insert(overlays.end(), marks.begin(), marks.end());
   }
+  dressing_.skinned = settings_.skin;
+  dressing_.surfaces.visibility = settings_.surfaces ? settings_.surface_opacity : 0.f;
+  figures_.synapses = figures_.triangles = 0;
+  Foveated::Dresser dress;
+  if (dressing_.wanted(view, colouring))
+    dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
+      dressing_.put_on(to, view, cut, eye, colouring, playback_.has_value(), painter, limits);
+      figures_.synapses += dressing_.chosen.balls.size(),
+          figures_.triangles += dressing_.skin.figures().triangles;
+    };
+  else
+    dressing_.rest();
   if (layered()) {
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
-    united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter);
+    united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter, dress);
     figures_.segments = foveated_->figures().segments, figures_.neurons = foveated_->figures().neurons;
     figures_.samples = last, figures_.error = view.detail.error;
     return;
@@ -294,6 +345,9 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   frame::Frame frame = scene::compose(forest_, view, colouring, chooser_.cut(), w, h, overlays);
   frame.glass = glass;
   chooser_.complete(frame);
+  if (dress)
+    dress(frame, chooser_.cut(),
+          scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)));
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
   chooser_.remember(renderer_->seen());
@@ -307,13 +361,15 @@ void Viewport::draw_moving() {
   scene::View view = settings_.view;
   view.samples = budget_.samples();
   view.detail.error *= budget_.error(), view.detail.thinnest = budget_.thinnest();
-  draw_part(view, 0, view.samples);
+  // What is not there yet is made once the view stands still.
+  draw_part(view, 0, view.samples, {.skin = {.new_pieces = 0}, .synapses = moving_synapses});
 }
 
-void Viewport::draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last) {
+void Viewport::draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last,
+                          const DressingLimits& limits) {
   scene::View view = settings_.view;
   view.samples = samples;
-  draw_part(view, first, last);
+  draw_part(view, first, last, limits);
 }
 
 void Viewport::refine() {
@@ -324,9 +380,9 @@ void Viewport::refine() {
   const auto affordable =
       std::uint32_t(std::max(1.f, slice_milliseconds / sample_milliseconds_ / float(group)));
   const std::uint32_t until = std::min(samples, (refined_ / group + affordable) * group);
-  draw_still(samples, refined_, until);
+  draw_still(samples, refined_, until, {.skin = {.new_pieces = still_pieces}});
   sample_milliseconds_ = std::max(.5f, float(clock.nsecsElapsed()) * 1e-6f / float(until - refined_));
-  refined_ = until;
+  refined_ = dressing_.skin.figures().missing ? 0 : until;  // more of it is there the next time
   if (refined_ == samples) stage_ = Stage::finished;
 }
 
@@ -375,6 +431,13 @@ void Viewport::paint(const frame::Image& image) {
       0, 0, QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888));
 }
 
+std::vector<scene::LegendEntry> Viewport::legend() const {
+  std::vector<scene::LegendEntry> entries = colouring_.legend;
+  if (figures_.synapses && settings_.view.synapses == scene::SynapseColour::sign)
+    std::ranges::move(scene::synapse_legend(settings_.view.background), std::back_inserter(entries));
+  return entries;
+}
+
 void Viewport::annotate() {
   QOpenGLPaintDevice device(size() * devicePixelRatioF());
   device.setDevicePixelRatio(devicePixelRatioF());
@@ -389,7 +452,7 @@ void Viewport::annotate() {
   if (settings_.legend && playback_)
     paint_activity(painter, rect(), activity(), time(), playback_->activity().facts().units, ink);
   else if (settings_.legend)
-    paint_legend(painter, rect(), colouring_.legend, ink);
+    paint_legend(painter, rect(), legend(), ink);
   if (const auto& gaze = settings_.view.detail.gaze)
     paint_gaze(painter, QPointF(gaze->x() * float(width()), gaze->y() * float(height())), ink);
 }
@@ -421,7 +484,12 @@ void Viewport::mouseMoveEvent(QMouseEvent* event) {
 }
 
 void Viewport::mouseReleaseEvent(QMouseEvent* event) {
-  if (!dragged_ && event->button() == Qt::LeftButton) select(pick(event->position()));
+  if (!dragged_ && event->button() == Qt::LeftButton) {
+    if (const auto synapse = pick_synapse(event->position()))
+      select(synapse->second, synapse->first);
+    else
+      select(pick(event->position()));
+  }
   dragged_ = event->buttons() ? dragged_ : false;
 }
 

@@ -17,6 +17,7 @@
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
 
+#include "apps/dressing.h"
 #include "apps/foveated.h"
 #include "apps/studio/selection.h"
 #include "apps/studio/settings.h"
@@ -46,7 +47,11 @@ class Viewport final : public QOpenGLWidget {
   void centre();
 
   const std::optional<Selection>& selection() const { return selection_; }
-  void select(const std::optional<scene::Pick>& pick);
+  /// @param synapse  that was meant, in synapses()->all(); the pick is the branch that it is on
+  void select(const std::optional<scene::Pick>& pick, std::optional<std::uint32_t> synapse = {});
+  const std::optional<std::uint32_t>& selected_synapse() const { return selected_synapse_; }
+  /// The synapse that is drawn there, before all branches; and its branch.
+  std::optional<std::pair<std::uint32_t, scene::Pick>> pick_synapse(const QPointF& place) const;
   /// What is drawn at a place of this widget: to half a pixel, else the nearest branch within a few.
   std::optional<scene::Pick> pick(const QPointF& place) const;
 
@@ -64,6 +69,14 @@ class Viewport final : public QOpenGLWidget {
   float rate() const { return rate_; }  // ms of activity a second
   void set_rate(float rate) { rate_ = rate; }
 
+  /// Shows these synapses, these surfaces from now on.
+  void show(scene::Synapses synapses);
+  void show(scene::Surfaces surfaces);
+  const scene::Synapses* synapses() const { return dressing_.synapses ? &*dressing_.synapses : nullptr; }
+  const scene::Surfaces& surfaces() const { return dressing_.surfaces; }
+  /// Of the whole forest, or of the surfaces where there is none.
+  frame::Camera whole() const;
+
   /// The picture alone, in full, at its size on the screen.
   frame::Image picture();
   /// What is seen, with legend and scale.
@@ -73,6 +86,8 @@ class Viewport final : public QOpenGLWidget {
     float frames_per_second = 0.f;  // while moving
     std::uint64_t segments = 0;     // drawn
     std::uint32_t neurons = 0;      // in sight
+    std::size_t synapses = 0;       // drawn
+    std::size_t triangles = 0;      // of skin
     std::uint32_t samples = 1;
     float error = 0.f;  // acceptable, pixels
   };
@@ -118,11 +133,14 @@ class Viewport final : public QOpenGLWidget {
   void advance(float seconds);  // glide and flight
   bool flies() const { return !held_.empty(); }
   void draw_moving();
-  void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last);
-  void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last);
+  void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last,
+                  const DressingLimits& limits = {});
+  void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
+                 const DressingLimits& limits);
   void refine();
   void took(float milliseconds);
   void paint(const frame::Image& image);
+  std::vector<scene::LegendEntry> legend() const;
   void annotate();
   bool layered() const;  // drawn layer by layer for the gaze
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
@@ -139,7 +157,9 @@ class Viewport final : public QOpenGLWidget {
   double window_ = 0.;  // ms of activity that the picture stands for
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
+  Dressing dressing_;
   std::optional<Selection> selection_;
+  std::optional<std::uint32_t> selected_synapse_;
   std::unique_ptr<render::Renderer> renderer_;
   render::OpenGLRenderer* card_ = nullptr;          // the renderer when it is OpenGL's …
   const render::CpuRenderer* processor_ = nullptr;  // … or this one where there is no graphics card

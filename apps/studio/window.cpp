@@ -29,6 +29,7 @@
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/targets_panel.h"
 #include "apps/studio/view_panel.h"
+#include "apps/surface_files.h"
 #include "apps/view_text.h"
 
 namespace forest::studio {
@@ -75,8 +76,7 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
     if (!panel_rest_.isActive()) panel_rest_.start();
   });
   connect(viewport_, &Viewport::selected, this, [this] {
-    const auto& selection = viewport_->selection();
-    selection_panel_->show_facts(selection ? facts(viewport_->forest(), *selection) : std::vector<Fact>{});
+    selection_panel_->show_facts(selected_facts());
     show_targets();
     activity_panel_->show_selection();
   });
@@ -161,6 +161,14 @@ void Window::add_menus() {
   const Command commands[] = {
       {"&File", "&Open activity…", "Ctrl+O", "Play a simulation on the branches: an activity file",
        [this] { open_activity(); }},
+      {"&File", "Open s&ynapses…", "",
+       "Show the synapses of a file: pack writes column.synapses beside column.forest",
+       [this] { open_synapses(); }},
+      {"&File", "Open su&rface…", "Ctrl+Shift+O",
+       "Add the surface of a cortex: GIFTI or FreeSurfer's lh.pial", [this] { open_surface(); }},
+      {"&File", "Colour the surface by a &map…", "",
+       "Values or areas on the last surface: GIFTI, FreeSurfer's lh.thickness, or text",
+       [this] { open_overlay(); }},
       {"&File", "&Save picture…", "Ctrl+S", "The forest alone as a PNG, smooth, at its size on the screen",
        [this] { save_picture(false); }},
       {"&File", "Save picture with &legend…", "Ctrl+Shift+S",
@@ -178,9 +186,12 @@ void Window::add_menus() {
       {"&Edit", "&Paste view", "Ctrl+V", "Go to a view that was copied", [this] { paste_view(); }},
       {"&Edit", "Copy &facts", "Ctrl+Shift+C", "The facts of the selected branch as JSON",
        [this] {
-         if (const auto& s = viewport_->selection())
-           QApplication::clipboard()->setText(
-               QString::fromStdString(to_json(viewport_->forest(), *s).dump()));
+         if (const auto& s = viewport_->selection()) {
+           nlohmann::ordered_json known = to_json(viewport_->forest(), *s);
+           if (const auto& synapse = viewport_->selected_synapse())
+             known["synapse"] = to_json(*viewport_->synapses(), *synapse);
+           QApplication::clipboard()->setText(QString::fromStdString(known.dump()));
+         }
        }},
       {"&Edit", "Select the &parent", "P", "The section that the selected one grows out of",
        [this] {
@@ -191,11 +202,7 @@ void Window::add_menus() {
       {"&View", "&Centre on the selection", "F", "Go to where the selected subarbor fills the picture",
        [this] { viewport_->centre(); }},
       {"&View", "&Whole forest", "Home", "Go back outside and see everything",
-       [this] {
-         frame::Camera camera = scene::overview(viewport_->forest()).camera;
-         camera.near = viewport_->settings().view.camera.near;
-         viewport_->glide_to(camera);
-       }},
+       [this] { viewport_->glide_to(viewport_->whole()); }},
       {"&View", "&Full screen", "F11", "The window over the whole screen, and back",
        [this] { setWindowState(windowState() ^ Qt::WindowFullScreen); }},
       {"&Activity", "&Play or pause", "Space", "Let the simulation go on, or stand still",
@@ -348,15 +355,59 @@ void Window::save_picture(bool as_seen) {
 const std::vector<reports::Trace>& Window::traces() const { return activity_panel_->traces(); }
 
 void Window::open_activity() {
-  const QString path = QFileDialog::getOpenFileName(this, tr("Open activity"), {},
-                                                    tr("Activity files (*.activity);;All files (*)"), nullptr,
+  open_with(tr("Open activity"), tr("Activity files (*.activity)"), [this](const std::string& path) {
+    viewport_->play(scene::Playback::open(viewport_->forest(), path));
+  });
+}
+
+std::vector<Fact> Window::selected_facts() const {
+  std::vector<Fact> all;
+  if (const auto& synapse = viewport_->selected_synapse()) all = facts(*viewport_->synapses(), *synapse);
+  if (const auto& selection = viewport_->selection())
+    std::ranges::move(facts(viewport_->forest(), *selection), std::back_inserter(all));
+  return all;
+}
+
+void Window::open_with(const QString& title, const QString& files,
+                       const std::function<void(const std::string&)>& open) {
+  const QString path = QFileDialog::getOpenFileName(this, title, {}, files + tr(";;All files (*)"), nullptr,
                                                     QFileDialog::DontUseNativeDialog);
   if (path.isEmpty()) return;
   try {
-    viewport_->play(scene::Playback::open(viewport_->forest(), path.toStdString()));
+    open(path.toStdString());
   } catch (const std::exception& error) {
-    QMessageBox::warning(this, tr("Open activity"), QString::fromUtf8(error.what()));
+    QMessageBox::warning(this, title, QString::fromUtf8(error.what()));
   }
+}
+
+void Window::open_synapses() {
+  open_with(tr("Open synapses"), tr("Synapses (*.synapses)"), [this](const std::string& path) {
+    viewport_->show(scene::Synapses::open(path, viewport_->forest()));
+  });
+}
+
+void Window::open_surface() {
+  open_with(tr("Open surface"), tr("Surfaces (*.surf.gii *.pial *.white *.inflated)"),
+            [this](const std::string& path) {
+              scene::Surfaces surfaces = viewport_->surfaces();
+              const bool first = surfaces.empty();
+              add_surface(surfaces, path);
+              viewport_->show(std::move(surfaces));
+              if (first && viewport_->forest().instances().empty()) viewport_->glide_to(viewport_->whole());
+            });
+}
+
+void Window::open_overlay() {
+  if (viewport_->surfaces().empty()) {
+    statusBar()->showMessage(tr("No surface is open: open one first, then what colours it."), 6000);
+    return;
+  }
+  open_with(tr("Colour the surface"), tr("Values and areas (*.gii *.thickness *.curv *.sulc *.area *.txt)"),
+            [this](const std::string& path) {
+              scene::Surfaces surfaces = viewport_->surfaces();
+              add_overlay(surfaces, path);
+              viewport_->show(std::move(surfaces));
+            });
 }
 
 void Window::save_traces() {

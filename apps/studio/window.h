@@ -50,7 +50,14 @@ class Window final : public QMainWindow {
   void play_path();
   void save_picture(bool as_seen);
   void explain();
+  // Asks for a file and opens it; says what is wrong with it.
+  void open_with(const QString& title, const QString& files,
+                 const std::function<void(const std::string&)>& open);
   void open_activity();
+  void open_synapses();
+  void open_surface();
+  void open_overlay();
+  std::vector<Fact> selected_facts() const;
   void save_traces();
   template <class Row, class Value>
   void set(const Row& row, Value value);

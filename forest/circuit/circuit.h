@@ -14,7 +14,8 @@ namespace forest::circuit {
 struct CellType {
   std::string name;        // for example "L5 pyramidal"
   std::string population;  // of the repository, where its neurons come from
-  bool excitatory = true;
+  bool excitatory = true;  // of glia without meaning
+  bool glia = false;       // astrocytes, microglia, …: no neurons, they make no synapses
 
   bool operator==(const CellType&) const = default;
 };

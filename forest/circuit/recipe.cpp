@@ -102,11 +102,17 @@ class Node {
 constexpr double longest = 1e5;  // µm: ten centimetres, the largest brain slab anyone plants
 
 CellType read_type(const Node& node) {
-  node.allow({"name", "population", "excitatory"});
+  node.allow({"name", "population", "excitatory", "glia"});
   CellType type;
   type.name = node.at("name").string();
   type.population = node.find("population") ? node.at("population").string() : type.name;
-  if (const auto excitatory = node.find("excitatory")) type.excitatory = excitatory->boolean();
+  if (const auto glia = node.find("glia")) type.glia = glia->boolean();
+  if (const auto excitatory = node.find("excitatory")) {
+    type.excitatory = excitatory->boolean();
+    if (type.glia)
+      excitatory->refuse(
+          fmt::format("{} is glia, which neither excites nor inhibits; take this out", type.name));
+  }
   return type;
 }
 

@@ -61,6 +61,12 @@ Segment segment_of(const Overlay& o) {
           o.b.x(), o.b.y(), o.b.z(), o.colour << 16};
 }
 
+Segment segment_of(const Ball& b) {
+  const Vec3& p = b.centre;
+  return {p.x(), p.y(), p.z(), half_pair(b.radius, b.radius),
+          p.x(), p.y(), p.z(), std::uint32_t(b.colour) << 16 | std::uint32_t(b.opacity) << 8};
+}
+
 float depth_of_code(std::uint32_t code) {
   return std::exp2(float(code) / float(FOREST_DEPTH_STEPS) - float(FOREST_DEPTH_BASE));
 }

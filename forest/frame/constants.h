@@ -28,6 +28,11 @@ inline float glass_depth(const Constants& c, float px, float py) {
 
 /// How an overlay is drawn: a segment in the world whose meta word names its palette entry.
 Segment segment_of(const Overlay& overlay);
+/// The same of a ball: its opacity stands in bits 8–15.
+Segment segment_of(const Ball& ball);
+/// Of ball number `number` of a frame: the key of its screen door, and its rank among those of less than a pixel, in [0, 1).
+inline std::uint32_t ball_key(std::uint32_t number) { return forest_mixed(number ^ 0x6a09e667u); }
+inline float ball_rank(std::uint32_t number) { return float(forest_mixed(number) >> 8) * 0x1p-24f; }
 
 /// Depth codes of a key (layout.h).
 float depth_of_code(std::uint32_t code);

@@ -62,6 +62,12 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const Overlay& o : frame.overlays)
     require(o.a.allFinite() && o.b.allFinite() && o.radius >= 0.f && o.colour < frame.palette.size(),
             "an overlay must be finite and its colour a palette entry");
+  bool finite = true;  // of all of them: there may be a million
+  std::uint8_t colours_of_balls = 0;
+  for (const Ball& b : frame.balls)
+    finite &= b.centre.allFinite() && b.radius >= 0.f && b.radius < 65504.f, colours_of_balls |= b.colour;
+  require(finite && colours_of_balls < frame.palette.size() && frame.balls.size() < (1u << 26),
+          "balls must be finite and fewer than 67,108,864, and their colours palette entries");
   require(frame.surfaces.size() < (1u << 20), "there must be fewer than 1,048,576 surfaces");
   for (const Surface& surface : frame.surfaces) check(surface, geometry);
 }
@@ -97,6 +103,7 @@ bool transparent(const Frame& frame) {
   // Lists that come later, by `rest`, hold no item whose state is not announced by its neuron's being parted.
   std::uint8_t least = 255, flags = 0;
   for (const State& state : frame.states) least = std::min(least, state.opacity), flags |= state.flags;
+  for (const Ball& b : frame.balls) least = std::min(least, b.opacity);
   return least < 255 || (flags & State::parted) || frame.opacities != opaque();
 }
 

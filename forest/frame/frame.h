@@ -87,6 +87,14 @@ struct Overlay {
   std::uint32_t colour = 0;  // palette entry
 };
 
+/// A small sphere in the world beside the forest: a synapse. Of less than a pixel it covers its share on the mean.
+struct Ball {
+  Vec3 centre = Vec3::Zero();
+  float radius = 1.f;       // µm
+  std::uint8_t colour = 0;  // palette entry, whose own opacity does not count
+  std::uint8_t opacity = 255;
+};
+
 /// Triangles with smooth shading: the surface of a cortex, the skin of a neuron. Both sides are seen.
 struct Surface {
   static constexpr std::uint32_t in_world = 0xffffffffu;
@@ -169,6 +177,7 @@ struct Frame : Lists {
   Opacities opacities = opaque();
   std::span<const State> states;  // one an instance
   std::span<const Overlay> overlays;
+  std::span<const Ball> balls;
   std::span<const Surface> surfaces;
   std::optional<Glass> glass;
   /// What the scene left out as probably hidden, or as far, and shows after all. Asked in rounds 0, 1, 2 … in every subframe, or

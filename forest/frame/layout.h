@@ -105,6 +105,7 @@ struct Constants {
 #define FOREST_FIRST_BAND 4u  // nothing is hidden yet
 #define FOREST_ENTRIES 8u     // every segment has a palette entry of its own …
 #define FOREST_SINGLE 16u     // … and the list has one an item, not FOREST_CLUSTER_SIZE
+#define FOREST_BALLS 32u      // of an overlay: spheres as large as they are
 
 // Transparency is stochastic (Enderton, Sintorn, Shirley & Luebke 2010, "Stochastic transparency"): what is half
 // transparent shows in half of the subframes, opaque there, so that the depth test is right without any order and the

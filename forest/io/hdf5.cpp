@@ -467,12 +467,13 @@ void NewFile::attribute(const std::string& object, const std::string& name,
 void NewFile::attribute(const std::string& object, const std::string& name, const std::string& text) {
   const Turn turn;
   const Type type(H5Tcopy(H5T_C_S1));
-  H5Tset_size(type, text.size() + 1);
+  H5Tset_size(type, H5T_VARIABLE);  // as h5py writes text: it reads others as bytes
   H5Tset_cset(type, H5T_CSET_UTF8);
   const Space space(H5Screate(H5S_SCALAR));
+  const char* const characters = text.c_str();
   const Attribute open(H5Acreate_by_name(file_, object.c_str(), name.c_str(), type, space, H5P_DEFAULT,
                                          H5P_DEFAULT, H5P_DEFAULT));
-  check(open.good() && H5Awrite(open, type, text.c_str()) >= 0, "written");
+  check(open.good() && H5Awrite(open, type, &characters) >= 0, "written");
 }
 
 std::string NewFile::bytes() {

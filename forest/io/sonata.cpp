@@ -16,6 +16,7 @@
 #include "forest/io/new_folder.h"
 #include "forest/io/node_types.h"
 #include "forest/io/sonata_config.h"
+#include "forest/io/sonata_edges.h"
 #include "forest/morphology/transform.h"
 
 namespace forest::io {
@@ -38,8 +39,8 @@ void refuse_foreign_folder(const fs::path& folder) {
   if (!SonataConfig::find(Json::parse(config, nullptr, false), sonata_our_key))
     refuse("holds something other than a circuit of Brain Forest");
 
-  constexpr std::array parts{sonata_config_name, sonata_nodes_name, sonata_types_name,
-                             sonata_morphologies_name};
+  constexpr std::array parts{sonata_config_name, sonata_nodes_name,      sonata_types_name,
+                             sonata_edges_name,  sonata_edge_types_name, sonata_morphologies_name};
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const fs::path name = entry.path().lexically_relative(folder);
     const bool morphology = name.parent_path() == sonata_morphologies_name && name.extension() == ".swc";
@@ -60,21 +61,13 @@ void check_file_name(const std::string& name) {
                     name));
 }
 
-/// The name of a SONATA population is a path in HDF5 and a key in reports: letters, digits, - and _ are safe everywhere.
-std::string population_name(const Circuit& circuit) {
-  std::string safe = circuit.name.empty() ? "neurons" : circuit.name;
-  for (char& c : safe)
-    if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-')) c = '_';
-  return safe;
-}
-
-std::string config_of(const Circuit& circuit) {
+std::string config_of(const Circuit& circuit, std::span<const circuit::Projection> projections) {
   const std::string base = "$BASE_DIR/";
   const Json population = {{"type", "biophysical"}, {"morphologies_dir", base + sonata_morphologies_name}};
   Json nodes;
   nodes["nodes_file"] = base + sonata_nodes_name;
   nodes["node_types_file"] = base + sonata_types_name;
-  nodes["populations"][population_name(circuit)] = population;
+  nodes["populations"][sonata_population(circuit)] = population;
 
   Json config;
   config["version"] = 2.4;
@@ -82,6 +75,13 @@ std::string config_of(const Circuit& circuit) {
   config["components"]["morphologies_dir"] = base + sonata_morphologies_name;
   config["networks"]["nodes"] = Json::array({nodes});
   config["networks"]["edges"] = Json::array();
+  if (!projections.empty()) {
+    Json edges;
+    edges["edges_file"] = base + sonata_edges_name;
+    edges["edge_types_file"] = base + sonata_edge_types_name;
+    for (const auto& projection : projections) edges["populations"][projection.name] = {{"type", "chemical"}};
+    config["networks"]["edges"].push_back(edges);
+  }
   Json& ours = config[sonata_our_key];
   ours["name"] = circuit.name;
   ours["radius"] = circuit.radius;
@@ -95,10 +95,24 @@ std::string types_of(const Circuit& circuit) {
   Table table;
   table.columns = {"node_type_id", "population", "model_type",       "model_template",
                    "pop_name",     "ei",         "source_population"};
-  for (std::size_t i = 0; i < circuit.types.size(); ++i)
-    table.rows.push_back({std::to_string(i), population_name(circuit), "biophysical", "NULL",
-                          circuit.types[i].name, circuit.types[i].excitatory ? "e" : "i",
-                          circuit.types[i].population});
+  const bool glia = std::ranges::any_of(circuit.types, &circuit::CellType::glia);
+  if (glia) table.columns.emplace_back("glia");
+  for (std::size_t i = 0; i < circuit.types.size(); ++i) {
+    const circuit::CellType& type = circuit.types[i];
+    table.rows.push_back({std::to_string(i), sonata_population(circuit), "biophysical", "NULL", type.name,
+                          type.glia         ? "NULL"
+                          : type.excitatory ? "e"
+                                            : "i",
+                          type.population});
+    if (glia) table.rows.back().emplace_back(type.glia ? "1" : "0");
+  }
+  return format_table(table);
+}
+
+std::string edge_types_of(std::span<const circuit::Projection> projections) {
+  Table table;
+  table.columns = {"edge_type_id", "population", "model_template"};
+  for (const auto& projection : projections) table.rows.push_back({"0", projection.name, "NULL"});
   return format_table(table);
 }
 
@@ -110,7 +124,7 @@ std::optional<float> angle_about_y(const Quat& q) {
 
 void write_nodes(const fs::path& path, const Circuit& circuit) {
   const auto& instances = circuit.instances;
-  const std::string base = "/nodes/" + population_name(circuit), group = base + "/0";
+  const std::string base = "/nodes/" + sonata_population(circuit), group = base + "/0";
   hdf5::NewFile file(path);
   file.attribute("/", "version", std::array<std::uint32_t, 2>{0, 1});
   file.attribute("/", "magic", sonata_magic);
@@ -150,8 +164,16 @@ void write_nodes(const fs::path& path, const Circuit& circuit) {
 
 }  // namespace
 
+// It is a path in HDF5 and a key in reports: letters, digits, - and _ are safe everywhere.
+std::string sonata_population(const Circuit& circuit) {
+  std::string safe = circuit.name.empty() ? "neurons" : circuit.name;
+  for (char& c : safe)
+    if (!((c >= 'a' && c <= 'z') || (c >= 'A' && c <= 'Z') || (c >= '0' && c <= '9') || c == '-')) c = '_';
+  return safe;
+}
+
 void write_sonata(const fs::path& folder, const Circuit& circuit, std::span<const Morphology> morphologies,
-                  Progress& progress) {
+                  Progress& progress, std::span<const circuit::Projection> projections) {
   circuit::check(circuit);
   if (morphologies.size() != circuit.morphologies.size())
     throw Error(fmt::format("a circuit of {} morphologies was given {} of them; give one for each name",
@@ -171,7 +193,11 @@ void write_sonata(const fs::path& folder, const Circuit& circuit, std::span<cons
   progress.end();
   write_nodes(files.path() / sonata_nodes_name, circuit);
   files.write(sonata_types_name, types_of(circuit));
-  files.write(sonata_config_name, config_of(circuit));
+  if (!projections.empty()) {
+    write_edges(files.path() / sonata_edges_name, projections);
+    files.write(sonata_edge_types_name, edge_types_of(projections));
+  }
+  files.write(sonata_config_name, config_of(circuit, projections));
   files.commit();
 }
 

@@ -9,7 +9,7 @@
 #include <span>
 #include <vector>
 
-#include "forest/circuit/circuit.h"
+#include "forest/circuit/synapses.h"
 #include "forest/core/progress.h"
 #include "forest/io/format.h"
 #include "forest/reports/report.h"
@@ -19,10 +19,14 @@ namespace forest::io {
 /// Writes a circuit as a folder, whole or not at all. The same circuit gives the same bytes.
 /// @param morphologies  one for each of circuit.morphologies; each is written once, as SWC, with its centre at the
 ///                      origin (forest/morphology/transform.h)
+/// @param projections  synapses between its neurons; without any there is no file of edges
 /// A circuit that Brain Forest wrote before is replaced; throws Error when the folder holds anything else, when a name
 /// of a morphology is no file name, or when the circuit is not sound (circuit::check).
 void write_sonata(const std::filesystem::path& folder, const circuit::Circuit& circuit,
-                  std::span<const Morphology> morphologies, Progress& progress = Progress::none());
+                  std::span<const Morphology> morphologies, Progress& progress = Progress::none(),
+                  std::span<const circuit::Projection> projections = {});
+/// What it calls the neurons of a circuit: the name of their population.
+std::string sonata_population(const circuit::Circuit& circuit);
 
 struct SonataCircuit {
   circuit::Circuit circuit;

@@ -60,7 +60,7 @@ class Assembler {
       config_.refuse("\"populations\" must have one entry a population, by name");
     const auto add = [&](const std::string& name, const Json& description) {
       const Json* type = SonataConfig::find(description, "type");
-      if (type && *type != "biophysical") {
+      if (type && *type != "biophysical" && *type != "astrocyte") {
         warn("not-biophysical",
              fmt::format("population {} is {}, without shapes; it was left out", name, type->dump()));
         return;
@@ -105,7 +105,8 @@ class Assembler {
     if (ours_)  // what no neuron uses is kept, and the order
       for (std::size_t i = 0; i < shape.values.size(); ++i)
         shape_index[i] = morphology(shape.values[i], name, folders);
-    const auto types = types_of(nodes, name, shaped);
+    const Json* kind = SonataConfig::find(description, "type");
+    const auto types = types_of(nodes, name, shaped, kind && *kind == "astrocyte");
     const auto ids = nodes.ids();
     const auto population = std::uint32_t(nodes_.populations.size());
     nodes_.populations.push_back(name);
@@ -139,7 +140,8 @@ class Assembler {
     std::vector<std::size_t> shaped;
     std::size_t without_model = 0;
     for (std::size_t i = 0; i < nodes.size(); ++i)
-      if (model.index[i] != unknown && model.values[model.index[i]] != "biophysical")
+      if (model.index[i] != unknown && model.values[model.index[i]] != "biophysical" &&
+          model.values[model.index[i]] != "astrocyte")
         ++without_model;
       else if (shape.index[i] != unknown)
         shaped.push_back(i);
@@ -190,14 +192,14 @@ class Assembler {
 
   /// The type of each node. Programs differ in what they call it.
   std::vector<std::uint32_t> types_of(const NodePopulation& nodes, const std::string& population,
-                                      std::span<const std::size_t> shaped) {
+                                      std::span<const std::size_t> shaped, bool astrocytes) {
     Categories names;
     for (const char* attribute : {"pop_name", "mtype", "model_name"}) {
       names = nodes.texts(attribute);
       if (!names.values.empty()) break;
     }
     const Categories ei = nodes.texts("ei"), synapse = nodes.texts("synapse_class"),
-                     source = nodes.texts("source_population");
+                     source = nodes.texts("source_population"), glia = nodes.texts("glia");
     const auto value = [](const Categories& all, std::size_t i,
                           const std::string& otherwise) -> const std::string& {
       return all.index[i] == unknown ? otherwise : all.values[all.index[i]];
@@ -206,13 +208,15 @@ class Assembler {
       for (const std::size_t row : nodes.type_rows())
         type({.name = nodes.type_cell(row, "pop_name"),
               .population = nodes.type_cell(row, "source_population"),
-              .excitatory = nodes.type_cell(row, "ei") != "i"});
+              .excitatory = nodes.type_cell(row, "ei") != "i",
+              .glia = nodes.type_cell(row, "glia") == "1"});
 
     std::vector<std::uint32_t> result(nodes.size());
     for (const std::size_t i : shaped)
       result[i] = type({.name = value(names, i, population),
                         .population = value(source, i, population),
-                        .excitatory = value(ei, i, "e") != "i" && value(synapse, i, "EXC") != "INH"});
+                        .excitatory = value(ei, i, "e") != "i" && value(synapse, i, "EXC") != "INH",
+                        .glia = astrocytes || value(glia, i, "0") == "1"});
     return result;
   }
 

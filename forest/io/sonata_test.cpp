@@ -15,8 +15,10 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/hdf5.h"
+#include "forest/io/sonata_edges.h"
 #include "forest/morphology/measure.h"
 #include "forest/morphology/transform.h"
+#include "forest/reports/layout.h"
 
 #include "tests/real_data.h"
 
@@ -386,6 +388,120 @@ TEST(PublishedCircuits, WithoutShapesOrMorphologiesAreRefusedInASentence) {
               HasSubstr(".swc there"));
   EXPECT_THAT(says("libsonata_tests/config"), testing::Not("accepted"));
   EXPECT_THAT(says("obi_tiny_circuits/blueetl_data/circuit/sonata"), testing::Not("accepted"));
+}
+
+TEST_F(Sonata, SynapsesComeBack) {
+  const circuit::Projection made =
+      circuit::made_up_synapses(circuit_, morphologies_, sonata_population(circuit_), 12, 5);
+  write_sonata(folder(), circuit_, morphologies_, Progress::none(), std::span(&made, 1));
+  const SonataOutline outline = outline_sonata(folder());
+  const SonataEdges edges = read_edges(folder(), outline.circuit, outline.nodes);
+  EXPECT_TRUE(edges.warnings.empty());
+  ASSERT_EQ(edges.projections.size(), 1u);
+  const circuit::Projection& back = edges.projections[0];
+  EXPECT_EQ(back.name, "two_layers__two_layers__made_up");
+  EXPECT_EQ(back.source, "two_layers");
+  ASSERT_EQ(back.synapses.size(), made.synapses.size());
+  for (std::size_t i = 0; i < made.synapses.size(); ++i) {
+    const circuit::Synapse &a = made.synapses[i], &b = back.synapses[i];
+    EXPECT_EQ(std::tuple(a.target, a.neuron, a.source, a.element, a.position, a.sign),
+              std::tuple(b.target, b.neuron, b.source, b.element, b.position, b.sign));
+  }
+  const auto before = bytes(folder());
+  write_sonata(folder(), circuit_, morphologies_, Progress::none(), std::span(&made, 1));  // over itself
+  EXPECT_EQ(bytes(folder()), before);
+  write();
+  EXPECT_FALSE(fs::exists(folder() / "edges.h5"));
+  EXPECT_TRUE(read_edges(folder(), outline.circuit, outline.nodes).projections.empty());
+}
+
+TEST_F(Sonata, DamagedSynapsesAreRefused) {
+  const circuit::Projection made =
+      circuit::made_up_synapses(circuit_, morphologies_, sonata_population(circuit_), 2, 5);
+  write_sonata(folder(), circuit_, morphologies_, Progress::none(), std::span(&made, 1));
+  const SonataOutline outline = outline_sonata(folder());
+  const auto reading = [&] {
+    return complaint([&] { read_edges(folder(), outline.circuit, outline.nodes); });
+  };
+  const std::string base = "/edges/two_layers__two_layers__made_up",
+                    whole(MappedFile(folder() / "edges.h5").text());
+  const auto file_with = [&](std::vector<std::uint64_t> sources, std::vector<std::uint64_t> targets,
+                             std::vector<std::int32_t> sections) {
+    hdf5::NewFile file(folder() / "edges.h5");
+    file.write(base + "/source_node_id", std::span(std::as_const(sources)));
+    file.write(base + "/target_node_id", std::span(std::as_const(targets)));
+    file.attribute(base + "/target_node_id", "node_population", std::string("two_layers"));
+    file.write(base + "/0/afferent_section_id", std::span(std::as_const(sections)));
+    file.write(base + "/0/afferent_section_pos",
+               std::span<const float>(std::vector<float>(sections.size(), .5f)));
+    file.close();
+  };
+  file_with({0, 1}, {1, 0}, {1, 2});
+  EXPECT_EQ(reading(), "accepted");
+  file_with({0}, {1, 0}, {1, 2});
+  EXPECT_THAT(reading(), HasSubstr("source_node_id has 1 entries, but the population has 2 edges"));
+  file_with({0, 1}, {1, 0}, {1});
+  EXPECT_THAT(reading(), HasSubstr("afferent_section_id has 1 entries, but edges refer to entry 1"));
+  file_with({0, 1}, {1, ~0ull}, {1, 2});
+  EXPECT_EQ(reading(), "accepted");  // ends on no neuron that is planted
+  file_with({0, 1, 9}, {1, 4000, 0}, {1, 1, -1});
+  const SonataEdges some = read_edges(folder(), outline.circuit, outline.nodes);
+  ASSERT_EQ(some.projections.size(), 1u);
+  EXPECT_EQ(some.projections[0].synapses.size(), 1u);
+  EXPECT_EQ(some.warnings.size(), 2u);
+  for (std::size_t size = 0; size < whole.size(); size += 211) {
+    write_file(folder() / "edges.h5", std::string_view(whole).substr(0, size));
+    EXPECT_NE(reading(), "accepted") << size;
+  }
+}
+
+// What the file says of places must be what the section and the position along it mean, on real circuits of others.
+TEST(SonataEdges, SectionsAndPositionsMeanThePlacesThatTheFileHas) {
+  FOREST_REAL_DATA(root, "sonata");
+  const fs::path place = root / "obi_tiny_circuits/tiny_circuits/nbS1-O1-E2Sst-maxNsyn-HEX0-L5";
+  const SonataCircuit read = read_sonata(place);
+  const SonataEdges edges = read_edges(place, read.circuit, read.nodes);
+  ASSERT_EQ(edges.projections.size(), 4u);
+  std::size_t compared = 0, excitatory = 0;
+  std::map<std::uint32_t, Vec3> offs;  // of each target
+  for (const circuit::Projection& p : edges.projections)
+    for (const circuit::Synapse& s : p.synapses) {
+      excitatory += s.sign == circuit::Sign::excitatory;
+      EXPECT_NE(s.sign, circuit::Sign::unknown) << p.name;
+      // Places of the thalamic and external fibres are some µm off in the file itself, each by another way.
+      if (s.element <= 0 || p.source != "S1nonbarrel_neurons") continue;
+      const circuit::Instance& instance = read.circuit.instances[s.target];
+      const Morphology& m = read.morphologies[instance.morphology];
+      const SectionId section = reports::sections_of_elements(m)[std::size_t(s.element) - 1];
+      double way = double(s.position) * section_length(m, section);
+      const auto points = m.points(section);
+      Vec3 at = points.back().position();
+      for (std::size_t i = 1; i < points.size(); ++i) {
+        const double length = segment_length(points[i - 1], points[i]);
+        if (way <= length) {
+          at = points[i - 1].position() +
+               float(way / length) * (points[i].position() - points[i - 1].position());
+          break;
+        }
+        way -= length;
+      }
+      // The program that wrote the file took another middle of the soma than we do: all are off by the same.
+      const Vec3 off = instance.position + instance.orientation * at - s.centre;
+      const Vec3& first = offs.try_emplace(s.target, off).first->second;
+      EXPECT_LT(off.norm(), 2.f) << p.name << ' ' << s.element << ' ' << s.position;
+      EXPECT_LT((off - first).norm(), .02f) << p.name << ' ' << s.element << ' ' << s.position;
+      ++compared;
+    }
+  EXPECT_GT(compared, 40u);
+  EXPECT_GT(excitatory, 1000u);
+  // Older files have other names for them.
+  const fs::path older = root / "allen_sonata_examples/9_cells";
+  const SonataOutline outline = outline_sonata(older);
+  const SonataEdges nine = read_edges(older, outline.circuit, outline.nodes);
+  ASSERT_EQ(nine.projections.size(), 2u);
+  EXPECT_EQ(nine.projections[0].synapses.size(), 659u);
+  EXPECT_EQ(nine.projections[0].synapses[0].sign, circuit::Sign::excitatory);
+  EXPECT_EQ(nine.projections[1].synapses[0].sign, circuit::Sign::inhibitory);
 }
 
 }  // namespace

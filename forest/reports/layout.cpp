@@ -8,6 +8,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/circuit/synapses.h"
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
 #include "forest/morphology/measure.h"
@@ -238,19 +239,7 @@ class Matcher {
 std::vector<SectionId> sections_of_elements(const Morphology& m) {
   std::vector<SectionId> ids;
   for (std::size_t i = 0; i < m.sections().size(); ++i) ids.emplace_back(i);
-  const auto rank = [&](SectionId id) {
-    switch (m.section(id).kind) {
-      case SectionKind::axon:
-        return 0;
-      case SectionKind::basal:
-        return 1;
-      case SectionKind::apical:
-        return 2;
-      default:
-        return 3;
-    }
-  };
-  std::ranges::stable_sort(ids, {}, rank);
+  std::ranges::stable_sort(ids, {}, [&](SectionId id) { return circuit::element_rank(m.section(id).kind); });
   return ids;
 }
 

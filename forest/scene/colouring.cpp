@@ -15,7 +15,6 @@
 namespace forest::scene {
 namespace {
 
-constexpr std::size_t class_count = 15;  // the entries of the last one are for surfaces and overlays
 constexpr std::size_t most_hues = 60'000, most_rows = 250;
 constexpr std::size_t depth_steps = 10;
 constexpr std::uint32_t grey = 0xBBBBBB;
@@ -33,6 +32,7 @@ constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B
                                                              {0x86D9B6, 0x2FBF8F, 0x0E8F6E},
                                                              {0xF4F1FF, 0xDCCBFA, 0xB9A2EE},
                                                              {0xE8E8E8, 0xBBBBBB, 0x909090}}};
+constexpr std::array<std::uint32_t, 3> glial{0xE3EDA4, 0xB4CC5C, 0x84A03C};  // olive
 // Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
 constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
                                                0x31688E, 0x5A5AA8, 0x8E4A9E};
@@ -55,8 +55,7 @@ Vec3 of_kind(const Vec3& base, std::uint32_t kind, float lift) {
   }
 }
 
-Vec3 ramp_colour(std::uint32_t type, float t) {
-  const auto& ramp = ramps[type % ramps.size()];
+Vec3 along(const std::array<std::uint32_t, 3>& ramp, float t) {
   const float at = 2.f * std::clamp(t, 0.f, 1.f);
   const std::size_t i = at < 1.f ? 0 : 1;
   return light_of(ramp[i]) + (light_of(ramp[i + 1]) - light_of(ramp[i])) * (at - float(i));
@@ -119,6 +118,14 @@ class Painter {
     return known;
   }
 
+  bool is_glia(std::uint32_t instance) const {
+    return forest_.circuit().types[forest_.types()[instance]].glia;
+  }
+  // Of a type, `t` from 0 under the pia to 1. Glia has a ramp that no neuron has.
+  Vec3 type_colour(std::size_t type, float t) const {
+    return forest_.circuit().types[type].glia ? along(glial, t) : along(ramps[type % ramps.size()], t);
+  }
+
   HueOf make_scheme(ColourBy by) {
     const auto& circuit = forest_.circuit();
     const auto first = std::uint16_t(hues_.size());
@@ -141,7 +148,15 @@ class Painter {
         for (const std::size_t kind : {1u, 2u, 3u, 4u})
           hue.legend.push_back(
               {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
-        return [first](std::uint32_t) { return first; };
+        const auto& types = circuit.types;
+        if (std::ranges::none_of(types, &circuit::CellType::glia))
+          return [first](std::uint32_t) { return first; };
+        // Whatever a file calls its processes.
+        Hue glia{{}, {{"glia", on_background(anatomical[7])}}};
+        glia.kinds.fill(glia.legend[0].colour);
+        glia.kinds[1] = on_background(anatomical[1]);
+        hues_.push_back(std::move(glia));
+        return [this, first](std::uint32_t i) { return std::uint16_t(first + is_glia(i)); };
       }
       case ColourBy::depth:
         return by_depth();
@@ -170,7 +185,7 @@ class Painter {
     if (pairs > (1u << 20)) {  // by the type alone
       const auto first = std::uint16_t(hues_.size());
       for (std::size_t t = 0; t < circuit.types.size(); ++t)
-        add_hue(ramp_colour(std::uint32_t(t), .5f), circuit.types[t].name);
+        add_hue(type_colour(t, .5f), circuit.types[t].name);
       return [this, first](std::uint32_t i) { return hue_at(first + forest_.types()[i]); };
     }
     std::vector<std::uint16_t> hue_of(pairs);
@@ -183,10 +198,9 @@ class Painter {
       std::ptrdiff_t step = 0;
       for (std::size_t layer = 0; layer < layers; ++layer)
         if (met[type * layers + layer]) {
-          hue_of[type * layers + layer] =
-              add_hue(ramp_colour(std::uint32_t(type), steps > 1 ? float(step) / float(steps - 1) : .5f) *
-                          (light_ ? .6f : 1.f),
-                      circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
+          hue_of[type * layers + layer] = add_hue(
+              type_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .6f : 1.f),
+              circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
           ++step;
         }
     }
@@ -325,9 +339,9 @@ class Painter {
     for (std::size_t i = 0; i < seen.size(); ++i)
       if (seen[i]) used.push_back(i);
     std::vector<std::size_t> kept = used;
-    if (kept.size() > class_count) {
+    if (kept.size() > colour_classes) {
       std::ranges::stable_sort(kept, std::greater(), [&](std::size_t i) { return seen[i]; });
-      kept.resize(class_count);
+      kept.resize(colour_classes);
       std::ranges::sort(kept);
     }
     std::vector<std::uint8_t> class_of(seen.size());

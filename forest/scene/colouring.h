@@ -19,6 +19,8 @@ struct View;
 
 enum class ColourBy : std::uint8_t { type, layer, kind, neuron, target, depth };
 enum class Background : std::uint8_t { dark, light };
+/// What the colours of synapses mean (synapses.h): whether they excite, or whose they are; none: they are not shown.
+enum class SynapseColour : std::uint8_t { none, sign, target };
 
 /// A branch of one neuron: the section and all that grows out of it; soma_section means the whole neuron.
 struct Branch {
@@ -57,15 +59,16 @@ struct Colouring {
   Shown shown() const { return {states, parts}; }
 };
 
-/// There are fifteen colour classes: where a view needs more, the rarest colours become the most similar of the others.
+/// There are so many colour classes: where a view needs more, the rarest colours become the most similar of the others.
 /// Throws Error for a target that is not there, a branch of a neuron that is not there.
 Colouring colour(const Targets& targets, const View& view);
 /// Without targets.
 Colouring colour(const Forest& forest, ColourBy by, Background background);
 
-/// Palette entry for highlights: bright, used by overlays.
-inline constexpr std::uint32_t highlight_entry = 127;
-inline constexpr std::uint32_t outline_entry = 126;
+/// Whose the entries of the palette are: eight a class of neurons; then eight that are always left for surfaces, which also take
+/// those of unused classes; synapses by sign; marks: what is picked, outlines, and what is bright.
+inline constexpr std::uint32_t colour_classes = 14, synapse_entry = 120, section_entry = 125,
+                               outline_entry = 126, highlight_entry = 127;
 
 /// Linear light of 0xrrggbb.
 Vec3 light_of(std::uint32_t rgb);

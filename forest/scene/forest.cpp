@@ -33,7 +33,7 @@ circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
     for (const auto& l : json["layers"]) c.layers.push_back({l.at("name"), l.at("bottom"), l.at("top")});
   if (json.contains("types"))
     for (const auto& t : json["types"])
-      c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory")});
+      c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory"), t.value("glia", false)});
   if (json.contains("node_sets")) nodes.sets = json.at("node_sets");
   if (json.contains("nodes")) {
     nodes.populations = json.at("populations");

@@ -26,9 +26,11 @@ std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes)
   Json json{{"name", c.name}, {"radius", c.radius}, {"morphologies", c.morphologies}};
   for (const auto& layer : c.layers)
     json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
-  for (const auto& type : c.types)
-    json["types"].push_back(
-        {{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
+  for (const auto& type : c.types) {
+    Json& row = json["types"].emplace_back(
+        Json{{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});
+    if (type.glia) row["glia"] = true;
+  }
   if (!nodes.runs.empty()) json["populations"] = nodes.populations;
   for (const circuit::NodeRun& run : nodes.runs)
     json["nodes"].push_back({run.population, run.first_node, run.count});

@@ -39,6 +39,18 @@ Sphere around(const BranchCone& c) {
           .5f * (c.shape.b - c.shape.a).norm() + std::max(c.shape.radius_a, c.shape.radius_b)};
 }
 
+// Depth of a sphere's farthest point.
+float farthest_depth(const Eye& eye, const Sphere& s) {
+  return eye.nearest_depth({s.centre, 0.f}) + s.radius;
+}
+
+// Pixels a µm where a sphere is nearest, but for what lies so near that it has no skin.
+float magnification_of(const Eye& eye, const Sphere& s) {
+  const float magnification = eye.magnification(s);
+  return eye.camera().orthographic() ? magnification
+                                     : magnification * std::min(1.f, eye.nearest_depth(s) / skin_nearest);
+}
+
 bool meet(const Sphere& a, const Sphere& b) { return (a.centre - b.centre).norm() <= a.radius + b.radius; }
 
 }  // namespace
@@ -99,7 +111,8 @@ struct Skin::Shape {
     for (std::size_t i = 0; i < forest.instances().size(); ++i)
       if (forest.instances()[i].morphology == which) {
         const auto type = forest.types()[i];
-        return type < forest.circuit().types.size() && forest.circuit().types[type].excitatory;
+        const auto& types = forest.circuit().types;
+        return type < types.size() && types[type].excitatory && !types[type].glia;
       }
     return false;
   }
@@ -376,8 +389,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         const BranchCone one{
             {c.a + from * (c.b - c.a), c.a + to * (c.b - c.a), radius(from), radius(to)}, 0, 0};
         const Sphere ball = place(around(one));
-        if (eye.frustum().may_see(ball))
-          parts.push_back({one.shape, eye.magnification(ball), of.widths[whole.branch], near.share});
+        if (eye.frustum().may_see(ball) && farthest_depth(eye, ball) > skin_nearest)
+          parts.push_back({one.shape, magnification_of(eye, ball), of.widths[whole.branch], near.share});
       }
     }
   }
@@ -387,11 +400,12 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     double expected = 0.;
     for (const Stretch& part : parts) {
       if (part.width * part.magnification < skin_begins * part.share * coarser) continue;
-      // Not more than fill the picture.
+      // Half of them are averted; and not more than fill the picture.
       const double voxel = double(voxel_pixels * coarser * part.share);
-      expected += std::min(expected_triangles({{part.cone, 0, 0}},
-                                              voxel_of(level_at(part.magnification, coarser * part.share))),
-                           25. * pixels / (voxel * voxel));
+      expected +=
+          std::min(.5 * expected_triangles({{part.cone, 0, 0}},
+                                           voxel_of(level_at(part.magnification, coarser * part.share))),
+                   25. * pixels / (voxel * voxel));
     }
     if (expected <= double(limits.triangles)) break;
     coarser *= float(std::clamp(std::sqrt(expected / double(limits.triangles)), 1.05, 2.));
@@ -407,14 +421,14 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
                           std::span<const std::uint32_t> segments) -> void {
       const PieceLattice grid{of.origin, voxel_of(level)};
       const Sphere ball = grid.around(cell), seen = place(ball);
-      if (!eye.frustum().may_see(seen)) return;
+      if (!eye.frustum().may_see(seen) || !(farthest_depth(eye, seen) > skin_nearest)) return;
       std::vector<std::uint32_t> here;
       for (const std::uint32_t segment : segments)
         if (meet(ball, around(of.cones[segment])) &&
             signed_distance(ball.centre, of.cones[segment].shape) < ball.radius)
           here.push_back(segment);
       if (here.empty()) return;
-      const float magnification = eye.magnification(seen);
+      const float magnification = magnification_of(eye, seen);
       if (level < level_at(magnification, coarser * list[n].share)) {
         for (std::int64_t child = 0; child < 8; ++child)
           self(self, level + 1,
@@ -441,7 +455,46 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   // The nearest of them, as many as the limit allows. Those that are not there are made, a few at once.
   constexpr std::size_t at_once = 8;
   shown_.assign(frame.surfaces.begin(), frame.surfaces.end());
-  std::vector<std::pair<const Wanted*, Made*>> used;
+  const auto state_at = [&](const Near& near, std::uint32_t branch) {
+    const frame::State* part = near.parts.empty() || branch == 0 ? nullptr : near.parts[branch - 1];
+    return part ? *part : state_of(near.instance);
+  };
+  // How much of the skin is there at a vertex, 0–1.
+  const auto presence_at = [&](const Made& made, std::size_t v, const Near& near, const Placed& place) {
+    const std::uint32_t branch =
+        shapes_.at(instances[near.instance].morphology)->cones[made.segment[v]].branch;
+    const frame::State state = state_at(near, branch);
+    const float share = share_of(state.kind) * coarser * (branch ? 1.f : 2.f);
+    if (!(share > 0.f) || !state.is(frame::State::visible)) return 0.f;
+    const Sphere at{place.position + place.turn * made.piece.mesh.positions[v], 0.f};
+    const float magnification = eye.magnification(at);
+    float presence =
+        smooth_step(skin_begins * share, skin_complete * share, std::abs(made.width[v]) * magnification);
+    if (made.width[v] < 0.f)
+      presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
+    if (!eye.camera().orthographic()) presence *= smooth_step(skin_nearest, skin_near, eye.nearest_depth(at));
+    return presence;
+  };
+  // Whether anything of a piece is there and faces the eye: what is averted is hidden by the capsules that it lies around.
+  const auto shows = [&](const Made& made, const Near& near) {
+    const Placed place(instances[near.instance]);
+    const Vec3 from = place.turn.transpose() * (eye.camera().eye - place.position),
+               back = place.turn.transpose() * eye.camera().axes().col(2);
+    for (std::size_t v = 0; v < made.piece.normals.size(); ++v) {
+      const Vec3 to_eye = eye.camera().orthographic() ? back : Vec3(from - made.piece.mesh.positions[v]);
+      if (made.piece.normals[v].dot(to_eye) > 0.f && presence_at(made, v, near, place) > 0.f) return true;
+    }
+    return false;
+  };
+  for (Near& near : list)
+    if (state_of(near.instance).is(frame::State::parted))
+      near.parts = section_states(forest_, shown, near.instance);
+  struct Used {
+    const Wanted* one;
+    Made* made;
+    float share;  // towards the limit less of a piece is there, so that none is seen to go
+  };
+  std::vector<Used> used;
   std::size_t triangles = 0;
   for (auto one = wanted.begin(); one != wanted.end(); ++one) {
     if (!made_.contains(one->key)) {
@@ -468,23 +521,19 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
       continue;
     }
     const std::size_t more = found->second->piece.mesh.triangles.size();
-    if (more == 0) continue;
+    if (!shows(*found->second, list[one->near])) continue;
     if (triangles + more > limits.triangles) break;
     triangles += more;
     found->second->used = picture_;
-    used.emplace_back(&*one, found->second.get());
+    used.push_back({&*one, found->second.get(),
+                    1.f - smooth_step(.5f, 1.f, float(double(triangles) / double(limits.triangles)))});
   }
-
-  // What each shows.
-  for (Near& near : list)
-    if (state_of(near.instance).is(frame::State::parted))
-      near.parts = section_states(forest_, shown, near.instance);
 
   // Activity colours segments: those that vertices are nearest to, in runs as a list has them.
   Cut runs;
   std::map<std::pair<std::uint32_t, std::uint32_t>, std::size_t> run_of;  // instance, segment / cluster_size
   if (painter) {
-    for (const auto& [one, made] : used) {
+    for (const auto& [one, made, share] : used) {
       const std::uint32_t instance = list[one->near].instance;
       const std::uint32_t base = forest_.neurons()[instances[instance].morphology].first_segment;
       for (const std::uint32_t segment : made->segment) {
@@ -500,17 +549,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   entries_.resize(used.size()), presence_.resize(used.size());
   std::vector<char> seen(used.size());
   parallel_for(used.size(), 1, [&](std::size_t k) {
-    const auto& [one, made] = used[k];
+    const auto& [one, made, share] = used[k];
     const Near& near = list[one->near];
     const Placed place(instances[near.instance]);
-    const frame::State whole = state_of(near.instance);
     const Shape& of = *shapes_.at(std::get<0>(one->key));
     const std::size_t count = made->segment.size();
     entries_[k].resize(count), presence_[k].resize(count);
     for (std::size_t v = 0; v < count; ++v) {
       const std::uint32_t branch = of.cones[made->segment[v]].branch;
-      const frame::State* part = near.parts.empty() || branch == 0 ? nullptr : near.parts[branch - 1];
-      const frame::State state = part ? *part : whole;
+      const frame::State state = state_at(near, branch);
       std::uint32_t entry = state.colour_class * 8u + made->kind[v];
       const std::uint32_t opacity = (state.opacity * frame.opacities[entry] + 127u) / 255u;
       if (runs.entries) {
@@ -518,23 +565,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         const std::size_t run = run_of.at({near.instance, segment / frame::cluster_size});
         entry = runs.entries->capsules[run * frame::cluster_size + segment % frame::cluster_size];
       }
-      const float magnification =
-          eye.magnification({place.position + place.turn * made->piece.mesh.positions[v], 0.f});
-      const float share = share_of(state.kind) * coarser * (branch ? 1.f : 2.f);
-      float presence = share > 0.f && state.is(frame::State::visible)
-                           ? smooth_step(skin_begins * share, skin_complete * share,
-                                         std::abs(made->width[v]) * magnification)
-                           : 0.f;
-      if (made->width[v] < 0.f)
-        presence *= smooth_step(spines_begin * coarser, spines_complete * coarser, magnification);
       entries_[k][v] = std::uint8_t(entry);
-      presence_[k][v] = std::uint8_t(std::lround(presence * float(opacity)));
+      presence_[k][v] =
+          std::uint8_t(std::lround(share * presence_at(*made, v, near, place) * float(opacity)));
       seen[k] |= char(presence_[k][v] > 0);
     }
   });
   for (std::size_t k = 0; k < used.size(); ++k) {
     if (!seen[k]) continue;
-    const auto& [one, made] = used[k];
+    const auto& [one, made, share] = used[k];
     frame::Surface& s = shown_.emplace_back();
     s.positions = made->piece.mesh.positions, s.normals = made->piece.normals;
     s.entries = entries_[k], s.presence = presence_[k];

@@ -29,12 +29,15 @@ namespace forest::scene {
 inline constexpr float skin_begins = 24.f, skin_complete = 40.f;
 // Pixels a µm from which spines are there, in full from the second on.
 inline constexpr float spines_begin = 18.f, spines_complete = 30.f;
+// µm before the eye: nearer than the first there is none, in full from the second on. A branch there fills the picture, and
+// would take all triangles.
+inline constexpr float skin_nearest = 3.f, skin_near = 7.f;
 inline constexpr float voxel_pixels = 6.f;  // a voxel is at most so large, and at least half of that
 inline constexpr float skin_gap = .1f * voxel_pixels;  // pixels
 
 struct SkinLimits {
   std::size_t triangles =
-      400'000;  // of a picture: towards it voxels and the widths above grow; what is too much is left out, the farthest first
+      400'000;  // of a picture, pieces aside of which nothing faces the eye: towards it voxels and the widths above grow; what is too much is left out, the farthest first
   std::size_t new_pieces =
       1u << 20;  // made for one picture, the nearest first; others are left out until the next
 };
@@ -63,6 +66,7 @@ class Skin {
     std::size_t pieces = 0, made = 0, missing = 0, triangles = 0;
   };
   const Figures& figures() const { return figures_; }  // of the last picture
+  void rest() { figures_ = {}; }                       // a picture without any
 
   /// The spines of a distinct neuron: on the dendrites of neurons that are planted as excitatory, from 20 µm from the soma on,
   /// one a µm, which is about what counts of pyramidal cells find (Luebke 2017, Front Neuroanat 11:11, reviews them; they differ

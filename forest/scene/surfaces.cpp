@@ -51,7 +51,7 @@ std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing)
   std::bitset<16> used;
   for (const frame::State& state : colouring.states) used.set(state.colour_class & 15);
   for (const Part& part : colouring.parts) used.set(part.state.colour_class & 15);
-  for (std::uint32_t entry = 0; entry < outline_entry; ++entry)
+  for (std::uint32_t entry = 0; entry < synapse_entry; ++entry)
     if (playing ? entry >= flash_entry + flash_steps : !used[entry / 8]) list.push_back(std::uint8_t(entry));
   return list;
 }
@@ -193,7 +193,7 @@ std::pair<float, float> Surfaces::shown_range() const {
 }
 
 void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playing) {
-  if (list_.empty()) return;
+  if (list_.empty() || !(visibility > 0.f)) return;
   const std::vector<std::uint8_t> free = free_entries(colouring, playing);
   // One for what is plain, then the areas, then as many steps of the map as there are left.
   const bool mapped = std::ranges::any_of(list_, [](const One& one) { return !one.values.empty(); });
@@ -224,7 +224,7 @@ void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playin
     frame::Surface& s = shown_.emplace_back();
     s.positions = one.mesh.positions, s.normals = one.normals;
     s.entries = one.entries, s.openness = one.openness, s.triangles = one.mesh.triangles;
-    s.opacity = std::uint8_t(std::lround(255.f * std::clamp(one.opacity, 0.f, 1.f)));
+    s.opacity = std::uint8_t(std::lround(255.f * std::clamp(one.opacity * visibility, 0.f, 1.f)));
     s.version = one.version;
   }
   frame.surfaces = shown_;

@@ -54,6 +54,8 @@ class Surfaces {
   /// The side from which a hemisphere shows most: its own; above when both are there.
   Side outside() const;
 
+  float visibility = 1.f;  // times the opacity of each, 0–1; 0: none is shown
+
   const ColourMap* map = &colour_maps().front();
   /// Values at the ends of the map; none: all but the lowest and highest two hundredths.
   std::optional<std::pair<float, float>> range;

@@ -72,12 +72,15 @@ constexpr std::array<Row, 14> attributes{{
      }},
     {"synapse_class",
      [](const Forest& f) {
-       return of_type(f,
-                      [](const circuit::CellType& t) { return std::string(t.excitatory ? "EXC" : "INH"); });
+       return of_type(f, [](const circuit::CellType& t) {
+         return std::string(t.glia ? "GLIA" : t.excitatory ? "EXC" : "INH");
+       });
      }},
     {"ei",
      [](const Forest& f) {
-       return of_type(f, [](const circuit::CellType& t) { return std::string(t.excitatory ? "e" : "i"); });
+       return of_type(f, [](const circuit::CellType& t) {
+         return std::string(t.glia ? "none" : t.excitatory ? "e" : "i");
+       });
      }},
     {"source_population",
      [](const Forest& f) { return of_type(f, [](const circuit::CellType& t) { return t.population; }); }},
@@ -98,7 +101,7 @@ constexpr std::array<Family, 4> families{
     {{"type", "mtype"}, {"layer", "layer"}, {"population", "population"}, {"sign", "synapse_class"}}};
 
 std::string_view shown_word(std::string_view word) {
-  return word == "EXC" ? "excitatory" : word == "INH" ? "inhibitory" : word;
+  return word == "EXC" ? "excitatory" : word == "INH" ? "inhibitory" : word == "GLIA" ? "glia" : word;
 }
 
 Members with_word(const Attribute& a, std::string_view word) {

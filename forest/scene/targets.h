@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// Targets: named sets of the neurons of a forest. Types, layers, populations, "excitatory", "inhibitory" and "all" are
+// Targets: named sets of the neurons of a forest. Types, layers, populations, "excitatory", "inhibitory", "glia" and "all" are
 // targets by themselves; SONATA's node sets (circuit/node_sets.h) add others, and "L5 and not inhibitory" is one too.
 #pragma once
 

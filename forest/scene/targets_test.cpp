@@ -181,7 +181,7 @@ TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
     view.targets.push_back({.name = "",
                             .branch = Branch{i},
                             .visible = {},
-                            .colour = i < 15 ? i << 4 : 0xff0000 + i,
+                            .colour = i < 14 ? i << 4 : 0xff0000 + i,
                             .colour_by = {},
                             .kind = {},
                             .opacity = {},
@@ -190,7 +190,7 @@ TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
   const Colouring c = colour(targets, view);
   for (std::uint32_t i = 0; i < 30; ++i) {
     const Vec3 shown = c.palette[8 * c.states[i].colour_class + 4];
-    EXPECT_EQ(shown.x() > .5f, i >= 15) << i;
+    EXPECT_EQ(shown.x() > .5f, i >= 14) << i;
   }
 }
 

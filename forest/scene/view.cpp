@@ -20,6 +20,7 @@ constexpr std::array<std::string_view, 6> colour_names{"type", "layer", "kind", 
 constexpr std::array<std::string_view, 7> kind_names{"any",    "dots", "lines", "capsules",
                                                      "somata", "skin", "bricks"};
 constexpr std::array<std::string_view, 2> background_names{"dark", "light"};
+constexpr std::array<std::string_view, 3> synapse_colour_names{"none", "sign", "target"};
 constexpr std::array<std::string_view, 2> projection_names{"perspective", "orthographic"};
 
 Vec3 vector_of(const Json& json, const std::string& name, std::string_view key) {
@@ -257,6 +258,8 @@ View parse_view(std::string_view text, const std::string& name) {
     else if (key == "skin") {
       if (!value.is_boolean()) throw InputError(name, 0, "'skin' must be true or false");
       v.skin = value.get<bool>();
+    } else if (key == "synapses") {
+      v.synapses = SynapseColour(word_of(value, name, key, synapse_colour_names));
     } else if (key == "colour_by")
       v.colour_by = ColourBy(word_of(value, name, key, colour_names));
     else if (key == "background")
@@ -296,6 +299,7 @@ std::string to_json(const View& v) {
             {"fog", v.fog},
             {"halo", v.halo}};
   if (!v.skin) json["skin"] = false;
+  if (v.synapses != View().synapses) json["synapses"] = synapse_colour_names[std::size_t(v.synapses)];
   if (v.detail.gaze) {
     json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
     json["fovea"] = v.detail.fovea;

@@ -30,16 +30,17 @@ struct View {
   Detail detail;  // gaze in shares of the width and height here, so that a view fits every picture size
   ColourBy colour_by = ColourBy::type;
   Background background = Background::dark;
-  std::uint32_t samples = 16;            // subframes of a still picture
-  float fog = 1.f;                       // strength of the depth cue; 0 for none
-  float halo = 1.f;                      // strength of the rim around nearer branches; 0 for none
-  bool skin = true;                      // of neurons near the eye (skin.h)
-  std::vector<Appearance> targets;       // how they are shown; later ones win
-  std::optional<ActivityView> activity;  // used where there is a simulation to show
+  std::uint32_t samples = 16;                    // subframes of a still picture
+  float fog = 1.f;                               // strength of the depth cue; 0 for none
+  float halo = 1.f;                              // strength of the rim around nearer branches; 0 for none
+  bool skin = true;                              // of neurons near the eye (skin.h)
+  SynapseColour synapses = SynapseColour::sign;  // where there are some
+  std::vector<Appearance> targets;               // how they are shown; later ones win
+  std::optional<ActivityView> activity;          // used where there is a simulation to show
 };
 
 /// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
-///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"skin":true,"targets":[{"name":"L5","opacity":.4}],
+///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"skin":true,"synapses":"sign","targets":[{"name":"L5","opacity":.4}],
 ///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5}}; only eye and target
 ///  are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.

@@ -25,6 +25,7 @@
 #include "forest/reports/trace.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/playback.h"
+#include "forest/scene/synapses.h"
 #include "forest/scene/view.h"
 
 #include "tests/sample_activity.h"
@@ -63,6 +64,17 @@ std::filesystem::path sample_activity() {
     return folder / "sample.activity";
   }();
   sample_file();
+  return path;
+}
+
+// Made-up synapses on its neurons.
+std::filesystem::path sample_synapses() {
+  static const std::filesystem::path path = [] {
+    const auto made =
+        circuit::made_up_synapses(testing::sample_circuit(120), testing::sample_neurons(), "p", 60, 2);
+    write_file(folder / "contacts.synapses", scene::Synapses::make(sample(), std::span(&made, 1)));
+    return folder / "contacts.synapses";
+  }();
   return path;
 }
 
@@ -141,12 +153,13 @@ void xdotool(const std::string& what) {
 class Window : public ::testing::Test {
  protected:
   virtual std::vector<std::string> more() const { return {}; }  // arguments
+  virtual float nearness() const { return .45f; }  // of the eye: share of the distance from which all is seen
 
   void SetUp() override {
     if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
     scene::View view = scene::overview(sample());
     view.camera.near = .5f;
-    view.camera.eye = view.camera.target + .45f * (view.camera.eye - view.camera.target);
+    view.camera.eye = view.camera.target + nearness() * (view.camera.eye - view.camera.target);
     view.samples = 4;
     write_file(folder / "near.json", scene::to_json(view));
     setenv("XDG_CONFIG_HOME", (folder / "settings").c_str(), 1);
@@ -166,6 +179,8 @@ class Window : public ::testing::Test {
     view_ = scene::parse_view(report.at("view").dump());
     picture_ = report.at("picture");
     activity_ = report.at("activity");
+    synapses_ = report.at("synapses");
+    skin_ = report.at("skin_triangles");
   }
   // The same after everything that the hand did so far: events are worked off in order, and Escape (which leaves
   // nothing selected) is answered at once. What was finished before, between two moves of a slow mouse, is passed over.
@@ -211,6 +226,17 @@ class Window : public ::testing::Test {
   std::unique_ptr<Studio> studio_;
   scene::View view_;
   Json picture_, activity_;
+  std::size_t synapses_ = 0, skin_ = 0;
+};
+
+class Contacts : public Window {
+ protected:
+  std::vector<std::string> more() const override { return {"--synapses", sample_synapses()}; }
+};
+
+class Near : public Window {
+ protected:
+  float nearness() const override { return .06f; }
 };
 
 class Playing : public Window {
@@ -446,7 +472,7 @@ TEST_F(Window, TargetsAreShownAndHiddenByKeys) {
   const io::Picture clear = saved("targets_clear.png");
   EXPECT_GT(difference(before, clear), .02);
   key("alt+k");
-  key("End");
+  xdotool("type Somata");
   settle();
   EXPECT_EQ(view_.targets.back().kind, frame::Kind::somata);
   key("alt+c");
@@ -594,6 +620,105 @@ TEST_F(Playing, AViewCopiedWithItsMomentGoesBackThere) {
   key("ctrl+v");
   settle();
   EXPECT_NEAR(time(), 1., 1e-6);
+}
+
+TEST_F(Contacts, AreShownUntilAKeyHidesThem) {
+  EXPECT_GT(synapses_, 100u);
+  const io::Picture with = saved("synapses.png");
+  key("y");
+  settle();
+  EXPECT_EQ(synapses_, 0u);
+  EXPECT_EQ(view_.synapses, scene::SynapseColour::none);
+  EXPECT_GT(difference(with, saved("no_synapses.png")), .001);
+  key("y");
+  key("shift+y");
+  settle();
+  EXPECT_GT(synapses_, 100u);
+  EXPECT_EQ(view_.synapses, scene::SynapseColour::target);
+}
+
+TEST_F(Contacts, AClickTellsSourceAndTarget) {
+  const auto synapses = scene::Synapses::open(sample_synapses(), sample());
+  const scene::Eye eye(view_.camera, viewport(), {});
+  const auto choice =
+      synapses.choose(eye, scene::colour(sample(), scene::ColourBy::type, scene::Background::dark),
+                      scene::SynapseColour::sign);
+  int clicked = 0;
+  for (std::size_t i = 0; i < choice.balls.size() && clicked < 3; ++i) {
+    const Vec3 at = frame::project(view_.camera, viewport(), choice.balls[i].centre);
+    const Vec2 pixel(std::floor(at.x()), std::floor(at.y()));
+    if (pixel.x() < 250 || pixel.x() > viewport().width - 60 || pixel.y() < 60 ||
+        pixel.y() > viewport().height - 120)
+      continue;
+    const auto found = scene::pick(choice, view_.camera, viewport(), pixel + Vec2(.5f, .5f), 1.5f);
+    const auto branch = scene::pick(sample(), view_.camera, viewport(), pixel + Vec2(.5f, .5f), 0.f);
+    if (!found || found->synapse != choice.synapses[i] || (branch && branch->distance < found->distance))
+      continue;
+    const scene::Synapse& synapse = synapses.all()[found->synapse];
+    const Json facts = click(pixel);
+    ASSERT_TRUE(facts.contains("synapse")) << facts.dump();
+    EXPECT_EQ(facts["synapse"]["synapse"], synapse.id);
+    EXPECT_EQ(facts["synapse"]["source"], synapse.source);
+    EXPECT_EQ(facts["synapse"]["target"], synapse.target);
+    EXPECT_EQ(facts["neuron"], synapse.target);
+    settle();
+    ++clicked;
+  }
+  EXPECT_GT(clicked, 0);
+}
+
+TEST_F(Near, SkinIsMadeWhenAskedForAndWhenATargetIsForcedToHaveOne) {
+  EXPECT_EQ(skin_, 0u);
+  key("n");
+  settle();
+  EXPECT_GT(skin_, 100u);
+  const std::size_t all = skin_;
+  key("n");
+  settle();
+  EXPECT_EQ(skin_, 0u);
+  key("alt+t");
+  key("End");  // "all"
+  key("alt+k");
+  key("End");
+  key("Up");  // Skin
+  settle();
+  ASSERT_FALSE(view_.targets.empty());
+  EXPECT_EQ(view_.targets.back().kind, frame::Kind::skin);
+  EXPECT_GT(skin_, all / 2);  // of half the width, too, as far as the limit goes
+}
+
+TEST(Studio, ShowsASurfaceWithoutAForest) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  // An octahedron of 40 mm, as FreeSurfer writes surfaces.
+  std::string bytes =
+      "\xff\xff\xfe"
+      "made by a test\n\n";
+  const auto add = [&](std::uint32_t word) {
+    for (int shift = 24; shift >= 0; shift -= 8) bytes += char(word >> shift & 255);
+  };
+  add(6), add(8);
+  for (int i = 0; i < 6; ++i)
+    for (int axis = 0; axis < 3; ++axis)
+      add(std::bit_cast<std::uint32_t>(axis == i / 2 ? (i % 2 ? -40.f : 40.f) : 0.f));
+  for (const std::uint32_t x : {0u, 1u})
+    for (const std::uint32_t y : {2u, 3u})
+      for (const std::uint32_t z : {4u, 5u})
+        add(x), add((x + y + z) % 2 ? y : z), add((x + y + z) % 2 ? z : y);
+  write_file(folder / "lh.pial", bytes);
+  Studio studio(
+      {folder / "lh.pial", "--size", "800x600", "--report", "--screenshot", folder / "surface.png"});
+  const Json report = studio.wait_for("settled");
+  const scene::View view = scene::parse_view(report.at("view").dump());
+  EXPECT_GT((view.camera.eye - view.camera.target).norm(), 40e3f);
+  EXPECT_EQ(report.at("segments"), 0);
+  EXPECT_EQ(studio.end(), std::pair(std::string(), 0));
+  const io::Picture seen = io::read_png(folder / "surface.png");
+  std::size_t bright = 0;
+  for (std::size_t i = 0; i < seen.pixels.size(); i += 4)
+    bright += seen.pixels[i] > 110 && seen.pixels[i + 2] > 60;
+  EXPECT_GT(bright, 5000u);
+  Studio wrong({sample_file(), "--overlay", folder / "lh.pial"});
+  EXPECT_NE(wrong.end().first.find("more overlays than surfaces"), std::string::npos);
 }
 
 TEST(Studio, RefusesASimulationOfAnotherCircuit) {

@@ -71,6 +71,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
       frame::check(more, s.picture.geometry);
       timing.drawn += s.splatter.draw(s.picture, more, s.canvas, false);
     }
+    s.splatter.draw(s.picture, f.balls, s.canvas);
     s.splatter.draw(s.picture, f.overlays, s.canvas);
     timing.draw += milliseconds_since(start);
     start = Clock::now();

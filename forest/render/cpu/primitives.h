@@ -7,6 +7,7 @@
 #include <cmath>
 #include <optional>
 
+#include "forest/frame/constants.h"
 #include "forest/render/cpu/capsule.h"
 #include "forest/render/cpu/run.h"
 #include "forest/render/cpu/window.h"
@@ -99,6 +100,7 @@ struct Dot {
   float px, py, z, radius, pixels, code, rank;  // its radius in µm and in pixels
   std::uint8_t entry, opacity;
   std::uint32_t key;
+  float nearest = 0.f;  // code of a depth before which nothing of it lies
 
   Dot(const frame::Constants& c, const Run& r, float first_rank)
       : px(r.px[0]),
@@ -111,11 +113,24 @@ struct Dot {
         entry(std::uint8_t(r.entry[0])),
         opacity(std::uint8_t(r.opacity[0])),
         key(r.key[0]) {}
+  /// @param at  before the camera, behind the near distance
+  Dot(const frame::Constants& c, const frame::Ball& ball, const Vec3& at, std::uint32_t number)
+      : px(c.centre_x + c.focal * at.x() / lens(c, at.z())),
+        py(c.centre_y - c.focal * at.y() / lens(c, at.z())),
+        z(at.z()),
+        radius(ball.radius),
+        pixels(c.focal * ball.radius / lens(c, at.z())),
+        code(depth_code(at.z())),
+        rank(fraction(frame::ball_rank(number) + golden * float(c.subframe))),
+        entry(ball.colour),
+        opacity(ball.opacity),
+        key(frame::ball_key(number)),
+        nearest(depth_code(std::max(at.z() - ball.radius, c.near))) {}
   Box box(float spread) const {
     const float reach = std::max(pixels, 1.f) + spread;
     return {px - reach, py - reach, px + reach, py + reach};
   }
-  float nearest_code() const { return 0.f; }
+  float nearest_code() const { return nearest; }
 };
 
 inline constexpr float tube_width =

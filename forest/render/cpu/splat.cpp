@@ -14,9 +14,9 @@
 namespace forest::render::cpu {
 namespace {
 
-constexpr std::size_t items_a_chunk = 256;
+constexpr std::size_t items_a_chunk = 256, balls_a_chunk = 4096;
 constexpr std::uint32_t number_bits = 13;  // of a thing's number within its chunk
-static_assert(items_a_chunk * run <= 1u << number_bits);
+static_assert(items_a_chunk * run <= 1u << number_bits && balls_a_chunk <= 1u << number_bits);
 constexpr float look_every = 16.f;  // of a square's pixels, drawn; between, what they hide is found out
 
 // What some items, that follow one another, give to be drawn.
@@ -164,6 +164,11 @@ class Gatherer {
     project(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, picture_.light, r_);
     prepare_lines(picture_.constants, picture_.constants.thinnest, picture_.spread, r_);
     add_near(0, chunk);
+  }
+  void add(const frame::Ball& ball, std::uint32_t number, Chunk& chunk) const {
+    const Vec3 at = picture_.to_camera * (ball.centre - picture_.eye);
+    if (ball.opacity == 0 || !(at.z() > picture_.constants.near)) return;
+    put(Dot(picture_.constants, ball, at, number), chunk.dots, chunk.ranges_of_dots);
   }
 
  private:
@@ -358,6 +363,16 @@ void Splatter::draw(const Picture& picture, std::span<const frame::Overlay> over
                            n * items_a_chunk, std::min(items_a_chunk, overlays.size() - n * items_a_chunk)))
                     gatherer.add(o, chunk);
                 });
+  draw_squares(picture, *sorted_, canvas);
+}
+
+void Splatter::draw(const Picture& picture, std::span<const frame::Ball> balls, Canvas& canvas) {
+  if (balls.empty()) return;
+  sorted_->sort(canvas, (balls.size() + balls_a_chunk - 1) / balls_a_chunk, [&](std::size_t n, Chunk& chunk) {
+    const Gatherer gatherer(picture, canvas);
+    for (std::size_t i = n * balls_a_chunk; i < std::min(balls.size(), (n + 1) * balls_a_chunk); ++i)
+      gatherer.add(balls[i], std::uint32_t(i), chunk);
+  });
   draw_squares(picture, *sorted_, canvas);
 }
 

@@ -23,6 +23,8 @@ class Splatter {
   std::uint64_t draw(const Picture& picture, const frame::Lists& lists, Canvas& canvas, bool clear);
   /// Overlays: at least two pixels wide, in the world.
   void draw(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas);
+  /// Balls, in the world.
+  void draw(const Picture& picture, std::span<const frame::Ball> balls, Canvas& canvas);
 
   class Sorted;
 

@@ -204,11 +204,12 @@ struct OpenGLRenderer::Device {
   Buffer mesh_looks;
   std::vector<std::uint8_t> looks;  // of every vertex: palette entry, presence
   Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
-  Buffer segments, instances, owners, states, palette, overlay_segments, uniforms, keys, sums, image, queue,
-      large_queue, tiles;
+  Buffer segments, instances, owners, states, palette, overlay_segments, ball_segments, uniforms, keys, sums,
+      image, queue, large_queue, tiles;
   ListSet lists{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}},
       rest{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}};
-  List overlays{&Drawing::capsules, FOREST_OVERLAY, {}};
+  List overlays{&Drawing::capsules, FOREST_OVERLAY, {}},
+      balls{&Drawing::dots, FOREST_OVERLAY | FOREST_BALLS, {}};
   frame::DepthMap seen;
   std::vector<std::uint32_t> farthest;
   frame::Geometry geometry;
@@ -221,7 +222,8 @@ struct OpenGLRenderer::Device {
                   std::uint32_t flags = 0) {
     list.items.upload(items);
     list.entries.upload(entries);
-    list.flags = (list.flags & FOREST_OVERLAY) | (entries.empty() ? 0 : FOREST_ENTRIES | flags);
+    list.flags =
+        (list.flags & (FOREST_OVERLAY | FOREST_BALLS)) | (entries.empty() ? 0 : FOREST_ENTRIES | flags);
     list.count = std::uint32_t(items.size());
     list.segments = 0;
     for (const Item& item : items) list.segments += std::size_t(std::popcount(item.drawn));
@@ -231,7 +233,7 @@ struct OpenGLRenderer::Device {
     set(to[capsule_list], from.capsules, from.entries.capsules);
     set(to[dot_list], from.dots, from.entries.dots, FOREST_SINGLE);
     set(to[line_list], from.lines, from.entries.lines);
-    std::size_t longest = overlays.segments;
+    std::size_t longest = std::max(overlays.segments, balls.segments);
     for (const List& list : to) longest = std::max(longest, list.segments);
     queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
     queue.bind_texels(6, GL_R32UI);
@@ -239,14 +241,18 @@ struct OpenGLRenderer::Device {
   }
 
   void upload(const frame::Frame& f) {
-    std::vector<Segment> marks;
-    std::vector<Item> mark_items;
-    for (const frame::Overlay& o : f.overlays) marks.push_back(frame::segment_of(o));
-    for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
-      mark_items.push_back({0, std::uint32_t(i), frame::first_segments(marks.size() - i), 0, 0, 0, 0,
-                            INFINITY});  // never culled as a whole
-    overlay_segments.upload(std::span<const Segment>(marks));
-    set(overlays, mark_items);
+    const auto upload_marks = [](const auto& things, Buffer& to, List& list) {
+      std::vector<Segment> marks;
+      std::vector<Item> items;
+      for (const auto& thing : things) marks.push_back(frame::segment_of(thing));
+      for (std::size_t i = 0; i < marks.size(); i += frame::cluster_size)
+        items.push_back({0, std::uint32_t(i), frame::first_segments(marks.size() - i), 0, 0, 0, 0,
+                         INFINITY});  // never culled as a whole
+      to.upload(std::span<const Segment>(marks));
+      set(list, items);
+    };
+    upload_marks(f.overlays, overlay_segments, overlays);
+    upload_marks(f.balls, ball_segments, balls);
     upload(lists, f);
 
     states.upload(f.states);
@@ -303,7 +309,8 @@ struct OpenGLRenderer::Device {
     set_constants();
     list.items.bind_texels(2, GL_RGBA32UI);
     list.entries.bind_texels(9, GL_R8UI);
-    (list.flags & FOREST_OVERLAY ? overlay_segments : segments).bind_texels(0, GL_RGBA32UI);
+    Buffer& in_world = list.flags & FOREST_BALLS ? ball_segments : overlay_segments;
+    (list.flags & FOREST_OVERLAY ? in_world : segments).bind_texels(0, GL_RGBA32UI);
     cull.use();
     glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
     run_queue(drawing->*list.program, queue);
@@ -395,6 +402,7 @@ struct OpenGLRenderer::Device {
       upload(rest, more);
       draw_bands(rest, more.bands, false);
     }
+    draw(balls, 0, balls.count, true);
     draw(overlays, 0, overlays.count, true);
     glMemoryBarrier(written_for_readers);
   }

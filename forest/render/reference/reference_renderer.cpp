@@ -621,6 +621,15 @@ frame::Timing ReferenceRenderer::draw(const frame::Frame& f) {
       c.opacity = 255;
       if (project(eye, c)) capsules.push_back(c);
     }
+    for (std::uint32_t i = 0; i < f.balls.size(); ++i) {
+      const frame::Ball& ball = f.balls[i];
+      Capsule c{};
+      c.a = c.b = eye.seen(ball.centre);
+      c.ra = c.rb = ball.radius;
+      c.entry = ball.colour;
+      c.opacity = ball.opacity, c.key = frame::ball_key(i);
+      if (c.opacity > 0 && c.a.z() > eye.near && project(eye, c)) capsules.push_back(c);
+    }
     canvas.add(capsules);
     canvas.resolve(f, std::min<std::uint32_t>(lanes, last - first), sums_);
   }

@@ -110,12 +110,24 @@ bool fetch(uint item_index, uint index, out Capsule c) {
   c.ra = radii.x;
   c.rb = radii.y;
   c.straw = item.x == FOREST_IN_WORLD && (view.flags & FOREST_OVERLAY) == 0u;
-  if ((view.flags & FOREST_OVERLAY) != 0u) {  // overlays: in the world, at least two pixels wide, entry in the meta word
+  if ((view.flags & FOREST_OVERLAY) != 0u) {  // in the world, entry in the meta word
     c.a = to_camera(c.a);
     c.b = to_camera(c.b);
-    c.ra = max(c.ra, lens(c.a.z) / view.focal);
-    c.rb = max(c.rb, lens(c.b.z) / view.focal);
+    if ((view.flags & FOREST_BALLS) == 0u) {  // at least two pixels wide
+      c.ra = max(c.ra, lens(c.a.z) / view.focal);
+      c.rb = max(c.rb, lens(c.b.z) / view.focal);
+    }
     c.entry = meta >> 16;
+#ifdef FOREST_DOOR
+    if ((view.flags & FOREST_BALLS) != 0u) {
+      door_opacity = meta >> 8 & 255u;
+      door_key = forest_mixed(item.y + index ^ 0x6a09e667u);  // as ball_key in frame/constants.h
+      if (view.subframes >= FOREST_DOOR_SUBFRAMES && door_opacity < 255u) {
+        if (!forest_shows(door_opacity, door_key, view.subframe)) return false;
+        door_opacity = 255u;
+      }
+    }
+#endif
     c.rank = 0.0;
     c.mean = 0.0;
   } else {

@@ -28,7 +28,10 @@ void draw_dot(Capsule c, float rank) {
 void main() {
   Capsule c;
   if (!fetch_queued(c)) return;
-  float rank = float(texelFetch(queue_seen, int(4u + thread_index())).x / 64u) * 0.7548777 + golden * float(view.subframe);
+  uint code = texelFetch(queue_seen, int(4u + thread_index())).x;
+  float rank = float(code / 64u) * 0.7548777 + golden * float(view.subframe);
+  if ((view.flags & FOREST_BALLS) != 0u)  // as ball_rank in frame/constants.h
+    rank = float(forest_mixed(code / 64u * FOREST_CLUSTER_SIZE + code % 64u) >> 8) / 16777216.0 + golden * float(view.subframe);
   float len = distance(c.a, c.b), width = c.ra + c.rb;
   vec3 from = c.a, way = c.b - c.a;
   uint count = 1u;

@@ -1,0 +1,50 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/dressing.h"
+
+#include <algorithm>
+
+namespace forest {
+namespace {
+
+bool has_skin(const frame::State& state) { return state.kind == frame::Kind::skin; }
+
+bool forced(const scene::Colouring& colouring) {
+  return std::ranges::any_of(colouring.states, has_skin) ||
+         std::ranges::any_of(colouring.parts, has_skin, &scene::Part::state);
+}
+
+// With a skin for those alone that are forced to have one.
+scene::Colouring alone(scene::Colouring colouring) {
+  const auto bare = [](frame::State& state) {
+    if (state.kind == frame::Kind::any) state.kind = frame::Kind::capsules;
+  };
+  std::ranges::for_each(colouring.states, bare);
+  for (scene::Part& part : colouring.parts) bare(part.state);
+  return colouring;
+}
+
+}  // namespace
+
+bool Dressing::wanted(const scene::View& view, const scene::Colouring& colouring) const {
+  return (!surfaces.empty() && surfaces.visibility > 0.f) || (view.skin && (skinned || forced(colouring))) ||
+         (synapses && view.synapses != scene::SynapseColour::none);
+}
+
+void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut,
+                      const scene::Eye& eye, const scene::Colouring& colouring, bool playing,
+                      const scene::Chooser::Painter& painter, const DressingLimits& limits) {
+  rest();
+  surfaces.show(frame, colouring, playing);
+  if (view.skin && skinned)
+    skin.show(frame, cut, eye, colouring, painter, limits.skin);
+  else if (view.skin && forced(colouring))
+    skin.show(frame, cut, eye, alone(colouring), painter, limits.skin);
+  if (!synapses) return;
+  const bool taken = playing && view.synapses == scene::SynapseColour::target;
+  chosen =
+      synapses->choose(eye, colouring, taken ? scene::SynapseColour::sign : view.synapses, limits.synapses);
+  scene::paint_synapses(frame.palette, view.background);
+  frame.balls = chosen.balls;
+}
+
+}  // namespace forest

@@ -1,0 +1,97 @@
+#!/usr/bin/env bash
+# SPDX-License-Identifier: Apache-2.0
+# Glia beside neurons: planted by a recipe, known by its shapes or by a word, with colours, a target and no synapses.
+set -euo pipefail
+source "$FOREST_SOURCE_DIR/tests/words.sh"
+
+# A star of eight processes, of kind 7 as an astrocyte's file has them, and the same as a microglial cell's of kind 3.
+/usr/bin/python3 - <<'PY'
+import math
+for name, kind in (("astrocyte", 7), ("microglia", 3)):
+    rows, n = ["1 1 0 0 0 4 -1"], 1
+    for k in range(8):
+        a, parent = 2 * math.pi * k / 8, 1
+        for step in range(1, 6):
+            n += 1
+            r = 5 + 6 * step
+            rows.append(f"{n} {kind} {r * math.cos(a):.3f} {r * math.sin(a):.3f} {3 * step * (-1) ** k} .6 {parent}")
+            parent = n
+    open(name + ".swc", "w").write("\n".join(rows) + "\n")
+PY
+"$program" import astrocyte.swc --repo r.db --population astrocyte >/dev/null
+"$program" import microglia.swc --repo r.db --population microglia >/dev/null
+"$program" grow --grammar pyramidal --count 2 --seed 1 --repo r.db >/dev/null
+cat >column.toml <<'TOML'
+name = "mixed"
+neurons = 60
+[column]
+radius = 120
+[[type]]
+name = "pyramidal cell"
+population = "pyramidal"
+[[type]]
+name = "astrocyte"
+population = "astrocyte"
+[[type]]
+name = "microglia"
+population = "microglia"
+glia = true
+[[layer]]
+name = "L2"
+thickness = 300
+density = 1000
+mix = { "pyramidal cell" = 0.2, "astrocyte" = 0.5, "microglia" = 0.3 }
+TOML
+"$program" plant --recipe column.toml --repo r.db --seed 3 --out circuit --synapses 10 --json >planted.json
+told planted.json "d['made_up_synapses'] == 120"
+grep -q glia circuit/node_types.csv || fail "the table of types does not tell glia"
+/usr/bin/python3 - <<'PY'
+import h5py
+with h5py.File("circuit/edges.h5") as file:
+    edges = next(iter(file["edges"].values()))
+    (nodes,) = h5py.File("circuit/nodes.h5")["nodes"].values()
+    types = nodes["node_type_id"][:]
+    for end in ("source_node_id", "target_node_id"):
+        assert (types[edges[end][:]] == 0).all(), "glia makes synapses"
+PY
+"$program" pack circuit -o a.forest >/dev/null
+"$program" targets a.forest --json >targets.json
+told targets.json "[t['neurons'] for t in d['targets'] if t['name'] == 'glia'] == [48] and [t['neurons'] for t in d['targets'] if t['name'] == 'excitatory'] == [12]"
+view='{"eye":[0,150,600],"target":[0,150,0],"fog":0}'
+for by in type kind; do
+  for who in all glia; do
+    "$program" render a.forest --view "${view%\}},\"colour_by\":\"$by\"}" --only $who -o $by.$who.png --size 320x240 --renderer cpu --json >$by.$who.json
+    told $by.$who.json "d['covered'] > .01"
+  done
+  cmp -s $by.all.png $by.glia.png && fail "a target without neurons is a picture of all"
+done
+"$program" render a.forest --view "$view" --hide glia -o hidden.png --size 320x240 --renderer cpu --json >hidden.json
+told hidden.json "d['neurons'] <= 12"
+# Its colour by kind is one that no neuron has: the bluish green of kind 7, brighter in green than in red.
+/usr/bin/python3 - <<'PY'
+import struct, zlib
+def pixels(path):
+    data, at, rows, packed = open(path, "rb").read(), 8, [], b""
+    while at < len(data):
+        size, word = struct.unpack(">I4s", data[at:at + 8])
+        if word == b"IHDR": width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
+        if word == b"IDAT": packed += data[at + 8:at + 8 + size]
+        at += 12 + size
+    raw, channels = zlib.decompress(packed), {2: 3, 6: 4}[colour]
+    before, stride = bytearray(width * channels), width * channels
+    for y in range(height):
+        line = raw[y * (stride + 1):(y + 1) * (stride + 1)]
+        row = bytearray(line[1:])
+        for i in range(stride):
+            a, b, c = (row[i - channels] if i >= channels else 0), before[i], (before[i - channels] if i >= channels else 0)
+            p = a + b - c
+            paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+            row[i] = (row[i] + (0, a, b, (a + b) // 2, paeth)[line[0]]) & 255
+        rows.append(row)
+        before = row
+    return [tuple(r[i:i + 3]) for r in rows for i in range(0, stride, channels)]
+green = sum(g > 60 and g > 1.15 * r for r, g, b in pixels("kind.glia.png"))
+assert green > 300, green
+PY
+sed 's/^glia = true/glia = true\nexcitatory = true/' column.toml >wrong.toml
+refuses "neither excites nor inhibits" "$program" plant --recipe wrong.toml --repo r.db --out x
