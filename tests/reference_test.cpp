@@ -3,6 +3,7 @@
 // really drawn.
 #include <gtest/gtest.h>
 
+#include "forest/core/half.h"
 #include "forest/core/random.h"
 #include "forest/frame/similarity.h"
 #include "forest/render/opengl/context.h"
@@ -60,16 +61,13 @@ TEST(Reference, WhatIsLeftOutForBeingThinIsWhatConnectionSays) {
       return Vec3(float(random.uniform(-30, 30)), float(random.uniform(-20, 20)),
                   float(random.uniform(-80, 40)));
     };
-    const auto half = [](double r) {
-      return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(float(r))));
-    };
     const Vec3 a = place(), b = place();
     if ((a - b).head<2>().norm() < 5.f) continue;
     const double radius = std::exp2(random.uniform(-8., 0.)),
                  mean = i % 4 ? radius * random.uniform(.5, 2.) : 0.;
-    const std::vector<frame::Segment> segments{{a.x(), a.y(), a.z(), half(radius) | half(radius) << 16, b.x(),
-                                                b.y(), b.z(),
-                                                3u | random.below(256) << 8 | half(mean) << 16}};
+    const std::uint32_t half = to_half(float(radius));
+    const std::vector<frame::Segment> segments{{a.x(), a.y(), a.z(), half | half << 16, b.x(), b.y(), b.z(),
+                                                3u | random.below(256) << 8 | to_half(float(mean)) << 16}};
     const std::vector<frame::Instance> instances{{0, 0, 0, 0, 0, 0, 0, 1}};
     const std::vector<frame::Item> items{{0, 0, 1, 0, 0, 0, 0, 100}};
     const bool as_line = i % 2;

@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <vector>
 
+#include "forest/core/half.h"
 #include "forest/render/renderer.h"
 
 namespace forest::render {
@@ -29,10 +30,7 @@ struct SmallScene {
 
   /// A segment of a basal dendrite. @param ra, rb  its radii where it begins and ends, which become halfs
   void add_segment(const Vec3& a, const Vec3& b, float ra, float rb) {
-    const auto half = [](float r) {
-      return std::uint32_t(Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(r)));
-    };
-    segments.push_back({a.x(), a.y(), a.z(), half(ra) | half(rb) << 16, b.x(), b.y(), b.z(), 3});
+    segments.push_back({a.x(), a.y(), a.z(), to_half(ra) | to_half(rb) << 16, b.x(), b.y(), b.z(), 3});
   }
   frame::Image drawn_by(Renderer& renderer) const {
     renderer.load({segments, instances});

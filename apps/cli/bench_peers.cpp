@@ -23,6 +23,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/half.h"
 #include "forest/frame/similarity.h"
 #include "forest/io/png.h"
 #include "forest/render/reference/reference_renderer.h"
@@ -157,18 +158,15 @@ Polylines polylines_of(const scene::Forest& forest, const scene::Neuron& neuron)
   std::vector<bool> follows(segments.size());
   for (const frame::Segment& s : segments)
     if (const auto i = next(s)) follows[*i] = true;
-  const auto radius = [](std::uint32_t bits) {
-    return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-  };
   Polylines result;
   for (std::uint32_t head = 0; head < segments.size(); ++head) {
     if (follows[head]) continue;
     const frame::Segment& first = segments[head];
-    result.points.insert(result.points.end(), {first.ax, first.ay, first.az, radius(first.radii & 0xffff)});
+    result.points.insert(result.points.end(), {first.ax, first.ay, first.az, from_half(first.radii)});
     std::uint32_t count = 1;
     for (std::optional<std::uint32_t> i = head; i; i = next(segments[*i]), ++count) {
       const frame::Segment& s = segments[*i];
-      result.points.insert(result.points.end(), {s.bx, s.by, s.bz, radius(s.radii >> 16)});
+      result.points.insert(result.points.end(), {s.bx, s.by, s.bz, from_half(s.radii >> 16)});
     }
     result.strips.push_back(count);
     result.kinds.push_back(first.meta & 7u);

@@ -74,7 +74,7 @@ repository::ModelRow find_model(const repository::Repository& repository, const 
         fmt::format("model {} has no version {}; its newest is {}", shown(name), version, newest->version));
   std::vector<std::string> known;
   for (const repository::ModelRow& model : repository.models())
-    if (model.version == 1) known.push_back(model.name);
+    if (known.empty() || known.back() != model.name) known.push_back(model.name);
   throw Error(fmt::format("there is no model {}; {}", shown(name),
                           known.empty() ? "store one with brainforest model import"
                                         : fmt::format("those that are there: {}", fmt::join(known, ", "))));

@@ -280,10 +280,11 @@ void diff(const Options& options, Console& console) {
   if (options.names.size() == 2) {
     from = find_model(repository, options.names[0]);
   } else {
-    if (to.version == 1)
+    for (ModelRow& row : repository.models())
+      if (row.name == to.name && row.version < to.version) from = std::move(row);  // the last of them
+    if (from.name.empty())
       throw Error(
           fmt::format("{} has no version before it; name the model to compare it with", full_name(to)));
-    from = *repository.model(to.name, to.version - 1);
   }
   const std::string text = unified_diff(from.text, to.text, full_name(from), full_name(to));
   if (text.empty())
@@ -291,6 +292,38 @@ void diff(const Options& options, Console& console) {
   else
     say_text(text, console);
   console.print({{"from", json_of(from)}, {"to", json_of(to)}, {"diff", text}});
+}
+
+void remove(const Options& options, Console& console) {
+  Repository repository = open_to_write(options.repo);
+  std::map<std::pair<std::string, int>, ModelRow> chosen;  // one may be named twice
+  for (const std::string& name : options.names) {
+    ModelRow model = find_model(repository, name);
+    if (options.all && model.name != name)
+      throw Error(fmt::format("{} is one version; name the model alone, or leave out --all", shown(name)));
+    if (options.all) {
+      for (ModelRow& row : repository.models())
+        if (row.name == name) chosen[{row.name, row.version}] = std::move(row);
+    } else {
+      chosen[{model.name, model.version}] = std::move(model);
+    }
+  }
+  Json list = Json::array();
+  std::vector<std::vector<std::string>> lines;
+  auto transaction = repository.begin();
+  for (const auto& [key, model] : chosen) {
+    if (!repository.remove_model(model.name, model.version))
+      throw Error(fmt::format("{} was removed by somebody else; nothing is removed", full_name(model)));
+    list.push_back(json_of(model));
+    lines.push_back({model.name, std::to_string(model.version),
+                     model.neurons ? fmt::format("{} grown from it, which keep its text",
+                                                 counted(model.neurons, "neuron"))
+                                   : ""});
+  }
+  transaction.commit();
+  console.table({"model", "version", "neurons"}, lines);
+  console.say(fmt::format("{} removed from {}", counted(lines.size(), "version"), options.repo));
+  console.print({{"repository", options.repo}, {"removed", list}});
 }
 
 // ── One row each ──
@@ -308,6 +341,9 @@ struct Action {
 void add_all(CLI::App& app, Options& o) {
   app.add_flag("--all", o.all, "Every version, not only the newest");
   must_be_name(*app.add_option("--population", o.population, "Only models of this population"));
+}
+void add_every(CLI::App& app, Options& o) {
+  app.add_flag("--all", o.all, "Every version of each, not only the newest");
 }
 void add_import(CLI::App& app, Options& o) {
   must_be_name(*app.add_option("--name", o.name, "Another name than the file's; with one file"));
@@ -345,6 +381,11 @@ constexpr Action actions[] = {
      "brainforest model diff motoneuron --repo cells.db\n"
      "  brainforest model diff motoneuron@1 motoneuron@3 --repo cells.db",
      1, 2, which, nullptr, diff},
+    {"remove",
+     "Take versions of models out, all that are named or none; neurons keep the texts they grew from",
+     "brainforest model remove motoneuron@2 --repo cells.db\n"
+     "  brainforest model remove bush --all --repo cells.db",
+     1, 1000, which, add_every, remove},
 };
 
 }  // namespace

@@ -9,7 +9,9 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/io/node_sets.h"
 #include "forest/io/sonata.h"
 #include "forest/io/sonata_edges.h"
 #include "forest/scene/forest.h"
@@ -33,6 +35,17 @@ circuit::NodeNames names_of(const reports::Nodes& nodes) {
     ++names.runs.back().count;
   }
   return names;
+}
+
+// The circuit's own node sets, so that the forest file knows them; a file of them that cannot be read stops nobody.
+std::string sets_of(const std::filesystem::path& file, Console& console) {
+  if (file.empty()) return {};
+  try {
+    return io::to_json(io::read_node_sets(file));
+  } catch (const InputError& error) {
+    console.warn(fmt::format("{}; the forest file has none of these node sets", error.what()));
+    return {};
+  }
 }
 
 // Packs the synapses of a circuit beside its forest file; returns how many. Without any there is no file.
@@ -74,8 +87,10 @@ std::function<void()> pack(CLI::App& command, Console& console) {
       if (options->verbose) oddities[index] = std::move(one.warnings);
       return std::move(one.morphology);
     };
+    circuit::NodeNames names = names_of(outline.nodes);
+    names.sets = sets_of(outline.node_sets, console);
     const scene::PackFigures figures =
-        scene::pack(outline.circuit, read, options->out, console.progress(), names_of(outline.nodes));
+        scene::pack(outline.circuit, read, options->out, console.progress(), names);
     const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
     const std::size_t synapses = options->no_synapses ? 0
                                                       : pack_synapses(options->circuit, outline, options->out,

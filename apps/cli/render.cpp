@@ -114,7 +114,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
                                                 {"colour_map", surfaces.map->name}};
     if (!options->gaze.empty()) view.detail.gaze = Vec2(options->gaze[0], options->gaze[1]);
     add_appearances(options->targets, view.targets);
-    Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
+    Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
     if (options->skin) artist.give_skin();
@@ -219,7 +219,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     if (views.size() == 1 && !playing)
       throw Error("a film needs two views or more, or none for a walk into the forest; give another --view");
     add_appearances(options->targets, plan.targets);
-    Artist artist(forest, options->drawer, read_node_sets(options->targets.node_sets, console));
+    Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     warn_of_empty(artist.targets(), plan.targets, console);
     artist.show(read_surfaces(options->surfaces, console));
     if (options->skin) artist.give_skin();

@@ -6,6 +6,7 @@
 
 #include "forest/io/node_sets.h"
 #include "forest/scene/colouring.h"
+#include "forest/scene/forest.h"
 
 #include "apps/cli/console.h"
 
@@ -26,17 +27,18 @@ void add_targets(CLI::App& command, TargetOptions& options) {
   command.add_option("--hide", options.hide, "Leave these targets out")->type_name("TARGET");
 }
 
-circuit::NodeSets read_node_sets(const std::vector<std::filesystem::path>& files, Console& console) {
-  circuit::NodeSets all;
+circuit::NodeSets read_node_sets(const scene::Forest& forest, const std::vector<std::filesystem::path>& files,
+                                 Console& console) {
+  circuit::NodeSets own = io::node_sets_of(forest.nodes()), all = own;
   for (const auto& file : files) {
     circuit::NodeSets sets = io::read_node_sets(file);
     for (circuit::NodeSet& set : sets.sets) {
       if (all.find(set.name))
-        console.warn(
-            fmt::format("{} replaces the node set '{}' of the files before it", file.string(), set.name));
+        console.warn(fmt::format("{} replaces the node set '{}' of the {}", file.string(), set.name,
+                                 own.find(set.name) ? "forest" : "files before it"));
       all.put(std::move(set));
     }
-    all.source = files.size() == 1 ? sets.source : "the node sets";
+    all.source = files.size() == 1 && own.sets.empty() ? sets.source : "the node sets";
   }
   return all;
 }

@@ -13,6 +13,7 @@ class App;
 }
 namespace forest::scene {
 struct Appearance;
+class Forest;
 class Targets;
 }  // namespace forest::scene
 
@@ -30,8 +31,9 @@ void add_targets(CLI::App& command, TargetOptions& options);
 /// --node-sets alone.
 void add_node_sets(CLI::App& command, std::vector<std::filesystem::path>& files);
 
-/// All files in one: of sets with one name the last is taken, and said so.
-circuit::NodeSets read_node_sets(const std::vector<std::filesystem::path>& files, Console& console);
+/// Those of the forest and of all files in one: of sets with one name the last is taken, and said so.
+circuit::NodeSets read_node_sets(const scene::Forest& forest, const std::vector<std::filesystem::path>& files,
+                                 Console& console);
 
 /// Adds --only and --hide to the targets of a view.
 void add_appearances(const TargetOptions& options, std::vector<scene::Appearance>& shown);

@@ -93,8 +93,8 @@ void remove(const std::string& name, scene::Targets& targets) {
 }
 
 void run(const Options& options, Console& console) {
-  scene::Targets targets(scene::Forest::open(options.forest), read_node_sets(options.node_sets, console));
-  const scene::Forest& forest = targets.forest();
+  const scene::Forest forest = scene::Forest::open(options.forest);
+  scene::Targets targets(forest, read_node_sets(forest, options.node_sets, console));
   for (const std::string& name : options.remove) remove(name, targets);
   for (const std::string& said : options.define) define(said, targets, console);
 

@@ -106,7 +106,7 @@ int run(const Options& options, int& argc, char** argv) {
   application.setApplicationName("Studio");
   apply_theme(application);
 
-  circuit::NodeSets sets;
+  circuit::NodeSets sets = io::node_sets_of(forest.nodes());
   for (const auto& file : options.node_sets) {
     circuit::NodeSets more = io::read_node_sets(file);
     for (circuit::NodeSet& set : more.sets) sets.put(std::move(set));

@@ -75,10 +75,11 @@ struct NodeRun {
 
   bool operator==(const NodeRun&) const = default;
 };
-/// What SONATA calls the instances of a circuit.
+/// What SONATA calls the instances of a circuit, and sets of them.
 struct NodeNames {
   std::vector<std::string> populations;
   std::vector<NodeRun> runs;  // of all instances, in their order
+  std::string sets{};  // the circuit's node sets, a JSON text as io/node_sets.h writes it; may be empty
 };
 
 /// Members of an expression: names joined by "and", "or", "not" and parentheses; "and" binds tighter than "or". A name may

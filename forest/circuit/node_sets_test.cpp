@@ -6,6 +6,8 @@
 
 #include "forest/core/error.h"
 
+#include "tests/refused.h"
+
 namespace forest::circuit {
 namespace {
 
@@ -53,13 +55,7 @@ TEST(NodeSets, NumbersAreComparedAndWordsMeetPatterns) {
 }
 
 std::string refused(const NodeSets& sets, std::string_view name) {
-  try {
-    members(sets, name, six());
-  } catch (const InputError& error) {
-    EXPECT_EQ(std::string_view(error.what()).find('\n'), std::string_view::npos);
-    return error.what();
-  }
-  return "not refused";
+  return forest::refused<InputError>([&] { members(sets, name, six()); });
 }
 
 TEST(NodeSets, CompoundsAreUnionsAndCirclesAreNamed) {

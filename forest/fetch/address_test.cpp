@@ -7,21 +7,13 @@
 
 #include "forest/core/error.h"
 
+#include "tests/refused.h"
+
 namespace forest::fetch {
 namespace {
 
 using testing::ElementsAre;
 using testing::HasSubstr;
-
-template <class F>
-std::string error_of(F f) {
-  try {
-    f();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "";
-}
 
 TEST(Address, IsAsTheServiceDocumentsIt) {
   const Addresses at("https://neuromorpho.org/");
@@ -41,7 +33,7 @@ TEST(Address, QueryIsConditionsThatAllHold) {
               ElementsAre("species:rat,mouse", "cell_type:\"a AND b\"", "age_scale:Day"));
   for (const char* wrong : {"", "rat", ":rat", "species:", "species:rat AND", "species:rat AND ", " AND a:b",
                             "species:\"rat", "spe cies:rat", "a/b:c"})
-    EXPECT_THAT(error_of([&] { conditions(wrong); }), HasSubstr("field:value")) << wrong;
+    EXPECT_THAT(refused([&] { conditions(wrong); }), HasSubstr("field:value")) << wrong;
 }
 
 TEST(Address, OfAServiceIsPlain) {
@@ -50,19 +42,19 @@ TEST(Address, OfAServiceIsPlain) {
   for (const char* wrong : {"", "neuromorpho.org", "file:///etc/passwd", "ftp://host", "http://",
                             "https:///x", "http://me:secret@host", "http://host/?q=1", "http://host#x",
                             "http://ho st", "http://host\r\nX: y", "http://host\\x"})
-    EXPECT_NE(error_of([&] { Addresses{wrong}; }), "") << wrong;
-  EXPECT_THAT(error_of([&] { Addresses{"http://me:secret@host"}; }), HasSubstr("without user"));
+    EXPECT_NE(refused([&] { Addresses{wrong}; }), "") << wrong;
+  EXPECT_THAT(refused([&] { Addresses{"http://me:secret@host"}; }), HasSubstr("without user"));
 }
 
 TEST(Address, NamesOfAServerStayInTheirFolder) {
   const Addresses at("http://host");
   for (const char* wrong :
        {"", ".", "..", "../x", "a/../b", "/etc/passwd", "a\\b", "a%2fb", "..%2F..", "a\nb"}) {
-    EXPECT_NE(error_of([&] { (void)at.swc("archive", wrong); }), "") << wrong;
-    EXPECT_NE(error_of([&] { (void)at.swc(wrong, "name"); }), "") << wrong;
-    EXPECT_NE(error_of([&] { (void)at.record(wrong); }), "") << wrong;
+    EXPECT_NE(refused([&] { (void)at.swc("archive", wrong); }), "") << wrong;
+    EXPECT_NE(refused([&] { (void)at.swc(wrong, "name"); }), "") << wrong;
+    EXPECT_NE(refused([&] { (void)at.record(wrong); }), "") << wrong;
   }
-  EXPECT_NE(error_of([&] { (void)at.swc("archive", std::string(100'000, 'a')); }), "");
+  EXPECT_NE(refused([&] { (void)at.swc("archive", std::string(100'000, 'a')); }), "");
 }
 
 RC_GTEST_PROP(Address, AnyNameIsOnePieceOrRefused, (const std::string& name)) {

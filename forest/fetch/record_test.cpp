@@ -7,6 +7,8 @@
 #include "forest/core/error.h"
 #include "forest/fetch/service.h"
 
+#include "tests/refused.h"
+
 namespace forest::fetch {
 namespace {
 
@@ -71,13 +73,8 @@ TEST(Record, EveryWrongByteIsAnErrorOrARecord) {
 }
 
 TEST(Record, StrangeAnswersAreSaid) {
-  const auto error_of = [](const std::string& text) -> std::string {
-    try {
-      (void)parse_record(text, "address");
-    } catch (const InputError& error) {
-      return error.what();
-    }
-    return "";
+  const auto error_of = [](const std::string& text) {
+    return refused<InputError>([&] { (void)parse_record(text, "address"); });
   };
   EXPECT_THAT(error_of("<html>login</html>"), HasSubstr("address: the answer is not JSON"));
   for (const char* text : {"[]", "null", "7", "{}", R"({"neuron_name":7})", R"({"neuron_name":""})"})

@@ -20,6 +20,7 @@
 #include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
 #include "forest/io/traced_branch.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -115,13 +116,6 @@ std::optional<SectionKind> type_of(std::string_view word) {
   if (same_word(word, "dendrite")) return SectionKind::basal;
   if (same_word(word, "apical") || same_word(word, "apicaldendrite")) return SectionKind::apical;
   return std::nullopt;
-}
-
-/// For a message: at most 40 characters, only printable ASCII.
-std::string shown(std::string_view text) {
-  std::string result(text.substr(0, 40));
-  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
-  return text.size() > 40 ? result + "…" : result;
 }
 
 class Reader {

@@ -17,6 +17,7 @@
 #include "forest/io/genesis_names.h"
 #include "forest/io/oddity.h"
 #include "forest/io/plain_text.h"
+#include "forest/io/words.h"
 #include "forest/morphology/measure.h"
 
 namespace forest::io {
@@ -81,7 +82,6 @@ using Oddities = OddityList<Odd>;
 using Place = std::array<double, 3>;
 
 constexpr std::string_view layout = "a line is: name parent x y z diameter [channel density]…";
-constexpr std::string_view blanks = " \t\v\f";
 
 enum class Option : std::uint8_t {
   relative,
@@ -134,18 +134,6 @@ constexpr std::array<std::pair<std::string_view, Option>, 28> options{{
 std::optional<Option> option_of(std::string_view word) {
   const auto row = std::ranges::find(options, word, &decltype(options)::value_type::first);
   return row == options.end() ? std::nullopt : std::optional(row->second);
-}
-
-std::string_view trim(std::string_view text) {
-  const auto first = text.find_first_not_of(blanks);
-  return first == text.npos ? std::string_view{}
-                            : text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
-std::string shown(std::string_view text) {
-  std::string result(text.substr(0, 40));
-  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
-  return text.size() > 40 ? result + "…" : result;
 }
 
 std::vector<std::string_view> words_of(std::string_view text) {
@@ -243,7 +231,8 @@ class Scanner {
   std::string without_comments(std::string_view text) {
     std::string rest;
     const auto comment = [&](std::string_view words) {
-      if (const std::string_view t = trim(words); !t.empty() && !scan_.ours) say("comment", std::string(t));
+      if (const std::string_view t = trimmed(words); !t.empty() && !scan_.ours)
+        say("comment", std::string(t));
     };
     while (!text.empty()) {
       if (in_comment_) {
@@ -258,7 +247,7 @@ class Scanner {
       rest += text.substr(0, slash);
       if (slash == text.npos) break;
       if (text[slash + 1] == '/') {
-        if (trim(rest).empty()) comment(text.substr(slash + 2));
+        if (trimmed(rest).empty()) comment(text.substr(slash + 2));
         break;
       }
       in_comment_ = true;
@@ -272,7 +261,7 @@ class Scanner {
     const std::vector<std::string_view> words = words_of(text);
     if (words.empty()) return;
     if (words[0][0] == '*')
-      option(words, trim(text));
+      option(words, trimmed(text));
     else
       compartment(words);
   }
@@ -662,7 +651,7 @@ bool recognises_genesis(std::string_view bytes) {
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   each_line(bytes.substr(0, 65536), [&](std::string_view text, std::size_t line) {
     if (line == 1 && text == genesis_marker) return !(found = true);
-    text = trim(text);
+    text = trimmed(text);
     if (in_comment || text.starts_with("/*")) {
       in_comment = text.find("*/") == text.npos;
       return true;

@@ -20,6 +20,7 @@
 #include "forest/io/plain_text.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/swc_rows.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -144,16 +145,9 @@ std::string_view local(const xml_node& node) {
 
 std::string_view attribute(const xml_node& node, const char* name) { return node.attribute(name).value(); }
 
-/// Whitespace around it is not part of a number.
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r\n");
-  if (first == text.npos) return {};
-  return text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-}
-
 template <class T>
 bool parse(std::string_view text, T& value) {
-  text = trimmed(text);
+  text = trimmed(text, xml_blanks);
   if (text.starts_with('+')) text.remove_prefix(1);
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
   if (end != text.data() + text.size() || text.empty()) return false;
@@ -327,7 +321,7 @@ class Assembler {
     for (const auto& [name, number] :
          {std::pair{"x", &p.x}, {"y", &p.y}, {"z", &p.z}, {"diameter", &p.radius}})
       if (!parse(attribute(node, name), *number)) {
-        const std::string word = lower(trimmed(attribute(node, name)));
+        const std::string word = lower(trimmed(attribute(node, name), xml_blanks));
         if (word != "nan" && word != "inf" && word != "-inf")
           refuse(node, fmt::format("<{}> has {} = \"{}\", which is no number; a point has x y z and diameter",
                                    local(node), name, attribute(node, name).substr(0, 40)));
@@ -800,7 +794,7 @@ class Assembler {
 void read_notes(const xml_node& owner, MorphologyBuilder& builder) {
   for (const xml_node& node : owner.children())
     if (local(node) == "notes")
-      if (const std::string_view text = trimmed(node.text().get()); !text.empty())
+      if (const std::string_view text = trimmed(node.text().get(), xml_blanks); !text.empty())
         builder.annotate("notes", std::string(text));
 }
 
@@ -986,7 +980,7 @@ class Writer {
     std::size_t skipped = none;
     for (std::size_t i = 0; i < m_.annotations().size() && !notes; ++i)
       if (const auto& [key, value] = m_.annotations()[i];
-          key == "notes" && plain(value) && trimmed(value) == value && !value.empty()) {
+          key == "notes" && plain(value) && trimmed(value, xml_blanks) == value && !value.empty()) {
         text_ += "    <notes>" + escaped(value) + "</notes>\n";
         notes = true;
         skipped = i;

@@ -22,6 +22,7 @@
 #include "forest/io/placed_words.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/traced_branch.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -96,15 +97,9 @@ struct TakePrefixes : pugi::xml_tree_walker {
   }
 };
 
-std::string_view trimmed(std::string_view text) {
-  const auto first = text.find_first_not_of(" \t\r\n");
-  return first == text.npos ? std::string_view{}
-                            : text.substr(first, text.find_last_not_of(" \t\r\n") - first + 1);
-}
-
 /// The decimal number; an infinity for the words NaN, INF and for numbers out of range.
 std::optional<float> number(std::string_view text) {
-  text = trimmed(text);
+  text = trimmed(text, xml_blanks);
   if (text.starts_with('+')) text.remove_prefix(1);
   float value = 0.f;
   const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
@@ -231,7 +226,8 @@ class Reader {
 
   void about_the_file(const pugi::xml_node& root) {
     const auto note = [&](std::string_view key, std::string_view value) {
-      if (!trimmed(value).empty()) builder_.annotate(std::string(key), std::string(trimmed(value)));
+      value = trimmed(value, xml_blanks);
+      if (!value.empty()) builder_.annotate(std::string(key), std::string(value));
     };
     note("description", root.child("description").text().get());
     const pugi::xml_node subject = root.child("sparcdata").child("subject");

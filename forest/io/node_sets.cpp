@@ -28,6 +28,8 @@ constexpr std::array<std::pair<std::string_view, Test>, 5> operators{{{"$regex",
                                                                       {"$lte", Test::at_most}}};
 
 constexpr int deepest = 8;  // brackets within brackets: node sets have three
+constexpr std::size_t most_bytes = 64
+                                   << 20;  // some eight million neurons one by one; a mistake is often larger
 
 struct Place {
   const std::string& source;
@@ -107,6 +109,12 @@ NodeSet set_of(const std::string& source, const std::string& name, const Json& r
 }
 
 Json parsed(std::string_view text, const std::string& source) {
+  if (text.size() > most_bytes)
+    throw InputError(
+        source, 0,
+        fmt::format("has {} MB, and node sets are read up to {}; name a file of node sets, or ask "
+                    "for attributes instead of single neurons",
+                    text.size() >> 20, most_bytes >> 20));
   std::set<std::string> names;  // one that is used twice would quietly win or lose
   std::string twice;
   bool deep = false;
@@ -174,6 +182,10 @@ NodeSets parse_node_sets(std::string_view text, const std::string& name) {
 NodeSets read_node_sets(const std::filesystem::path& file) {
   const MappedFile mapped(file);
   return parse_node_sets(mapped.text(), file.string());
+}
+
+NodeSets node_sets_of(const circuit::NodeNames& nodes) {
+  return nodes.sets.empty() ? NodeSets{} : parse_node_sets(nodes.sets, "the forest's own node sets");
 }
 
 NodeSet parse_node_set(std::string_view json, const std::string& name) {

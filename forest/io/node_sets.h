@@ -15,6 +15,9 @@ namespace forest::io {
 circuit::NodeSets parse_node_sets(std::string_view json, const std::string& name);
 circuit::NodeSets read_node_sets(const std::filesystem::path& file);
 
+/// Those that a circuit came with into a forest file.
+circuit::NodeSets node_sets_of(const circuit::NodeNames& nodes);
+
 /// A rule as it stands behind a name: {"layer": "L5"} or ["name", …].
 circuit::NodeSet parse_node_set(std::string_view json, const std::string& name);
 

@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 
 #include "tests/real_data.h"
+#include "tests/refused.h"
 
 namespace forest::io {
 namespace {
@@ -40,12 +41,15 @@ TEST(NodeSetsFile, WhatIsWrittenIsReadAgain) {
 }
 
 std::string refused(const std::string& json) {
-  try {
-    parse_node_sets(json, "sets.json");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "not refused";
+  return forest::refused<InputError>([&] { parse_node_sets(json, "sets.json"); });
+}
+
+TEST(NodeSetsFile, AForestBringsItsOwn) {
+  EXPECT_TRUE(node_sets_of({}).sets.empty());
+  const NodeSets sets = parse_node_sets(everything, "sets.json");
+  EXPECT_EQ(node_sets_of({.populations = {}, .runs = {}, .sets = to_json(sets)}).sets, sets.sets);
+  EXPECT_THAT(forest::refused<InputError>([] { node_sets_of({.populations = {}, .runs = {}, .sets = "{"}); }),
+              HasSubstr("the forest's own node sets:1: is no JSON"));
 }
 
 TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {
@@ -73,6 +77,8 @@ TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {
   };
   for (const auto& [json, words] : wrong) EXPECT_THAT(refused(json), HasSubstr(words)) << json;
   EXPECT_THAT(refused("{\"a\": " + std::string(100'000, '[')), HasSubstr("no JSON"));
+  EXPECT_THAT(refused(std::string((64 << 20) + 1, ' ')),
+              HasSubstr("has 64 MB, and node sets are read up to 64"));
   EXPECT_THAT(refused("{\"a\": " + std::string(1000, '[') + std::string(1000, ']') + "}"),
               HasSubstr("brackets"));
 }

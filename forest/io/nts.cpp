@@ -20,6 +20,7 @@
 #include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
 #include "forest/io/traced_branch.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -74,20 +75,6 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NtsOddity::count)> table{{
 constexpr std::string_view layout =
     "a record is: number code tag x y z thickness, in columns 0-5, 8-10, 11-15, 16-23, "
     "24-31, 32-39, 40-45";
-constexpr std::string_view blanks = " \t\v\f";
-
-std::string_view trim(std::string_view text, std::string_view around = blanks) {
-  const auto first = text.find_first_not_of(around);
-  return first == text.npos ? std::string_view{}
-                            : text.substr(first, text.find_last_not_of(around) - first + 1);
-}
-
-/// For a message: at most 60 characters, only printable ASCII.
-std::string shown(std::string_view text) {
-  std::string result(text.substr(0, 60));
-  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
-  return text.size() > 60 ? result + "…" : result;
-}
 
 template <class Number>
 bool parse(std::string_view text, Number& value) {
@@ -107,7 +94,7 @@ struct Record {
 };
 
 std::string_view field(std::string_view line, std::size_t first, std::size_t last) {
-  return first >= line.size() ? std::string_view{} : trim(line.substr(first, last - first + 1));
+  return first >= line.size() ? std::string_view{} : trimmed(line.substr(first, last - first + 1));
 }
 
 bool is_code(std::string_view text) {
@@ -139,11 +126,11 @@ std::optional<Record> record_of(std::string_view line) {
     fields[i] = field(line, columns[i].first, columns[i].second);
   if (count == tokens.size() && reads(tokens)) {
     r.by_blanks = fields != tokens;
-    r.rest = trim(line.substr(end));
+    r.rest = trimmed(line.substr(end));
     return r;
   }
   if (!reads(fields)) return std::nullopt;
-  r.rest = line.size() > 46 ? trim(line.substr(46)) : std::string_view{};
+  r.rest = line.size() > 46 ? trimmed(line.substr(46)) : std::string_view{};
   return r;
 }
 
@@ -175,7 +162,7 @@ class Reader {
       oddities_.add(NtsOddity::byte_order_mark, 1, "the file begins with a byte order mark");
     each_line(plain.text, [&](std::string_view line, std::size_t number) {
       line_ = number;
-      if (const std::string_view text = trim(line); !text.empty()) this->line(line, text);
+      if (const std::string_view text = trimmed(line); !text.empty()) this->line(line, text);
       return true;
     });
     finish_tree();
@@ -199,14 +186,14 @@ class Reader {
     } else if (same_start(text, "no. points")) {
       if (header_) oddities_.add(NtsOddity::second_header, line_, "another header begins");
       header_ = true;
-      if (std::int64_t count = 0; parse(trim(text.substr(10)), count))
+      if (std::int64_t count = 0; parse(trimmed(text.substr(10)), count))
         said_points_ = said_points_.value_or(0) + count;
     } else if (same_start(text, "no. trees")) {
-      if (std::int64_t count = 0; parse(trim(text.substr(9)), count))
+      if (std::int64_t count = 0; parse(trimmed(text.substr(9)), count))
         said_trees_ = said_trees_.value_or(0) + count;
     } else if (same_start(text, "point ") && text.find("Type") != text.npos) {
     } else if (same_start(text, "text ") && header_) {
-      if (const std::string_view value = trim(text.substr(5)); value != "unassigned")
+      if (const std::string_view value = trimmed(text.substr(5)); value != "unassigned")
         annotations_.emplace_back("Text", value);
     } else {
       comment(text);
@@ -231,7 +218,7 @@ class Reader {
       const std::size_t end = std::min(text.find(' '), text.size());
       if (!parse(text.substr(0, end), v[count]) || !std::isfinite(v[count])) break;
       ++count;
-      text = trim(text.substr(end));
+      text = trimmed(text.substr(end));
     }
     const Point sphere{v[0], v[1], v[2], v[3]};
     if (count < 4 || !text.empty() || sphere.radius < 0.f || too_large({sphere.x, sphere.y, sphere.z, 0.f}))
@@ -248,7 +235,8 @@ class Reader {
   void record(std::string_view line) {
     const auto found = record_of(line);
     if (!found)
-      throw InputError(name_, line_, fmt::format("\"{}\" is no record; {}", shown(trim(line)), layout));
+      throw InputError(name_, line_,
+                       fmt::format("\"{}\" is no record; {}", shown(trimmed(line), 60), layout));
     Record r = *found;
     if (records_++ == 0 && !header_ && !to_the_letter_)
       oddities_.add(NtsOddity::no_header, line_, "records begin without \"No. points\"");
@@ -337,7 +325,7 @@ class Reader {
     std::vector<std::string_view> parts;
     while (parts.size() < nts_no_name.size() && !rest.empty()) {
       parts.push_back(rest.substr(0, std::min(rest.find_first_of(blanks), rest.size())));
-      rest = trim(rest.substr(parts.back().size()));
+      rest = trimmed(rest.substr(parts.back().size()));
     }
     while (!parts.empty() && parts.back() == nts_no_name[parts.size() - 1]) parts.pop_back();
     std::string word(code.code);
@@ -507,9 +495,10 @@ class Reader {
 bool recognises_nts(std::string_view bytes) {
   bool found = false;
   each_line(bytes, [&](std::string_view line, std::size_t number) {
-    const auto record =
-        line.size() < 200 && !trim(line).empty() && is_digit(trim(line)[0]) ? record_of(line) : std::nullopt;
-    found = same_start(trim(line), "no. points") || (record && find_nts_code(record->code));
+    const auto record = line.size() < 200 && !trimmed(line).empty() && is_digit(trimmed(line)[0])
+                            ? record_of(line)
+                            : std::nullopt;
+    found = same_start(trimmed(line), "no. points") || (record && find_nts_code(record->code));
     return !found && number < 100;
   });
   return found;

@@ -187,12 +187,7 @@ class Writer {
     const Soma& soma = m_.soma();
     if (soma.kind == SomaKind::none) return;
     if (soma.kind == SomaKind::contours) {
-      for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-        const std::size_t end =
-            i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
-        outline(NtsRole::soma,
-                std::span(soma.points).subspan(soma.contour_starts[i], end - soma.contour_starts[i]));
-      }
+      for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) outline(NtsRole::soma, soma.contour(i));
       return;
     }
     const Point sphere = soma.sphere();

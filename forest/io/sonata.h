@@ -41,6 +41,7 @@ struct SonataOutline {
   std::vector<std::filesystem::path> files;  // of each of circuit.morphologies
   std::vector<Warning> warnings;             // neurons left out
   reports::Nodes nodes;                      // of each instance: what reports call it
+  std::filesystem::path node_sets{};         // the file that the configuration names; empty: none
 
   /// Reads one of circuit.morphologies, centre at the origin; warnings name its file. May be called by several threads.
   ReadResult morphology(std::size_t index) const;

@@ -356,7 +356,14 @@ SonataOutline outline_sonata(const fs::path& place) {
   if (!nodes || !nodes->is_array())
     config.refuse("\"networks\" has no list of \"nodes\"; add the file of the neurons");
   for (const Json& entry : *nodes) assembler.add_nodes(entry);
-  return assembler.finish();
+  SonataOutline outline = assembler.finish();
+  try {
+    outline.node_sets = config.path(config.json(), "node_sets_file").value_or("");
+  } catch (const InputError& error) {  // the neurons are there all the same
+    outline.warnings.push_back(
+        {0, "node-sets", fmt::format("{}; the circuit has no node sets", error.what())});
+  }
+  return outline;
 }
 
 SonataCircuit read_sonata(const fs::path& place, Progress& progress) {

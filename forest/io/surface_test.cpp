@@ -13,6 +13,7 @@
 #include "forest/core/file.h"
 
 #include "tests/real_data.h"
+#include "tests/refused.h"
 
 namespace forest::io {
 namespace {
@@ -125,19 +126,11 @@ void expect_tetrahedron(const Mesh& mesh) {
     }
 }
 
-std::string error_of(auto&& read) {
-  try {
-    read();
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
-}
 std::string surface_error(const std::string& bytes) {
-  return error_of([&] { (void)read_surface(bytes, "s"); });
+  return refused<InputError>([&] { (void)read_surface(bytes, "s"); });
 }
 std::string values_error(const std::string& bytes) {
-  return error_of([&] { (void)read_surface_values(bytes, "v"); });
+  return refused<InputError>([&] { (void)read_surface_values(bytes, "v"); });
 }
 
 TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {

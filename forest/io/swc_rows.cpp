@@ -12,12 +12,12 @@
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/plain_text.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
 
 constexpr float unknown = std::numeric_limits<float>::quiet_NaN();
-constexpr std::string_view blanks = " \t\v\f";
 
 // Header keys of Cannon et al. 1998 that are plain words; any KEY_WITH_UNDERSCORE or KEY/SLASH counts too.
 constexpr std::array<std::string_view, 8> plain_keys{"CREATURE",  "REGION", "TYPE",   "CONTRIBUTOR",
@@ -25,19 +25,6 @@ constexpr std::array<std::string_view, 8> plain_keys{"CREATURE",  "REGION", "TYP
 
 constexpr std::array<std::string_view, 7> columns{"id", "type", "x", "y", "z", "radius", "parent"};
 constexpr std::string_view layout = "a row is: id type x y z radius parent";
-
-std::string_view trim(std::string_view text) {
-  const auto first = text.find_first_not_of(blanks);
-  return first == text.npos ? std::string_view{}
-                            : text.substr(first, text.find_last_not_of(blanks) - first + 1);
-}
-
-/// For a message: at most 40 characters, only printable ASCII.
-std::string shown(std::string_view text) {
-  std::string result(text.substr(0, 40));
-  for (char& c : result) c = c < ' ' || c > '~' ? '?' : c;
-  return text.size() > 40 ? result + "…" : result;
-}
 
 bool same_word(std::string_view text, std::string_view lower) {
   return std::ranges::equal(text, lower,
@@ -186,19 +173,19 @@ class Scanner {
   // ---------------------------------------------------------------------------
 
   void odd_line(std::string_view line) {
-    const std::string_view text = trim(line);
+    const std::string_view text = trimmed(line);
     if (footer_) return footer(text);
     if (text.empty()) {
       if (rows_.size() && !blank_line_) blank_line_ = line_;
     } else if (text[0] == '#') {
-      comment(trim(text.substr(1)));
+      comment(trimmed(text.substr(1)));
     } else {
       odd_row(text);
     }
   }
 
   void footer(std::string_view text) {
-    if (text.starts_with('#')) text = trim(text.substr(1));
+    if (text.starts_with('#')) text = trimmed(text.substr(1));
     if (text == "end synapse")
       footer_ = false;
     else if (!text.empty())
@@ -266,8 +253,8 @@ class Scanner {
 
   void odd_row(std::string_view text) {
     const std::size_t hash = text.find('#');
-    const std::string plain = without_typography(trim(text.substr(0, hash)));
-    const std::string_view data = trim(plain);
+    const std::string plain = without_typography(trimmed(text.substr(0, hash)));
+    const std::string_view data = trimmed(plain);
     std::vector<std::string> tokens = split(data);
     if (tokens.empty()) tokens.emplace_back();
     const bool number =
@@ -385,7 +372,7 @@ std::size_t SwcRows::line(std::size_t row) const {
 }
 
 std::pair<std::string_view, std::string_view> swc_comment(std::string_view text) {
-  text = trim(text);
+  text = trimmed(text);
   const std::string_view word = text.substr(0, text.find_first_of(blanks));
   const bool capital =
       !word.empty() && word[0] >= 'A' && word[0] <= 'Z' && std::ranges::all_of(word, [](char c) {
@@ -394,7 +381,7 @@ std::pair<std::string_view, std::string_view> swc_comment(std::string_view text)
   const bool key =
       std::ranges::find(plain_keys, word) != plain_keys.end() || word.find_first_of("_/") != word.npos;
   if (!capital || !key) return {"comment", text};
-  return {word, trim(text.substr(word.size()))};
+  return {word, trimmed(text.substr(word.size()))};
 }
 
 SwcRows scan_swc(std::string_view bytes, const std::string& name, OddityList<SwcOddity>& oddities) {

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/io/words.h"
 #include "forest/io/workbook.h"
 
 namespace forest::io {
@@ -381,12 +382,6 @@ class SheetReader {
   std::uint32_t row_ = 0;
 };
 
-std::string_view trimmed(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  return first == std::string_view::npos ? ""
-                                         : text.substr(first, text.find_last_not_of(" \t\r\n") + 1 - first);
-}
-
 }  // namespace
 
 std::string ReadSheet::place(std::size_t row, std::size_t column) const {
@@ -437,7 +432,7 @@ ReadWorkbook read_workbook(std::string_view bytes, const std::string& name) {
       archive.fail("its sheet {} is missing; copy or save it again", title);
     if (book.find(title)) archive.fail("has two sheets {}; save it again with a spreadsheet", title);
     if (auto sheet = SheetReader(archive, book, budget, shared).read(title, relation->part)) {
-      for (std::string& column : sheet->header) column = trimmed(column);
+      for (std::string& column : sheet->header) column = trimmed(column, xml_blanks);
       book.sheets.push_back(std::move(*sheet));
     }
   }
@@ -486,7 +481,7 @@ void read_csv(ReadWorkbook& book, std::string sheet, std::string_view bytes, con
     if (quoted)
       throw InputError(name, begun, "a quotation that begins in this row does not end; close it by \"");
     if (number == 1) {
-      for (const std::string& field : fields) read.header.emplace_back(trimmed(field));
+      for (const std::string& field : fields) read.header.emplace_back(trimmed(field, xml_blanks));
       while (!read.header.empty() && read.header.back().empty()) read.header.pop_back();
       continue;
     }

@@ -70,6 +70,10 @@ struct Soma {
   std::vector<std::int32_t> parents;
   std::vector<std::uint32_t> contour_starts;
 
+  std::span<const Point> contour(std::size_t i) const {
+    const std::size_t end = i + 1 < contour_starts.size() ? contour_starts[i + 1] : points.size();
+    return std::span(points).subspan(contour_starts[i], end - contour_starts[i]);
+  }
   Point sphere()
       const;  // centre and radius of a sphere of the same place and mean size; radius 0 when there is none
   double area() const;  // µm²; of contours: the sphere of their mean radius

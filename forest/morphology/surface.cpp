@@ -23,11 +23,8 @@ Vec4 vec4(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
 std::vector<Vec4> outlines(const Soma& soma) {
   std::vector<Vec4> discs;
   for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-    const std::size_t begin = soma.contour_starts[i];
-    const std::size_t end =
-        i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
-    if (begin == end) continue;
-    const auto loop = std::span(soma.points).subspan(begin, end - begin);
+    const std::span<const Point> loop = soma.contour(i);
+    if (loop.empty()) continue;
     Vec3 middle = Vec3::Zero();
     for (const Point& p : loop) middle += p.position() / float(loop.size());
     float radius = 0.f;
@@ -104,10 +101,8 @@ Lines sticks(const Morphology& m) {
     }
   } else if (soma.kind == SomaKind::contours) {
     for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-      const std::size_t end =
-          i + 1 < soma.contour_starts.size() ? soma.contour_starts[i + 1] : soma.points.size();
       line.clear();
-      for (std::size_t p = soma.contour_starts[i]; p < end; ++p) line.push_back(soma.points[p].position());
+      for (const Point& p : soma.contour(i)) line.push_back(p.position());
       if (line.empty()) continue;
       line.push_back(line[0]);
       lines.add(line, soma_label);

@@ -88,6 +88,33 @@ std::pair<int, bool> Repository::add_model(const NewModel& model) {
   });
 }
 
+bool Repository::remove_model(std::string_view name, int version) {
+  Impl& impl = *impl_;
+  return impl.write([&] {
+    const auto id = impl.ask<int>("select id from models where name = :name and version = :version",
+                                  std::string(name), version);
+    if (!id) return false;
+    const int grammar = impl.ask<int>("select grammar from models where id = :id", *id).value();
+    const Answer parts =
+        impl.database->ask(fmt::format("select distribution from model_distributions where model = {}", *id));
+    impl.sql << "delete from model_distributions where model = :id", use(*id);
+    for (const auto& row : parts.rows) {
+      const int part = int(number_in(row[0]));
+      impl.sql
+          << "delete from distributions where id = :id and not exists (select 1 from model_distributions "
+             "d where d.distribution = distributions.id)",
+          use(part);
+    }
+    impl.sql << "delete from models where id = :id", use(*id);
+    impl.sql
+        << "delete from grammars where id = :id and not exists (select 1 from models m where m.grammar = "
+           "grammars.id) and not exists (select 1 from provenance o where o.grammar = grammars.id)",
+        use(grammar);
+    impl.known_grammar = {}, impl.known_hash.clear();
+    return true;
+  });
+}
+
 std::vector<ModelRow> Repository::models() const {
   const auto [found, parts] = impl_->read([&] {
     return std::pair(

@@ -50,6 +50,52 @@ TEST_P(EveryDatabase, ADistributionHasVersionsOfWhichNoneChanges) {
   EXPECT_EQ(view.rows.at(0).at(0), Answer::Value(second)) << "as a person reads it with any client";
 }
 
+TEST_P(EveryDatabase, AVersionThatIsRemovedLeavesTheOthersAndWhatNeuronsGrewFrom) {
+  Repository repository = Repository::open(place_, Access::write);
+  const auto count = [&](const char* table) {
+    const std::string question = fmt::format("select count(*) from {}", table);
+    return std::get<std::int64_t>(Repository::open(place_, Access::read).query(question).rows[0][0]);
+  };
+  const auto add = [&](const std::string& text, const std::string& ratio) {
+    return repository.add_model(
+        {.name = "bush", .text = text, .distributions = {{"ratio", ratio}, {"turn", "the same"}}});
+  };
+  add("first", "a"), add("second", "b"), add("first", "a"), add("third", "c");
+  const std::string hash = repository.add_grammar("bush", "second");
+  repository.add(neuron(0), {.name = "b", .provenance = Grown{"bush", hash, 1, 0}});
+  EXPECT_FALSE(repository.remove_model("bush", 5));
+  EXPECT_FALSE(repository.remove_model("shrub", 1));
+
+  EXPECT_TRUE(repository.remove_model("bush", 1)) << "version 3 has its text, too";
+  EXPECT_FALSE(repository.remove_model("bush", 1));
+  EXPECT_EQ(count("grammars"), 3);
+  EXPECT_EQ(repository.model("bush", 3)->text, "first");
+  EXPECT_TRUE(repository.remove_model("bush", 2)) << "a neuron was grown from it";
+  EXPECT_EQ(count("grammars"), 3);
+  EXPECT_EQ(repository.grammar(hash), "second");
+  EXPECT_TRUE(repository.check(Progress::none()).empty());
+  EXPECT_TRUE(repository.remove_model("bush", 4));
+  EXPECT_EQ(count("grammars"), 2);
+  EXPECT_EQ(repository.models().size(), 1u);
+  EXPECT_EQ(repository.distribution("bush.ratio", "")->text, "a");
+  EXPECT_EQ(repository.distribution("bush.turn", "")->text, "the same");
+  EXPECT_EQ(add("fourth", "d").first, 4) << "counted from the newest that is there";
+  EXPECT_TRUE(repository.remove_model("bush", 3) && repository.remove_model("bush", 4));
+  EXPECT_TRUE(repository.models().empty());
+  EXPECT_EQ(count("distributions"), 0);
+  EXPECT_EQ(count("grammars"), 1);
+  {
+    auto transaction = repository.begin();
+    add("fifth", "e");
+    transaction.commit();
+  }
+  {
+    auto undone = repository.begin();
+    EXPECT_TRUE(repository.remove_model("bush", 1));
+  }
+  EXPECT_EQ(repository.model("bush")->text, "fifth");
+}
+
 TEST_P(EveryDatabase, WhatNeuronsAreGrownFromIsAModel) {
   Repository repository = Repository::open(place_, Access::write);
   const std::string text = "axiom: A\n\tA -> \\(90) F(1) A  # \"turned\", µm\n";

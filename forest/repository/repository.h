@@ -171,6 +171,10 @@ class Repository {
   std::vector<ModelRow> models() const;  // by name and version
   /// Version 0: the newest.
   std::optional<ModelRow> model(std::string_view name, int version = 0) const;
+  /// Takes one version out, with its text where no neuron was grown from it and no other version has it, and with the
+  /// distributions that were its alone. Other versions keep their numbers; that of the newest is given again. Returns
+  /// false when there was none.
+  bool remove_model(std::string_view name, int version);
 
   /// Keeps the text that neurons are grown from and returns the hash Grown::grammar_hash asks for. When no version of the
   /// model has the text it is the next one.

@@ -9,6 +9,7 @@
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/scene/grove.h"
+#include "forest/scene/placed.h"
 
 namespace forest::scene {
 namespace {
@@ -126,8 +127,8 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
     const double step = double(of.size()) / double(first[i + 1] - first[i]);
     const double turn = double(uniform(std::uint32_t(i) ^ 0x9e3779b9u));
     const Pieces::Piece& piece = of[std::size_t((double(k) + turn) * step) % of.size()];
-    const Quat q(instance.qw, instance.qx, instance.qy, instance.qz);
-    return {&piece, Vec3(instance.x, instance.y, instance.z) + q * piece.at, q * piece.along};
+    const Placed placed(instance);
+    return {&piece, placed.position + placed.turn * piece.at, placed.turn * piece.along};
   };
 
   const std::uint64_t finest = first.back();
@@ -201,10 +202,9 @@ Bricks build_bricks(std::span<const frame::Instance> instances, std::span<const 
       if (leaf)
         for (const frame::Owner& owner : std::span(result.owners).subspan(begin, brick.segment_count)) {
           const frame::Instance& i = instances[owner.instance];
-          const Sphere& of = pieces[i.morphology].sphere;
-          const Vec3 centre = Vec3(i.x, i.y, i.z) + Quat(i.qw, i.qx, i.qy, i.qz) * of.centre;
+          const Sphere whole = Placed(i)(pieces[i.morphology].sphere);
           brick.neurons =
-              std::max(brick.neurons, 1.001f * (centre - brick.sphere().centre).norm() + of.radius);
+              std::max(brick.neurons, 1.001f * (whole.centre - brick.sphere().centre).norm() + whole.radius);
         }
     });
   }

@@ -37,6 +37,7 @@ struct Cluster {
   std::uint32_t groups[group_count] = {};  // the sphere around each group: see group()
   std::uint32_t visible[8] = {};  // which segments show at each of `magnifications`: bit i is segment i
 
+  Sphere sphere() const { return {{x, y, z}, radius}; }
   bool is_leaf() const { return children[0] == 0; }
 
   /// A branch thinner than a pixel shows from the magnification (pixels a µm) on at which its width reaches its rank. Which
@@ -48,7 +49,7 @@ struct Cluster {
   }
   std::uint32_t all() const { return frame::first_segments(segment_count); }
   /// The sphere around the segments [8 i, 8 i + 8) drawn.
-  Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], {{x, y, z}, radius}); }
+  Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], sphere()); }
   static constexpr float magnifications[8] = {.05f, .1f, .17f, .25f, .35f, .5f, .8f, 1.5f};
 };
 static_assert(sizeof(Cluster) == 96);

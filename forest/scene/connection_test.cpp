@@ -3,6 +3,7 @@
 
 #include <gtest/gtest.h>
 
+#include "forest/core/half.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
 #include "forest/scene/whole.h"
@@ -55,7 +56,7 @@ TEST(Connection, APieceThatIsMissingIsNoticed) {
 TEST(Connection, ABranchThatIsTooThinInTheMiddleComesApart) {
   // Three segments in a row; each is its own branch as far as thickness goes.
   const auto segment = [](float from, float radius) {
-    const std::uint32_t half = Eigen::numext::bit_cast<std::uint16_t>(Eigen::half(radius));
+    const std::uint32_t half = to_half(radius);
     return frame::Segment{from, 0, 0, half | half << 16, from + 10.f, 0, 0, 3u | 128u << 8 | half << 16};
   };
   const frame::Instance instance{0, 0, 0, 0, 0, 0, 0, 1};

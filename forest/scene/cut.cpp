@@ -42,16 +42,44 @@ frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t draw
 
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
+// The camera of all sights, and that of the pictures before.
+struct Cameras {
+  Viewer now, before;
+
+  explicit Cameras(std::span<const Sight> sights) : now(sights.front().eye.viewer()), before(now) {
+    for (const Sight& sight : sights)
+      if (sight.before) before = sight.before->viewer();
+  }
+  // For spheres of a neuron.
+  Cameras within(const Placed& placed) const {
+    Cameras cameras = *this;
+    cameras.now = now.within(placed.position, placed.turn);
+    cameras.before = before.within(placed.position, placed.turn);
+    return cameras;
+  }
+};
+
 // What is looked at, by whom, and what is known to be hidden.
 struct Look {
   const Forest& forest;
   std::span<const Sight> sights;
   bool keep;  // what is hidden
   const Shown& shown;
+  Cameras cameras{sights};
   Fog fog = fog_of(forest, sights.front().eye.camera(), sights.front().eye.detail().fog);
   bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
 
   std::uint32_t all() const { return frame::first_segments(std::uint32_t(sights.size())); }
+  // What is read of a neuron first, into the cache; and then.
+  void fetch(std::uint32_t index) const {
+    __builtin_prefetch(&forest.instances()[index]);
+    __builtin_prefetch(&forest.spheres()[index]);
+    if (!shown.states.empty()) __builtin_prefetch(&shown.states[index]);
+  }
+  void fetch_root(std::uint32_t index) const {
+    const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
+    if (neuron.cluster_count) __builtin_prefetch(&forest.clusters()[neuron.first_cluster]);
+  }
   frame::State state(std::uint32_t index) const {
     return shown.states.empty() ? frame::State{} : shown.states[index];
   }
@@ -141,13 +169,13 @@ void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const
 // A sphere as all sights see it, and as the camera of the pictures before saw it; that once somebody asks.
 class Judged {
  public:
-  Judged(const Look& look, const Sphere& sphere)
-      : sphere_(sphere), seen_(look.sights.front().eye.see(sphere)) {}
+  Judged(const Cameras& cameras, const Sphere& sphere)
+      : cameras_(cameras), sphere_(sphere), seen_(cameras.now(sphere)) {}
 
   const Seen& seen() const { return seen_; }
   bool hidden(const Sight& sight) {
     if (!sight.before) return false;
-    if (!before_) before_ = sight.before->see(sphere_);
+    if (!before_) before_ = cameras_.before(sphere_);
     return sight.before->hide(*before_);
   }
   // Whether it is left out for now, or for good.
@@ -159,6 +187,7 @@ class Judged {
   }
 
  private:
+  const Cameras& cameras_;
   const Sphere& sphere_;
   Seen seen_;
   std::optional<Seen> before_;
@@ -171,7 +200,7 @@ void each_of(std::uint32_t sights, auto&& take) {
 
 // Of a cluster that is good enough, these groups.
 void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, std::uint32_t at,
-                   std::uint32_t groups, const Placed& placed, const Sphere& sphere, const Seen& seen,
+                   std::uint32_t groups, const Placed& placed, const Cameras& cameras, const Seen& seen,
                    Cut& cut) {
   const Cluster& c = look.forest.clusters()[at];
   const frame::Kind kind = look.state(index).kind;
@@ -181,21 +210,21 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
   };
   const std::uint32_t all = shown(seen);
   if (groups == every_group &&
-      (std::popcount(all) <= few || sphere.radius * sight.eye.magnification(seen) <= group_limit))
-    return add(cut, item(index, c.first_segment, all, sphere), kind, sight.eye.thin(seen, c.thickness));
+      (std::popcount(all) <= few || seen.radius * sight.eye.magnification(seen) <= group_limit))
+    return add(cut, item(index, c.first_segment, all, placed(c)), kind, sight.eye.thin(seen, c.thickness));
   std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
     const std::uint32_t first = g * Cluster::group_size;
     if (!(groups >> g & 1u) || first >= c.segment_count) continue;
-    const Sphere around = placed(c.group(g));
-    Judged judged(look, around);
+    const Sphere around = c.group(g);
+    Judged judged(cameras, around);
     if (!sight.eye.may_see(judged.seen())) continue;
     const std::uint32_t drawn = shown(judged.seen()) >> first & 255u;
     if (!drawn) continue;
     if (judged.hidden(sight))
       hidden |= 1u << g;
     else
-      add(cut, item(index, c.first_segment + first, drawn, around), kind,
+      add(cut, item(index, c.first_segment + first, drawn, placed(around)), kind,
           sight.eye.thin(judged.seen(), c.thickness));
   }
   if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, hidden});
@@ -205,6 +234,7 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
 std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from,
                               std::uint32_t of_sights, std::span<Cut> cuts) {
   const Placed placed(look.forest.instances()[index]);
+  const Cameras cameras = look.cameras.within(placed);
   const auto clusters = look.forest.clusters();
   const frame::State state = look.state(index);
   const bool parted =
@@ -222,8 +252,8 @@ std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32
   while (depth) {
     const auto [at, sights] = open[--depth];
     const Cluster& c = clusters[at];
-    const Sphere sphere = placed(c);
-    Judged judged(look, sphere);
+    const Sphere sphere = c.sphere();
+    Judged judged(cameras, sphere);
     const Seen& seen = judged.seen();
     std::uint32_t finer = 0;
     each_of(sights, [&](std::size_t s) {
@@ -237,12 +267,13 @@ std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32
                  (parted || !look.good_enough(sight, seen, c.error))) {
         finer |= 1u << s;
       } else if (parted) {
-        add_parts(look, index, c, sphere, sight.eye.thin(seen, c.thickness), states, cut);
+        add_parts(look, index, c, placed(c), sight.eye.thin(seen, c.thickness), states, cut);
       } else {
-        choose_groups(look, sight, index, at, every_group, placed, sphere, seen, cut);
+        choose_groups(look, sight, index, at, every_group, placed, cameras, seen, cut);
       }
     });
     if (!finer) continue;
+    __builtin_prefetch(&clusters[c.children[1]]);
     open[depth++] = {c.children[1], finer};
     open[depth++] = {c.children[0], finer};
   }
@@ -261,7 +292,7 @@ void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, st
       if (part.section == soma_section) ball.state = frame::packed(part.state);
     if (!(ball.state ? frame::unpacked(ball.state) : state).is(frame::State::visible)) return;
   }
-  Judged judged(look, sphere);
+  Judged judged(look.cameras, sphere);
   each_of(sights, [&](std::size_t s) {
     const Sight& sight = look.sights[s];
     if (!look.in_sight(sight, judged.seen())) return;
@@ -299,7 +330,7 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     const auto [at, sights] = open.back();
     open.pop_back();
     const Groves::Node& node = groves.nodes()[at];
-    Judged judged(look, node.sphere);
+    Judged judged(look.cameras, node.sphere);
     std::uint32_t within = 0;
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
@@ -313,8 +344,13 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     if (!within) continue;
     for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back({node.first_child + c, within});
     if (node.child_count) continue;
-    for (const std::uint32_t i : groves.members().subspan(node.first, node.count))
-      choose_neuron(look, i, within, cuts);
+    // They are neighbours in space, not in memory.
+    const auto members = groves.members().subspan(node.first, node.count);
+    for (const std::uint32_t i : members) look.fetch(i);
+    for (std::size_t k = 0; k < members.size(); ++k) {
+      if (k + 2 < members.size()) look.fetch_root(members[k + 2]);
+      choose_neuron(look, members[k], within, cuts);
+    }
   }
 }
 
@@ -343,7 +379,7 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
     const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
     if (!drawn || !(groups >> g & 1u)) continue;
     const Sphere around = b.group(g);
-    Judged judged(look, around);
+    Judged judged(look.cameras, around);
     if (!look.in_sight(sight, judged.seen())) continue;
     if (judged.hidden(sight))
       hidden |= 1u << g;
@@ -361,7 +397,7 @@ void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
     open.pop_back();
     const Brick& b = bricks[at];
     const Sphere sphere = b.sphere();
-    Judged judged(look, sphere);
+    Judged judged(look.cameras, sphere);
     const Seen& seen = judged.seen();
     std::uint32_t finer = 0;
     each_of(sights, [&](std::size_t s) {
@@ -515,13 +551,16 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
         break;
     }
     if (!l.groups) {
+      const std::uint64_t before = cuts.front().segments;
       choose_clusters(look, l.instance, l.number, 1, cuts);
+      const Neuron& neuron = forest.neurons()[forest.instances()[l.instance].morphology];
+      cuts.front().neurons += l.number == neuron.first_cluster && cuts.front().segments > before;
       return;
     }
     const Placed placed(forest.instances()[l.instance]);
-    const Sphere sphere = placed(forest.clusters()[l.number]);
-    choose_groups(look, now, l.instance, l.number, l.groups, placed, sphere, now.eye.see(sphere),
-                  cuts.front());
+    const Cameras cameras = look.cameras.within(placed);
+    choose_groups(look, now, l.instance, l.number, l.groups, placed, cameras,
+                  cameras.now(forest.clusters()[l.number].sphere()), cuts.front());
   };
   Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
   arrange(cut, now.eye);

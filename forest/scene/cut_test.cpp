@@ -5,6 +5,7 @@
 
 #include <gtest/gtest.h>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/scene/path.h"
@@ -179,11 +180,8 @@ TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
       for (std::uint32_t i = 0; i < c.segment_count; ++i) {
         if (shown >> i & 1u) continue;
         const frame::Segment& s = forest.segments()[c.first_segment + i];
-        const auto radius = [&](std::uint32_t bits) {
-          return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-        };
-        const float width = 2.f * std::max(radius(s.radii & 0xffff), radius(s.radii >> 16)) * magnification;
-        const float of_branch = 2.f * radius(s.meta >> 16) * magnification;
+        const float width = 2.f * std::max(from_half(s.radii), from_half(s.radii >> 16)) * magnification;
+        const float of_branch = 2.f * from_half(s.meta >> 16) * magnification;
         EXPECT_LE(of_branch * 256.f, float(s.meta >> 8 & 255) * 1.01f);
         EXPECT_LT(width, 1.01f);
       }

@@ -34,6 +34,7 @@ circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
   if (json.contains("types"))
     for (const auto& t : json["types"])
       c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory"), t.value("glia", false)});
+  if (json.contains("node_sets")) nodes.sets = json.at("node_sets");
   if (json.contains("nodes")) {
     nodes.populations = json.at("populations");
     for (const auto& run : json["nodes"])
@@ -219,7 +220,10 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
   });
   data->groves = Groves(data->spheres);
   circuit::NodeNames& nodes = data->nodes;
-  if (nodes.runs.empty()) nodes = {{data->circuit.name}, {{0, 0, 0, std::uint32_t(f.instances().size())}}};
+  if (nodes.runs.empty()) {
+    nodes.populations = {data->circuit.name};
+    nodes.runs = {{0, 0, 0, std::uint32_t(f.instances().size())}};
+  }
   std::uint64_t named = 0;
   for (circuit::NodeRun& run : nodes.runs) {
     require(run.population < nodes.populations.size() && run.count <= f.instances().size() - named, wrong);

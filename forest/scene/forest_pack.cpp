@@ -34,6 +34,7 @@ std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes)
   if (!nodes.runs.empty()) json["populations"] = nodes.populations;
   for (const circuit::NodeRun& run : nodes.runs)
     json["nodes"].push_back({run.population, run.first_node, run.count});
+  if (!nodes.sets.empty()) json["node_sets"] = nodes.sets;
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 

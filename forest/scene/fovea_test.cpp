@@ -247,8 +247,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       const Vec3 pixel = frame::project(camera, viewport, point);
       if (pixel.z() < camera.near) continue;
       if (seen.known) {
-        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(),
-                  1.001f * focal * seen.reach + .01f);
+        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place()).norm(),
+                  1.001f * focal * seen.reach() + .01f);
         EXPECT_GE(pixel.z(), seen.nearest - 1e-3f);
       }
       const auto in = [&](const frame::Area& a) {

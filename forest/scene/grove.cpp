@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include "forest/core/parallel.h"
 
@@ -17,6 +18,16 @@ std::uint64_t spread(std::uint64_t x) {
   x = (x | x << 8) & 0x100f00f00f00f00full;
   x = (x | x << 4) & 0x10c30c30c30c30c3ull;
   return (x | x << 2) & 0x1249249249249249ull;
+}
+
+// Around the middle of the box around some spheres, as tight as that allows.
+Sphere enclosing(auto&& spheres) {
+  Bounds box;
+  for (const Sphere& s : spheres) box.add(s.centre, s.radius);
+  Sphere all{box.centre()};
+  for (const Sphere& s : spheres)
+    all.radius = std::max(all.radius, 1.0001f * (s.centre - all.centre).norm() + s.radius);
+  return all;
 }
 
 }  // namespace
@@ -49,17 +60,9 @@ Groves::Groves(std::span<const Sphere> spheres) : members_(spheres.size()) {
     Node& leaf = leaves[n];
     leaf.first = std::uint32_t(n) * in_leaf;
     leaf.count = std::min(in_leaf, std::uint32_t(spheres.size()) - leaf.first);
-    Bounds box;
-    for (std::uint32_t i = 0; i < leaf.count; ++i) {
-      const Sphere& s = spheres[members_[leaf.first + i]];
-      box.add(s.centre, s.radius);
-    }
-    leaf.sphere.centre = box.centre();
-    for (std::uint32_t i = 0; i < leaf.count; ++i) {
-      const Sphere& s = spheres[members_[leaf.first + i]];
-      leaf.sphere.radius =
-          std::max(leaf.sphere.radius, 1.0001f * (s.centre - leaf.sphere.centre).norm() + s.radius);
-    }
+    leaf.sphere =
+        enclosing(std::span(members_).subspan(leaf.first, leaf.count) |
+                  std::views::transform([&](std::uint32_t i) -> const Sphere& { return spheres[i]; }));
   });
   levels.push_back(std::move(leaves));
   while (levels.back().size() > 1) {
@@ -71,13 +74,7 @@ Groves::Groves(std::span<const Sphere> spheres) : members_(spheres.size()) {
       node.child_count = std::min(children, std::uint32_t(below.size()) - node.first_child);
       const std::span<const Node> own = std::span(below).subspan(node.first_child, node.child_count);
       node.first = own.front().first, node.count = own.back().first + own.back().count - node.first;
-      Bounds box;
-      for (const Node& child : own) box.add(child.sphere.centre, child.sphere.radius);
-      node.sphere.centre = box.centre();
-      for (const Node& child : own)
-        node.sphere.radius =
-            std::max(node.sphere.radius,
-                     1.0001f * (child.sphere.centre - node.sphere.centre).norm() + child.sphere.radius);
+      node.sphere = enclosing(own | std::views::transform(&Node::sphere));
     }
     levels.push_back(std::move(above));
   }

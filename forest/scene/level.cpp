@@ -73,8 +73,8 @@ bool Eye::may_see(const Seen& seen) const {
     return false;
   if (!detail_.hole || !seen.known) return true;
   const frame::Area& hole = *detail_.hole;
-  const Vec2 place = middle_ + focal_ * seen.place;
-  const float reach = focal_ * seen.reach + margin;
+  const Vec2 place = middle_ + focal_ * seen.place();
+  const float reach = focal_ * seen.reach() + margin;
   return !(place.x() - reach >= float(hole.left) && place.y() - reach >= float(hole.top) &&
            place.x() + reach <= float(hole.right) && place.y() + reach <= float(hole.bottom));
 }
@@ -82,7 +82,7 @@ bool Eye::may_see(const Seen& seen) const {
 float Eye::acceptable(const Seen& seen) const {
   if (!detail_.gaze || !seen.known) return detail_.error;
   const float eccentricity =
-      gaze_.eccentricity(middle_ + focal_ * seen.place) - gaze_.angle(focal_ * seen.reach + margin);
+      gaze_.eccentricity(middle_ + focal_ * seen.place()) - gaze_.angle(focal_ * seen.reach() + margin);
   if (eccentricity <= detail_.fovea) return detail_.error;
   return detail_.error * std::max(1.f, gaze_.resolved(eccentricity, detail_));
 }

@@ -85,6 +85,7 @@ class Eye {
 
   /// The same for all eyes whose cameras are the same, whatever the size of their pictures.
   Seen see(const Sphere& sphere) const { return viewer_(sphere); }
+  const Viewer& viewer() const { return viewer_; }
   /// Whether anything of it may be in what is wanted of the picture.
   bool may_see(const Seen& seen) const;
 
@@ -102,9 +103,10 @@ class Eye {
   /// Whether something in `sphere`, wrong by `error` µm, may be shown so.
   bool good_enough(const Sphere& sphere, float error) const { return good_enough(see(sphere), error); }
   bool good_enough(const Seen& seen, float error) const {
-    const float wrong = error * magnification(seen);
+    const float wrong = error * focal_, unit = camera_.orthographic() ? 1.f : nearest_depth(seen);
     // Most are by far good enough, or are not anywhere.
-    return wrong <= detail_.error || (wrong <= most_acceptable_ && wrong <= acceptable(seen));
+    return wrong <= detail_.error * unit ||
+           (wrong <= most_acceptable_ * unit && wrong <= acceptable(seen) * unit);
   }
   /// Whether branches of this radius, µm, are so thin there that they are drawn as lines.
   bool thin(const Seen& seen, float radius) const {

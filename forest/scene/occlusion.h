@@ -16,9 +16,9 @@ class Occluders {
   /// @param map  of a picture of that size, as the camera saw it
   Occluders(const frame::DepthMap& map, const frame::Camera& camera, const frame::Viewport& viewport);
 
-  /// A sphere as that camera saw it.
-  Seen see(const Sphere& sphere) const { return viewer_(sphere); }
-  /// Whether everything within a sphere, seen by see(), lies behind what the picture shows. False for what was beside the picture,
+  /// As that camera saw spheres.
+  const Viewer& viewer() const { return viewer_; }
+  /// Whether everything within a sphere, seen by viewer(), lies behind what the picture shows. False for what was beside the picture,
   /// too near or in doubt: only true is certain.
   bool hide(const Seen& seen) const;
 

@@ -14,7 +14,7 @@ struct Placed {
   explicit Placed(const frame::Instance& i)
       : position(i.x, i.y, i.z), turn(Quat(i.qw, i.qx, i.qy, i.qz).toRotationMatrix()) {}
   Sphere operator()(const Sphere& s) const { return {position + turn * s.centre, s.radius}; }
-  Sphere operator()(const Cluster& c) const { return (*this)(Sphere{{c.x, c.y, c.z}, c.radius}); }
+  Sphere operator()(const Cluster& c) const { return (*this)(c.sphere()); }
 };
 
 }  // namespace forest::scene

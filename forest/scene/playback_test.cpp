@@ -12,6 +12,7 @@
 #include "forest/geometry/polyline.h"
 #include "forest/reports/trace.h"
 
+#include "tests/refused.h"
 #include "tests/sample_activity.h"
 #include "tests/sample_forest.h"
 
@@ -400,14 +401,10 @@ TEST(Playback, ASimulationOfAnotherCircuitIsRefusedAndTheMismatchNamed) {
   const Sample sample;
   const Activity activity = sample.activity();
   const auto refusal = [&](const circuit::Circuit& circuit, const std::vector<Morphology>& neurons) {
-    try {
-      Playback(Forest::from_bytes(pack(circuit, neurons)), activity, "run.activity");
-    } catch (const InputError& error) {
-      return std::string(error.what());
-    }
-    return std::string("taken");
+    return refused<InputError>(
+        [&] { Playback(Forest::from_bytes(pack(circuit, neurons)), activity, "run.activity"); });
   };
-  EXPECT_EQ(refusal(sample.circuit, sample.neurons), "taken");
+  EXPECT_EQ(refusal(sample.circuit, sample.neurons), "");
   circuit::Circuit fewer = sample.circuit;
   fewer.instances.pop_back();
   EXPECT_THAT(refusal(fewer, sample.neurons), HasSubstr("with 30 neurons and the forest has 29"));

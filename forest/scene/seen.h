@@ -13,12 +13,18 @@ struct Seen {
   Vec3 at = Vec3::Zero();  // its centre: to the right, up and ahead of the eye, µm
   float radius = 0.f;      // µm
   float nearest = 0.f;     // how far ahead its nearest point lies, µm
-  // In a picture of any size, times that picture's focal length (frame::Camera::focal): pixels from its middle to where the
-  // centre is seen, y downwards, and how far beside it anything of the sphere is seen at most. Nothing is known of a sphere that is
-  // not wholly before the eye.
-  Vec2 place = Vec2::Zero();
-  float reach = 0.f;
-  bool known = false;
+  bool known = false;      // whether it is wholly before the eye; of others nothing below is known
+  bool orthographic = false;
+
+  /// In a picture of any size, times that picture's focal length (frame::Camera::focal): pixels from its middle to where the
+  /// centre is seen, y downwards.
+  Vec2 place() const { return Vec2(at.x(), -at.y()) * scale(); }
+  /// The same: how far beside it anything of the sphere is seen at most. A point at distance r from the centre is seen
+  /// f · r · |p| / (depth · nearest) beside it at most.
+  float reach() const { return scale() * radius * (orthographic ? 1.f : at.norm() / nearest); }
+
+ private:
+  float scale() const { return orthographic ? 1.f : 1.f / at.z(); }
 };
 
 /// From where spheres are seen.
@@ -32,18 +38,20 @@ class Viewer {
     to_camera_.row(2) *= -1.f;
   }
 
-  bool orthographic() const { return orthographic_; }
+  /// The same for spheres in the coordinates of something that stands there and is turned so.
+  Viewer within(const Vec3& position, const Mat3& turn) const {
+    Viewer viewer = *this;
+    viewer.to_camera_ = to_camera_ * turn;
+    viewer.eye_ = turn.transpose() * (eye_ - position);
+    return viewer;
+  }
   Seen operator()(const Sphere& sphere) const {
     Seen seen;
     seen.at = to_camera_ * (sphere.centre - eye_);
     seen.radius = sphere.radius;
-    const float depth = seen.at.z();
-    seen.nearest = depth - sphere.radius;
+    seen.nearest = seen.at.z() - sphere.radius;
     seen.known = seen.nearest > near_;
-    // A point at distance r from the centre is seen at most f · r · |p| / (depth · nearest) beside it.
-    const float scale = orthographic_ ? 1.f : 1.f / depth;
-    seen.place = {scale * seen.at.x(), -scale * seen.at.y()};
-    seen.reach = scale * sphere.radius * (orthographic_ ? 1.f : seen.at.norm() / seen.nearest);
+    seen.orthographic = orthographic_;
     return seen;
   }
 

@@ -9,6 +9,7 @@
 
 #include <gtest/gtest.h>
 
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/scene/view.h"
 
@@ -30,10 +31,8 @@ std::vector<RoundCone> cones_of(const Forest& forest, std::uint32_t which, float
   std::vector<std::pair<std::uint32_t, RoundCone>> all;
   for (std::uint32_t i = 0; i < neuron.original_count; ++i) {
     const frame::Segment& s = forest.segments()[neuron.first_segment + i];
-    const auto half = [](std::uint32_t bits) {
-      return float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(bits)));
-    };
-    const RoundCone cone{{s.ax, s.ay, s.az}, {s.bx, s.by, s.bz}, half(s.radii), half(s.radii >> 16)};
+    const RoundCone cone{
+        {s.ax, s.ay, s.az}, {s.bx, s.by, s.bz}, from_half(s.radii), from_half(s.radii >> 16)};
     const std::uint32_t section = forest.section_of_segment()[neuron.first_original + i];
     all.emplace_back(section, cone);
     widest[section] = std::max(widest[section], std::max(cone.radius_a, cone.radius_b));

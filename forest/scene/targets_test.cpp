@@ -7,10 +7,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "forest/core/error.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/view.h"
 
+#include "tests/refused.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -35,13 +35,17 @@ Members where(const Forest& forest, auto&& holds) {
   return members;
 }
 
-std::string refused(auto&& what) {
-  try {
-    what();
-  } catch (const Error& error) {
-    return error.what();
+TEST(Targets, NodeSetsOfACircuitStayWithTheForest) {
+  for (const bool named : {false, true}) {
+    circuit::NodeNames nodes{{}, {}, "{\"α\": {\"layer\": \"upper\"}}\n"};
+    if (named) nodes.populations = {"a"}, nodes.runs = {{0, 0, 7, 40}};
+    const Forest f = Forest::from_bytes(
+        pack(testing::sample_circuit(40), testing::sample_neurons(), Progress::none(), nodes));
+    EXPECT_EQ(f.nodes().sets, nodes.sets);
+    EXPECT_EQ(f.nodes().populations[0], named ? "a" : "column");
+    EXPECT_EQ(f.nodes().runs.front().first_node, named ? 7u : 0u);
   }
-  return "not refused";
+  EXPECT_EQ(sample().nodes().sets, "");
 }
 
 TEST(Targets, AForestHasThemByItself) {

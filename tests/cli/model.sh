@@ -1,5 +1,5 @@
 # SPDX-License-Identifier: Apache-2.0
-# brainforest model: what neurons grow from is kept in versions; none is lost, none is changed.
+# brainforest model: what neurons grow from is kept in versions; none is changed, none is lost unasked.
 set -E
 trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
@@ -133,12 +133,36 @@ PY
   $model export "'); drop table models; --" --repo "$repo" --out odd >out.txt
   cmp odd/* odd.lsys
   $model list --repo "$repo" | grep -q 'drop table models'
+
+  # remove: the newest version, one that is named, or all; neurons keep what they grew from. All that are named or none.
+  $model remove "'); drop table models; --" --repo "$repo" | grep -q '^1 version removed from'
+  short 1 "there is no model 'shrub'; those that are there: bush, motoneuron, pyramidal" $model remove bush shrub --repo "$repo"
+  short 1 "model 'bush' has no version 9" $model remove bush@9 --repo "$repo"
+  short 1 "'bush@2' is one version" $model remove bush@2 --all --repo "$repo"
+  short 1 "there is no model ''" $model remove '' --repo "$repo"
+  short 2 '--repo' $model remove bush
+  short 2 'names' $model remove --repo "$repo"
+  [ "$($model list --repo "$repo" --all --json | json '[m["version"] for m in d if m["name"] == "bush"]')" = '[1, 2, 3, 4, 5]' ]
+  [ "$($model remove bush bush@2 bush bush@5 --repo "$repo" --json | json '[(m["version"], m["neurons"]) for m in d["removed"]]')" = '[(2, 3), (5, 0)]' ]
+  [ "$($model list --repo "$repo" --all --json | json '[m["version"] for m in d if m["name"] == "bush"]')" = '[1, 3, 4]' ]
+  [ "$($model diff bush@3 --repo "$repo" --json | json 'd["from"]["version"]')" = 1 ]
+  [ "$($BRAINFOREST query "select version from distribution where name = 'bush.turn' and population = 'L5' order by version" --repo "$repo" --json | json 'd["rows"]')" = '[[1], [3]]' ]
+  $BRAINFOREST check --repo "$repo" | grep -q 'all is well'
+  $BRAINFOREST export bush-1-00002 --repo "$repo" --out again >out.txt
+  cmp <(grep -v '^#' grown/bush-1-00002.swc) <(grep -v '^#' again/bush-1-00002.swc)
+  $model remove bush --all --repo "$repo" >out.txt
+  short 1 "there is no model 'bush'" $model show bush --repo "$repo"
+  [ "$($BRAINFOREST query "select count(*) from distribution where name like 'bush.%'" --repo "$repo" --json | json 'd["rows"][0][0]')" = 0 ]
+  [ "$($BRAINFOREST query "select count(*) from provenance o join grammars g on g.id = o.grammar where g.name = 'bush'" --repo "$repo" --json | json 'd["rows"][0][0]')" = 3 ]
+  $BRAINFOREST check --repo "$repo" | grep -q 'all is well'
+  [ "$($model import bush.lsys --repo "$repo" --json | json 'd["models"][0]["version"]')" = 1 ]
 }
 
 mkdir file && cd file
 check_verbs cells.db
 short 1 'no such repository' $BRAINFOREST model list --repo none.db
 short 1 'no such repository' $BRAINFOREST model edit bush --repo none.db
+short 1 'no such repository' $BRAINFOREST model remove bush --repo none.db
 [ ! -e none.db ]
 cd ..
 

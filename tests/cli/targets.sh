@@ -70,6 +70,42 @@ refuses "'etype'" "$program" targets a.forest --node-sets bad.json --members c
 [[ $("$program" targets a.forest --node-sets bad.json 2>/dev/null | grep -c '?$') == 3 ]] || fail "sets that cannot be used are not listed as such"
 printf '{"a": {"layer": 5},\n "b" {}}' >slip.json
 refuses "slip.json:2: is no JSON" "$program" targets a.forest --node-sets slip.json
+
+# A circuit that names its node sets brings them along; a file of them that cannot be read stops nobody.
+cp -r circuit with
+cp sets.json with/sets.json
+sed -i '0,/{/s//{ "node_sets_file": "$BASE_DIR\/sets.json",/' with/circuit_config.json
+"$program" pack with -o with.forest >/dev/null 2>err.txt
+[[ ! -s err.txt ]] || fail "packing said $(cat err.txt)"
+"$program" targets with.forest --members 'either and not deep' --json >own.json
+told own.json 'd["members"] == json.load(open("members.json"))["members"] and d["members"]'
+"$program" render with.forest --only deep --size 64x64 -o own.png >/dev/null
+rm own.png
+echo '{"deep": {"layer": "L2"}}' >more.json
+"$program" targets with.forest --node-sets more.json --members deep --json >replaced.json 2>err.txt
+grep -q "more.json replaces the node set 'deep' of the forest" err.txt || fail "it is not said that a set is replaced"
+told replaced.json 'sum(map(len, d["members"].values())) == next(t["neurons"] for t in json.load(open("list.json"))["targets"] if t["name"] == "L2")'
+for broken in '{"deep"' '{"deep": 3}'; do
+  echo "$broken" >with/sets.json
+  "$program" pack with -o without.forest >/dev/null 2>err.txt
+  grep -q "sets.json.*; the forest file has none of these node sets" err.txt || fail "nothing is said of $broken"
+done
+truncate -s 1G with/sets.json
+"$program" pack with -o without.forest >/dev/null 2>err.txt
+grep -q "sets.json: has 1024 MB.*; the forest file has none of these node sets" err.txt || fail "nothing is said of a gigabyte"
+rm with/sets.json
+"$program" pack with -o without.forest >/dev/null 2>err.txt
+grep -q "cannot be opened.*; the forest file has none of these node sets" err.txt || fail "nothing is said of sets that are missing"
+[[ $(wc -l <err.txt) == 1 ]] || fail "sets that are missing take more than a sentence"
+cmp without.forest a.forest || fail "sets that cannot be read change the forest file"
+for odd in 7 '"$NOWHERE\/sets.json"'; do
+  sed "s/\"node_sets_file\": [^,]*,/\"node_sets_file\": $odd,/" with/circuit_config.json >with/odd.json
+  "$program" pack with/odd.json --verbose -o without.forest >/dev/null 2>err.txt
+  grep -q '"node_sets_file".*; the circuit has no node sets' err.txt || fail "nothing is said of $odd"
+  cmp without.forest a.forest || fail "sets without a file change the forest file"
+done
+refuses "no target 'deep'" "$program" targets without.forest --members deep
+
 refuses "defines nothing" "$program" targets a.forest --define L2
 refuses "no node set 'x'" "$program" targets a.forest --remove x
 [[ ! -e x.png ]] || fail "a refused command left a file behind"

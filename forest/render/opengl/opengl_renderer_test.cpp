@@ -4,9 +4,9 @@
 
 #include <epoxy/gl.h>
 
-#include "forest/core/error.h"
 #include "forest/render/opengl/offscreen.h"
 
+#include "tests/refused.h"
 #include "tests/renderer_laws.h"
 
 namespace forest::render {
@@ -15,15 +15,6 @@ namespace {
 std::unique_ptr<Renderer> make() { return std::make_unique<OffscreenRenderer>(); }
 INSTANTIATE_TEST_SUITE_P(OpenGL, RendererLaws, testing::Values(make));
 INSTANTIATE_TEST_SUITE_P(OpenGL, SurfaceLaws, testing::Values(make));
-
-std::string refused(auto&& what) {
-  try {
-    what();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "not refused";
-}
 
 // Sets what a driver answers, and puts it right again.
 template <class Function>

@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/geometry/round_cone.h"
@@ -41,7 +42,7 @@ TEST(ReferenceRenderer, AnOrthographicCameraShowsThingsAsLargeAtAnyDepth) {
       f.frame.subframes = 64;
       f.add({-20, 3, depth}, {15, -8, depth - 10}, radius, radius);
       const double scale = f.frame.camera.focal(200.f), length = Vec3(35, -11, 0).norm(),
-                   r = double(Eigen::half(radius));
+                   r = double(from_half(to_half(radius)));
       EXPECT_NEAR(f.area() / (scale * scale * (2 * r * length + M_PI * r * r)), 1., .01) << radius;
     }
 }
@@ -72,7 +73,7 @@ TEST(ReferenceRenderer, CapsuleCoversItsProjectedAreaHoweverThin) {
     Fixture f;
     f.add({-20, 3, 0}, {15, -8, 0}, radius, radius);
     f.frame.subframes = 256;
-    const double length = Vec3(35, -11, 0).norm(), r = double(Eigen::half(radius));
+    const double length = Vec3(35, -11, 0).norm(), r = double(from_half(to_half(radius)));
     const double expected = f.scale() * f.scale() * (2 * r * length + M_PI * r * r);
     EXPECT_NEAR(f.area() / expected, 1., .01) << radius;
   }
