@@ -10,7 +10,11 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
+#include "forest/scene/cut.h"
+#include "forest/scene/pick.h"
+#include "forest/scene/view.h"
 
+#include "tests/checksums.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -154,6 +158,33 @@ TEST(ForestFile, AnyChangedByteIsRefused) {
     damaged[i] ^= std::byte{0x41};
     EXPECT_THROW(Forest::from_bytes(std::move(damaged)), InputError) << i;
   }
+}
+
+// Checksums tell of accidents, not of intent.
+TEST(ForestFile, WhatIsChangedBehindRightChecksumsIsRefusedOrCanBeSeen) {
+  const auto bytes = pack(sample_circuit(3),
+                          std::vector<Morphology>{testing::random_tree(1, 5), Morphology(), Morphology()});
+  auto same = bytes;
+  testing::put_forest_right(same);
+  EXPECT_EQ(same, bytes);
+  std::size_t refused = 0, seen = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    for (const std::byte change : {std::byte{1}, std::byte{0xff}}) {
+      auto changed = bytes;
+      changed[i] ^= change;
+      testing::put_forest_right(changed);
+      try {
+        const Forest f = Forest::from_bytes(std::move(changed));
+        const View view = overview(f);
+        (void)choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+        (void)pick(f, view.camera, {320, 200}, {160, 100});
+        ++seen;
+      } catch (const InputError&) {
+        ++refused;
+      }
+    }
+  EXPECT_GT(refused, 100u);
+  EXPECT_GT(seen, 100u);
 }
 
 TEST(ForestFile, RefusesACircuitThatDoesNotFitItsNeurons) {

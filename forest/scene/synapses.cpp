@@ -20,35 +20,19 @@
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/synapses_layout.h"
 
 namespace forest::scene {
 namespace {
 
 using Json = nlohmann::ordered_json;
 
-static_assert(std::endian::native == std::endian::little);
+using namespace synapses_layout;
 
-constexpr std::array<char, 8> magic{'B', 'F', 'S', 'Y', 'N', 'A', 'P', '\n'};
-constexpr std::uint32_t version = 1;
-constexpr std::size_t alignment = 64;
 constexpr std::uint32_t bundle_size = 64, fan = 8;
 constexpr float usual_radius = .4f;   // µm: bouton and head of the spine together
 constexpr float whole_pixels = .75f;  // radius from which on every synapse is drawn as it is
 constexpr std::size_t at_once = 16;   // bundles; fixed, so that the result does not depend on threads
-
-enum Table : std::uint32_t { synapses, all_bundles, samples, text, part_count };
-constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(Synapse), sizeof(Bundle), 4, 1};
-
-struct Header {
-  struct Entry {
-    std::uint64_t offset, count, hash;
-  };
-  std::array<char, 8> magic;
-  std::uint32_t version, zero;
-  std::uint64_t file_size, forest;  // forest: what it was made for
-  std::array<Entry, part_count> table;
-  std::uint64_t hash;  // of all before
-};
 
 std::uint64_t mark_of(const Forest& forest) {
   return block_hash(std::as_bytes(forest.instances())) ^ (forest.section_of_segment().size() << 20) ^
@@ -236,13 +220,13 @@ struct Synapses::Data {
   Forest forest;
 
   template <class T>
-  std::span<const T> as(Table part) const {
+  std::span<const T> as(FilePart part) const {
     return {reinterpret_cast<const T*>(parts[part].data()), parts[part].size() / sizeof(T)};
   }
 };
 
-std::span<const Synapse> Synapses::all() const { return data_->as<Synapse>(Table::synapses); }
-std::span<const Bundle> Synapses::bundles() const { return data_->as<Bundle>(Table::all_bundles); }
+std::span<const Synapse> Synapses::all() const { return data_->as<Synapse>(FilePart::synapses); }
+std::span<const Bundle> Synapses::bundles() const { return data_->as<Bundle>(FilePart::bundles); }
 const std::vector<ProjectionFacts>& Synapses::projections() const { return data_->projections; }
 const Forest& Synapses::forest() const { return data_->forest; }
 
@@ -413,9 +397,9 @@ Synapses Synapses::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   const Forest& forest = data->forest;
   require(header.forest == mark_of(forest), "was made for another forest");
   const std::string wrong = "names things that are not there";
-  const auto all = data->as<Synapse>(Table::synapses);
+  const auto all = data->as<Synapse>(FilePart::synapses);
   try {
-    const auto text = data->as<char>(Table::text);
+    const auto text = data->as<char>(FilePart::text);
     const Json description = Json::parse(text.begin(), text.end());
     for (const Json& p : description.at("projections")) {
       ProjectionFacts facts{p.at("name"), p.at("source"), p.at("target"), p.at("first"), p.at("count")};
@@ -444,8 +428,8 @@ Synapses Synapses::check(std::shared_ptr<Data> data, std::span<const std::byte> 
             wrong);
   });
   // Every bundle but the last has one parent, which comes later: so a walk ends.
-  const auto bundles = data->as<Bundle>(Table::all_bundles);
-  const auto list = data->as<std::uint32_t>(Table::samples);
+  const auto bundles = data->as<Bundle>(FilePart::bundles);
+  const auto list = data->as<std::uint32_t>(FilePart::samples);
   std::uint64_t next_child = 0, next_synapse = 0, next_sample = 0;
   for (std::size_t n = 0; n < bundles.size(); ++n) {
     const Bundle& b = bundles[n];
@@ -480,7 +464,7 @@ Synapses::Choice Synapses::choose(const Eye& eye, const Colouring& colouring, Sy
   const auto list = bundles();
   if (list.empty() || colour == SynapseColour::none || most == 0) return choice;
   const auto every = all();
-  const auto sampled = data_->as<std::uint32_t>(Table::samples);
+  const auto sampled = data_->as<std::uint32_t>(FilePart::samples);
   const auto f_of = [](float pixels, float whole) {
     return 2. * double(pixels / whole) * double(pixels / whole);
   };

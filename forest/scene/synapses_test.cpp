@@ -9,12 +9,14 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/half.h"
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/view.h"
 
+#include "tests/checksums.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -216,8 +218,7 @@ TEST(Synapses, SitOnlyOnBranchesThatAPictureOfOneSampleDraws) {
     const Synapse& one = s.synapses.all()[i];
     const Neuron& neuron = s.forest.neurons()[s.forest.instances()[one.target].morphology];
     const frame::Segment& segment = s.forest.segments()[neuron.first_segment + one.segment];
-    const float width = 2.f * float(Eigen::numext::bit_cast<Eigen::half>(std::uint16_t(segment.meta >> 16))) *
-                        eye.magnification({one.centre(), 0.f});
+    const float width = 2.f * from_half(segment.meta >> 16) * eye.magnification({one.centre(), 0.f});
     drawn += width >= 4.f || float(segment.meta >> 8 & 255) / 256.f < width / 4.f;
   }
   EXPECT_EQ(drawn, choice.synapses.size());
@@ -294,6 +295,35 @@ TEST(Synapses, WhatIsWrongIsSaid) {
       EXPECT_EQ(s.bytes[at], std::byte{0}) << at;
     }
   }
+}
+
+TEST(Synapses, ChangedBehindRightChecksumsAreRefusedOrCanBeSeen) {
+  const Sample s;
+  std::vector<circuit::Projection> few{
+      {"few", "a", "b", {s.projections[0].synapses.begin(), s.projections[0].synapses.begin() + 150}}};
+  const std::vector<std::byte> bytes = Synapses::make(s.forest, few);
+  auto same = bytes;
+  testing::put_synapses_right(same);
+  EXPECT_EQ(same, bytes);
+  std::size_t refused = 0, seen = 0;
+  for (std::size_t i = 0; i < bytes.size(); ++i) {
+    auto changed = bytes;
+    changed[i] ^= std::byte{0xff};
+    testing::put_synapses_right(changed);
+    try {
+      const Synapses synapses = Synapses::from_bytes(std::move(changed), s.forest);
+      for (const std::size_t most : {10u, 1000u}) {
+        const auto choice = synapses.choose(s.near(), s.colouring, SynapseColour::sign, most);
+        for (const std::uint32_t k : choice.synapses)
+          (void)synapses.projection(synapses.all()[k]), (void)synapses.section(synapses.all()[k]);
+      }
+      ++seen;
+    } catch (const InputError&) {
+      ++refused;
+    }
+  }
+  EXPECT_GT(refused, 100u);
+  EXPECT_GT(seen, 100u);
 }
 
 }  // namespace
