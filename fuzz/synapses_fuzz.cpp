@@ -13,8 +13,8 @@
 
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace forest;
-  static const scene::Forest sample = scene::Forest::from_bytes(
-      scene::pack(testing::sample_circuit(4), testing::sample_neurons()), "sample");
+  static const scene::Forest sample =
+      scene::Forest::from_bytes(scene::pack(testing::sample_circuit(4), testing::sample_neurons()), "sample");
   static const scene::Colouring colouring =
       scene::colour(sample, scene::ColourBy::type, scene::Background::dark);
   const auto* first = reinterpret_cast<const std::byte*>(data);

@@ -359,8 +359,8 @@ bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze
 
 void Viewport::draw_moving() {
   scene::View view = settings_.view;
-  view.samples = budget_.samples();
-  view.detail.error *= budget_.error(), view.detail.thinnest = budget_.thinnest();
+  view.samples = budget().samples();
+  view.detail.error *= budget().error(), view.detail.thinnest = budget().thinnest();
   // What is not there yet is made once the view stands still.
   draw_part(view, 0, view.samples, {.skin = {.new_pieces = 0}, .synapses = moving_synapses});
 }
@@ -387,7 +387,7 @@ void Viewport::refine() {
 }
 
 void Viewport::took(float milliseconds) {
-  budget_.took(double(milliseconds));
+  budget().took(double(milliseconds));
   milliseconds_ = milliseconds_ > 0.f ? .8f * milliseconds_ + .2f * milliseconds : milliseconds;
   figures_.frames_per_second = 1000.f / milliseconds_;
 }

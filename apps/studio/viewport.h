@@ -143,6 +143,7 @@ class Viewport final : public QOpenGLWidget {
   std::vector<scene::LegendEntry> legend() const;
   void annotate();
   bool layered() const;  // drawn layer by layer for the gaze
+  scene::Budget& budget() { return layered() ? gaze_budget_ : budget_; }
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;
@@ -168,9 +169,9 @@ class Viewport final : public QOpenGLWidget {
   Stage stage_ = Stage::moving;
   std::uint32_t refined_ = 0;  // samples that are drawn of the picture that is shown
   float sample_milliseconds_ = 20.f;
-  float milliseconds_ = 0.f;  // of a moving picture, smoothed
-  scene::Budget budget_;      // of a moving picture
-  int warming_up_ = 2;        // the first pictures make programs and buffers: they are no measure
+  float milliseconds_ = 0.f;                                      // of a moving picture, smoothed
+  scene::Budget budget_, gaze_budget_{scene::Budget::with_gaze};  // of a moving picture
+  int warming_up_ = 2;  // the first pictures make programs and buffers: they are no measure
   Figures figures_;
   QTimer rest_;         // runs out when the view has stood still
   QElapsedTimer tick_;  // since the last step of flight

@@ -135,6 +135,8 @@ class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
   static constexpr double usual = 30.;
+  /// The same for pictures that follow a gaze: sixty a second.
+  static constexpr double with_gaze = 15.5;
 
   /// @param worst  error that is accepted at most, pixels
   explicit Budget(double milliseconds = usual, float worst = 6.f)
