@@ -13,35 +13,35 @@
 
 namespace forest::testing {
 
-/// Those of the parts that lie within the file.
-inline void put_parts_right(auto& table, auto& element_sizes, std::span<const std::byte> bytes) {
-  for (std::size_t p = 0; p < table.size(); ++p) {
-    auto& e = table[p];
-    if (e.offset <= bytes.size() && e.count <= (bytes.size() - e.offset) / element_sizes[p])
-      e.hash = block_hash(bytes.subspan(e.offset, e.count * element_sizes[p]));
+/// The file's size and those of its parts that lie within it; `seal(header)` puts that of the table right.
+template <class Header>
+void put_right(std::vector<std::byte>& bytes, std::span<const std::uint32_t> element_sizes, auto&& seal) {
+  Header header;
+  if (bytes.size() < sizeof header) return;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const std::span<const std::byte> all = bytes;
+  for (std::size_t p = 0; p < header.table.size(); ++p) {
+    auto& e = header.table[p];
+    if (e.offset <= all.size() && e.count <= (all.size() - e.offset) / element_sizes[p])
+      e.hash = block_hash(all.subspan(e.offset, e.count * element_sizes[p]));
   }
+  header.file_size = bytes.size();
+  seal(header);
+  std::memcpy(bytes.data(), &header, sizeof header);
 }
 
 inline void put_forest_right(std::vector<std::byte>& bytes) {
-  namespace layout = scene::layout;
-  layout::Header header;
-  if (bytes.size() < sizeof header) return;
-  std::memcpy(&header, bytes.data(), sizeof header);
-  put_parts_right(header.table, layout::element_sizes, bytes);
-  header.file_size = bytes.size();
-  header.table_hash = hash64(std::as_bytes(std::span(header.table)), header.file_size);
-  std::memcpy(bytes.data(), &header, sizeof header);
+  using scene::layout::Header;
+  put_right<Header>(bytes, scene::layout::element_sizes, [](Header& header) {
+    header.table_hash = hash64(std::as_bytes(std::span(header.table)), header.file_size);
+  });
 }
 
 inline void put_synapses_right(std::vector<std::byte>& bytes) {
-  namespace layout = scene::synapses_layout;
-  layout::Header header;
-  if (bytes.size() < sizeof header) return;
-  std::memcpy(&header, bytes.data(), sizeof header);
-  put_parts_right(header.table, layout::element_sizes, bytes);
-  header.file_size = bytes.size();
-  header.hash = hash64(std::as_bytes(std::span(&header, 1)).first(offsetof(layout::Header, hash)));
-  std::memcpy(bytes.data(), &header, sizeof header);
+  using scene::synapses_layout::Header;
+  put_right<Header>(bytes, scene::synapses_layout::element_sizes, [](Header& header) {
+    header.hash = hash64(std::as_bytes(std::span(&header, 1)).first(offsetof(Header, hash)));
+  });
 }
 
 }  // namespace forest::testing

@@ -51,15 +51,16 @@ Subject subject(const scene::Forest& forest, const Selection& selection) {
 double tidy(float value) { return std::round(double(value) * 1000.) / 1000.; }
 
 // One row feeds the panel, the JSON and the documentation. A null value: the row does not apply.
+template <class Of>
 struct Row {
   const char* key;
   const char* name;
   const char* unit;
   const char* hint;
-  Json (*value)(const Subject&);
+  Json (*value)(const Of&);
 };
 constexpr std::uint32_t none = 0xffffffffu;
-const Row rows[] = {
+const Row<Subject> rows[] = {
     {"neuron", "Neuron", "", "Id of the planted neuron, from 0",
      [](const Subject& s) { return Json(s.index()); }},
     {"type", "Cell type", "", "From the recipe of the column",
@@ -133,7 +134,7 @@ std::optional<scene::Pick> parent_of(const scene::Forest& forest, const scene::P
 std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection) {
   const Subject s = subject(forest, selection);
   std::vector<Fact> known;
-  for (const Row& row : rows)
+  for (const auto& row : rows)
     if (const Json value = row.value(s); !value.is_null())
       known.push_back({row.name, row.unit, row.hint, in_words(value)});
   return known;
@@ -142,7 +143,7 @@ std::vector<Fact> facts(const scene::Forest& forest, const Selection& selection)
 nlohmann::ordered_json to_json(const scene::Forest& forest, const Selection& selection) {
   const Subject s = subject(forest, selection);
   Json json;
-  for (const Row& row : rows)
+  for (const auto& row : rows)
     if (Json value = row.value(s); !value.is_null()) json[row.key] = std::move(value);
   json["segment"] = selection.pick.segment - s.neuron.first_segment;
   return json;
@@ -189,14 +190,7 @@ Contact contact(const scene::Synapses& all, std::uint32_t number) {
   return {all, synapse, number, all.projection(synapse)};
 }
 
-struct ContactRow {
-  const char* key;
-  const char* name;
-  const char* unit;
-  const char* hint;
-  Json (*value)(const Contact&);
-};
-const ContactRow contact_rows[] = {
+const Row<Contact> contact_rows[] = {
     {"synapse", "Synapse", "", "Its number among the edges of its population, from 0",
      [](const Contact& c) { return Json(c.synapse.id - c.projection.first); }},
     {"sign", "Sign", "", "Whether it excites or inhibits",
@@ -225,7 +219,7 @@ const ContactRow contact_rows[] = {
 std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse) {
   const Contact c = contact(synapses, synapse);
   std::vector<Fact> known;
-  for (const ContactRow& row : contact_rows)
+  for (const auto& row : contact_rows)
     if (const Json value = row.value(c); !value.is_null())
       known.push_back({row.name, row.unit, row.hint, in_words(value)});
   return known;
@@ -234,7 +228,7 @@ std::vector<Fact> facts(const scene::Synapses& synapses, std::uint32_t synapse) 
 nlohmann::ordered_json to_json(const scene::Synapses& synapses, std::uint32_t synapse) {
   const Contact c = contact(synapses, synapse);
   Json json;
-  for (const ContactRow& row : contact_rows)
+  for (const auto& row : contact_rows)
     if (Json value = row.value(c); !value.is_null()) json[row.key] = std::move(value);
   return json;
 }

@@ -19,6 +19,7 @@
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/scene/grove.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/synapses_layout.h"
 
@@ -127,20 +128,6 @@ class Sections {
   std::vector<Run> runs_;
 };
 
-// Interleaves the low 21 bits of three numbers.
-std::uint64_t morton(const Vec3& p, const Bounds& bounds) {
-  const Vec3 scale = Vec3::Constant(2097151.f).cwiseQuotient(bounds.extent().cwiseMax(Vec3::Constant(1e-3f)));
-  std::uint64_t key = 0;
-  for (int axis = 0; axis < 3; ++axis) {
-    std::uint64_t v = std::uint64_t(std::clamp((p[axis] - bounds.low[axis]) * scale[axis], 0.f, 2097151.f));
-    v = (v | v << 32) & 0x1f00000000ffffull, v = (v | v << 16) & 0x1f0000ff0000ffull;
-    v = (v | v << 8) & 0x100f00f00f00f00full, v = (v | v << 4) & 0x10c30c30c30c30c3ull;
-    v = (v | v << 2) & 0x1249249249249249ull;
-    key |= v << axis;
-  }
-  return key;
-}
-
 bool before(const Synapse& a, const Synapse& b) {
   return std::pair(a.rank(), a.id) < std::pair(b.rank(), b.id);
 }
@@ -150,17 +137,13 @@ struct Tree {
   std::vector<std::uint32_t> samples;
 };
 
-Sphere around(const Bounds& bounds) {
-  return {bounds.centre(), .5f * bounds.extent().norm() * 1.0001f + 1e-4f};
-}
-
 // Puts the synapses in the order of the file.
 Tree grow(std::vector<Synapse>& list, const Bounds& bounds) {
-  std::vector<std::pair<std::uint64_t, std::uint32_t>> order(list.size());
+  std::vector<Keyed> order(list.size());
   parallel_for(list.size(), 4096, [&](std::size_t i) {
-    order[i] = {morton(list[i].centre(), bounds), std::uint32_t(i)};
+    order[i] = {morton_code(list[i].centre(), bounds), i};
   });
-  std::ranges::sort(order);
+  parallel_sort(order);
   std::vector<Synapse> sorted(list.size());
   parallel_for(list.size(), 4096, [&](std::size_t i) { sorted[i] = list[order[i].second]; });
   list = std::move(sorted);
