@@ -181,8 +181,8 @@ void Lettering::write(frame::Image& image, std::string_view text, float left, fl
           float nearest = INFINITY;
           for (const auto& [a, b] : lines)
             // A point as thin as a stroke would be overlooked.
-            nearest = std::min(nearest, distance({float(x) + .5f, float(y) + .5f}, a, b) -
-                                            (a == b ? .6f * radius : 0.f));
+            nearest = std::min(
+                nearest, distance({float(x) + .5f, float(y) + .5f}, a, b) - (a == b ? .6f * radius : 0.f));
           if (const float share = std::clamp(radius + .5f - nearest, 0.f, 1.f); share > 0.f)
             blend(image, x, y, colour, share);
         }
