@@ -26,12 +26,14 @@ struct Trace {
     Vec3 at;             // µm
     float diameter = 0;  // µm
   };
-  Vec3 heading;             // unit: of the branch that it leaves, at its end
-  float diameter = 0.f;     // at its beginning, µm
-  std::vector<Stop> stops;  // at least one
+  Vec3 heading;               // unit: of the branch that it leaves, at its end
+  float diameter = 0.f;       // at its beginning, µm
+  std::vector<Stop> stops;    // at least one
   Vec3 ahead = Vec3::Zero();  // where it heads at its end
 
   const Vec3& end() const { return stops.back().at; }
+  /// At this share of its length. From the first place on: what leads there belongs to the branch before.
+  float diameter_at(float part) const;
   float length() const {
     float sum = 0.f;
     Vec3 last = Vec3::Zero();
