@@ -33,7 +33,8 @@ std::optional<std::size_t> longest_run(const lsystem::Word& word, const lsystem:
     const lsystem::Sample& sample = samples[std::size_t(values[0])];
     const auto column = std::ranges::find(sample.outcomes, "donor");
     if (column == sample.outcomes.end()) continue;
-    const double donor = sample.outcome(std::size_t(values[1]), std::size_t(column - sample.outcomes.begin()));
+    const double donor =
+        sample.outcome(std::size_t(values[1]), std::size_t(column - sample.outcomes.begin()));
     run = {donor, run.length && run.donor == donor ? run.length + 1 : 1};
     longest = std::max(longest.value_or(0), run.length);
   }

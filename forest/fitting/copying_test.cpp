@@ -11,7 +11,8 @@ namespace {
 
 std::optional<std::size_t> run_of(const std::string& word) {
   const lsystem::Grammar g = lsystem::parse(
-      "sample s(x = -> donor) = 0 -> 7 | 0 1 0 1: 0 3 0 1; 1 -> 8 | 0 1 0 1: 0 3 0 1; 2 -> 7 | 0 1 0 1: 0 3 0 1\n"
+      "sample s(x = -> donor) = 0 -> 7 | 0 1 0 1: 0 3 0 1; 1 -> 8 | 0 1 0 1: 0 3 0 1; 2 -> 7 | 0 1 0 1: 0 3 "
+      "0 1\n"
       "sample other(x =) = 0 | 0 1 0 1: 0 3 0 1\naxiom: " +
           word + "\nnothing: z -> z\n",
       "copies");
