@@ -21,6 +21,8 @@ struct Metric {
   std::string_view name;  // "total_length"
   std::string_view unit;  // "µm", "µm²", "°"; empty for counts and ratios
   Level level;
+  bool
+      diameters;  // depends on radii, of branches or of the soma; what does not is of the axes of branches alone
   /// One value an element: 1 for a neuron, Arbors::sections(), Arbors::bifurcations(), or shells of radius
   /// sholl_step, 2 sholl_step, … up to the last that is crossed. NaN where it is not defined for an element.
   std::vector<double> (*values)(const Arbors& arbors);

@@ -203,6 +203,26 @@ TEST(Metrics, ScaleWithTheirUnit) {
     }
 }
 
+// Nothing but radii is changed, each of them otherwise, and not where they are tied.
+TEST(Metrics, SayWhetherTheyDependOnDiameters) {
+  Names moved;
+  for (std::uint64_t seed = 0; seed < 20; ++seed) {
+    Random random(seed);
+    const auto thicker = [&](Point p) {
+      return Point{p.x, p.y, p.z, p.radius * float(random.uniform(1.1, 3.))};
+    };
+    const Morphology m = wild(seed), thick = changed(m, thicker);
+    for (const Metric& metric : metrics()) {
+      const auto was = metric.values(Arbors(m)), is = metric.values(Arbors(thick));
+      ASSERT_EQ(was.size(), is.size()) << metric.name;
+      for (std::size_t i = 0; i < was.size(); ++i)
+        if (was[i] != is[i] && !(std::isnan(was[i]) && std::isnan(is[i]))) moved.insert(metric.name);
+    }
+  }
+  for (const Metric& metric : metrics())
+    EXPECT_EQ(moved.contains(metric.name), metric.diameters) << metric.name;
+}
+
 TEST(Metrics, DoNotDependOnHowDenselyABranchWasTraced) {
   const Names local{
       "number_of_segments", "taper_1",        "taper_2",    "section_taper_rates", "parent_daughter_ratio",
