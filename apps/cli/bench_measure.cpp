@@ -204,7 +204,7 @@ void run(const std::vector<std::string>& places, bool details, Console& console)
                              {"bars_per_barcode", double(tips) / barcodes}};
   if (details) {
     std::vector<std::vector<std::string>> rows;
-    auto& each = out["microseconds"] = nlohmann::ordered_json::object();
+    auto each = nlohmann::ordered_json::object();
     for (const Metric& metric : metrics()) {
       double time = 0.;
       for (const Morphology& cell : cells) {
@@ -216,6 +216,7 @@ void run(const std::vector<std::string>& places, bool details, Console& console)
       each[std::string(metric.name)] = 1e6 * time / count;
       rows.push_back({std::string(metric.name), fmt::format("{:.1f}", 1e6 * time / count)});
     }
+    out["microseconds"] = std::move(each);
     console.table({"metric alone", "µs a neuron"}, rows);
   }
   console.print(out);

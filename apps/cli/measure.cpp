@@ -192,11 +192,12 @@ struct Table {
 /// A row a group: how many neurons, and over them mean and standard deviation of each metric, of which a neuron's own mean
 /// counts where it has many values.
 Table grouped(const Options& options, const Table& neurons, const std::vector<std::string>& groups) {
-  std::map<std::string, std::vector<const Row*>> members;
-  for (std::size_t i = 0; i < neurons.rows.size(); ++i) members[groups[i]].push_back(&neurons.rows[i]);
+  std::map<std::pair<bool, std::string>, std::vector<const Row*>> members;  // those nobody named come last
+  for (std::size_t i = 0; i < neurons.rows.size(); ++i)
+    members[{groups[i].empty(), groups[i]}].push_back(&neurons.rows[i]);
   Table table{{{options.by, "", true}, {"neurons", "", true}}, {}};
   for (const auto& [name, rows] : members)
-    table.rows.push_back({name.empty() ? "not said" : name, double(rows.size())});
+    table.rows.push_back({name.first ? "not said" : name.second, double(rows.size())});
   const auto ends_in = [](const std::string& name, std::string_view part) {
     return name.ends_with(fmt::format(" {}", part));
   };
@@ -241,8 +242,7 @@ nlohmann::ordered_json json(const Options& options, const Table& table) {
   const auto& [columns, rows] = table;
   nlohmann::ordered_json out{{"level", options.level}, {"kind", options.kind}};
   if (!options.by.empty()) out["by"] = options.by;
-  auto& units = out["units"] = nlohmann::ordered_json::object();
-  auto& list = out["rows"] = nlohmann::ordered_json::array();
+  auto units = nlohmann::ordered_json::object(), list = nlohmann::ordered_json::array();
   for (const Column& c : columns)
     if (!c.unit.empty()) units[c.name] = c.unit;
   for (const Row& row : rows) {
@@ -252,6 +252,7 @@ nlohmann::ordered_json json(const Options& options, const Table& table) {
                  row[i]);  // NaN is written as null
     list.push_back(std::move(entry));
   }
+  out["units"] = std::move(units), out["rows"] = std::move(list);
   return out;
 }
 

@@ -269,7 +269,7 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
       EXPECT_EQ(whole_neurons(place_, source), source.size()) << "opening it again ends what was begun";
     }
     Repository repository = Repository::open(place_, Access::read);
-    EXPECT_EQ(repository.neurons_where("total_length > 0 and hull_volume > 0").size(), source.size());
+    EXPECT_EQ(repository.neurons_where("total_length > 0 and sholl_maximum > 0").size(), source.size());
     EXPECT_THAT(repository.check(), testing::IsEmpty()) << "all metrics are those of the neurons";
     EXPECT_EQ(repository.grammar(hash), grammar_text);
     const auto count = [&](const char* question) {

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Which metrics are stored with every neuron, so that neurons are found by them: those of whole neurons, and means of others
-// that tell cells apart. Storing all would take most of the time of an import.
+// Which metrics are stored with every neuron, so that neurons are found by them: those that cost an import little. Storing all
+// would take most of its time.
 #pragma once
 
 #include <span>

@@ -78,8 +78,9 @@ void mark(Occupied& occupied, const Place& from, const Place& to) {
   std::array<int, 3> box = from.box, step{};
   std::array<double, 3> next{}, width{};  // share of the segment up to the next wall, and between walls
   int walls = 0;
+  for (std::size_t i = 0; i < 3; ++i) walls += std::abs(to.box[i] - box[i]);
+  if (walls == 1) return set(occupied, to.box);
   for (std::size_t i = 0; i < 3; ++i) {
-    walls += std::abs(to.box[i] - box[i]);
     step[i] = to.at[i] < from.at[i] ? -1 : 1;
     const double way = std::abs(to.at[i] - from.at[i]);
     width[i] = way > 0. ? 1. / way : 1e300;

@@ -11,6 +11,8 @@
 
 #include <Eigen/Geometry>
 
+#include "forest/core/clones.h"
+
 namespace forest::statistics {
 namespace {
 
@@ -44,6 +46,8 @@ class Quickhull {
     }
     return result();
   }
+
+  std::span<const Face> faces() const { return faces_; }
 
  private:
   std::vector<Index> everything() const {
@@ -185,16 +189,16 @@ class Quickhull {
   Hull result() const {
     Hull hull;
     const Vector& origin = points_[faces_.back().corners[0]];
+    std::vector<bool> corner(points_.size());
     for (const Face& face : faces_) {
       if (!face.alive) continue;
-      hull.vertices.insert(hull.vertices.end(), face.corners.begin(), face.corners.end());
+      for (const Index c : face.corners) corner[c] = true;
       const Vector a = points_[face.corners[0]] - origin, b = points_[face.corners[1]] - origin,
                    c = points_[face.corners[2]] - origin;
       hull.volume += a.dot(b.cross(c)) / 6.;
     }
-    std::ranges::sort(hull.vertices);
-    const auto twice = std::ranges::unique(hull.vertices);
-    hull.vertices.erase(twice.begin(), twice.end());
+    for (Index i = 0; i < points_.size(); ++i)
+      if (corner[i]) hull.vertices.push_back(i);
     return hull;
   }
 
@@ -213,15 +217,64 @@ class Quickhull {
 
 }  // namespace
 
-Hull convex_hull(std::span<const Vector> points) {
-  double spread = 0.;
-  for (const Vector& p : points) spread = std::max(spread, (p - points[0]).lpNorm<Eigen::Infinity>());
-  double tolerance = 16. * std::numeric_limits<double>::epsilon() * spread;
+namespace {
+
+Hull plain_hull(std::span<const Vector> points, double tolerance) {
   for (int attempt = 0; attempt < 4; ++attempt, tolerance *= 1e3)
     if (auto hull = Quickhull(points, tolerance).run()) return *std::move(hull);
   Hull all{std::vector<Index>(points.size()), std::numeric_limits<double>::quiet_NaN()};
   std::iota(all.vertices.begin(), all.vertices.end(), 0);
   return all;
+}
+
+FOREST_CLONES void raise(std::size_t count, const double* __restrict x, const double* __restrict y,
+                         const double* __restrict z, double nx, double ny, double nz, double offset,
+                         double* __restrict highest) {
+  for (std::size_t i = 0; i < count; ++i) {
+    const double above = nx * x[i] + ny * y[i] + nz * z[i] - offset;
+    highest[i] = highest[i] > above ? highest[i] : above;
+  }
+}
+
+/// Those that may be corners: what lies within the hull of a few points is not. Empty when that hull is flat.
+std::vector<Index> candidates(std::span<const Vector> points, double tolerance) {
+  constexpr std::size_t apart = 24;
+  std::vector<Vector> some;
+  for (std::size_t i = 0; i < points.size(); i += apart) some.push_back(points[i]);
+  Quickhull rough(some, tolerance);
+  const auto hull = rough.run();
+  if (!hull || !(hull->volume > 0.)) return {};
+
+  std::vector<double> x, y, z, highest(points.size(), -1.);
+  for (auto* column : {&x, &y, &z}) column->reserve(points.size());
+  for (const Vector& p : points) x.push_back(p.x()), y.push_back(p.y()), z.push_back(p.z());
+  for (const Face& face : rough.faces())
+    if (face.alive)
+      raise(points.size(), x.data(), y.data(), z.data(), face.normal.x(), face.normal.y(), face.normal.z(),
+            face.offset, highest.data());
+  std::vector<Index> kept;
+  for (const Index corner : hull->vertices) kept.push_back(Index(apart) * corner);
+  for (Index i = 0; i < points.size(); ++i)
+    if (i % apart != 0 && highest[i] > 0.) kept.push_back(i);
+  return kept;
+}
+
+}  // namespace
+
+Hull convex_hull(std::span<const Vector> points) {
+  constexpr std::size_t many = 256;
+  double spread = 0.;
+  for (const Vector& p : points) spread = std::max(spread, (p - points[0]).lpNorm<Eigen::Infinity>());
+  const double tolerance = 16. * std::numeric_limits<double>::epsilon() * spread;
+  if (points.size() > many)
+    if (const auto kept = candidates(points, tolerance); !kept.empty()) {
+      std::vector<Vector> some;
+      for (const Index i : kept) some.push_back(points[i]);
+      Hull hull = plain_hull(some, tolerance);
+      for (Index& corner : hull.vertices) corner = kept[corner];
+      return hull;
+    }
+  return plain_hull(points, tolerance);
 }
 
 PlanarHull planar_hull(std::vector<Eigen::Vector2d> points) {
