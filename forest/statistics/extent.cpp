@@ -24,8 +24,14 @@ double extent_holding(double part, const Arbors& arbors, const std::vector<doubl
   const auto bin = [low = low, scale](double x) {
     return std::min(bins - 1, std::size_t((x - low) * scale));
   };
-  std::array<double, bins> held{};
-  for (std::size_t i = 0; i < length.size(); ++i) held[bin(coordinate[i])] += length[i];
+  std::array<double, bins> held{},
+      others{};  // by turns: neighbours often fall into one bin, and would wait for each other
+  for (std::size_t i = 0; i + 1 < length.size(); i += 2) {
+    held[bin(coordinate[i])] += length[i];
+    others[bin(coordinate[i + 1])] += length[i + 1];
+  }
+  if (length.size() % 2) held[bin(coordinate.back())] += length.back();
+  for (std::size_t k = 0; k < bins; ++k) held[k] += others[k];
   std::size_t first = 0, last = bins - 1;
   for (double sum = held[first]; sum <= spare && first + 1 < bins;) sum += held[++first];
   for (double sum = held[last]; sum <= spare && last > 0;) sum += held[--last];

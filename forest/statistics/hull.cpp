@@ -34,7 +34,9 @@ struct Face {
 class Quickhull {
  public:
   Quickhull(std::span<const Vector> points, double tolerance)
-      : points_(points), tolerance_(tolerance), next_(points.size(), none) {}
+      : points_(points), tolerance_(tolerance), next_(points.size(), none) {
+    faces_.reserve(512);  // as many as a few hundred points need
+  }
 
   /// None when rounding has made a hole in the hull; a greater tolerance helps.
   std::optional<Hull> run() {

@@ -19,6 +19,9 @@ Barcodes path_barcodes(const Arbors& arbors) { return {arbors, Filtration::path}
 Hulls hulls(const Arbors& arbors) {
   const Columns& c = arbors.columns();
   std::vector<std::vector<Vector>> points(arbors.stems().size());
+  std::vector<std::size_t> counts(points.size(), 0);
+  for (const Branch& b : arbors.sections()) counts[b.arbor] += b.row_count;
+  for (std::size_t i = 0; i < points.size(); ++i) points[i].reserve(counts[i]);
   for (const Branch& b : arbors.sections())  // a daughter's first point is its parent's last
     for (std::size_t row = b.first_row + (b.parent >= 0); row <= b.last_row(); ++row)
       points[b.arbor].push_back(place(c, row));
