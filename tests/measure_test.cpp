@@ -45,6 +45,17 @@ TEST(RealNeurons, ObeyTheLawsOfTrees) {
     if (a.sections().empty()) continue;
     EXPECT_GE(value("total_length", a) + 1e-6, value("max_path_distance", a));
     EXPECT_LE(summary("section_strahler_orders", a).max, 1. + std::log2(value("number_of_leaves", a)));
+    const Summary bars = summary("tmd_path_bars", a);
+    EXPECT_EQ(double(bars.count), value("number_of_leaves", a));
+    EXPECT_NEAR(bars.mean * double(bars.count), value("total_length", a), 1e-6 * value("total_length", a));
+    for (const auto& [part, whole] :
+         {std::pair("width", "total_width"), {"height", "total_height"}, {"depth", "total_depth"}})
+      EXPECT_FALSE(value(part, a) > value(whole, a)) << part;
+    EXPECT_FALSE(value("hull_volume", a) >
+                 value("total_width", a) * value("total_height", a) * value("total_depth", a) * (1. + 1e-9));
+    EXPECT_FALSE(value("circularity", a) > 1.);
+    EXPECT_FALSE(value("fractal_dimension_boxes", a) > 2.5);
+    EXPECT_FALSE(summary("tortuosity_10", a).min < 1. - 1e-6);
   }
 }
 

@@ -62,7 +62,9 @@ std::span<const Verb> verbs() {
       {"check", "Say what is odd in neuron files, and mend them", "brainforest check cells/ --repair mended/",
        check},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
-       "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
+       "brainforest measure cells/*.swc --kind dendrite --csv cells.csv\n"
+       "  brainforest measure --repo cells.db --population L5 --by type --xlsx types.xlsx",
+       measure},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"
        "  brainforest model edit pyramidal --repo cells.db\n"

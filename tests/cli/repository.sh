@@ -37,7 +37,7 @@ cmp one.db two.db
 [ "$(ls one.db*)" = one.db ]
 
 # An independent reader finds what the schema's page says.
-[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n7' ]
+[ "$(sqlite3 one.db 'pragma integrity_check; pragma foreign_key_check; pragma user_version')" = $'ok\n8' ]
 [ "$(sqlite3 one.db 'select count(*), sum(sections), min(name), max(name) from neurons')" = '40|'"$(sqlite3 one.db 'select count(*) from sections')"'|cell00|cell39' ]
 [ "$(sqlite3 one.db "select count(*) from neurons join provenance on neuron = id where origin = 'traced' and length(source_hash) = 32 and source_file like 'cells/%.swc'")" = 40 ]
 python3 - <<'PY'
