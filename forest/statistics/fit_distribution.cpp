@@ -86,7 +86,8 @@ std::vector<Run> take_atoms(std::vector<Run>& runs, std::size_t count, bool step
       if (i > 0 && i + 1 < runs.size())
         usual = std::max(count_at(i - 1), count_at(i + 1));
       else if (runs.size() > 2)
-        usual = i == 0 ? count_at(1) * count_at(1) / count_at(2) : count_at(i - 1) * count_at(i - 1) / count_at(i - 2);
+        usual = i == 0 ? count_at(1) * count_at(1) / count_at(2)
+                       : count_at(i - 1) * count_at(i - 1) / count_at(i - 2);
       if (count_at(i) < 1.7 * usual + 5. * std::sqrt(usual + 1.)) continue;
     }
     atoms.push_back(runs[i]);
