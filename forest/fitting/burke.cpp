@@ -85,7 +85,7 @@ struct KindModel {
   Angles angles;
   Values girths;
   double finest = 0., thickest = 0., extent = 0.;
-  std::size_t most_tips = 0, sections = 0;
+  std::size_t most_abreast = 0, sections = 0;
   Rate fork, end;
   std::string loss, trend;  // rows of tables by diameter: of µm a µm; of the ratio over its mean
   double anticorrelation = 0., ratio_mean = 1., ratio_sd = 0.;
@@ -186,7 +186,7 @@ KindModel measured(std::span<const Morphology> cells, const Form& form, double s
       parents.push_back(parent), ratios.push_back({ratio(b.left), ratio(b.right)});
     }
     model.correction.tips += double(tips) / double(cells.size());
-    model.most_tips = std::max(model.most_tips, tips);
+    model.most_abreast = std::max(model.most_abreast, abreast(arbors));
   }
   if (model.sections == 0) return model;
   model.extent = std::min(model.extent, 1e5);  // 10 cm: a stray point must not make growth endless
@@ -234,7 +234,7 @@ std::string text_of(const KindModel& m) {
       "end_{0}: Tip_{0}(d, path) : path > 0 -> : if(path < extent_{0}, ends_{0}(d), 1)\n"
       "grow_{0}: Tip_{0}(d, path) {{ e = thin_{0}(d) }}\n"
       "  -> /(uniform(0, 360)) &(wander_{0}()) F(dL, e) Tip_{0}(e, path + dL)\n",
-      k, 4 * std::max<std::size_t>(m.most_tips, 5));
+      k, 4 * std::max<std::size_t>(m.most_abreast, 5));
   return t + text_of(m.stems, *m.form, fmt::format("Tip_{}(d, 0)", k));
 }
 
@@ -245,7 +245,7 @@ std::string text_of(const std::vector<KindModel>& kinds, const Values& somata, s
   for (const KindModel& m : kinds) {
     const double long_way = m.extent / step + 3. + double(*std::ranges::max_element(m.stems.counts));
     steps = std::max(steps, long_way);
-    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_tips, 5));
+    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_abreast, 5));
     axiom += fmt::format(" Stems_{0}(stems_{0})", m.form->suffix);
     parts += text_of(m);
   }

@@ -21,8 +21,8 @@ struct BurkeOptions {
 
 /// The text of a grammar (docs/lsystem/notation.md): soma, number and diameter and direction of stems, taper, chances to fork
 /// and to end by diameter (exponentials by maximum likelihood), ratios of diameters with Burke's anticorrelation, angles,
-/// tortuosity. Nothing is thinner, thicker or further than in the cells, and where four times as many tips grow as any
-/// cell has none forks, so that it never runs away. The same text for the same cells, name and seed.
+/// tortuosity. Nothing is thinner, thicker or further than in the cells, and where four times as many branches grow as
+/// run side by side in any cell none forks, so that it never runs away. The same text for the same cells, name and seed.
 /// @param name  for its title
 /// Throws Error when the cells have no section of these kinds.
 std::string burke_grammar(std::span<const Morphology> cells, const std::string& name,

@@ -25,7 +25,7 @@ struct KindModel {
   Values thresholds, girths;
   Angles angles;
   double extent = 0.;
-  std::size_t most_tips = 0, sections = 0;
+  std::size_t most_abreast = 0, sections = 0;
   Correction correction;  // of the threshold: divides it
 };
 
@@ -61,7 +61,7 @@ KindModel measured(std::span<const Morphology> cells, const Form& form, double s
         model.thresholds.push_back(0.5 * parent + 0.25 * (x + y));
     }
     model.correction.tips += double(tips) / double(cells.size());
-    model.most_tips = std::max(model.most_tips, tips);
+    model.most_abreast = std::max(model.most_abreast, abreast(arbors));
   }
   model.extent = std::min(model.extent, 1e5);  // 10 cm: a stray point must not make growth endless
   std::ranges::sort(model.girths);
@@ -105,7 +105,7 @@ std::string text_of(const KindModel& m) {
       "  -> F(left, e) /(uniform(0, 360)) [ +(b * big / (small + big)) !(small) Branch_{0}(small, path) ]\n"
       "  -(b * small / (small + big)) !(big) Branch_{0}(big, path)\n",
       k, number_text(m.extent), number_text(m.correction.more), number_text(m.correction.tips),
-      number_text(thickest), number_text(finest), 4 * std::max<std::size_t>(m.most_tips, 5));
+      number_text(thickest), number_text(finest), 4 * std::max<std::size_t>(m.most_abreast, 5));
   return t + text_of(m.stems, *m.form, fmt::format("Branch_{}(d, 0)", k));
 }
 
@@ -117,7 +117,7 @@ std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, st
     const double long_way =
         3. * m.extent / shared.step + 200. + double(*std::ranges::max_element(m.stems.counts));
     steps = std::max(steps, long_way);
-    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_tips, 5));
+    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_abreast, 5));
     axiom += fmt::format(" Stems_{0}(stems_{0})", m.form->suffix);
     parts += text_of(m);
   }

@@ -133,6 +133,16 @@ Angles angles_of(std::span<const Morphology> cells, SectionKind kind, double ste
   return {turns, spreads};
 }
 
+std::size_t abreast(const Arbors& arbors) {
+  std::vector<std::pair<double, int>> changes;
+  for (const Branch& b : arbors.sections())
+    changes.insert(changes.end(), {{b.path_distance - b.length, 1}, {b.path_distance, -1}});
+  std::ranges::sort(changes);  // at one place what ends comes first
+  int now = 0, most = 0;
+  for (const auto& [place, change] : changes) most = std::max(most, now += change);
+  return std::size_t(most);
+}
+
 std::string drawn_as(const std::string& name, const std::vector<double>& values,
                      std::vector<std::string> families) {
   if (values.empty()) return fmt::format("function {} = 0\n", name);

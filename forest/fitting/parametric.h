@@ -29,6 +29,9 @@ struct Angles {
 };
 Angles angles_of(std::span<const Morphology> cells, SectionKind kind, double step);
 
+/// How many branches run side by side at most, at the same path distance: what grows at once, where all grow alike.
+std::size_t abreast(const statistics::Arbors& arbors);
+
 /// A declaration that draws such values, by the family that fits them best, and none beyond them.
 std::string drawn_as(const std::string& name, const std::vector<double>& values,
                      std::vector<std::string> families);

@@ -251,6 +251,26 @@ TEST(Fit, FindsTheStepsOfATracerAndWhatComesBackBesideThem) {
   EXPECT_EQ(fit_distribution(x, {.families = {"gamma"}, .atoms = false}).distribution.step, 0.);
 }
 
+// Half a pixel of 0.22917 µm, written with two decimals, as in real files.
+TEST(Fit, FindsStepsThatFilesHaveRounded) {
+  const Distribution truth{{part("lognormal", {0.6, 0.5})}, {}, 0.22917};
+  std::vector<double> x = drawn(truth, 200, 6);
+  for (double& v : x) v = std::round(v * 100.) / 100.;
+  const DistributionFit f = fit_distribution(x);
+  EXPECT_NEAR(f.distribution.step, 0.22917, 1e-3);
+  EXPECT_TRUE(f.distribution.atoms.empty());
+  // What has no step has none.
+  EXPECT_EQ(fit_distribution(drawn({truth.components, {}, 0.}, 200, 6)).distribution.step, 0.);
+}
+
+TEST(Fit, TorquesThatAreEvenAreUniform) {
+  const DistributionFit f =
+      fit_distribution(drawn({{part("uniform", {-180, 180})}, {}, 0.}, 800, 6), {.angles = true});
+  EXPECT_EQ(f.distribution.expression(), "uniform(-180, 180)");
+  EXPECT_TRUE(f.estimates.empty());
+  EXPECT_GT(f.p, 0.01);
+}
+
 TEST(Fit, TakesWhateverItIsGiven) {
   constexpr double nan = std::numeric_limits<double>::quiet_NaN(),
                    infinity = std::numeric_limits<double>::infinity();

@@ -59,16 +59,22 @@ double step_of(const std::vector<Run>& runs, std::size_t count) {
     if (const double gap = runs[i].value - runs[i - 1].value; gap > 1e-5 * most) gaps.push_back(gap);
   if (gaps.size() < 4) return 0.;
   std::ranges::sort(gaps);
-  for (const double step : {gaps.front(), gaps[gaps.size() / 10], gaps[gaps.size() / 2]}) {
-    std::size_t fitting = 0;
-    double steps = 0., squares = 0.;  // refined: the regression of values on their numbers of steps
-    for (const Run& r : runs) {
-      const double k = std::round(r.value / step);
-      if (std::abs(r.value / step - k) < 0.06) fitting += r.count, steps += k * r.value, squares += k * k;
+  for (double step : {gaps.front(), gaps[gaps.size() / 10], gaps[gaps.size() / 2]}) {
+    // A step known from small values, which files round, is told more exactly by large ones: the regression of values on
+    // their numbers of steps.
+    for (const double far : {8., 40., 1e9}) {
+      double steps = 0., squares = 0.;
+      for (const Run& r : runs)
+        if (const double k = std::round(r.value / step);
+            std::abs(k) <= far && std::abs(r.value / step - k) < 0.15)
+          steps += double(r.count) * k * r.value, squares += double(r.count) * k * k;
+      if (squares > 0.) step = steps / squares;
     }
-    if (fitting * 50 < count * 49 || squares == 0.) continue;
-    if (gaps[gaps.size() / 2] > 3.5 * step) continue;  // every value is a multiple of something small enough
-    return steps / squares;
+    std::size_t fitting = 0;
+    for (const Run& r : runs)
+      if (std::abs(r.value / step - std::round(r.value / step)) < 0.06) fitting += r.count;
+    // Where the step is small every value is a multiple.
+    if (fitting * 20 >= count * 19 && gaps[gaps.size() / 2] <= 3.5 * step) return step;
   }
   return 0.;
 }
@@ -202,7 +208,10 @@ bool improve(Components& components, const Values& x, int rounds) {
 }
 
 /// @param begin  parameters nearby, when they are known
-std::optional<Components> fitted(const Spec& spec, const Values& x, const Components* begin = nullptr) {
+std::optional<Components> fitted(const Spec& spec, const Values& x, bool angles,
+                                 const Components* begin = nullptr) {
+  if (spec.size() == 1 && angles && spec[0]->support == Family::interval)
+    return Components{{spec[0], {-180., 180.}}};
   if (spec.size() == 1) {
     Component c{spec[0]};
     if (!c.family->fit(x, {}, c.parameters)) return std::nullopt;
@@ -221,16 +230,18 @@ std::optional<Components> fitted(const Spec& spec, const Values& x, const Compon
     // The likelihood's shape is known from few values; all of them say where exactly its top is.
     if (!improve(components, thinned(x, coarse), 300)) return std::nullopt;
   }
-  if ((begin || x.size() > coarse) && !improve(components, x, begin ? 40 : 10)) return std::nullopt;
+  if ((begin || x.size() > coarse) && !improve(components, x, begin ? 40 : 4)) return std::nullopt;
   if (std::ranges::all_of(spec, [&](const Family* f) { return f == spec[0]; }))
     std::ranges::sort(components, {},
                       [](const Component& c) { return c.family->quantile(c.parameters, 0.5); });
   return components;
 }
 
-int parameters_of(const Spec& spec) {
-  return std::accumulate(spec.begin(), spec.end(), int(spec.size()) - 1,
-                         [](int sum, const Family* f) { return sum + f->count; });
+int parameters_of(const Spec& spec, bool angles) {
+  int sum = int(spec.size()) - 1;
+  for (const Family* f : spec)
+    sum += angles && f->support == Family::interval ? 0 : f->count;  // the circle is as it is
+  return sum;
 }
 
 std::string name_of(const Spec& spec) {
@@ -368,6 +379,8 @@ Values half_widths(const Components& best, const Coordinates& coordinates, const
 std::vector<Estimate> estimates_of(const Components& best, const Values& x, double part, double confidence) {
   const Coordinates coordinates(best);
   const Values widths = half_widths(best, coordinates, x, confidence);
+  const auto first_weight = std::size_t(
+      std::ranges::find(coordinates.places, -1, &Coordinates::Place::parameter) - coordinates.places.begin());
   std::vector<Estimate> out;
   for (std::size_t j = 0; j < best.size(); ++j) {
     const Family& f = *best[j].family;
@@ -379,7 +392,9 @@ std::vector<Estimate> estimates_of(const Components& best, const Values& x, doub
                                                : widths[std::size_t(place - coordinates.places.begin())];
     };
     if (best.size() > 1) {
-      const double w = best[j].weight, wide = j + 1 < best.size() ? width(-1) : nan;
+      const double w = best[j].weight, wide = j + 1 < best.size() ? width(-1)
+                                              : best.size() == 2  ? widths[first_weight]
+                                                                  : nan;
       out.push_back(
           {before + "weight", w * part, std::max(0., w - wide) * part, std::min(1., w + wide) * part});
       if (std::isnan(wide)) out.back().lower = out.back().upper = nan;
@@ -438,7 +453,7 @@ double p_of(const Spec& spec, const Components& best, const Values& x, const Fit
     some.resize(tested);
     std::ranges::sort(some);
   }
-  const auto refitted = fitted(spec, some, &best);
+  const auto refitted = fitted(spec, some, options.angles, &best);
   if (!refitted) return nan;
   const double here = distance(*refitted, some).anderson_darling;
   std::vector<char> further(options.replicates, 0);
@@ -448,7 +463,7 @@ double p_of(const Spec& spec, const Components& best, const Values& x, const Fit
     Values drawn(some.size());
     for (double& v : drawn) v = drawn_from.draw(random);
     std::ranges::sort(drawn);
-    const auto again = fitted(spec, drawn, &*refitted);
+    const auto again = fitted(spec, drawn, options.angles, &*refitted);
     further[r] = again && distance(*again, drawn).anderson_darling >= here;
   });
   return (1. + double(std::ranges::count(further, 1))) / (1. + double(options.replicates));
@@ -482,9 +497,10 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   };
   std::vector<Fitted> all;
   const auto attempt = [&](const Spec& spec) {
-    const auto components = fitted(spec, x);
+    const auto components = fitted(spec, x, options.angles);
     if (!components) return;
-    const double likelihood = log_likelihood(*components, x), n = double(x.size()), k = parameters_of(spec);
+    const double likelihood = log_likelihood(*components, x), n = double(x.size()),
+                 k = parameters_of(spec, options.angles);
     if (!std::isfinite(likelihood)) return;
     const double aicc = n > k + 1. ? 2. * k - 2. * likelihood + 2. * k * (k + 1.) / (n - k - 1.) : infinity;
     all.push_back(
@@ -505,7 +521,8 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
     fit.distribution.components = best.components;
     for (Component& c : fit.distribution.components) c.weight *= part;
     fit.distribution.step = sample.step;
-    fit.estimates = estimates_of(best.components, x, part, options.confidence);
+    if (best.candidate.parameters > 0)
+      fit.estimates = estimates_of(best.components, x, part, options.confidence);
     const Distance far = distance(best.components, x);
     fit.kolmogorov = far.kolmogorov, fit.anderson_darling = far.anderson_darling;
     if (options.replicates > 0) fit.p = p_of(best.spec, best.components, x, options);

@@ -41,7 +41,8 @@ for q in json.load(open("by.json"))["quantities"]:
     assert all(b["count"] >= 60 for b in q["bins"]) or len(q["bins"]) == 1
     assert sum(b["count"] for b in q["bins"]) == q["count"]
 PY
-$BRAINFOREST distributions cells --kind basal --by path --replicates 0 | grep -q 'path up to'
+$BRAINFOREST distributions cells --kind basal --by path --replicates 0 >path.txt
+grep -q 'path up to' path.txt
 
 # Kept in the repository, in versions, as texts that a grammar can use.
 $BRAINFOREST distributions --repo cells.db --population grown --kind basal --replicates 0 --keep >kept.txt
@@ -51,8 +52,7 @@ $BRAINFOREST distributions --repo cells.db --population grown --kind basal --by 
 for name in length_of_terminal_segments torque nontermination_by_order; do
   $BRAINFOREST model show basal.$name --repo cells.db >>use.lsys
 done
-$BRAINFOREST query "select text from distribution where name = 'basal.amplitude' and version = 1" --repo cells.db --json |
-  python3 -c 'import json,sys; print(json.load(sys.stdin)["rows"][0][0])' >>use.lsys
+$BRAINFOREST model show basal.amplitude@1 --repo cells.db >>use.lsys
 cat >>use.lsys <<'TEXT'
 steps: 4
 axiom: Soma(10) f(5) A(0)
