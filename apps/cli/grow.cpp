@@ -13,6 +13,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/io/format.h"
+#include "forest/lsystem/derive.h"
 #include "forest/morphology/measure.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
@@ -31,6 +32,7 @@ struct Options {
   std::filesystem::path out;
   std::size_t count = 1;
   std::uint64_t seed = 0;
+  std::uint32_t time_lapse = 0;  // steps between pictures of a growing neuron; 0: only the grown one
   bool force = false;
 };
 
@@ -42,10 +44,28 @@ std::filesystem::path file_of(const std::filesystem::path& folder, const std::st
   return folder / (repository::file_name(name) + ".swc");  // a model may have any name
 }
 
+struct Younger {
+  int step;
+  Morphology neuron;
+};
+
 struct Ready {
   Morphology neuron;
   std::optional<repository::Prepared> prepared;  // when it goes into a repository
+  std::vector<Younger> younger;                  // for a time lapse, up to the last step
 };
+
+/// After which steps a time lapse shows a neuron: the last one among them.
+std::vector<int> moments(const Options& options, const lsystem::Grammar& grammar) {
+  std::vector<int> steps;
+  if (options.time_lapse == 0) return steps;
+  for (std::int64_t step = options.time_lapse; step < grammar.steps; step += options.time_lapse)
+    steps.push_back(int(step));
+  steps.push_back(grammar.steps);
+  return steps;
+}
+
+std::string name_at(const std::string& name, int step) { return fmt::format("{}-step{:06}", name, step); }
 
 /// Where grown neurons go.
 class Destination {
@@ -100,13 +120,18 @@ class IntoFolder final : public Destination {
     for (const auto& file : unfinished_) std::filesystem::remove(file, none);
   }
   void put(Ready& ready, const std::string& name, std::uint64_t) override {
-    const auto file = file_of(folder_, name);
-    if (!std::filesystem::exists(file)) unfinished_.push_back(file);
-    io::write(file, ready.neuron);
+    write(name, ready.neuron);
+    for (const Younger& y : ready.younger) write(name_at(name, y.step), y.neuron);
   }
   void finish() override { unfinished_.clear(); }
 
  private:
+  void write(const std::string& name, const Morphology& neuron) {
+    const auto file = file_of(folder_, name);
+    if (!std::filesystem::exists(file)) unfinished_.push_back(file);
+    io::write(file, neuron);
+  }
+
   std::filesystem::path folder_;
   std::vector<std::filesystem::path> unfinished_;
 };
@@ -133,6 +158,12 @@ void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, 
     for (std::size_t i = 0; i < count; ++i)
       if (there[i]) overwrites.look(files[i], format.write(neurons[i]));
   }
+  lsystem::Deriver deriver(grammar);
+  for (const int step : moments(options, grammar))
+    for (std::size_t i = 0; i < options.count; ++i)
+      if (const auto file = file_of(options.out, name_at(name_of(options, grammar, i), step));
+          std::filesystem::exists(file))
+        overwrites.look(file, format.write(lsystem::grow_to(deriver, grammar, options.seed, i, step)));
   overwrites.refuse();
 }
 
@@ -144,14 +175,18 @@ void run(const Options& options, Console& console) {
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
   if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
 
+  const std::vector<int> steps = moments(options, grammar);
   std::size_t segments = 0;
   double length = 0.;
   console.progress().begin("growing", options.count);
   parallel_in_order(
       options.count,
       [&](std::size_t i) {
-        Ready ready{lsystem::grow(grammar, options.seed, i), {}};
+        Ready ready{lsystem::grow(grammar, options.seed, i), {}, {}};
         if (!options.repo.empty()) ready.prepared.emplace(ready.neuron);
+        lsystem::Deriver deriver(grammar);
+        for (const int step : steps)
+          ready.younger.push_back({step, lsystem::grow_to(deriver, grammar, options.seed, i, step)});
         return ready;
       },
       [&](std::size_t i, Ready&& ready) {
@@ -169,7 +204,8 @@ void run(const Options& options, Console& console) {
                  {"seed", options.seed},
                  {"neurons", options.count},
                  {"segments", segments},
-                 {"length", length}});
+                 {"length", length},
+                 {"steps", steps}});
   const double count = double(options.count);
   console.table({"grammar", "neurons", "segments each", "length each (µm)"},
                 {{grammar.name, fmt::format("{}", options.count),
@@ -193,9 +229,16 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   add_seed(command, options->seed, "The same seed grows the same neurons");
   CLI::Option_group* into = command.add_option_group("into", "where the neurons go");
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
-  into->add_option("--out", options->out, "Write them into this folder as SWC files");
+  CLI::Option* out = into->add_option("--out", options->out, "Write them into this folder as SWC files");
   into->require_option(1, 2);
   model->needs(repo);
+  CLI::Option* lapse =
+      command
+          .add_option("--time-lapse", options->time_lapse,
+                      "Write every neuron also as it was after each so many steps, as NAME-step000010.swc")
+          ->type_name("STEPS")
+          ->needs(out);
+  must_be_whole(*lapse, 1, 1'000'000);
   add_force(command, options->force);
   command.add_option("--population", options->population, "Their population; by default the grammar's name")
       ->needs(repo);

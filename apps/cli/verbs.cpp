@@ -17,6 +17,7 @@ std::function<void()> remove_neurons(CLI::App&, Console&);
 std::function<void()> convert(CLI::App&, Console&);
 std::function<void()> check(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
+std::function<void()> distributions(CLI::App&, Console&);
 std::function<void()> model(CLI::App&, Console&);
 std::function<void()> fit(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
@@ -65,6 +66,11 @@ std::span<const Verb> verbs() {
        "brainforest measure cells/*.swc --kind dendrite --csv cells.csv\n"
        "  brainforest measure --repo cells.db --population L5 --by type --xlsx types.xlsx",
        measure},
+      {"distributions",
+       "Fit what the branches of a population are drawn from: chances to fork, lengths, angles, diameters",
+       "brainforest distributions cells/ --kind basal --by order\n"
+       "  brainforest distributions --repo cells.db --population L5 --keep",
+       distributions},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"
        "  brainforest model edit pyramidal --repo cells.db\n"

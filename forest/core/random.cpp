@@ -63,4 +63,25 @@ double Random::gamma(double shape, double scale) {
   }
 }
 
+double Random::von_mises(double mean, double concentration) {
+  constexpr double degree = std::numbers::pi / 180.;
+  double turn;
+  if (concentration < 1e-6) {
+    turn = uniform(-180., 180.);
+  } else if (concentration > 1e6) {  // the normal distribution, closer than a float can say
+    turn = normal() / std::sqrt(concentration) / degree;
+  } else {
+    const double t = 1. + std::sqrt(1. + 4. * concentration * concentration);
+    const double rho = (t - std::sqrt(2. * t)) / (2. * concentration), r = (1. + rho * rho) / (2. * rho);
+    double f, c;
+    do {
+      const double z = std::cos(std::numbers::pi * uniform());
+      f = (1. + r * z) / (r + z), c = concentration * (r - f);
+    } while (std::log1p(-uniform()) > std::log(c) + 1. - c);
+    turn = std::copysign(std::acos(std::clamp(f, -1., 1.)) / degree, uniform() - 0.5);
+  }
+  const double whole = std::remainder(mean + turn, 360.);  // in [-180, 180]
+  return whole == -180. ? 180. : whole;
+}
+
 }  // namespace forest

@@ -30,6 +30,8 @@ class Random {
   double truncated_normal(double mean, double sd, double low, double high);  // by inversion, low <= high
   double exponential(double mean);
   double gamma(double shape, double scale);  // Marsaglia & Tsang 2000
+  /// Degrees in (-180, 180] about `mean`. Best & Fisher 1979.
+  double von_mises(double mean, double concentration);
 
  private:
   std::uint64_t seed_, item_;

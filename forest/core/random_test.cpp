@@ -48,6 +48,39 @@ TEST(Random, NormalFollowsItsDistribution) {
             1e-4);
 }
 
+TEST(Random, VonMisesFollowsItsDensityAllAroundTheCircle) {
+  Random random(12);
+  for (const double concentration : {0., 0.5, 3., 40.}) {
+    constexpr int bins = 36;
+    std::vector<double> part(bins, 0.);
+    double total = 0.;
+    for (int i = 0; i < 3600; ++i) {
+      const double x = -180. + (i + .5) / 10.;
+      const double d = std::exp(concentration * (std::cos((x - 170.) * 3.141592653589793 / 180.) - 1.));
+      part[std::size_t(i / 100)] += d, total += d;
+    }
+    std::vector<double> seen(bins, 0.);
+    for (int i = 0; i < 50000; ++i) {
+      const double x = random.von_mises(170., concentration);
+      ASSERT_TRUE(x > -180. && x <= 180.);
+      ++seen[std::size_t(std::min(35., (x + 180.) / 10.))];
+    }
+    double sum = 0., rest = 0., rest_seen = 0.;
+    int used = 0;
+    for (int b = 0; b < bins; ++b) {
+      const double expected = 50000. * part[std::size_t(b)] / total, here = seen[std::size_t(b)];
+      if (expected < 5.) {
+        rest += expected, rest_seen += here;
+      } else {
+        sum += (here - expected) * (here - expected) / expected, ++used;
+      }
+    }
+    EXPECT_LT(rest_seen, rest + 5. * std::sqrt(rest) + 5.);
+    EXPECT_GT(boost::math::cdf(boost::math::complement(boost::math::chi_squared(used - 1), sum)), 1e-4)
+        << concentration;
+  }
+}
+
 TEST(Random, TruncatedNormalFollowsItsDistributionAndKeepsItsLimits) {
   Random random(10);
   const double low = normal_cdf(-1.), high = normal_cdf(.5);

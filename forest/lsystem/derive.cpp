@@ -85,6 +85,7 @@ struct Deriver::State {
     std::ranges::fill(written, 0);
     run(grammar.cell, slots.data(), {}, grammar.lookups, random, stack.data());
     std::copy_n(slots.begin(), cell.size(), cell.begin());
+    for (const Total& t : grammar.totals) cell[t.place] = 0.;
     evaluate(grammar.axiom_values, random);
     if (!append(grammar.axiom))
       throw InputError(grammar.file, 0,
@@ -208,7 +209,22 @@ struct Deriver::State {
     return chosen;
   }
 
+  // What productions ask of the word as a whole.
+  void sum(Random& random) {
+    for (const Total& t : grammar.totals) {
+      const std::size_t keys = t.key < 0 ? 1 : std::size_t(total_keys);
+      std::fill_n(cell.begin() + std::ptrdiff_t(t.place), keys, 0.);
+      for (const std::uint32_t n : active) {
+        if (!fits(n, t.module)) continue;
+        std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
+        const double key = t.key < 0 ? 0. : slots[std::size_t(t.key)], value = evaluate(t.value, random)[-1];
+        if (key >= 0. && key < double(keys)) cell[t.place + std::size_t(key)] += value;
+      }
+    }
+  }
+
   void step(Random& random) {
+    if (!grammar.totals.empty()) sum(random);
     changes.clear(), later.clear();
     std::size_t will_live = live;
     for (const std::uint32_t n : active) {

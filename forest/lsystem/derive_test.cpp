@@ -147,5 +147,45 @@ TEST(Derivation, LongHistoriesTakeNoMemoryOfTheirOwn) {
   EXPECT_EQ(derived("axiom: A(300000)B\np: A(n) : n > 0 -> A(n-1)\n", 300000), "A(0)B");
 }
 
+// Each step adds one A for every two there are; B counts only in its own tree.
+TEST(Derive, TotalsAreSumsOverTheWordBeforeEachStep) {
+  const Grammar g = parse(
+      "module Count(n, m, w)\ntotal many = A(tree, x) : 1\ntotal weight(tree) = A(tree, x) : x * 2\n"
+      "function both(t) = many + weight(t)\n"
+      "axiom: A(0, 1) A(1, 10) A(1, 20) R(0)\n"
+      "grow: A(tree, x) -> A(tree, x + many)\nread: R(i) : i < 2 -> Count(many, weight(i), both(1)) R(i + "
+      "1)\n",
+      "test");
+  const Word word = derive(g, 0, 0, 3);
+  EXPECT_EQ(to_string(word, g), "A(0,10)A(1,19)A(1,29)Count(3,2,63)Count(3,72,75)R(2)");
+  EXPECT_EQ(derive(g, 0, 0, 3).parameters, word.parameters);
+  Deriver again(g);  // memory is kept, sums are not
+  again.derive(0, 0, 3);
+  EXPECT_EQ(again.derive(0, 0, 3).parameters, word.parameters);
+}
+
+TEST(Derive, TotalsSayWhatIsWrongWithThem) {
+  const auto refused = [](const std::string& text, const std::string& why) {
+    try {
+      parse(text + "axiom: A(1)\ng: A(x) -> A(x)\n", "t");
+      FAIL() << text;
+    } catch (const InputError& error) {
+      EXPECT_NE(std::string(error.what()).find(why), std::string::npos) << error.what();
+    }
+  };
+  refused("total n = A(x) B(y) : 1\n", "one module");
+  refused("total n = [ : 1\n", "one module");
+  refused("total n(y) = A(x) : 1\n", "no parameter y");
+  refused("total n = A(x) : uniform(0, x)\n", "neither draws");
+  refused("total n = A(x) : 1\ntotal m = A(x) : n\n", "neither draws");
+  refused("total n = A(x) : 1\ncell c = n\n", "before there is a word");
+  refused("total n = A(x) : 1\nfunction f(x) = n\ncell c = f(1)\n", "before there is a word");
+  refused("total n(x) = A(x) : 1\nfunction f(x) = n\n", "wants its arguments");
+  refused("total n = A(x)\n", "before what is summed");
+  // Beyond its whole numbers a total by a parameter is not a number, which a production says of itself.
+  const Grammar g = parse("total n(x) = A(x) : 1\naxiom: A(70)\ng: A(x) -> A(n(x))\n", "t");
+  EXPECT_THROW(derive(g, 0, 0, 1), InputError);
+}
+
 }  // namespace
 }  // namespace forest::lsystem

@@ -25,13 +25,13 @@ constexpr std::size_t most_parameters = 64;                             // of on
 
 // What a name in an expression stands for.
 struct Meaning {
-  enum { constant, cell, table, sample, function } kind = constant;
+  enum { constant, cell, total, table, sample, function } kind = constant;
   double value = 0.;                       // of a constant
-  std::int32_t index = 0;                  // of a cell value, a table or a sample
+  std::int32_t index = 0;                  // of a cell value, a total, a table or a sample
   std::vector<std::string> outcomes = {};  // of a sample
   Program body = {};                       // of a function: finds its arguments in slots 0 to parameters - 1
   std::int32_t parameters = 0, slots = 0;
-  bool draws = false;
+  bool draws = false, sums = false;
 };
 using Meanings = std::map<std::string, Meaning, std::less<>>;
 
@@ -68,6 +68,12 @@ class Compiler {
   }
   std::int32_t slots() const { return slots_; }
   bool draws() const { return draws_; }
+  bool sums() const { return sums_; }
+  /// Of a parameter or binding; -1 when there is none of that name.
+  std::int32_t slot_of(const std::string& name) const {
+    const auto found = std::ranges::find(names_, name);
+    return found == names_.end() ? -1 : std::int32_t(found - names_.begin());
+  }
 
   void expression(Program& out) { binary(out, 0); }
 
@@ -143,7 +149,9 @@ class Compiler {
           fmt::format("'{}' is not known here; make it a parameter or a binding, or #define it above", name));
     const Meaning& m = found->second;
     if (m.kind == Meaning::constant) return out.push_back({Op::constant, 0, m.value});
-    if (m.kind == Meaning::cell) return out.push_back({Op::cell, m.index, 0.});
+    sums_ |= m.kind == Meaning::total;
+    if (m.kind == Meaning::cell || (m.kind == Meaning::total && m.parameters == 0))
+      return out.push_back({Op::cell, m.index, 0.});
     text_.fail_at(place, fmt::format("'{}' wants its arguments; write {}(…)", name, name));
   }
 
@@ -167,7 +175,12 @@ class Compiler {
         out.push_back(i);
       }
       barrier_ = out.size();
-      draws_ |= f.draws;
+      draws_ |= f.draws, sums_ |= f.sums;
+    } else if (found != meanings_.end() && found->second.kind == Meaning::total) {
+      close(arguments(out), found->second.parameters);
+      out.push_back({found->second.parameters ? Op::cell_at : Op::cell, found->second.index, 0.});
+      barrier_ = out.size();
+      sums_ = true;
     } else if (found != meanings_.end() && found->second.kind == Meaning::table) {
       close(arguments(out), 1);
       out.push_back({Op::table, found->second.index, 0.});
@@ -257,7 +270,7 @@ class Compiler {
   std::int32_t slots_ = 0;
   std::size_t barrier_ = 0;
   int depth_ = 0;
-  bool draws_ = false;
+  bool draws_ = false, sums_ = false;
 };
 
 // Comments become blanks, so that every place keeps its line and column.
@@ -371,6 +384,7 @@ class Parser {
         {"module", &Parser::modules},    {"cell", &Parser::cell_value},
         {"function", &Parser::function}, {"distribution", &Parser::distribution},
         {"table", &Parser::table},       {"sample", &Parser::sample},
+        {"total", &Parser::total},
     };
     static constexpr Row settings[] = {
         {"axiom", &Parser::axiom}, {"title", &Parser::title}, {"steps", &Parser::steps},
@@ -446,6 +460,8 @@ class Parser {
     Compiler compiler(text_, meanings_);
     Program program;
     compiler.expression(program);
+    if (compiler.sums())
+      text_.fail("a cell's values are drawn before there is a word; use totals in productions");
     note(program, compiler);
     const auto index = std::int32_t(grammar_.cell_values++);
     program.push_back({Op::store, index, 0.});
@@ -469,7 +485,7 @@ class Parser {
     text_.expect("=", "between a function and its expression");
     compiler.expression(meaning.body);
     meaning.slots = compiler.slots();
-    meaning.draws = compiler.draws();
+    meaning.draws = compiler.draws(), meaning.sums = compiler.sums();
     if (meaning.draws && !may_draw)
       text_.fail_at(place, fmt::format("a function may not draw; write distribution {} instead", name));
     if (!meaning.draws && may_draw)
@@ -573,6 +589,37 @@ class Parser {
       trace.stops.push_back({at, float(text_.number())});
     } while (text_.takes(","));
     return trace;
+  }
+
+  // total share(tree) = Tip(tree, order) : 2^(-S * order)
+  void total() {
+    const std::string name = new_name("of the total");
+    std::string key;
+    if (text_.takes("(")) {
+      key = text_.name("of the parameter that it is summed by");
+      text_.expect(")", "after the parameter");
+    }
+    text_.expect("=", "between a total and the module that it is of");
+    Compiler compiler(text_, meanings_);
+    const std::size_t place = (text_.more(), text_.at());
+    const std::vector<Shape> module = context(compiler);
+    if (module.size() != 1 || is(module[0], Action::push) || is(module[0], Action::pop))
+      text_.fail_at(place, "a total is of one module; write total NAME = MODULE(parameters) : expression");
+    Total total{.module = module[0],
+                .value = {},
+                .key = key.empty() ? -1 : compiler.slot_of(key),
+                .place = grammar_.cell_values};
+    if (!key.empty() && total.key < 0)
+      text_.fail_at(place, fmt::format("the module has no parameter {}", key));
+    text_.expect(":", "before what is summed");
+    compiler.expression(total.value);
+    if (compiler.draws() || compiler.sums())
+      text_.fail_at(place, "a total neither draws nor uses totals; sum what the module's parameters say");
+    note(total.value, compiler);
+    meanings_[name] = {
+        .kind = Meaning::total, .index = std::int32_t(total.place), .parameters = !key.empty()};
+    grammar_.cell_values += key.empty() ? 1 : std::size_t(total_keys);
+    grammar_.totals.push_back(std::move(total));
   }
 
   void modules() {

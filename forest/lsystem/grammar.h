@@ -59,6 +59,14 @@ struct Production {
   Program values;  // of all parameters of the successor, in order
 };
 
+/// A sum over the modules of the word, worked out before each step. Its values lie among those drawn once a neuron.
+struct Total {
+  Shape module;
+  Program value;          // finds the module's parameters in slots 0 to count - 1
+  std::int32_t key = -1;  // the parameter by which there are total_keys sums; -1: there is one
+  std::size_t place = 0;  // of the first
+};
+
 /// A statement that gives a name to a value, a function, a distribution, a table or a sample.
 struct Declaration {
   std::string name;
@@ -77,6 +85,7 @@ struct Grammar {
   std::vector<bool> ignored;                               // by symbol: not seen by contexts
   std::vector<Symbol> drawn_as;  // by symbol: the turtle's that it stands for; F_l and its like are F
   Lookups lookups;
+  std::vector<Total> totals;
   std::vector<Declaration> declarations;  // in the order of the text
   Program cell;                           // one store a value that is drawn once a neuron
   std::size_t cell_values = 0;

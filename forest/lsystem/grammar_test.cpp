@@ -83,6 +83,8 @@ TEST(Expression, DistributionsHaveTheirMomentsAndLimits) {
       {"lognormal(1, 0.4)", below, lognormal_variance},
       {"gamma(3, 2)", 6, 12},
       {"exponential(5)", 5, 25},
+      {"weibull(2, 10)", 8.8623, 21.4602},
+      {"vonmises(0, 4)", 0, 979.026},
       {"poisson(4.5)", 4.5, 4.5},
       {"poisson(70)", 70, 70},
       {"chance(0.3)", .3, .21},

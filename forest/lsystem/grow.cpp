@@ -9,10 +9,12 @@ namespace forest::lsystem {
 
 namespace {
 
+Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
+  return {{"grammar", grammar.name}, {"seed", std::to_string(seed)}, {"index", std::to_string(index)}};
+}
+
 Morphology grown(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
-  return interpret(
-      deriver.derive(seed, index), grammar,
-      {{"grammar", grammar.name}, {"seed", std::to_string(seed)}, {"index", std::to_string(index)}});
+  return interpret(deriver.derive(seed, index), grammar, source(grammar, seed, index));
 }
 
 }  // namespace
@@ -20,6 +22,13 @@ Morphology grown(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, s
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
   Deriver deriver(grammar);
   return grown(deriver, grammar, seed, index);
+}
+
+Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
+                   int steps) {
+  Annotations annotations = source(grammar, seed, index);
+  annotations.emplace_back("step", std::to_string(steps));
+  return interpret(deriver.derive(seed, index, steps), grammar, annotations);
 }
 
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,

@@ -37,6 +37,8 @@ constexpr Function function_table[] = {
     {"lognormal", 2, Op::lognormal, true, "mean and standard deviation of the logarithm"},
     {"gamma", 2, Op::gamma, true, "shape, scale: mean shape * scale"},
     {"exponential", 1, Op::exponential, true, "mean"},
+    {"weibull", 2, Op::weibull, true, "shape, scale"},
+    {"vonmises", 2, Op::vonmises, true, "mean direction in degrees, concentration"},
     {"poisson", 1, Op::poisson, true, "mean"},
     {"chance", 1, Op::chance, true, "1 with probability p, else 0"},
 };
@@ -55,6 +57,14 @@ double truncated_normal(Random& random, double mean, double sd, double low, doub
 
 double gamma(Random& random, double shape, double scale) {
   return shape > 0. && std::isfinite(shape) ? random.gamma(shape, scale) : nonsense;
+}
+
+double weibull(Random& random, double shape, double scale) {
+  return shape > 0. ? scale * std::pow(random.exponential(1.), 1. / shape) : nonsense;
+}
+
+double von_mises(Random& random, double mean, double concentration) {
+  return concentration >= 0. ? random.von_mises(mean, concentration) : nonsense;
 }
 
 // Knuth 1969, in pieces of at most 32 so that the product does not vanish.
@@ -87,6 +97,7 @@ Effect effect(const Instruction& instruction) {
       return {0, 0};
     case Op::negate:
     case Op::logical_not:
+    case Op::cell_at:
     case Op::table:
     case Op::outcome:
       return {1, 1};
@@ -137,6 +148,11 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         break;
       case Op::cell:
         *top++ = cell[std::size_t(i->index)];
+        break;
+      case Op::cell_at:
+        unary([&](double key) {
+          return key >= 0. && key < total_keys ? cell[std::size_t(i->index) + std::size_t(key)] : nonsense;
+        });
         break;
       case Op::store:
         slots[i->index] = *--top;
@@ -278,6 +294,12 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         break;
       case Op::exponential:
         unary([&](double a) { return random.exponential(a); });
+        break;
+      case Op::weibull:
+        binary([&](double a, double b) { return weibull(random, a, b); });
+        break;
+      case Op::vonmises:
+        binary([&](double a, double b) { return von_mises(random, a, b); });
         break;
       case Op::poisson:
         unary([&](double a) { return poisson(random, a); });

@@ -17,11 +17,11 @@ namespace forest::lsystem {
 
 enum class Op : std::uint8_t {
   // clang-format off
-  constant, slot, cell, store, jump, jump_if_zero, table, row, outcome,
+  constant, slot, cell, cell_at, store, jump, jump_if_zero, table, row, outcome,
   add, subtract, multiply, divide, power, modulo, negate,
   less, less_equal, greater, greater_equal, equal, not_equal, logical_and, logical_or, logical_not,
   sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, abs, floor, ceil, round, sign, min, max,
-  uniform, normal, truncnormal, lognormal, gamma, exponential, poisson, chance,
+  uniform, normal, truncnormal, lognormal, gamma, exponential, weibull, vonmises, poisson, chance,
   // clang-format on
 };
 
@@ -32,6 +32,9 @@ struct Instruction {
 };
 
 using Program = std::vector<Instruction>;
+
+/// A total by a parameter has one value for each of the whole numbers below this.
+inline constexpr int total_keys = 64;
 
 /// A function that expressions may call.
 struct Function {

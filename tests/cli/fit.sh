@@ -19,9 +19,11 @@ diff -r one two
 
 # From a repository, under a name.
 $BRAINFOREST fit --repo cells.db --population traced --model like_traced >/dev/null
-$BRAINFOREST model list --repo cells.db | grep like_traced | grep -q 'fitted to 12 neurons of traced'
+$BRAINFOREST model list --repo cells.db >models.txt
+grep -q 'like_traced.*fitted to 12 neurons of traced' models.txt
 $BRAINFOREST grow --repo cells.db --model like_traced --count 4 --seed 1 --population grown >/dev/null
-$BRAINFOREST query "select count(*) from neuron where population = 'grown'" --repo cells.db | grep -qw 4
+$BRAINFOREST query "select count(*) from neuron where population = 'grown'" --repo cells.db >count.txt
+grep -qw 4 count.txt
 
 mkdir few && cp "$(find traced -name '*.swc' | sort | head -1)" few
 refuses 'needs two such neurons' $BRAINFOREST fit few -o few.lsys

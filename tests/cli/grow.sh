@@ -47,6 +47,32 @@ printf 'limit: 1000\nsteps: 50\naxiom: A\nrabbits: A -> F [+ A] A\n' >runaway.ls
 fails_with 1 'production rabbits' $BRAINFOREST grow --grammar runaway.lsys --out runaway --repo runaway.db
 [ -z "$(ls -A runaway)" ]
 
+# A time lapse: the same neuron younger, after every so many steps, up to the last.
+$BRAINFOREST grow --grammar bes --count 2 --seed 3 --out lapse --time-lapse 100 --json >lapse.json
+python3 - <<'PY'
+import json, re, pathlib
+assert json.load(open("lapse.json"))["steps"] == [100, 200, 300, 400, 432]
+def tree(name):
+    rows = [line.split() for line in open(name) if line.strip() and line[0] != "#"]
+    return [tuple(map(float, r[2:5])) for r in rows], [int(r[6]) for r in rows]
+for i in range(2):
+    before = 0
+    for step in (100, 200, 300, 400, 432):
+        text = pathlib.Path(f"lapse/bes-3-0000{i}-step{step:06}.swc")
+        places, parents = tree(text)
+        length = sum(sum((a - b) ** 2 for a, b in zip(places[k], places[p - 1])) ** .5 for k, p in enumerate(parents) if p > 1)
+        assert length > before, (i, step, length, before)
+        before = length
+    assert tree(f"lapse/bes-3-0000{i}.swc") == tree(text)  # at the end it is the grown one
+PY
+[ "$(ls lapse | wc -l)" = 12 ]
+grep -q 'step.*200' lapse/bes-3-00001-step000200.swc
+$BRAINFOREST grow --grammar bes --count 2 --seed 3 --out lapse --time-lapse 100 >/dev/null  # again: nothing changes
+echo '# changed' >>lapse/bes-3-00000-step000300.swc
+fails_with 1 'step000300.swc is there and holds something else' $BRAINFOREST grow --grammar bes --count 2 --seed 3 --out lapse --time-lapse 100
+fails_with 2 'out' $BRAINFOREST grow --grammar bes --repo lapse.db --time-lapse 10
+fails_with 2 '' $BRAINFOREST grow --grammar bes --out lapse --time-lapse 0
+
 fails_with 1 'motoneuron, purkinje, pyramidal' $BRAINFOREST grow --grammar nobody --out x
 fails_with 2 '' $BRAINFOREST grow --grammar pyramidal
 fails_with 2 '' $BRAINFOREST grow --grammar pyramidal --out x --population L5

@@ -1,0 +1,292 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest distributions: what the branches of a population are drawn from, in the three families of N++.
+#include <algorithm>
+#include <cmath>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/fitting/burke.h"
+#include "forest/fitting/hillman.h"
+#include "forest/io/format.h"
+#include "forest/repository/repository.h"
+#include "forest/statistics/segment_families.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/neurons.h"
+#include "apps/cli/options.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+using namespace statistics;
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  std::vector<std::string> files;
+  std::string repo, population;
+  std::string kind = "dendrite", by = "nothing", criterion = "bic";
+  std::uint32_t least = 85, replicates = 99;
+  std::uint64_t seed = 0;
+  bool keep = false, force = false;
+  std::filesystem::path grammar;  // to write
+  std::string form = "burke";
+};
+
+std::vector<Morphology> cells_of(const Options& options, Console& console) {
+  std::vector<std::string> errors;
+  std::vector<Morphology> cells;
+  if (!options.repo.empty()) {
+    using namespace repository;
+    const Repository repository = Repository::open(options.repo, Access::read);
+    for (const NeuronRow& row : pick_neurons(repository, {}, options.population))
+      cells.push_back(repository.morphology(row.id));
+    if (cells.empty())
+      throw Error(fmt::format("{} holds no neuron; import or grow some first", options.repo));
+    return cells;
+  }
+  const auto files = neuron_files(options.files, console);
+  cells.resize(files.size()), errors.resize(files.size());
+  std::vector<char> read(files.size(), 0), skipped(files.size(), 0);
+  console.progress().begin("reading", files.size());
+  parallel_for(files.size(), 1, [&](std::size_t i) {
+    try {
+      cells[i] = io::read(files[i]).morphology;
+      read[i] = 1;
+    } catch (const Error& error) {
+      errors[i] = error.what();
+      skipped[i] = may_skip(error, files[i], options.files);
+    }
+    console.progress().advance();
+  });
+  console.progress().end();
+  std::vector<Morphology> good;
+  std::size_t failed = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (read[i]) good.push_back(std::move(cells[i]));
+    if (!errors[i].empty()) console.warn(skipped[i] ? errors[i] + "; skipped" : errors[i]);
+    failed += !read[i] && !skipped[i];
+  }
+  if (failed)  // distributions of a part would be taken for those of all
+    throw Error(
+        fmt::format("{} of {} neurons could not be read; mend them or leave them out", failed, files.size()));
+  if (good.empty()) throw Error("no neuron could be read, so nothing was fitted");
+  return good;
+}
+
+std::string shown(double value) { return std::isnan(value) ? "-" : fmt::format("{:.4g}", value); }
+
+std::string shown(const Estimate& e) {
+  return std::isnan(e.lower) ? shown(e.value)
+                             : fmt::format("{} [{}, {}]", shown(e.value), shown(e.lower), shown(e.upper));
+}
+
+Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
+
+Json json_of(const Estimate& e) {
+  return {
+      {"name", e.name}, {"value", number(e.value)}, {"lower", number(e.lower)}, {"upper", number(e.upper)}};
+}
+
+Json json_of(const DistributionFit& f) {
+  Json estimates = Json::array(), candidates = Json::array();
+  for (const Estimate& e : f.estimates) estimates.push_back(json_of(e));
+  for (const Candidate& c : f.candidates)
+    candidates.push_back({{"family", c.name},
+                          {"log_likelihood", number(c.log_likelihood)},
+                          {"parameters", c.parameters},
+                          {"aicc", number(c.aicc)},
+                          {"bic", number(c.bic)}});
+  return {{"count", f.count},
+          {"left_out", f.left_out},
+          {"in_atoms", f.in_atoms},
+          {"family", f.name},
+          {"expression", f.count ? f.distribution.expression() : ""},
+          {"step", f.distribution.step},
+          {"estimates", estimates},
+          {"kolmogorov", number(f.kolmogorov)},
+          {"anderson_darling", number(f.anderson_darling)},
+          {"p", number(f.p)},
+          {"candidates", candidates}};
+}
+
+std::string estimates_of(const DistributionFit& f) {
+  std::string text;
+  for (const Estimate& e : f.estimates)
+    text += fmt::format("{}{} {}", text.empty() ? "" : ", ", e.name, shown(e));
+  if (f.distribution.step > 0.) text += fmt::format(", in steps of {}", shown(f.distribution.step));
+  return text;
+}
+
+void print(const SegmentFamilies& f, Given by, Console& console) {
+  console.say(fmt::format("{}, {}\n\nsegment nontermination: the chance that a segment forks is {}",
+                          counted(f.cells, "cell"), counted(f.sections, "segment"), shown(f.nontermination)));
+  for (const auto& table : f.tables) {
+    if (by == Given::nothing ? table.given != Given::order : table.given != by) continue;
+    std::vector<std::vector<std::string>> lines;
+    for (const ChanceBin& b : table.bins)
+      lines.push_back({shown(b.upper), std::to_string(b.count), shown(b.chance)});
+    const std::string unit(unit_of(table.given));
+    console.table({fmt::format("{} up to{}", name_of(table.given), unit.empty() ? "" : " (" + unit + ")"),
+                   "segments", "chance to fork"},
+                  lines);
+  }
+  for (const auto family : {Quantity::trajectory, Quantity::rotations, Quantity::calibre}) {
+    std::vector<std::vector<std::string>> lines;
+    for (const FittedQuantity& q : f.quantities) {
+      if (q.family != family || q.fit.count == 0) continue;
+      const auto line = [&](std::string name, const DistributionFit& d) {
+        lines.push_back({std::move(name), std::string(q.unit), std::to_string(d.count), d.name,
+                         shown(d.kolmogorov), shown(d.p), estimates_of(d)});
+      };
+      line(std::string(q.name), q.fit);
+      for (const auto& bin : q.bins)
+        line(fmt::format("  {} up to {}", name_of(by), shown(bin.upper)), bin.fit);
+    }
+    if (lines.empty()) continue;
+    console.say(fmt::format("\n{}", name_of(family)));
+    console.table({"", "unit", "values", "family", "distance", "p", "parameters"}, lines);
+  }
+}
+
+Json json_of(const SegmentFamilies& f) {
+  Json tables = Json::object(), quantities = Json::array();
+  for (const auto& table : f.tables) {
+    Json& bins = tables[std::string(name_of(table.given))] = Json::array();
+    for (const ChanceBin& b : table.bins)
+      bins.push_back({{"upper", number(b.upper)},
+                      {"count", b.count},
+                      {"chance", number(b.chance.value)},
+                      {"lower", number(b.chance.lower)},
+                      {"upper_limit", number(b.chance.upper)}});
+  }
+  for (const FittedQuantity& q : f.quantities) {
+    Json entry{{"name", q.name},
+               {"unit", q.unit},
+               {"family_of_n_plus_plus", name_of(q.family)},
+               {"meaning", q.meaning}};
+    entry.update(json_of(q.fit));
+    entry["text"] = q.distribution;
+    Json& bins = entry["bins"] = Json::array();
+    for (const auto& b : q.bins) {
+      bins.push_back({{"upper", number(b.upper)}});
+      bins.back().update(json_of(b.fit));
+    }
+    quantities.push_back(std::move(entry));
+  }
+  return {{"cells", f.cells},
+          {"segments", f.sections},
+          {"nontermination", json_of(f.nontermination)},
+          {"nontermination_by", tables},
+          {"quantities", quantities}};
+}
+
+void run(const Options& options, Console& console) {
+  const KindSet kinds = kind_set(options.kind);
+  const Given by = *given_of(options.by);
+  const std::vector<Morphology> cells = cells_of(options, console);
+  const SegmentFamilies families =
+      segment_families(cells,
+                       {.kinds = kinds,
+                        .given = by,
+                        .binning = {.least = options.least},
+                        .fit = {.criterion = options.criterion == "bic" ? Criterion::bic : Criterion::aicc,
+                                .replicates = options.replicates,
+                                .seed = options.seed}},
+                       console.progress());
+  if (families.sections == 0)
+    throw Error(fmt::format("none of the {} has a section of kind {}; say another --kind",
+                            counted(cells.size(), "neuron"), options.kind));
+  if (!options.grammar.empty()) {
+    const auto write = options.form == "burke" ? fitting::burke_grammar : fitting::hillman_grammar;
+    const std::string name = options.grammar.stem().string();
+    write_unless_there(options.grammar, write(cells, name, {.kinds = kinds, .seed = options.seed}),
+                       options.force);
+  }
+  Json kept = Json::array();
+  if (options.keep) {
+    repository::Repository repository = repository::Repository::open(options.repo, repository::Access::write);
+    auto transaction = repository.begin();
+    for (const auto& [name, text] : families.texts()) {
+      const std::string full = fmt::format("{}.{}", options.kind, name);
+      kept.push_back(
+          {{"name", full}, {"version", repository.add_distribution(full, options.population, text)}});
+    }
+    transaction.commit();
+  }
+  print(families, by, console);
+  if (options.keep)
+    console.say(fmt::format(
+        "\n{} are kept in {}, of population '{}'; brainforest model show {}.NAME --repo {} prints one",
+        counted(kept.size(), "distribution"), options.repo, options.population, options.kind, options.repo));
+  if (!options.grammar.empty())
+    console.say(fmt::format("\n{} grows such cells: brainforest grow --grammar {} --count 10 --out grown/",
+                            options.grammar.string(), options.grammar.string()));
+  Json out = json_of(families);
+  out["kind"] = options.kind, out["by"] = options.by, out["kept"] = std::move(kept);
+  console.print(out);
+}
+
+}  // namespace
+
+std::function<void()> distributions(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  CLI::Option* files =
+      command.add_option("files", options->files, "Files of neurons, or folders with such files below them")
+          ->type_name("FILES");
+  CLI::Option* repo = command.add_option("--repo", options->repo, "The neurons of this repository instead")
+                          ->excludes(files)
+                          ->type_name("REPO");
+  CLI::Option* population =
+      command.add_option("--population", options->population, "Only those of this population")->needs(repo);
+  command
+      .add_option("--kind", options->kind, "Sections that are meant: dendrite, all, axon, basal, apical, …")
+      ->type_name("KIND")
+      ->capture_default_str()
+      ->check([](const std::string& word) -> std::string {
+        try {
+          kind_set(word);
+          return {};
+        } catch (const Error& error) {
+          return error.what();
+        }
+      });
+  command.add_option("--by", options->by, "Fit in bins of order, path, radius or height")
+      ->check(CLI::IsMember({"nothing", "order", "path", "radius", "height"}))
+      ->type_name("BY")
+      ->capture_default_str();
+  add_whole(command, "--least", options->least, "Values a bin, at least", 1, 1'000'000);
+  command
+      .add_option("--criterion", options->criterion,
+                  "What chooses among families: bic, or aicc, which likes more parameters")
+      ->check(CLI::IsMember({"bic", "aicc"}))
+      ->capture_default_str();
+  add_whole(command, "--replicates", options->replicates, "Drawn samples behind each p; 0 for none", 0,
+            100'000);
+  add_seed(command, options->seed, "The same seed draws the same samples");
+  command
+      .add_flag("--keep", options->keep,
+                "Keep the distributions in the repository, as the next versions of their names")
+      ->needs(population);
+  command
+      .add_option("--grammar", options->grammar,
+                  "Write a grammar to this file too, whose branches follow their diameters alone")
+      ->type_name("FILE");
+  command
+      .add_option("--form", options->form, "Of that grammar: burke (chances by µm) or hillman (a threshold)")
+      ->check(CLI::IsMember({"burke", "hillman"}))
+      ->capture_default_str();
+  add_force(command, options->force);
+  command.parse_complete_callback([options] {
+    if (options->files.empty() && options->repo.empty()) throw CLI::RequiredError("files or --repo");
+  });
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli
