@@ -57,7 +57,10 @@ Band band_of(std::span<const Curve> known, std::span<const Curve> more, std::siz
     std::vector<double> z;
     for (std::size_t r = 0; r < radii; ++r)
       if (sd[r] > 0. && band.mean[r] > least) z.push_back(std::abs(curve[r]) / sd[r]);
-    if (!z.empty()) reach.push_back(quantile(z, .95));
+    if (z.empty()) continue;
+    const auto enough = z.begin() + std::ptrdiff_t(std::ceil(.95 * double(z.size()))) - 1;
+    std::nth_element(z.begin(), enough, z.end());
+    reach.push_back(*enough);
   }
   const double times = reach.empty() ? 0. : quantile(reach, .95);
   for (std::size_t r = 0; r < radii; ++r) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 #include <map>
+#include <numeric>
 #include <set>
 
 #include <fmt/format.h>
@@ -226,6 +227,36 @@ FeatureTable completed(const FeatureTable& table) {
       if (!std::isfinite(x)) x = middle;
   }
   return out;
+}
+
+std::vector<std::size_t> unlike(const FeatureTable& table, std::span<const std::size_t> order,
+                                std::size_t count) {
+  const Eigen::Index n = table.values.rows();
+  const auto ranks = [&](std::size_t column) -> Eigen::VectorXd {
+    std::vector<Eigen::Index> rows(static_cast<std::size_t>(n));
+    std::iota(rows.begin(), rows.end(), Eigen::Index(0));
+    const auto values = table.values.col(Eigen::Index(column));
+    std::ranges::sort(rows, {}, [&](Eigen::Index r) { return values[r]; });
+    Eigen::VectorXd rank(n);
+    for (std::size_t i = 0, j = 0; i < rows.size(); i = j) {  // equal values share their mean rank
+      while (j < rows.size() && values[rows[j]] == values[rows[i]]) ++j;
+      for (std::size_t k = i; k < j; ++k) rank[rows[k]] = .5 * double(i + j - 1);
+    }
+    rank.array() -= rank.mean();
+    return rank.normalized();
+  };
+  std::vector<std::size_t> chosen;
+  std::vector<Eigen::VectorXd> said;
+  for (const std::size_t column : order) {
+    if (chosen.size() == count) break;
+    Eigen::VectorXd rank = ranks(column);
+    if (std::ranges::any_of(said,
+                            [&](const Eigen::VectorXd& other) { return std::abs(rank.dot(other)) > .8; }))
+      continue;
+    chosen.push_back(column);
+    said.push_back(std::move(rank));
+  }
+  return chosen;
 }
 
 Eigen::MatrixXd standardised(const FeatureTable& table) {

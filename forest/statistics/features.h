@@ -73,4 +73,9 @@ FeatureTable completed(const FeatureTable& table);
 /// The values of a completed table with mean 0 and standard deviation 1 in every column.
 Eigen::MatrixXd standardised(const FeatureTable& completed);
 
+/// Of the columns in `order` the first `count` that say something of their own: none whose order of cells is nearly that of
+/// one before it (Spearman's correlation beyond ±0.8).
+std::vector<std::size_t> unlike(const FeatureTable& completed, std::span<const std::size_t> order,
+                                std::size_t count);
+
 }  // namespace forest::statistics

@@ -105,6 +105,14 @@ TEST(Completed, TakesTheMedianForWhatIsMissing) {
   EXPECT_NEAR(X.col(0).squaredNorm(), 3., 1e-12);
 }
 
+TEST(Unlike, LeavesOutWhatFollowsFromOneBefore) {
+  const FeatureTable t =
+      small_table({{1, 1, 5, -1}, {2, 8, 1, -2}, {3, 27, 4, -3}, {4, 64, 2, -4}, {5, 65, 3, -5}});
+  const std::array<std::size_t, 4> order{1, 0, 2, 3};
+  EXPECT_EQ(unlike(t, order, 9), (std::vector<std::size_t>{1, 2}));
+  EXPECT_EQ(unlike(t, order, 1), (std::vector<std::size_t>{1}));
+}
+
 TEST(Tables, AreStackedCutAndStrippedOfDiameters) {
   const std::array<FeatureTable, 2> two{small_table({{1, 2}, {3, 4}}), small_table({{5, 6}})};
   const FeatureTable all = stacked(two);
