@@ -17,6 +17,7 @@ std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_gaze(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
+std::function<void()> bench_measure(CLI::App&, Console&);
 std::function<void()> bench_pack(CLI::App&, Console&);
 std::function<void()> bench_peers(CLI::App&, Console&);
 std::function<void()> bench_pick(CLI::App&, Console&);
@@ -31,6 +32,7 @@ std::span<const Benchmark> benchmarks() {
       {"gaze", "How much less is drawn for an eye that looks at one place, and how fast", bench_gaze},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
+      {"measure", "How many neurons a second have all their metrics measured, on one core", bench_measure},
       {"pack", "How many segments a second are packed into a forest file, and in how much memory",
        bench_pack},
       {"peers", "How fast, small and true the column is drawn beside VTK's lines, tube impostors and tubes",

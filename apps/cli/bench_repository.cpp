@@ -17,6 +17,7 @@
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/repository/repository.h"
+#include "forest/repository/stored_metrics.h"
 #include "forest/statistics/metric.h"
 
 #include "apps/cli/console.h"
@@ -166,9 +167,9 @@ void run(const Options& options, Console& console) {
     std::size_t count = 0, most = 0;  // ranges; neurons found by one of them
     double slowest = 0.;              // s
   } narrow, wide;
-  for (const statistics::Metric& metric : statistics::metrics()) {
+  for (const statistics::Metric* metric : repository::stored_metrics()) {
     const auto at = [&](double part) {
-      const std::string number = fmt::format("(select id from metrics where name = '{}')", metric.name);
+      const std::string number = fmt::format("(select id from metrics where name = '{}')", metric->name);
       const Answer value =
           repository.query(fmt::format("select value from neuron_metrics where metric = {0} order by value "
                                        "limit 1 offset (select cast(count(*) * {1} "
@@ -180,11 +181,11 @@ void run(const Options& options, Console& console) {
     if (std::isnan(low)) continue;  // not defined for such neurons
     std::vector<NeuronRow> found;
     const double time = seconds([&] {
-      found = repository.neurons_where(fmt::format("{0} >= {1} and {0} <= {2}", metric.name, low, high));
+      found = repository.neurons_where(fmt::format("{0} >= {1} and {0} <= {2}", metric->name, low, high));
     });
     Ranges& of = found.size() > rows.size() / 10 ? wide : narrow;
     of = {of.count + 1, std::max(of.most, found.size()), std::max(of.slowest, time)};
-    if (found.empty()) throw Error(fmt::format("no neuron was found by its {}", metric.name));
+    if (found.empty()) throw Error(fmt::format("no neuron was found by its {}", metric->name));
   }
 
   const double bytes = double(std::filesystem::file_size(path)) / double(rows.size());

@@ -31,7 +31,7 @@ struct Options {
   std::vector<std::string> samples;
   std::string repo, population, with, kind = "all";
   std::filesystem::path csv, report;
-  std::uint32_t repeats = 50, permutations = 100;
+  std::uint32_t repeats = 50, permutations = 199;
   std::uint64_t seed = 0;
   bool force = false;
 };
@@ -70,6 +70,7 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
           {"logistic", json_of(c.logistic)},
           {"energy", {{"distance", c.energy.distance}, {"p", c.energy.p}}},
           {"mmd", {{"distance", c.mmd.distance}, {"p", c.mmd.p}}},
+          {"barcode", {{"distance", c.barcodes.distance}, {"p", c.barcodes.p}}},
           {"sholl_inside", c.sholl_inside},
           {"power", {{"auc", c.detectable_auc}, {"cohens_d", c.detectable_effect}}},
           {"seed", options.seed},
@@ -136,6 +137,7 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
                 {"logistic regression, all features", shown(c.logistic.auc), shown_p(c.logistic.p)},
                 {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
                 {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
+                {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
                 {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}});
 
   report.heading("By what?");
@@ -236,6 +238,7 @@ void run(const Options& options, Console& console) {
                  {"logistic regression", shown(c.logistic.auc), shown_p(c.logistic.p)},
                  {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
                  {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
+                 {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
                  {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}});
   console.say("");
   std::vector<std::vector<std::string>> lines;

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// brainforest measure: the metrics of neurons as a table, CSV or JSON.
+// brainforest measure: the metrics of neurons, or of groups of them, as a table, CSV, workbook or JSON.
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <memory>
 #include <variant>
 
@@ -16,6 +17,7 @@
 #include "forest/io/format.h"
 #include "forest/io/workbook.h"
 #include "forest/repository/repository.h"
+#include "forest/statistics/barcode.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
 
@@ -35,9 +37,9 @@ struct Options {
   std::vector<std::string> files;  // or folders
   std::string repo, population;
   std::vector<std::string> metrics;
-  std::string kind = "all", level = "neuron";
-  std::filesystem::path csv;
-  bool list = false, force = false;
+  std::string kind = "all", level = "neuron", by;
+  std::filesystem::path csv, xlsx;
+  bool list = false, force = false, store = false;
 };
 
 /// What the terminal shows of several neurons when no metric is asked for; all of them would not fit.
@@ -62,9 +64,18 @@ struct Column {
   std::string title() const { return unit.empty() ? name : fmt::format("{} ({})", name, unit); }
 };
 
+/// What neurons of a repository may be grouped by.
+constexpr std::array<std::pair<std::string_view, std::string repository::NeuronRow::*>, 5> groupings{
+    {{"type", &repository::NeuronRow::type},
+     {"layer", &repository::NeuronRow::layer},
+     {"region", &repository::NeuronRow::region},
+     {"species", &repository::NeuronRow::species},
+     {"population", &repository::NeuronRow::population}}};
+
 /// Neurons to measure, whatever they come from.
 struct Neurons {
-  std::vector<std::string> names;
+  std::vector<std::string> names, groups;  // groups: only with --by; of a file its folder
+  std::vector<repository::NeuronId> ids;   // of a repository's
   std::function<std::function<Morphology(std::size_t)>()> reader;  // reads the i-th; each thread has its own
 };
 
@@ -72,6 +83,8 @@ Neurons of_files(const Options& options, Console& console) {
   std::vector<std::filesystem::path> files = neuron_files(options.files, console);
   Neurons neurons;
   for (const auto& file : files) neurons.names.push_back(file.string());
+  if (!options.by.empty())
+    for (const auto& file : files) neurons.groups.push_back(file.parent_path().filename().string());
   neurons.reader = [files = std::move(files)] {
     return [&files](std::size_t i) { return io::read(files[i]).morphology; };
   };
@@ -83,12 +96,13 @@ Neurons of_repository(const Options& options) {
   const auto rows = pick_neurons(Repository::open(options.repo, Access::read), {}, options.population);
   if (rows.empty()) throw Error(fmt::format("{} holds no neuron; import or grow some first", options.repo));
   Neurons neurons;
-  std::vector<NeuronId> ids;
   for (const NeuronRow& row : rows) {
     neurons.names.push_back(options.population.empty() ? row.population + '/' + row.name : row.name);
-    ids.push_back(row.id);
+    neurons.ids.push_back(row.id);
+    for (const auto& [word, member] : groupings)
+      if (word == options.by) neurons.groups.push_back(row.*member);
   }
-  neurons.reader = [place = options.repo, ids = std::move(ids)] {
+  neurons.reader = [place = options.repo, ids = neurons.ids] {
     const auto open = std::make_shared<Repository>(Repository::open(place, Access::read));
     return [open, &ids](std::size_t i) { return open->morphology(ids[i]); };
   };
@@ -106,9 +120,13 @@ Picks pick(const Options& options) {
 
 std::vector<Column> columns(const Options& options, const Picks& picks) {
   std::vector<Column> columns{{"neuron", "", true}};
-  if (options.level == "section") columns.insert(columns.end(), {{"section", "", true}, {"kind", "", true}});
-  if (options.level == "bifurcation") columns.push_back({"section", "", true});
+  const auto add = [&](auto... names) { (columns.push_back({names, "", true}), ...); };
+  if (options.level == "arbor") add("arbor", "kind");
+  if (options.level == "section") add("section", "kind");
+  if (options.level == "bifurcation") add("section");
+  if (options.level == "point") add("section", "point");
   if (options.level == "shell") columns.push_back({"radius", "µm", true});
+  if (options.level == "bar") add("arbor", "bar");
   for (const Metric* m : picks) {
     const bool brief =
         !options.metrics.empty() || options.level != "neuron" || std::ranges::count(headline, m->name);
@@ -138,12 +156,23 @@ std::vector<Row> rows(const Options& options, const Picks& picks, const std::str
     return {row};
   }
   std::vector<Row> rows;
-  if (options.level == "section") {
-    for (const Branch& b : arbors.sections())
-      rows.push_back({name, double(b.id.value()), std::string(name_of(arbors.neuron().section(b.id).kind))});
+  const auto kind = [&](const Branch& b) { return std::string(name_of(arbors.neuron().section(b.id).kind)); };
+  if (options.level == "arbor") {
+    for (std::size_t i = 0; i < arbors.stems().size(); ++i)
+      rows.push_back({name, double(i), kind(arbors.section(arbors.stems()[i]))});
+  } else if (options.level == "section") {
+    for (const Branch& b : arbors.sections()) rows.push_back({name, double(b.id.value()), kind(b)});
   } else if (options.level == "bifurcation") {
     for (const Bifurcation& b : arbors.bifurcations())
       rows.push_back({name, double(arbors.section(b.parent).id.value())});
+  } else if (options.level == "point") {
+    for (const Branch& b : arbors.sections())
+      for (std::uint32_t i = 1; i < b.row_count; ++i) rows.push_back({name, double(b.id.value()), double(i)});
+  } else if (options.level == "bar") {
+    const Barcodes barcodes(arbors, Filtration::path);
+    for (std::size_t i = 0; i < barcodes.size(); ++i)
+      for (std::size_t k = 0; k < barcodes.of_arbor(i).size(); ++k)
+        rows.push_back({name, double(i), double(k)});
   }
   for (const Metric* m : picks) {
     const std::vector<double> values = m->values(arbors);
@@ -154,20 +183,64 @@ std::vector<Row> rows(const Options& options, const Picks& picks, const std::str
   return rows;
 }
 
-std::string csv(const std::vector<Column>& columns, const std::vector<Row>& rows) {
-  io::TableSheet sheet{.name = "metrics", .columns = {}, .rows = {}};
-  for (const Column& c : columns) sheet.columns.push_back({c.name, std::string(c.unit)});
-  for (const Row& row : rows) {
-    auto& cells = sheet.rows.emplace_back();
-    for (const Cell& cell : row)  // NaN becomes an empty cell
-      std::visit([&](const auto& value) { cells.emplace_back(value); }, cell);
+/// What is measured of neurons and of groups of them.
+struct Table {
+  std::vector<Column> columns;
+  std::vector<Row> rows;
+};
+
+/// A row a group: how many neurons, and over them mean and standard deviation of each metric, of which a neuron's own mean
+/// counts where it has many values.
+Table grouped(const Options& options, const Table& neurons, const std::vector<std::string>& groups) {
+  std::map<std::string, std::vector<const Row*>> members;
+  for (std::size_t i = 0; i < neurons.rows.size(); ++i) members[groups[i]].push_back(&neurons.rows[i]);
+  Table table{{{options.by, "", true}, {"neurons", "", true}}, {}};
+  for (const auto& [name, rows] : members)
+    table.rows.push_back({name.empty() ? "not said" : name, double(rows.size())});
+  const auto ends_in = [](const std::string& name, std::string_view part) {
+    return name.ends_with(fmt::format(" {}", part));
+  };
+  for (std::size_t c = 1; c < neurons.columns.size(); ++c) {
+    const Column& column = neurons.columns[c];
+    if (std::ranges::any_of(parts, [&](const auto& part) {
+          return part.first != "mean" && ends_in(column.name, part.first);
+        }))
+      continue;
+    const std::string name = column.name.substr(0, column.name.find(' '));
+    table.columns.push_back({name + " mean", column.unit, column.brief});
+    table.columns.push_back({name + " sd", column.unit, column.brief});
+    auto row = table.rows.begin();
+    for (const auto& [group, rows] : members) {
+      std::vector<double> values;
+      for (const Row* of : rows) values.push_back(std::get<double>((*of)[c]));
+      const Summary summary = summarize(values);
+      row->emplace_back(summary.mean), row->emplace_back(summary.sd);
+      ++row;
+    }
   }
-  return io::csv_of(sheet);
+  return table;
 }
 
-nlohmann::ordered_json json(const Options& options, const std::vector<Column>& columns,
-                            const std::vector<Row>& rows) {
+io::TableSheet sheet(std::string name, const Table& table) {
+  io::TableSheet sheet{.name = std::move(name), .columns = {}, .rows = {}};
+  for (const Column& c : table.columns) sheet.columns.push_back({c.name, std::string(c.unit)});
+  for (const Row& row : table.rows) {
+    auto& cells = sheet.rows.emplace_back();
+    for (const Cell& cell : row) {
+      const double* number = std::get_if<double>(&cell);
+      if (number && std::isnan(*number))
+        cells.emplace_back();
+      else
+        std::visit([&](const auto& value) { cells.emplace_back(value); }, cell);
+    }
+  }
+  return sheet;
+}
+
+nlohmann::ordered_json json(const Options& options, const Table& table) {
+  const auto& [columns, rows] = table;
   nlohmann::ordered_json out{{"level", options.level}, {"kind", options.kind}};
+  if (!options.by.empty()) out["by"] = options.by;
   auto& units = out["units"] = nlohmann::ordered_json::object();
   auto& list = out["rows"] = nlohmann::ordered_json::array();
   for (const Column& c : columns)
@@ -210,9 +283,25 @@ void print_neuron(Console& console, const Picks& picks, const Row& row) {
   console.table({"metric", "unit", "value or mean", "sd", "min", "median", "max"}, lines);
 }
 
+/// A row a metric, a column a group.
+void print_groups(Console& console, const Options& options, const Table& table) {
+  std::vector<std::string> header{options.by}, counts{"neurons"};
+  for (const Row& row : table.rows) header.push_back(shown(row[0])), counts.push_back(shown(row[1]));
+  std::vector<std::vector<std::string>> lines{counts};
+  for (std::size_t c = 2; c < table.columns.size(); c += 2) {
+    Column metric = table.columns[c];
+    if (!metric.brief) continue;
+    metric.name = metric.name.substr(0, metric.name.find(' '));
+    lines.push_back({metric.title()});
+    for (const Row& row : table.rows)
+      lines.back().push_back(fmt::format("{} ± {}", shown(row[c]), shown(row[c + 1])));
+  }
+  console.table(header, lines);
+}
+
 /// A row each, and of several neurons their mean and standard deviation.
-void print_rows(Console& console, const Options& options, const std::vector<Column>& columns,
-                const std::vector<Row>& rows) {
+void print_rows(Console& console, const Options& options, const Table& table) {
+  const auto& [columns, rows] = table;
   const bool summaries = options.level == "neuron", files = options.repo.empty();
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> lines(rows.size() + (summaries ? 2 : 0));
@@ -232,6 +321,27 @@ void print_rows(Console& console, const Options& options, const std::vector<Colu
   console.table(header, lines);
 }
 
+/// What the rows say of the neurons `ids`: of a metric with many values their mean.
+void store(const Options& options, const Picks& picks, const std::vector<repository::NeuronId>& ids,
+           const std::vector<Row>& rows, Progress& progress) {
+  auto repository = repository::Repository::open(options.repo, repository::Access::write);
+  auto transaction = repository.begin();
+  progress.begin("storing", ids.size());
+  std::vector<std::pair<const Metric*, double>> values;
+  for (std::size_t i = 0; i < ids.size(); ++i) {
+    values.clear();
+    auto cell = rows[i].begin() + 1;
+    for (const Metric* m : picks) {
+      values.emplace_back(m, std::get<double>(*cell));
+      cell += m->level == Level::neuron ? 1 : std::ptrdiff_t(parts.size());
+    }
+    repository.store_metrics(ids[i], values);
+    progress.advance();
+  }
+  transaction.commit();
+  progress.end();
+}
+
 void list(Console& console) {
   nlohmann::ordered_json out = nlohmann::ordered_json::array();
   std::vector<std::vector<std::string>> lines;
@@ -241,6 +351,7 @@ void list(Console& console) {
     out.push_back({{"name", m.name},
                    {"unit", m.unit},
                    {"level", name_of(m.level)},
+                   {"diameters", m.diameters},
                    {"definition", m.definition},
                    {"source", m.source},
                    {"l_measure", m.l_measure}});
@@ -251,6 +362,7 @@ void list(Console& console) {
 
 void run(const Options& options, Console& console) {
   if (options.list) return list(console);
+  if (!options.xlsx.empty() && !options.force) refuse_existing({options.xlsx});
   const Picks picks = pick(options);
   const KindSet kinds = kind_set(options.kind);
 
@@ -276,30 +388,49 @@ void run(const Options& options, Console& console) {
   });
   console.progress().end();
 
-  const std::vector<Column> header = columns(options, picks);
-  std::vector<Row> all;
+  Table table{columns(options, picks), {}};
+  std::vector<std::string> groups;
+  std::vector<repository::NeuronId> ids;
   std::size_t failed = 0, unread = 0;
-  for (Measured& m : measured) {
+  for (std::size_t i = 0; i < measured.size(); ++i) {
+    Measured& m = measured[i];
     if (!m.error.empty()) {
       console.warn(m.skipped ? m.error + "; skipped" : m.error);
       ++unread, failed += !m.skipped;
+    } else {
+      if (!options.by.empty()) groups.push_back(neurons.groups[i]);
+      if (options.store) ids.push_back(neurons.ids[i]);
     }
-    std::ranges::move(m.rows, std::back_inserter(all));
+    std::ranges::move(m.rows, std::back_inserter(table.rows));
   }
   if (unread == measured.size()) throw Error("no neuron could be read, so nothing was measured");
 
-  if (!options.csv.empty()) write_unless_there(options.csv, csv(header, all), options.force);
-  if (console.json) {
-    console.print(json(options, header, all));
-  } else if (options.level == "neuron" && all.size() == 1) {
-    print_neuron(console, picks, all[0]);
-  } else if (options.level == "neuron" || options.csv.empty()) {
-    print_rows(console, options, header, all);
+  if (options.store) store(options, picks, ids, table.rows, console.progress());
+  io::Workbook book{{sheet("metrics", table)}, {}};
+  if (!options.by.empty()) {
+    table = grouped(options, table, groups);
+    book.sheets.insert(book.sheets.begin(), sheet("groups", table));
   }
-  if (!options.csv.empty())
-    console.say(fmt::format("{} rows of {} columns were written to {}", all.size(), header.size(),
-                            options.csv.string()));
-  else if (options.level == "neuron" && options.metrics.empty() && all.size() > 1)
+  const bool written = !options.csv.empty() || !options.xlsx.empty();
+  if (!options.csv.empty()) write_unless_there(options.csv, io::csv_of(book.sheets[0]), options.force);
+  if (!options.xlsx.empty()) io::write_workbook(options.xlsx, book);
+  if (console.json) {
+    console.print(json(options, table));
+  } else if (!options.by.empty()) {
+    print_groups(console, options, table);
+  } else if (options.level == "neuron" && table.rows.size() == 1) {
+    print_neuron(console, picks, table.rows[0]);
+  } else if (options.level == "neuron" || !written) {
+    print_rows(console, options, table);
+  }
+  for (const auto& path : {options.csv, options.xlsx})
+    if (!path.empty())
+      console.say(fmt::format("{} rows of {} columns were written to {}", table.rows.size(),
+                              table.columns.size(), path.string()));
+  if (options.store)
+    console.say(fmt::format("{} of {} are kept in {}; list --where and query find them",
+                            counted(picks.size(), "metric"), counted(ids.size(), "neuron"), options.repo));
+  if (!written && options.level == "neuron" && options.metrics.empty() && table.rows.size() > 1)
     console.say("--metric NAME shows other metrics, --csv FILE writes them all, --list says what they are");
   if (failed)
     throw Error(fmt::format("{} of {} neurons could not be read; the sentences above say why", failed,
@@ -319,7 +450,7 @@ std::function<void()> measure(CLI::App& command, Console& console) {
           ->type_name("REPO");
   command.add_option("--population", options->population, "Only those of this population")->needs(repo);
   command
-      .add_option("--metric", options->metrics,
+      .add_option("--metric,--metrics", options->metrics,
                   "Metrics to show, by their or L-Measure's name; all by default")
       ->type_name("NAME")
       ->delimiter(',')
@@ -338,16 +469,45 @@ std::function<void()> measure(CLI::App& command, Console& console) {
           return error.what();
         }
       });
-  command.add_option("--level", options->level, "What a row is: neuron, section, bifurcation or shell")
-      ->check(CLI::IsMember({"neuron", "section", "bifurcation", "shell"}))
+  command
+      .add_option(
+          "--level", options->level,
+          "What a row is: neuron, arbor, section, bifurcation, point, shell (a sphere about the soma) or bar "
+          "(of an arbor's barcode)")
+      ->check(CLI::IsMember(std::vector<std::string>(levels.begin(), levels.end())))
       ->type_name("LEVEL")
       ->capture_default_str();
+  command
+      .add_option("--by", options->by,
+                  "Mean and standard deviation over the neurons of each type, layer, region, species or "
+                  "population of a "
+                  "repository, or of each folder of files")
+      ->check(CLI::IsMember({"type", "layer", "region", "species", "population", "folder"}))
+      ->type_name("WHAT");
   command.add_option("--csv", options->csv, "Write the table to this file")->type_name("FILE");
+  command.add_option("--xlsx", options->xlsx, "Write it to this workbook, with --by both groups and neurons")
+      ->type_name("FILE.xlsx")
+      ->check([](const std::string& file) {
+        return file.ends_with(".xlsx") ? "" : fmt::format("{}: a workbook's name ends in .xlsx", file);
+      });
+  command
+      .add_flag("--store", options->store,
+                "Keep the metrics in the repository, so that neurons are found by them: of those with many "
+                "values the mean")
+      ->needs(repo);
   add_force(command, options->force);
   command.add_flag("--list", options->list, "Show all metrics and what they are");
   command.parse_complete_callback([options] {
     if (!options->list && options->files.empty() && options->repo.empty())
       throw CLI::RequiredError("files or --repo");
+    if (!options->by.empty() && options->level != "neuron")
+      throw CLI::ValidationError(
+          fmt::format("--by: groups are of neurons, not of each {}; leave --level out", options->level));
+    if (!options->by.empty() && (options->by == "folder") != options->repo.empty())
+      throw CLI::ValidationError(
+          "--by: files are grouped by folder, neurons of --repo by what is known of them");
+    if (options->store && (options->level != "neuron" || options->kind != "all"))
+      throw CLI::ValidationError("--store: what is kept is of whole neurons; leave --level and --kind out");
     for (const std::string& name : options->metrics)
       if (options->level != "neuron" && name_of(find_metric(name)->level) != options->level)
         throw CLI::ValidationError(

@@ -112,9 +112,10 @@ TableSheet metrics_sheet(Repository& repository, const std::vector<repository::N
                          const std::string& ids) {
   TableSheet table{"metrics", {{"neuron", ""}, {"name", ""}}, {}};
   std::map<std::string, std::size_t> column;
-  for (const statistics::Metric& m : statistics::metrics()) {
-    column[std::string(m.name)] = table.columns.size();
-    table.columns.push_back({std::string(m.name), std::string(m.unit)});
+  for (const auto& metric : repository.query("select name, unit from metrics order by id").rows) {
+    const auto& name = std::get<std::string>(metric[0]);
+    column[name] = table.columns.size();
+    table.columns.push_back({name, std::get<std::string>(metric[1])});
   }
   std::map<std::int64_t, std::size_t> row;
   for (const auto& neuron : neurons) {

@@ -65,7 +65,9 @@ std::span<const Verb> verbs() {
       {"check", "Say what is odd in neuron files, and mend them", "brainforest check cells/ --repair mended/",
        check},
       {"measure", "Measure neurons: lengths, counts, angles, asymmetry, Sholl and more",
-       "brainforest measure cells/*.swc --kind dendrite --csv cells.csv", measure},
+       "brainforest measure cells/*.swc --kind dendrite --csv cells.csv\n"
+       "  brainforest measure --repo cells.db --population L5 --by type --xlsx types.xlsx",
+       measure},
       {"compare", "Say whether two populations can be told apart, by what, and how surely",
        "brainforest compare pyramidal/ basket/ --kind dendrite --report apart.html\n"
        "  brainforest compare --repo cells.db --population traced --with grown",

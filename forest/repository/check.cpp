@@ -8,6 +8,7 @@
 #include "forest/core/parallel.h"
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
+#include "forest/repository/stored_metrics.h"
 
 namespace forest::repository {
 
@@ -24,7 +25,10 @@ std::vector<std::string> Repository::Impl::findings(const Repository& repository
   parallel_for(neurons.size(), 1, [&](std::size_t i) {
     if (whole[i]) expected[i] = rows_of(*whole[i]);
   });
-  const auto known = read([&] { return ask<int>("select count(*) from metrics").value_or(0); });
+  const auto known = read([&] {
+    return ask<int>(fmt::format("select count(*) from metrics where id < {}", first_further_number))
+        .value_or(0);
+  });
   Statements statements(*database);
   for (std::size_t i = 0; i < neurons.size(); ++i) {
     if (!whole[i]) continue;

@@ -5,6 +5,7 @@
 
 #include "forest/morphology/morphology.h"
 #include "forest/repository/schema.h"
+#include "forest/repository/stored_metrics.h"
 #include "forest/statistics/metric.h"
 
 namespace forest::repository {
@@ -25,9 +26,9 @@ void fill_section_kinds(soci::session& sql) {
 
 void fill_metrics(soci::session& sql) {
   int id = 0;
-  for (const statistics::Metric& m : statistics::metrics()) {
-    const std::string name(m.name), level(statistics::name_of(m.level)), unit(m.unit),
-        definition(m.definition);
+  for (const statistics::Metric* m : stored_metrics()) {
+    const std::string name(m->name), level(statistics::name_of(m->level)), unit(m->unit),
+        definition(m->definition);
     sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, "
            ":definition)",
         soci::use(++id), soci::use(name), soci::use(level), soci::use(unit), soci::use(definition);
@@ -58,7 +59,7 @@ void migrate(Database& database, int from, Refill refill) {
     if (step.to <= from) continue;
     run_script(database, step.sql);
     if (step.to == 1) fill_section_kinds(database.sql());
-    if (step.to == 2) fill_metrics(database.sql());
+    if (step.to == 8) fill_metrics(database.sql());
   }
   if (from > 0)
     refill(database, from);

@@ -65,7 +65,10 @@ struct Repository::Impl {
   /// What an earlier version stored, with what this one knows of it besides.
   static void refill(Database& database, int from);
   void refill_shapes();
+  void refill_metrics();
   void refill_grammars();
+
+  int number_of_metric(const statistics::Metric& metric);
 
   /// Calls `body`; errors of the database become sentences.
   template <class Body>

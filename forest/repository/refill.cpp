@@ -1,7 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 // Repositories of earlier versions, brought up to date where SQL alone does not do it (schema.h).
+#include <algorithm>
+#include <span>
+
 #include <fmt/format.h>
 
+#include "forest/core/parallel.h"
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
 #include "forest/repository/packing.h"
@@ -12,6 +16,7 @@ void Repository::Impl::refill(Database& database, int from) {
   Impl impl("", std::shared_ptr<Database>(std::shared_ptr<void>(), &database));
   if (from < 3) impl.refill_shapes();
   if (from < 4) impl.refill_grammars();
+  if (from >= 3 && from < 8) impl.refill_metrics();
 }
 
 /// Before version 3 a section was named by two numbers, before version 2 points were not packed.
@@ -25,13 +30,40 @@ void Repository::Impl::refill_shapes() {
                              fmt::format("old_sections where neuron = {} order by number", id)));
     for (const char* table : {"points", "arbors"})
       sql << fmt::format("delete from {} where neuron = {}", table, id);
-    sql << "delete from " + of_metrics(id);
     all.id = id;
     all.rows = rows_of(m);
     all.packed_points = packed(m.points(), runs_of(all.rows));
     all.run_shape();
   }
   sql << "drop table old_sections";
+}
+
+/// Before version 8 fewer metrics were stored. (Before version 3 the shapes that were stored anew brought theirs.)
+void Repository::Impl::refill_metrics() {
+  Statements all(*database);
+  std::vector<int> ids(room(std::size_t(ask<int>("select count(*) from neurons").value_or(0))));
+  sql << "select id from neurons order by id", into(ids);
+  constexpr std::size_t together = 64;  // on all cores
+  for (std::size_t first = 0; first < ids.size(); first += together) {
+    const auto some = std::span(ids).subspan(first, std::min(together, ids.size() - first));
+    std::vector<Rows> rows(some.size());
+    for (std::size_t i = 0; i < some.size(); ++i) try {
+        rows[i] = stored(NeuronId(std::size_t(some[i])), "points", of_sections(some[i]) + " order by id");
+      } catch (const Error&) {  // damaged: it stays as it is, without metrics, and who reads it is told
+      }
+    parallel_for(some.size(), 1, [&](std::size_t i) {
+      try {
+        rows[i] = rows_of(morphology_of(rows[i]));
+      } catch (const Error&) {
+        rows[i] = {};
+      }
+    });
+    for (std::size_t i = 0; i < some.size(); ++i) {
+      all.id = some[i];
+      all.rows = std::move(rows[i]);
+      all.run_metrics();
+    }
+  }
 }
 
 /// Before version 4 the text of a grammar was one line.

@@ -27,6 +27,10 @@
 #include "forest/morphology/morphology.h"
 #include "forest/repository/answer.h"
 
+namespace forest::statistics {
+struct Metric;
+}
+
 namespace forest::repository {
 
 using NeuronId = Id<struct NeuronTag>;  // counted from 1, in the order of storing
@@ -200,7 +204,7 @@ class Repository {
   std::vector<PopulationRow> populations() const;  // by name
   std::vector<NeuronRow> neurons(
       std::string_view population = "") const;  // in the order of storing; "": of all populations
-  /// Those for which a condition in SQL holds, on the columns of the view `neuron` and the names of metrics:
+  /// Those for which a condition in SQL holds, on the columns of the view `neuron` and the names of metrics that are stored:
   ///   "type = 'L5 pyramidal' and total_length > 5000"
   /// Throws Error that says what is not understood.
   std::vector<NeuronRow> neurons_where(const std::string& condition, std::string_view population = "") const;
@@ -212,6 +216,11 @@ class Repository {
   /// Equal, bit for bit and with its annotations, to what was stored. Throws Error when there is no such
   /// neuron or its checksum says that it was damaged.
   Morphology morphology(NeuronId id) const;
+
+  /// Keeps metrics of a neuron so that it is found by them: those that are stored with every neuron anew, others besides, until
+  /// its points are revised. One value each, of a metric of sections and the like their mean; NaN: none. Throws Error when there
+  /// is no such neuron, or the metric has the name of what a neuron has anyway (`type`).
+  void store_metrics(NeuronId id, std::span<const std::pair<const statistics::Metric*, double>> values);
 
   bool remove(NeuronId id);  // false when there was none
 

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
 #include "forest/morphology/measure.h"
+#include "forest/repository/stored_metrics.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
 
@@ -37,9 +38,9 @@ std::vector<T> values_of(const std::string& blob) {
 void measure(const Morphology& m, Rows& rows) {
   const statistics::Arbors arbors(m);
   int number = 0;
-  for (const statistics::Metric& metric : statistics::metrics()) {
+  for (const statistics::Metric* metric : stored_metrics()) {
     ++number;
-    const double value = statistics::mean(metric.values(arbors));
+    const double value = statistics::mean(metric->values(arbors));
     if (!std::isfinite(value)) continue;
     rows.metric.push_back(number);
     rows.metric_value.push_back(value);

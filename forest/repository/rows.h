@@ -30,8 +30,8 @@ struct Rows {
     std::vector<double> length;
     std::size_t size() const { return root.size(); }
   } arbors;
-  std::vector<int> metric;           // number of a statistics::Metric from 1, of those that are defined
-  std::vector<double> metric_value;  // of the neuron, or the mean over its sections, bifurcations, shells
+  std::vector<int> metric;           // numbers (stored_metrics.h) of those that are defined
+  std::vector<double> metric_value;  // of the neuron, or the mean over its sections, bifurcations, …
   std::vector<Spine> spines;
   Annotations annotations;
 };

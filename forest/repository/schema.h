@@ -137,7 +137,7 @@ alter table sections add column end_z double precision not null default 0;
 create table metrics (
   id         integer primary key,
   name       text not null unique,
-  level      text not null,           -- neuron, section, bifurcation, shell; of all but the first the mean is kept
+  level      text not null,           -- neuron, arbor, section, bifurcation, point …; of all but the first the mean is kept
   unit       text not null,
   definition text not null
 );
@@ -301,7 +301,10 @@ create view junction as
          s.end_diameter_pm / 1e6 as diameter
   from neurons n cross join sections s join populations p on p.id = n.population
   where s.id >= cast(n.id as bigint) * 16777216 and s.id < (cast(n.id as bigint) + 1) * 16777216;
-)sql"}};
+)sql"},
+    // More metrics (stored_metrics.h), and section_radial_distances is measured from the start of its arbor, as NeuroM does. The
+    // program works them all out anew.
+    Migration{8, "delete from neuron_metrics;\ndelete from metrics;\n"}};
 
 inline constexpr int section_bits = 24;                      // of sections.id
 inline constexpr int schema_version = migrations.back().to;  // an older program refuses a newer repository

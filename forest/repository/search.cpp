@@ -2,6 +2,8 @@
 // Which neurons there are: lists, conditions, questions.
 #include <algorithm>
 #include <bit>
+#include <functional>
+#include <map>
 #include <span>
 #include <utility>
 
@@ -108,7 +110,8 @@ struct Condition {
   std::string text, joins;
 };
 
-Condition condition_of(std::string_view text) {
+/// @param numbers  of the metrics that are stored, by name
+Condition condition_of(std::string_view text, const std::map<std::string, int, std::less<>>& numbers) {
   Condition condition;
   std::vector<int> joined;
   for (std::size_t at = 0; at < text.size();) {
@@ -124,8 +127,9 @@ Condition condition_of(std::string_view text) {
       std::size_t end = at;
       while (end < text.size() && word_char(text[end])) ++end;
       const std::string_view word = text.substr(at, end - at);
-      if (const statistics::Metric* metric = statistics::find_metric(word)) {
-        const int number = int(metric - statistics::metrics().data()) + 1;
+      const statistics::Metric* metric = statistics::find_metric(word);
+      if (const auto stored = numbers.find(metric ? metric->name : word); stored != numbers.end()) {
+        const int number = stored->second;
         if (std::ranges::find(joined, number) == joined.end()) {
           joined.push_back(number);
           condition.joins += fmt::format(
@@ -147,7 +151,10 @@ Condition condition_of(std::string_view text) {
 }  // namespace
 
 std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::string_view population) const {
-  const Condition condition = condition_of(text);
+  const Answer known = impl_->guarded([&] { return impl_->database->ask("select name, id from metrics"); });
+  std::map<std::string, int, std::less<>> numbers;
+  for (const auto& row : known.rows) numbers[text_of(row[0])] = int(number_in(row[1]));
+  const Condition condition = condition_of(text, numbers);
   return impl_->rows(fmt::format("({}) and {}", condition.text, in_population(population)), condition.joins);
 }
 

@@ -14,6 +14,7 @@
 #include "forest/repository/database.h"
 #include "forest/repository/names.h"
 #include "forest/repository/schema.h"
+#include "forest/repository/stored_metrics.h"
 
 namespace forest::repository {
 namespace {
@@ -141,8 +142,10 @@ void Statements::run_shape() {
   if (!data_.empty()) points_.run();
   run(arbors_, rows.arbors.size());
   sections_.run(rows.sections.size());
-  metrics_.run(rows.metric.size());
+  run_metrics();
 }
+
+void Statements::run_metrics() { metrics_.run(rows.metric.size()); }
 
 std::string Statements::deviation(Database& database, const Morphology& m) {
   fill(m), fill_shape();
@@ -162,7 +165,8 @@ std::string Statements::deviation(Database& database, const Morphology& m) {
        {Part{neuron_, 1, fmt::format("neurons where id = {}", id), " stems sections points spines length "},
         Part{soma_, 1, of("somata", "")}, Part{arbors_, rows.arbors.size(), of("arbors", " order by number")},
         Part{sections_, rows.sections.size(), of_sections(id) + " order by id"},
-        Part{metrics_, rows.metric.size(), of_metrics(id) + " order by metric"},
+        Part{metrics_, rows.metric.size(),
+             fmt::format("{} and metric < {} order by metric", of_metrics(id), first_further_number)},
         Part{spines_, rows.spines.size(), of("spines", " order by number")}}) {
     std::vector<const InsertColumn*> columns;
     std::vector<std::string_view> names;

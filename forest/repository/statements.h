@@ -35,6 +35,7 @@ class Statements {
 
   /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
   void run_shape();
+  void run_metrics();
 
   /// What the tables hold otherwise than this neuron, of all that follows from its points: "length of sections is 1 in row 2,
   /// not 14.5", and how much more there is. Empty when nothing is.

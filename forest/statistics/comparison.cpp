@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
+#include "forest/statistics/persistence_image.h"
 #include "forest/statistics/random_forest.h"
 #include "forest/statistics/summary.h"
 
@@ -63,6 +64,9 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.energy = energy_distance(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed);
   c.mmd = mean_discrepancy(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed);
 
+  if (all.bars.size() == all.size())
+    c.barcodes = barcode_distance(persistence_images(all.bars), a.size(), options.dealings, options.seed);
+
   std::vector<std::uint8_t> second(a.size(), 0);
   second.resize(a.size() + b.size(), 1);
   const std::vector<double> importances =
@@ -80,9 +84,9 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.detectable_auc = detectable_auc(a.size(), b.size());
   c.detectable_effect = detectable_effect(a.size(), b.size(), c.differences.size());
 
-  double least = std::min({c.forest.p, c.energy.p, c.mmd.p});
+  double least = std::min({c.forest.p, c.energy.p, c.mmd.p, c.barcodes.p});
   for (const Difference& d : c.differences) least = std::min(least, d.p_holm);
-  c.p = std::min(1., 4. * least);
+  c.p = std::min(1., 5. * least);
   return c;
 }
 

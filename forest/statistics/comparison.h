@@ -29,7 +29,7 @@ struct Difference {
 };
 
 struct ComparisonOptions {
-  std::size_t repeats = 50, trees = 100, permutations = 100;
+  std::size_t repeats = 50, trees = 100, permutations = 199;
   std::size_t dealings = 1999;
   std::uint64_t seed = 0;
 };
@@ -40,12 +40,13 @@ struct Comparison {
   Discrimination forest, logistic;      // on all features, with permutations
   Discrimination structure;             // random forest without what depends on diameters
   DistanceTest energy, mmd;
-  Band sholl;  // around the mean of a, as wide as a sample like b may be by chance
+  DistanceTest barcodes;  // of mean persistence images
+  Band sholl;             // around the mean of a, as wide as a sample like b may be by chance
   Curve sholl_b;
   double sholl_inside = 1.;
   double detectable_auc = 1., detectable_effect = 0.;  // in four of five cases
   double p =
-      1.;  // that one population looks as different: four times the smallest p of forest, energy, mmd and features
+      1.;  // that one population looks as different: five times the smallest p of forest, energy, mmd, barcodes and features
 
   bool told_apart() const { return p <= .05; }
 };

@@ -12,7 +12,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/morphology/transform.h"
 #include "forest/statistics/metric.h"
+#include "forest/statistics/shared.h"
 #include "forest/statistics/summary.h"
 
 namespace forest::statistics {
@@ -28,6 +30,21 @@ constexpr auto skewed = std::to_array<std::string_view>(
     {"section_lengths", "section_term_lengths", "section_bif_lengths", "section_end_distances",
      "section_tortuosity", "section_mean_radii", "daughter_ratio"});
 
+// What repeats another metric, or tells the tracer and not the cell.
+constexpr auto left_out =
+    std::to_array<std::string_view>({"segment_midpoints_x", "segment_midpoints_y", "segment_midpoints_z",
+                                     "euc_distance", "diameter", "type"});
+
+const std::vector<const Metric*>& chosen() {
+  static const std::vector<const Metric*> all = [] {
+    std::vector<const Metric*> rows;
+    for (const Metric& m : metrics())
+      if (!std::ranges::count(left_out, m.name)) rows.push_back(&m);
+    return rows;
+  }();
+  return all;
+}
+
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
@@ -37,9 +54,6 @@ std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   if (m.level == Level::shell) {
     std::vector<Feature> columns;
     for (const double r : radii) columns.push_back(column(fmt::format("at {} µm", r), m.unit));
-    columns.push_back(column("maximum", m.unit));
-    columns.push_back(column("radius of maximum", "µm"));
-    columns.push_back(column("mean radius", "µm"));
     columns.push_back(column("sd of radius", "µm"));
     return columns;
   }
@@ -53,16 +67,12 @@ void add_sholl(std::span<const double> curve, std::vector<double>& row) {
     const auto shell = std::size_t(r / sholl_step) - 1;
     row.push_back(shell < curve.size() ? curve[shell] : 0.);
   }
-  const auto top = std::ranges::max_element(curve);
   double sum = 0., first = 0., second = 0.;
   for (std::size_t i = 0; i < curve.size(); ++i) {
     const double r = double(i + 1) * sholl_step;
     sum += curve[i], first += r * curve[i], second += r * r * curve[i];
   }
   const double mean = sum > 0. ? first / sum : nan;
-  row.push_back(curve.empty() ? 0. : *top);
-  row.push_back(curve.empty() ? nan : double(top - curve.begin() + 1) * sholl_step);
-  row.push_back(mean);
   row.push_back(sum > 0. ? std::sqrt(std::max(0., second / sum - mean * mean)) : nan);
 }
 
@@ -94,21 +104,28 @@ std::vector<Group> groups_of(std::string_view word) {
 std::vector<Feature> features_of(std::span<const Group> groups) {
   std::vector<Feature> features;
   for (const Group& group : groups)
-    for (const Metric& m : metrics())
-      std::ranges::move(columns_of(m, group.name), std::back_inserter(features));
+    for (const Metric* m : chosen())
+      std::ranges::move(columns_of(*m, group.name), std::back_inserter(features));
   return features;
 }
 
 Measured measure(const Morphology& neuron, std::span<const Group> groups) {
   Measured measured;
+  const Morphology placed = centred(neuron);
   for (const Group& group : groups) {
-    const Arbors arbors(neuron, group.kinds);
-    for (const Metric& m : metrics()) {
+    const Arbors arbors(placed, group.kinds);
+    const bool first = &group == &groups.front();
+    if (first) {
+      const auto bars = arbors.once<radial_barcodes>().bars();
+      measured.bars.assign(bars.begin(), bars.end());
+    }
+    for (const Metric* metric : chosen()) {
+      const Metric& m = *metric;
       const std::vector<double> values = m.values(arbors);
       if (m.level == Level::neuron) {
         measured.features.push_back(values.at(0));
       } else if (m.level == Level::shell) {
-        if (measured.sholl.empty() && &group == &groups.front()) measured.sholl = values;
+        if (first) measured.sholl = values;
         add_sholl(values, measured.features);
       } else {
         const Summary s = summarize(values);
@@ -125,12 +142,14 @@ Measured measure(const Morphology& neuron, std::span<const Group> groups) {
 
 FeatureTable table_of(std::vector<std::string> cells, std::span<const Group> groups,
                       std::span<const Measured> measured) {
-  FeatureTable table{.cells = std::move(cells), .features = features_of(groups), .values = {}, .sholl = {}};
+  FeatureTable table{
+      .cells = std::move(cells), .features = features_of(groups), .values = {}, .sholl = {}, .bars = {}};
   table.values.resize(Eigen::Index(measured.size()), Eigen::Index(table.features.size()));
   for (std::size_t i = 0; i < measured.size(); ++i) {
     table.values.row(Eigen::Index(i)) =
         Eigen::Map<const Eigen::RowVectorXd>(measured[i].features.data(), table.values.cols());
     table.sholl.push_back(measured[i].sholl);
+    table.bars.push_back(measured[i].bars);
   }
   return table;
 }
@@ -145,6 +164,7 @@ FeatureTable stacked(std::span<const FeatureTable> tables) {
       throw Error("tables of different features cannot be compared; measure both alike");
     all.cells.insert(all.cells.end(), t.cells.begin(), t.cells.end());
     all.sholl.insert(all.sholl.end(), t.sholl.begin(), t.sholl.end());
+    all.bars.insert(all.bars.end(), t.bars.begin(), t.bars.end());
     rows += t.values.rows();
   }
   all.values.resize(rows, Eigen::Index(all.features.size()));
@@ -157,18 +177,20 @@ FeatureTable stacked(std::span<const FeatureTable> tables) {
 }
 
 FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> rows) {
-  FeatureTable part{.cells = {}, .features = table.features, .values = {}, .sholl = {}};
+  FeatureTable part{.cells = {}, .features = table.features, .values = {}, .sholl = {}, .bars = {}};
   part.values.resize(Eigen::Index(rows.size()), table.values.cols());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     part.cells.push_back(table.cells[rows[i]]);
     if (!table.sholl.empty()) part.sholl.push_back(table.sholl[rows[i]]);
+    if (!table.bars.empty()) part.bars.push_back(table.bars[rows[i]]);
     part.values.row(Eigen::Index(i)) = table.values.row(Eigen::Index(rows[i]));
   }
   return part;
 }
 
 FeatureTable structure_of(const FeatureTable& table) {
-  FeatureTable part{.cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl};
+  FeatureTable part{
+      .cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl, .bars = table.bars};
   std::vector<Eigen::Index> columns;
   for (std::size_t i = 0; i < table.features.size(); ++i)
     if (!table.features[i].diameters) {
@@ -181,7 +203,8 @@ FeatureTable structure_of(const FeatureTable& table) {
 
 FeatureTable distinct(const FeatureTable& table) {
   const Eigen::Index rows = table.values.rows();
-  FeatureTable out{.cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl};
+  FeatureTable out{
+      .cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl, .bars = table.bars};
   out.values.resize(rows, 2 * table.values.cols());
   std::map<std::pair<double, double>, std::vector<Eigen::Index>>
       alike;  // columns by two sums, before all values

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // A population as numbers: one row a cell, one column a feature. Features are the rows of the table of metrics, of
 // several groups of sections: what belongs to the neuron as it is, what belongs to its parts by mean and standard
-// deviation (and median where values are skewed), Sholl's curve at fixed radii and by its moments.
+// deviation (and median where values are skewed), Sholl's curve at fixed radii.
 #pragma once
 
 #include <span>
@@ -11,6 +11,7 @@
 #include <Eigen/Core>
 
 #include "forest/statistics/arbors.h"
+#include "forest/statistics/barcode.h"
 
 namespace forest::statistics {
 
@@ -39,8 +40,10 @@ struct Measured {
   std::vector<double>
       features;  // NaN where not defined, such as the contraction of a kind that the cell has not
   std::vector<double> sholl;  // crossings of spheres of radius sholl_step, 2 sholl_step, … by the first group
+  std::vector<Bar> bars;      // of the radial barcodes of the first group
 };
 
+/// Where the neuron lies in its file does not matter: it is measured with its soma at the origin.
 Measured measure(const Morphology& neuron, std::span<const Group> groups);
 
 struct FeatureTable {
@@ -48,6 +51,7 @@ struct FeatureTable {
   std::vector<Feature> features;
   Eigen::MatrixXd values;                  // cells × features, NaN where not defined
   std::vector<std::vector<double>> sholl;  // of each cell; may be empty for tables that were not measured
+  std::vector<std::vector<Bar>> bars;      // likewise
 
   std::size_t size() const { return cells.size(); }
 };

@@ -10,6 +10,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/morphology/transform.h"
 
 #include "tests/zoo.h"
 
@@ -79,7 +80,11 @@ TEST(Features, ReadShollsCurveAtFixedRadii) {
   EXPECT_EQ(value("basal sholl_crossings at 20 µm"), m.sholl[1]);
   EXPECT_EQ(value("basal sholl_crossings at 40 µm"), m.sholl[3]);
   EXPECT_EQ(value("basal sholl_crossings at 1000 µm"), 0.);
-  EXPECT_EQ(value("basal sholl_crossings maximum"), *std::ranges::max_element(m.sholl));
+  EXPECT_EQ(value("basal sholl_maximum"), *std::ranges::max_element(m.sholl));
+  EXPECT_EQ(m.bars.size(), 8u);  // one a tip
+  const Measured moved = measure(translated(zoo_parts::binary_tree(3), {64, -128, 32}), groups);
+  for (std::size_t i = 0; i < features.size(); ++i)
+    EXPECT_TRUE(moved.features[i] == m.features[i] || std::isnan(m.features[i])) << features[i].name;
 }
 
 TEST(Distinct, LeavesOutWhatSaysNothingAndWhatIsSaidTwice) {

@@ -2,6 +2,7 @@
 #include "forest/statistics/metric.h"
 
 #include <cmath>
+#include <cstdlib>
 #include <fstream>
 #include <functional>
 #include <map>
@@ -135,7 +136,7 @@ void expect_same(const Metric& metric, const Morphology& a, const Morphology& b,
   }
 }
 
-TEST(Metrics, AreAtLeastTwentyWithNamesOfTheirOwn) {
+TEST(Metrics, AreAtLeastAHundredWithNamesOfTheirOwn) {
   Names names;
   for (const Metric& m : metrics()) {
     EXPECT_TRUE(names.insert(m.name).second) << m.name;
@@ -145,7 +146,7 @@ TEST(Metrics, AreAtLeastTwentyWithNamesOfTheirOwn) {
     }
     EXPECT_TRUE(m.definition.ends_with('.')) << m.name;
   }
-  EXPECT_GE(names.size(), 20u);
+  EXPECT_GE(names.size(), 100u);
   EXPECT_EQ(find_metric(""), nullptr);
   EXPECT_EQ(find_metric("Total_Length"), nullptr);
 }
@@ -163,9 +164,14 @@ TEST(Metrics, GiveOneFiniteValueAnElement) {
   all.push_back(b.build());  // as far as a number goes
   for (const Morphology& m : all) {
     const Arbors arbors(m);
-    const std::map<Level, std::size_t> elements{{Level::neuron, 1},
-                                                {Level::section, arbors.sections().size()},
-                                                {Level::bifurcation, arbors.bifurcations().size()}};
+    const auto sections = arbors.sections();
+    const std::map<Level, std::size_t> elements{
+        {Level::neuron, 1},
+        {Level::arbor, arbors.stems().size()},
+        {Level::section, sections.size()},
+        {Level::bifurcation, arbors.bifurcations().size()},
+        {Level::point, arbors.columns().x.size() - sections.size()},
+        {Level::bar, std::size_t(std::ranges::count(sections, 0u, &Branch::daughters))}};
     for (const Metric& metric : metrics()) {
       const auto v = metric.values(arbors);
       if (metric.level != Level::shell) {
@@ -177,7 +183,30 @@ TEST(Metrics, GiveOneFiniteValueAnElement) {
 }
 
 TEST(Metrics, AreInvariantUnderRotationAndTranslation) {
-  const Names bound_to_axes{"total_width", "total_height", "total_depth", "length_fraction_above_soma"};
+  const Names bound_to_axes{"total_width",
+                            "total_height",
+                            "total_depth",
+                            "width",
+                            "height",
+                            "depth",
+                            "length_fraction_above_soma",
+                            "aspect_ratio",
+                            "circularity",
+                            "shape_factor",
+                            "fractal_dimension_boxes",
+                            "trunk_vectors_x",
+                            "trunk_vectors_y",
+                            "trunk_vectors_z",
+                            "trunk_origin_azimuths",
+                            "trunk_origin_elevations",
+                            "trunk_angles_from_vector",
+                            "trunk_angles",
+                            "segment_midpoints_x",
+                            "segment_midpoints_y",
+                            "segment_midpoints_z",
+                            "x",
+                            "y",
+                            "z"};
   const Quat turn = Quat(0.3f, -0.5f, 0.7f, 0.2f).normalized();
   const auto move = [&](Point p) {
     const Vec3 v = turn * p.position() + Vec3(100, -40, 12);
@@ -194,11 +223,13 @@ TEST(Metrics, ScaleWithTheirUnit) {
   const auto twice = [](Point p) { return Point{2 * p.x, 2 * p.y, 2 * p.z, 2 * p.radius}; };
   for (const Morphology& m : zoo())
     for (const Metric& metric : metrics()) {
-      if (metric.level == Level::shell) continue;
-      const double factor = metric.unit == "µm"    ? 2.
-                            : metric.unit == "µm²" ? 4.
-                            : metric.unit == "µm³" ? 8.
-                                                   : 1.;
+      if (metric.level == Level::shell || metric.name.starts_with("sholl_") ||
+          metric.name.starts_with("tortuosity_"))
+        continue;
+      const std::map<std::string_view, double> factors{
+          {"", 1.},    {"°", 1.},    {"µm", 2.},     {"µm²", 4.},
+          {"µm³", 8.}, {"1/µm", .5}, {"1/µm²", .25}, {"µm^1.5", std::pow(2., 1.5)}};
+      const double factor = factors.at(metric.unit);
       expect_same(metric, m, changed(m, twice), factor, 1e-12);
     }
 }
@@ -224,14 +255,37 @@ TEST(Metrics, SayWhetherTheyDependOnDiameters) {
 }
 
 TEST(Metrics, DoNotDependOnHowDenselyABranchWasTraced) {
-  const Names local{
-      "number_of_segments", "taper_1",        "taper_2",    "section_taper_rates", "parent_daughter_ratio",
-      "sibling_ratios",     "daughter_ratio", "rall_power", "pk_classic"};
+  const Names local{"number_of_segments",
+                    "width",
+                    "height",
+                    "depth",
+                    "surface",
+                    "volume",
+                    "aspect_ratio",
+                    "taper_1",
+                    "taper_2",
+                    "section_taper_rates",
+                    "fragmentation",
+                    "fractal_dim",
+                    "parent_daughter_ratio",
+                    "diam_threshold",
+                    "sibling_ratios",
+                    "daughter_ratio",
+                    "rall_power",
+                    "pk",
+                    "pk_classic",
+                    "pk_2",
+                    "diameter_power_relations",
+                    "hillman_threshold",
+                    "principal_direction_extents",
+                    "principal_direction_extents_2",
+                    "principal_direction_extents_3"};
   for (std::uint64_t seed = 0; seed < 20; ++seed) {
     const Morphology m = wild(seed), denser = changed(m, same, 3);
     EXPECT_EQ(denser.segment_count(), 4 * m.segment_count());
     for (const Metric& metric : metrics())
-      if (!local.contains(metric.name)) expect_same(metric, m, denser, 1., 1e-3);
+      if (metric.level != Level::point && !local.contains(metric.name))
+        expect_same(metric, m, denser, 1., 1e-3);
   }
 }
 
@@ -249,6 +303,78 @@ TEST(Counts, TellBifurcationsFromForkingPoints) {
   EXPECT_EQ(value("number_of_bifurcations", m), 0);
   EXPECT_EQ(value("number_of_forking_points", m), 1);
   EXPECT_EQ(value("number_of_leaves", m), 3);
+}
+
+TEST(Metrics, AreTheSameWhoeverAsksFirst) {
+  for (std::uint64_t seed = 0; seed < 5; ++seed) {
+    const Morphology m = wild(seed);
+    const Arbors shared(m);
+    std::vector<std::vector<double>> backwards;
+    for (auto row = metrics().rbegin(); row != metrics().rend(); ++row)
+      backwards.push_back(row->values(shared));
+    for (const Metric& metric : metrics()) {
+      const auto alone = metric.values(Arbors(m));
+      EXPECT_THAT(backwards.back(), testing::Pointwise(testing::NanSensitiveDoubleEq(), alone))
+          << metric.name;
+      backwards.pop_back();
+    }
+  }
+}
+
+TEST(Metrics, CoverBothVocabularies) {
+  for (const char* name : {"Soma_Surface",
+                           "N_stems",
+                           "N_bifs",
+                           "N_branch",
+                           "N_tips",
+                           "Width",
+                           "Height",
+                           "Depth",
+                           "Type",
+                           "Diameter",
+                           "Diameter_pow",
+                           "Length",
+                           "Surface",
+                           "SectionArea",
+                           "Volume",
+                           "EucDistance",
+                           "PathDistance",
+                           "XYZ",
+                           "Branch_Order",
+                           "Terminal_degree",
+                           "TerminalSegment",
+                           "Taper_1",
+                           "Taper_2",
+                           "Branch_pathlength",
+                           "Contraction",
+                           "Fragmentation",
+                           "Daughter_Ratio",
+                           "Parent_Daughter_Ratio",
+                           "Partition_asymmetry",
+                           "Rall_Power",
+                           "Pk",
+                           "Pk_classic",
+                           "Pk_2",
+                           "Bif_ampl_local",
+                           "Bif_ampl_remote",
+                           "Bif_tilt_local",
+                           "Bif_tilt_remote",
+                           "Bif_torque_local",
+                           "Bif_torque_remote",
+                           "Last_parent_diam",
+                           "Diam_threshold",
+                           "HillmanThreshold",
+                           "Helix",
+                           "Fractal_Dim",  // and NeuroM's
+                           "section_term_lengths",
+                           "segment_meander_angles",
+                           "terminal_path_lengths",
+                           "volume_density",
+                           "principal_direction_extents",
+                           "trunk_angles_inter_types",
+                           "diameter_power_relations",
+                           "aspect_ratio"})
+    EXPECT_NE(find_metric(name), nullptr) << name;
 }
 
 TEST(Kinds, PartTheNeuron) {
@@ -428,19 +554,34 @@ TEST(Volume, IsTheIntegralOfTheCrossSection) {
   EXPECT_NEAR(value("total_volume", m), volume, 1e-5 * volume);
 }
 
+// The page's table is made here: BRAINFOREST_REWRITE_DOCS=1 puts it in.
 TEST(Documentation, HoldsTheTableOfMetrics) {
-  std::ifstream file(FOREST_SOURCE_DIR "/docs/statistics/metrics.md");
-  std::stringstream page;
-  page << file.rdbuf();
-  std::string table;
+  const std::string path = FOREST_SOURCE_DIR "/docs/statistics/metrics.md";
+  std::stringstream content;
+  content << std::ifstream(path).rdbuf();
+  const std::string page = content.str();
+
+  std::string table =
+      "| name | unit | level | diameters | definition | source | L-Measure "
+      "|\n|---|---|---|---|---|---|---|\n";
   for (const Metric& m : metrics()) {
-    const auto or_dash = [](std::string_view s) { return s.empty() ? std::string("–") : std::string(s); };
-    table += "| `" + std::string(m.name) + "` | " + or_dash(m.unit) + " | " + std::string(name_of(m.level)) +
-             " | " + std::string(m.definition) + " | " + or_dash(m.source) + " | " + or_dash(m.l_measure) +
-             " |\n";
+    const auto or_dash = [](std::string_view s) { return s.empty() ? "–" : std::string(s); };
+    table += "| `" + std::string(m.name) + "` | ";
+    for (const std::string& cell :
+         {or_dash(m.unit), std::string(name_of(m.level)), or_dash(m.diameters ? "yes" : ""),
+          std::string(m.definition), or_dash(m.source)})
+      table += cell + " | ";
+    table += or_dash(m.l_measure) + " |\n";
   }
-  EXPECT_NE(page.str().find(table), std::string::npos) << "put this table into docs/statistics/metrics.md:\n"
-                                                       << table;
+  const std::size_t begin = page.find("| name | unit |"), end = page.find("\n\n", begin) + 1;
+  ASSERT_LT(begin, end) << "the page has no table";
+  const std::string right = page.substr(0, begin) + table + page.substr(end);
+  if (std::getenv("BRAINFOREST_REWRITE_DOCS")) {
+    std::ofstream(path) << right;
+  } else {
+    EXPECT_TRUE(page == right)
+        << path << " is not what the table says; run this test with BRAINFOREST_REWRITE_DOCS=1";
+  }
 }
 
 }  // namespace

@@ -1,11 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/statistics/summary.h"
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 #include <vector>
 
 #include <gtest/gtest.h>
+
+#include "forest/core/random.h"
 
 namespace forest::statistics {
 namespace {
@@ -32,6 +35,32 @@ TEST(Summary, OfOneValueHasNoSpreadAndOfNoneHasNoMean) {
 
 TEST(Summary, KeepsItsSpreadFarFromZero) {
   EXPECT_NEAR(summarize(std::vector{1e9 + 1., 1e9 + 2., 1e9 + 3.}).sd, 1., 1e-6);
+}
+
+TEST(Summary, IsThatOfThePlainDefinitions) {
+  Random random(1);
+  for (const std::size_t count : {1u, 2u, 7u, 8u, 9u, 500u, 1024u, 5000u, 5001u})
+    for (const bool skewed : {false, true}) {
+      std::vector<double> values, defined;
+      for (std::size_t i = 0; i < count; ++i) {
+        values.push_back(skewed ? std::exp(random.normal(0., 9.)) : std::round(random.normal(0., 30.)));
+        defined.push_back(values.back());
+        if (i % 5 == 4) values.push_back(nan);
+      }
+      double sum = 0., squares = 0.;
+      for (const double x : defined) sum += x;
+      const double expected = sum / double(count);
+      for (const double x : defined) squares += (x - expected) * (x - expected);
+      std::ranges::sort(defined);
+      const Summary s = summarize(values);
+      EXPECT_EQ(s.count, count);
+      EXPECT_NEAR(s.mean, expected, 1e-12 * (1. + std::abs(expected)));
+      EXPECT_NEAR(mean(values), expected, 1e-12 * (1. + std::abs(expected)));
+      EXPECT_NEAR(s.sd, count > 1 ? std::sqrt(squares / double(count - 1)) : 0., 1e-9 * (1. + s.sd));
+      EXPECT_EQ(s.min, defined.front());
+      EXPECT_EQ(s.max, defined.back());
+      EXPECT_EQ(s.median, 0.5 * (defined[(count - 1) / 2] + defined[count / 2])) << count << skewed;
+    }
 }
 
 }  // namespace

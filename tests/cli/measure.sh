@@ -37,11 +37,16 @@ PY
   "[{'neuron': 'fork.swc', 'number_of_leaves': 2.0, 'total_length': 30.0, 'max_path_distance': 20.0}, {'neuron': 'apical, one.swc', 'number_of_leaves': 0.0, 'total_length': 0.0, 'max_path_distance': None}]" ]
 
 # One row a section, a bifurcation, a shell.
-for level in section bifurcation shell; do $BRAINFOREST measure fork.swc --level $level --csv $level.csv >/dev/null; done
-[ "$(wc -l <section.csv)" = 4 ] && [ "$(wc -l <bifurcation.csv)" = 2 ]
+for level in arbor section bifurcation point shell bar; do
+  $BRAINFOREST measure fork.swc --level $level --csv $level.csv >/dev/null
+done
+[ "$(wc -l <section.csv)" = 4 ] && [ "$(wc -l <bifurcation.csv)" = 2 ] && [ "$(wc -l <arbor.csv)" = 2 ]
+[ "$(wc -l <point.csv)" = 4 ] && [ "$(wc -l <bar.csv)" = 3 ]
+$BRAINFOREST measure fork.swc --level bar --metrics tmd_path_births,tmd_path_deaths --csv bars.csv >/dev/null
+[ "$(tail -n +2 bars.csv | tr -d '\r' | sort)" = $'fork.swc,0,0,20,0\nfork.swc,0,1,20,10' ]
 [ "$(tail -n 2 shell.csv | tr -d '\r')" = $'fork.swc,10,1\nfork.swc,20,1' ]
 
-$BRAINFOREST measure --list --json | python3 -c 'import json,sys; assert len(json.load(sys.stdin)) >= 20'
+$BRAINFOREST measure --list --json | python3 -c 'import json,sys; assert len(json.load(sys.stdin)) >= 100'
 
 # The same bytes at any number of threads.
 for i in $(seq 40); do sed "s/ 15 0 / $((14 + i)) 0 /" fork.swc >many_$i.swc; done
@@ -59,6 +64,51 @@ $BRAINFOREST measure --repo cells.db --metric total_length >repository.txt
 grep -q '^many/many_1 ' repository.txt
 fails_with 1 'few' $BRAINFOREST measure --repo cells.db --population few
 fails_with 2 'excludes' $BRAINFOREST measure fork.swc --repo cells.db
+
+# By groups: mean and standard deviation over the neurons of each.
+$BRAINFOREST import fork.swc --repo types.db --population all --type bush >/dev/null
+sed 's/ 25 0 / 35 0 /' fork.swc >longer.swc
+$BRAINFOREST import longer.swc --repo types.db --population all --type bush >/dev/null
+sed 's/ 25 0 / 45 0 /' fork.swc >longest.swc
+$BRAINFOREST import longest.swc --repo types.db --population all >/dev/null
+$BRAINFOREST measure --repo types.db --by type --metric total_length,section_lengths --csv types.csv --xlsx types.xlsx >types.txt
+grep -Eq '^type +bush +not said$' types.txt
+grep -Eq '^neurons +2 +1$' types.txt
+grep -Eq '^total_length \(µm\) +35 ± 7.071 +50 ± 0$' types.txt
+$BRAINFOREST measure --repo types.db --by type --metric total_length,section_lengths --json >types.json
+python3 - <<'PY'
+import csv, json, zipfile
+bush, unsaid = csv.DictReader(open("types.csv", encoding="utf-8"))
+assert bush["type"] == "bush" and bush["neurons"] == "2", bush
+assert float(bush["total_length mean (µm)"]) == 35 and abs(float(bush["total_length sd (µm)"]) - 50**.5) < 1e-9, bush
+assert abs(float(bush["section_lengths mean (µm)"]) - 35 / 3) < 1e-9, bush
+assert float(unsaid["total_length sd (µm)"]) == 0, unsaid
+out = json.load(open("types.json"))
+assert out["by"] == "type" and out["rows"][0]["total_length mean"] == 35, out
+names = zipfile.ZipFile("types.xlsx").read("xl/workbook.xml").decode()
+assert names.index('"groups"') < names.index('"metrics"'), names
+PY
+mkdir -p folders/a folders/b && cp fork.swc folders/a && cp longer.swc folders/b
+$BRAINFOREST measure folders --by folder --metric total_length | grep -Eq '^total_length \(µm\) +30 ± 0 +40 ± 0$'
+fails_with 1 'types.xlsx' $BRAINFOREST measure fork.swc --xlsx types.xlsx
+$BRAINFOREST measure fork.swc --xlsx types.xlsx --force >/dev/null
+fails_with 2 'ends in .xlsx' $BRAINFOREST measure fork.swc --xlsx types.ods
+fails_with 2 'by folder' $BRAINFOREST measure fork.swc --by type
+fails_with 2 'by folder' $BRAINFOREST measure --repo types.db --by folder
+fails_with 2 'groups are of neurons' $BRAINFOREST measure --repo types.db --by type --level section
+
+# What a repository keeps is found by it; what it does not keep is measured.
+[ "$($BRAINFOREST list --repo types.db --where 'max_strahler_order = 2 and total_length > 45' | grep -c longest)" = 1 ]
+fails_with 1 'tmd_path_births' $BRAINFOREST list --repo types.db --where 'tmd_path_births > 1'
+$BRAINFOREST measure --repo types.db --metric tmd_path_births,total_length --store >/dev/null
+[ "$($BRAINFOREST list --repo types.db --where 'tmd_path_births > 25' | grep -c longest)" = 1 ]
+[ "$($BRAINFOREST query "select count(*) from metric where metric = 'tmd_path_births' and unit = 'µm'" --repo types.db --json |
+  python3 -c 'import json,sys; print(json.load(sys.stdin)["rows"][0][0])')" = 3 ]
+$BRAINFOREST check --repo types.db >/dev/null
+$BRAINFOREST export --repo types.db --out tables --format csv >/dev/null && grep -q 'tmd_path_births' tables/metrics.csv
+fails_with 1 'type' $BRAINFOREST measure --repo types.db --metric type --store
+fails_with 2 'whole neurons' $BRAINFOREST measure --repo types.db --kind axon --store
+fails_with 2 'repo' $BRAINFOREST measure fork.swc --store
 
 # A bad file is named, the others are measured, and the status says so.
 echo nonsense >bad.swc
