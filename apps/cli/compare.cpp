@@ -11,6 +11,7 @@
 
 #include "forest/statistics/comparison.h"
 #include "forest/statistics/metric.h"
+#include "forest/statistics/persistence_image.h"
 #include "forest/statistics/projection.h"
 
 #include "apps/cli/console.h"
@@ -183,6 +184,25 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
           "Mean crossings of spheres. The band holds, in 95 % of the cases, the mean of {} cells of the same "
           "population at 95 % of radii.",
           c.cells_b));
+
+  report.heading("Barcodes");
+  const PersistenceImages images = persistence_images(all.bars);
+  const Eigen::VectorXd first = images.images.topRows(Eigen::Index(tables[0].size())).colwise().mean(),
+                        second = images.images.bottomRows(Eigen::Index(tables[1].size())).colwise().mean();
+  const auto heat = [](std::string title, const Eigen::VectorXd& values, std::size_t colour,
+                       bool difference) {
+    return HeatPanel{std::move(title), {values.begin(), values.end()}, colour, difference};
+  };
+  if (images.reach > 0.)
+    report.plot(
+        heat_plots(std::array<HeatPanel, 3>{heat(names[0], first, 0, false), heat(names[1], second, 1, false),
+                                            heat("more in either", second - first, 0, true)},
+                   std::size_t(images.side), images.reach, "distance of the tip (µm)",
+                   "where its branch begins (µm)"),
+        fmt::format(
+            "Mean persistence images: every branch by how far from the soma its tip is and where it leaves a "
+            "longer one; opacity goes with the square root. They share {:.0f} % (p = {}).",
+            100. * (1. - c.barcodes.distance), shown_p(c.barcodes.p)));
 
   report.heading("The cells");
   const Projection plane = principal_components(standardised(whole), 1., 2);

@@ -284,6 +284,41 @@ std::string scatter_plot(std::span<const Dot> dots, std::span<const std::string>
   return svg.done(476., "Cells in the plane of two components");
 }
 
+std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, double reach,
+                       const std::string& x_title, const std::string& y_title) {
+  Svg svg;
+  constexpr double panel = 240., gap = 48., top = 34.;
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const HeatPanel& h = panels[p];
+    const double left = 56. + double(p) * (panel + gap), pixel = panel / double(side);
+    double most = 1e-300;
+    for (const double v : h.values) most = std::max(most, std::abs(v));
+    svg.text(left, top - 14., h.title);
+    for (std::size_t i = 0; i < h.values.size() && i < side * side; ++i) {
+      const double share =
+          std::sqrt(std::abs(h.values[i]) / most);  // so that rare branches show beside frequent ones
+      if (share < .03) continue;
+      svg.add(
+          R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{:.2f}" fill="{}" fill-opacity="{:.2f}"/>)",
+          left + pixel * double(i % side), top + panel - pixel * double(i / side + 1), pixel + .15,
+          pixel + .15, colour_of(h.difference ? h.values[i] > 0. : h.colour), share);
+    }
+    const Scale x{0., reach, left, left + panel}, y{0., reach, top + panel, top};
+    svg.line(x(0.), y(0.), x(reach), y(reach), .3, R"(stroke-dasharray="3 3")");
+    svg.line(left, top + panel, left + panel, top + panel, .5);
+    svg.line(left, top, left, top + panel, .5);
+    for (const double t : ticks(0., reach, 4)) {
+      svg.text(x(t), top + panel + 16., number(t), "middle", 10.5, .7);
+      if (p == 0) svg.text(left - 6., y(t) + 4., number(t), "end", 10.5, .7);
+    }
+    svg.text(left + .5 * panel, top + panel + 36., x_title, "middle", 11.5, .85);
+  }
+  svg.add(
+      R"~(<text transform="translate(14 {:.1f}) rotate(-90)" text-anchor="middle" font-size="11.5" fill="currentColor" fill-opacity=".85">{}</text>)~",
+      top + .5 * panel, escaped_html(y_title));
+  return svg.done(top + panel + 48., "Persistence images");
+}
+
 std::string chance_plot(std::span<const double> null, double found, double lower, double upper,
                         const std::string& title) {
   Svg svg;

@@ -63,6 +63,18 @@ struct Dot {
 std::string scatter_plot(std::span<const Dot> dots, std::span<const std::string> names,
                          const std::string& x_title, const std::string& y_title);
 
+/// Pictures of side × side values, the first axis fastest, upwards; shades of a population's colour, or from one to the
+/// other of two.
+struct HeatPanel {
+  std::string title;
+  std::vector<double> values;
+  std::size_t colour = 0;
+  bool difference = false;  // negative in colour 0, positive in colour 1
+};
+
+std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, double reach,
+                       const std::string& x_title, const std::string& y_title);
+
 /// How often chance reached which value, and what was found.
 std::string chance_plot(std::span<const double> null, double found, double lower, double upper,
                         const std::string& title);

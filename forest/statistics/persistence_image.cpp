@@ -11,7 +11,8 @@
 namespace forest::statistics {
 
 PersistenceImages persistence_images(std::span<const Bars> cells, Eigen::Index side, double width) {
-  PersistenceImages out{.side = side, .reach = 0., .images = Eigen::MatrixXd::Zero(Eigen::Index(cells.size()), side * side)};
+  PersistenceImages out{
+      .side = side, .reach = 0., .images = Eigen::MatrixXd::Zero(Eigen::Index(cells.size()), side * side)};
   for (const Bars& bars : cells)
     for (const Bar& bar : bars) out.reach = std::max({out.reach, bar.birth, bar.death});
   if (!(out.reach > 0.) || !std::isfinite(out.reach)) return out;
@@ -26,12 +27,14 @@ PersistenceImages persistence_images(std::span<const Bars> cells, Eigen::Index s
       return p / p.sum();  // what lies beyond the edge counts within
     };
     for (const Bar& bar : cells[i]) image += profile(bar.birth) * profile(bar.death).transpose();
-    if (!cells[i].empty()) out.images.row(Eigen::Index(i)) = image.reshaped().transpose() / double(cells[i].size());
+    if (!cells[i].empty())
+      out.images.row(Eigen::Index(i)) = image.reshaped().transpose() / double(cells[i].size());
   });
   return out;
 }
 
-DistanceTest barcode_distance(const PersistenceImages& all, std::size_t first, std::size_t dealings, std::uint64_t seed) {
+DistanceTest barcode_distance(const PersistenceImages& all, std::size_t first, std::size_t dealings,
+                              std::uint64_t seed) {
   const auto n = std::size_t(all.images.rows());
   if (first == 0 || first >= n) return {};
   const Eigen::MatrixXd pixels = all.images.transpose();  // a cell a column

@@ -47,12 +47,14 @@ TEST(BarcodeDistance, IsNothingForTheSameAndOneForWhatNeverMeets) {
 }
 
 TEST(BarcodeDistance, SeesLongerBranches) {
-  EXPECT_LE(barcode_distance(persistence_images(both(cells(1, 20, 1.), cells(2, 20, 1.5))), 20, 199, 1).p, .01);
+  EXPECT_LE(barcode_distance(persistence_images(both(cells(1, 20, 1.), cells(2, 20, 1.5))), 20, 199, 1).p,
+            .01);
   int rejected = 0;
   for (std::uint64_t trial = 0; trial < 100; ++trial)
     rejected +=
-        barcode_distance(persistence_images(both(cells(100 + trial, 10, 1.), cells(900 + trial, 10, 1.))), 10, 99, 1).p <=
-        .05;
+        barcode_distance(persistence_images(both(cells(100 + trial, 10, 1.), cells(900 + trial, 10, 1.))), 10,
+                         99, 1)
+            .p <= .05;
   EXPECT_LE(rejected, 14);
 }
 

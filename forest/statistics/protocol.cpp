@@ -68,23 +68,35 @@ void ask_each_feature(const std::array<FeatureTable, 3>& tables, const ProtocolO
   std::vector<double> p(std::size_t(features), 1.), spread(std::size_t(features), 0.),
       usual(std::size_t(features), 0.);
   std::vector<std::vector<double>> real_spread(static_cast<std::size_t>(features));
-  // Real cells dealt to two samples of the same sizes, as far as there are enough.
+  // Real cells dealt to two samples of the same sizes, as far as there are enough; the same dealings for all features.
   const std::size_t n_held = held_out.size(), n_grown = std::min(grown.size(), real.size() - n_held);
+  std::vector<std::vector<std::uint8_t>> dealt(
+      options.resamples);  // of each real cell: 1 or 2, 0 for neither
+  parallel_for(dealt.size(), 16, [&](std::size_t k) {
+    Random random(options.seed, k, 0x6d767320);  // "mvs "
+    std::vector<std::uint32_t> deal = real;
+    dealt[k].assign(real.size(), 0);
+    for (std::uint32_t i = 0; i < n_held + n_grown; ++i) {
+      std::swap(deal[i], deal[i + random.below(std::uint32_t(deal.size()) - i)]);
+      dealt[k][deal[i]] = i < n_held ? 1 : 2;
+    }
+  });
   parallel_for(std::size_t(features), 1, [&](std::size_t f) {
     const auto c = Eigen::Index(f);
     const std::vector<double> a = column(all.values, c, held_out), b = column(all.values, c, grown);
     if (a.empty() || b.empty()) return;  // "… is defined" tells
     p[f] = kolmogorov_smirnov(a, b).p;
     spread[f] = median_visible_spread(a, b);
-    std::vector<std::uint32_t> deal;
-    for (std::size_t k = 0; k < options.resamples; ++k) {
-      Random random(options.seed, k, 0x6d767320);  // "mvs ": the same dealings for all features
-      deal = real;
-      for (std::uint32_t i = 0; i < n_held + n_grown; ++i)
-        std::swap(deal[i], deal[i + random.below(std::uint32_t(deal.size()) - i)]);
-      const std::vector<double> one = column(all.values, c, std::span(deal).first(n_held)),
-                                two = column(all.values, c, std::span(deal).subspan(n_held, n_grown));
-      real_spread[f].push_back(one.empty() || two.empty() ? 0. : median_visible_spread(one, two));
+    std::vector<std::uint32_t> rising;
+    for (const std::uint32_t row : real)
+      if (std::isfinite(all.values(row, c))) rising.push_back(row);
+    std::ranges::stable_sort(rising, {}, [&](std::uint32_t row) { return all.values(row, c); });
+    std::vector<double> one, two;
+    for (const auto& deal : dealt) {
+      one.clear(), two.clear();
+      for (const std::uint32_t row : rising)
+        if (deal[row]) (deal[row] == 1 ? one : two).push_back(all.values(row, c));
+      real_spread[f].push_back(one.empty() || two.empty() ? 0. : median_visible_spread_of_sorted(one, two));
     }
     usual[f] = std::max(.02, quantile(real_spread[f], .95));  // medians of counts may hardly ever differ
   });

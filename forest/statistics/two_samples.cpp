@@ -21,7 +21,7 @@ std::vector<double> sorted(std::span<const double> values) {
   return v;
 }
 
-double quantile_of(const std::vector<double>& sorted, double share) {
+double quantile_of(std::span<const double> sorted, double share) {
   if (sorted.empty()) return nan;
   const double at = share * double(sorted.size() - 1);
   const auto low = std::size_t(at);
@@ -145,12 +145,15 @@ Estimate cliffs_delta(std::span<const double> a, std::span<const double> b) {
   return {2. * area.value - 1., 2. * area.lower - 1., 2. * area.upper - 1.};
 }
 
-double median_visible_spread(std::span<const double> first, std::span<const double> second) {
-  const std::vector<double> a = sorted(first), b = sorted(second);
+double median_visible_spread_of_sorted(std::span<const double> a, std::span<const double> b) {
   const double apart = std::abs(quantile_of(a, .5) - quantile_of(b, .5));
   const double spread =
       std::max(quantile_of(a, .95), quantile_of(b, .95)) - std::min(quantile_of(a, .05), quantile_of(b, .05));
   return apart == 0. ? 0. : apart / spread;
+}
+
+double median_visible_spread(std::span<const double> a, std::span<const double> b) {
+  return median_visible_spread_of_sorted(sorted(a), sorted(b));
 }
 
 double quantile(std::span<const double> values, double share) { return quantile_of(sorted(values), share); }

@@ -42,6 +42,8 @@ Estimate cliffs_delta(std::span<const double> a, std::span<const double> b);
 /// Median visible spread: |median a - median b| over (larger 95th percentile - smaller 5th percentile), as in
 /// BlueBrain's synthesis-workflow; 0 … 1. 0 where the medians are the same.
 double median_visible_spread(std::span<const double> a, std::span<const double> b);
+/// The same for values in rising order, none NaN.
+double median_visible_spread_of_sorted(std::span<const double> a, std::span<const double> b);
 
 /// Interpolated linearly between order statistics; `share` in [0, 1]. NaN when there is no value.
 double quantile(std::span<const double> values, double share);
