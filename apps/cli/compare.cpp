@@ -30,7 +30,7 @@ using Json = nlohmann::ordered_json;
 
 struct Options {
   std::vector<std::string> samples;
-  std::string repo, population, with, kind = "all";
+  std::string repo, population, with, slices, kind = "all";
   std::filesystem::path csv, report;
   std::uint32_t repeats = 50, permutations = 199;
   std::uint64_t seed = 0;
@@ -236,8 +236,10 @@ void run(const Options& options, Console& console) {
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),
       read_sample({stored ? options.with : options.samples[1]}, options.repo, console)};
   const std::vector<Group> groups = groups_of(options.kind);
-  const std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
-                                           measured(samples[1], groups, console)};
+  std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
+                                     measured(samples[1], groups, console)};
+  if (!options.slices.empty())
+    for (FeatureTable& table : tables) set_slices(table, options.slices);
   std::array<std::string, 2> names{samples[0].name, samples[1].name};
   if (names[0] == names[1]) names = {options.samples[0], options.samples[1]};
 
@@ -281,6 +283,7 @@ std::function<void()> compare(CLI::App& command, Console& console) {
   command.add_option("--population", options->population, "One of them")->needs(repo);
   command.add_option("--with", options->with, "The other")->needs(repo)->type_name("POPULATION");
   add_kind(command, options->kind);
+  add_slices(command, options->slices);
   add_whole(command, "--repeats", options->repeats, "Cross-validations that an AUC is the mean of", 1, 10000);
   add_whole(command, "--permutations", options->permutations, "Dealings by which chance is known", 0, 100000);
   add_seed(command, options->seed, "The same seed gives the same result");

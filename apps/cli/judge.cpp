@@ -68,7 +68,7 @@ Control changed(std::string name, const Sample& real, std::span<const Group> gro
 
 Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& grown,
                      const Sample* parametric, const std::string& kind, const ProtocolOptions& options,
-                     Console& console) {
+                     Console& console, const std::string& slices) {
   const std::vector<Group> groups = groups_of(kind);
   Judged judged{.tables = {measured(train, groups, console), measured(held_out, groups, console),
                            measured(grown, groups, console)},
@@ -81,6 +81,17 @@ Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& 
   controls.push_back(changed("jittered", train, groups, console, [&](std::size_t i) {
     return jittered(train.neurons[i], 10.f, options.seed, i);
   }));
+  if (!slices.empty()) {
+    for (FeatureTable* traced : {&judged.tables[0], &judged.tables[1]}) set_slices(*traced, slices);
+    for (std::size_t i = 0; i < grown.cells.size(); ++i)
+      judged.tables[2].slices.push_back(fmt::format("grown {}", i));
+    for (Control& control : controls)
+      if (control.name == "burke")
+        for (std::size_t i = 0; i < control.cells.size(); ++i)
+          control.cells.slices.push_back(fmt::format("burke {}", i));
+      else
+        control.cells.slices = judged.tables[0].slices;
+  }
   judged.judgement =
       judge(judged.tables[0], judged.tables[1], judged.tables[2], controls, options, console.progress());
   return judged;
@@ -215,7 +226,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> train, held_out, grown, parametric;
-  std::string repo, kind = "dendrite";
+  std::string repo, slices, kind = "dendrite";
   std::filesystem::path features, report;
   std::uint32_t repeats = 50;
   std::uint64_t seed = 0;
@@ -230,7 +241,7 @@ void run(const Options& options, Console& console) {
   if (!options.parametric.empty()) parametric = read_sample(options.parametric, options.repo, console);
   const Judged judged =
       judge_samples(train, held_out, grown, options.parametric.empty() ? nullptr : &parametric, options.kind,
-                    {.repeats = options.repeats, .seed = options.seed}, console);
+                    {.repeats = options.repeats, .seed = options.seed}, console, options.slices);
   if (!options.features.empty())
     write_unless_there(options.features,
                        features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
@@ -257,6 +268,7 @@ std::function<void()> judge(CLI::App& command, Console& console) {
   sample("--burke", options->parametric, "Neurons of a parametric model, which the protocol must reject");
   command.add_option("--repo", options->repo, "Take populations of this repository")->type_name("REPO");
   add_kind(command, options->kind);
+  add_slices(command, options->slices);
   add_whole(command, "--repeats", options->repeats, "Cross-validations that an AUC is the mean of", 1, 10000);
   add_seed(command, options->seed, "The same seed gives the same judgement");
   command

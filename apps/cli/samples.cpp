@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/cli/samples.h"
 
+#include <algorithm>
+#include <regex>
+
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
 
@@ -128,6 +131,33 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
         row.emplace_back(x);  // NaN becomes an empty cell
     }
   return io::csv_of(sheet);
+}
+
+void set_slices(statistics::FeatureTable& table, const std::string& expression) {
+  const std::regex pattern(expression);
+  table.slices.clear();
+  for (const std::string& cell : table.cells) {
+    std::smatch found;
+    const bool any = std::regex_search(cell, found, pattern) && found.length() > 0;
+    table.slices.push_back(any ? found.str() : "only " + cell);
+  }
+}
+
+void add_slices(CLI::App& command, std::string& expression) {
+  command
+      .add_option("--slices", expression,
+                  "Cells in whose names this regular expression finds the same are sisters, of one slice or "
+                  "animal, and "
+                  "dealt together")
+      ->type_name("REGEX")
+      ->check([](const std::string& text) -> std::string {
+        try {
+          std::regex pattern(text);
+          return {};
+        } catch (const std::regex_error&) {
+          return "--slices is no regular expression; an example is '^[A-Z]+[0-9]+'";
+        }
+      });
 }
 
 void add_kind(CLI::App& command, std::string& kind) {

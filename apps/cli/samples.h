@@ -38,6 +38,12 @@ statistics::FeatureTable measured(const Sample& sample, std::span<const statisti
 std::string features_csv(std::span<const statistics::FeatureTable> tables,
                          std::span<const std::string> groups);
 
+/// Names the slice of each cell: what the regular expression finds in its name, or the cell itself where it finds nothing.
+void set_slices(statistics::FeatureTable& table, const std::string& expression);
+
+/// --slices, a regular expression.
+void add_slices(CLI::App& command, std::string& expression);
+
 /// --kind, as the verb measure has it.
 void add_kind(CLI::App& command, std::string& kind);
 

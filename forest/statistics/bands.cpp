@@ -76,7 +76,7 @@ double share_inside(const Curve& curve, const Band& band) {
   for (std::size_t r = 0; r < std::max(curve.size(), band.mean.size()); ++r) {
     const bool known = r < band.mean.size();
     const double x = r < curve.size() ? curve[r] : 0.;
-    if (x <= least && (!known || band.mean[r] <= least)) continue;
+    if (x <= 2. * least && (!known || band.mean[r] <= least)) continue;
     ++count;
     inside += known && x >= band.lower[r] - 1e-9 && x <= band.upper[r] + 1e-9;
   }

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
+#include "forest/statistics/dealing.h"
 #include "forest/statistics/persistence_image.h"
 #include "forest/statistics/random_forest.h"
 #include "forest/statistics/summary.h"
@@ -50,10 +51,12 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   Comparison c;
   c.cells_a = a.size(), c.cells_b = b.size();
 
+  const std::vector<std::uint32_t> slices = numbered(all.slices);
   const DiscriminatorOptions with{.repeats = options.repeats,
                                   .trees = options.trees,
                                   .permutations = options.permutations,
-                                  .seed = options.seed};
+                                  .seed = options.seed,
+                                  .slices = slices};
   DiscriminatorOptions without = with;
   without.permutations = 0;
   const Eigen::MatrixXd X = standardised(whole), S = standardised(structure);
@@ -61,11 +64,12 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.logistic = discriminate(X.topRows(of_a), X.bottomRows(of_b), Classifier::logistic, with, progress);
   c.structure =
       discriminate(S.topRows(of_a), S.bottomRows(of_b), Classifier::random_forest, without, progress);
-  c.energy = energy_distance(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed);
-  c.mmd = mean_discrepancy(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed);
+  c.energy = energy_distance(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed, slices);
+  c.mmd = mean_discrepancy(X.topRows(of_a), X.bottomRows(of_b), options.dealings, options.seed, slices);
 
   if (all.bars.size() == all.size())
-    c.barcodes = barcode_distance(persistence_images(all.bars), a.size(), options.dealings, options.seed);
+    c.barcodes =
+        barcode_distance(persistence_images(all.bars), a.size(), options.dealings, options.seed, slices);
 
   std::vector<std::uint8_t> second(a.size(), 0);
   second.resize(a.size() + b.size(), 1);

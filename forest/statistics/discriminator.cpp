@@ -2,8 +2,11 @@
 #include "forest/statistics/discriminator.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
-#include <mutex>
+#include <functional>
+#include <limits>
+#include <map>
 #include <numeric>
 
 #include <boost/math/distributions/normal.hpp>
@@ -11,6 +14,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/statistics/dealing.h"
 #include "forest/statistics/logistic.h"
 #include "forest/statistics/random_forest.h"
 #include "forest/statistics/summary.h"
@@ -71,11 +75,9 @@ class CrossValidation {
         if (labels[i] == sample) rows.push_back(i);
       shuffle(rows, random);
       rows.resize(drawn_[sample]);
-      for (std::uint32_t i = 0; i < rows.size(); ++i) {
-        out.rows.push_back(rows[i]);
-        out.folds.push_back(i % std::uint32_t(folds_));
-      }
+      for (const std::uint32_t row : rows) out.rows.push_back(row);
     }
+    out.folds = folds_of(out.rows, labels, random);
     out.scores.resize(out.rows.size());
     for (std::uint32_t fold = 0; fold < folds_; ++fold) {
       Rows train, test, places;
@@ -102,6 +104,29 @@ class CrossValidation {
     Eigen::MatrixXd all(a.rows() + b.rows(), a.cols());
     all << a, b;
     return all;
+  }
+
+  /// Slices one after the other, the large ones first, each to the fold that has the fewest cells of its kinds.
+  std::vector<std::uint32_t> folds_of(const Rows& rows, const Labels& labels, Random& random) const {
+    std::map<std::uint32_t, std::vector<std::uint32_t>> slices;
+    for (std::uint32_t i = 0; i < rows.size(); ++i)
+      slices[options_.slices.empty() ? i : options_.slices[rows[i]]].push_back(i);
+    std::vector<const std::vector<std::uint32_t>*> order;
+    for (const auto& [slice, cells] : slices) order.push_back(&cells);
+    for (auto i = std::uint32_t(order.size()); i > 1; --i) std::swap(order[i - 1], order[random.below(i)]);
+    std::ranges::stable_sort(order, std::greater(), [](const auto* cells) { return cells->size(); });
+    std::vector<std::array<std::size_t, 2>> counts(folds_, {0, 0});
+    std::vector<std::uint32_t> folds(rows.size());
+    for (const auto* cells : order) {
+      std::size_t best = 0, least = std::size_t(-1);
+      for (std::size_t fold = 0; fold < folds_; ++fold) {
+        std::size_t already = 0;
+        for (const std::uint32_t i : *cells) already += counts[fold][labels[rows[i]]];
+        if (already < least) least = already, best = fold;
+      }
+      for (const std::uint32_t i : *cells) ++counts[best][labels[rows[i]]], folds[i] = std::uint32_t(best);
+    }
+    return folds;
   }
 
   std::vector<double> logistic(const Labels& labels, const Rows& train, const Rows& test) const {
@@ -156,11 +181,11 @@ Discrimination discriminate(const Eigen::MatrixXd& first, const Eigen::MatrixXd&
       scored[i] = validation.run(labels, i);
     } else {
       const std::size_t k = i - scored.size();
-      Labels dealt = labels;
       Random random(options.seed, k, deal_stream);
-      for (std::uint32_t j = std::uint32_t(dealt.size()); j > 1; --j)
-        std::swap(dealt[j - 1], dealt[random.below(j)]);
-      null[k] = auc_of(validation.run(dealt, i), dealt);
+      const Rows order = dealt(labels.size(), options.slices, random);
+      Labels anew(labels.size(), 0);
+      for (std::size_t j = std::size_t(first.rows()); j < order.size(); ++j) anew[order[j]] = 1;
+      null[k] = auc_of(validation.run(anew, i), anew);
     }
     progress.advance();
   });

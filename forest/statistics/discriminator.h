@@ -26,6 +26,8 @@ struct DiscriminatorOptions {
   std::size_t permutations = 0;       // cross-validations with kinds dealt anew: what guessing reaches
   std::size_t first = 0, second = 0;  // cells of each that a repeat draws, without repetition; 0 for all
   std::uint64_t seed = 0;
+  std::vector<std::uint32_t> slices =
+      {};  // of the cells, first sample first (dealing.h): a slice is never trained on and tested
 };
 
 struct Discrimination {

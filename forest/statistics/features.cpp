@@ -142,8 +142,12 @@ Measured measure(const Morphology& neuron, std::span<const Group> groups) {
 
 FeatureTable table_of(std::vector<std::string> cells, std::span<const Group> groups,
                       std::span<const Measured> measured) {
-  FeatureTable table{
-      .cells = std::move(cells), .features = features_of(groups), .values = {}, .sholl = {}, .bars = {}};
+  FeatureTable table{.cells = std::move(cells),
+                     .features = features_of(groups),
+                     .values = {},
+                     .sholl = {},
+                     .bars = {},
+                     .slices = {}};
   table.values.resize(Eigen::Index(measured.size()), Eigen::Index(table.features.size()));
   for (std::size_t i = 0; i < measured.size(); ++i) {
     table.values.row(Eigen::Index(i)) =
@@ -165,6 +169,7 @@ FeatureTable stacked(std::span<const FeatureTable> tables) {
     all.cells.insert(all.cells.end(), t.cells.begin(), t.cells.end());
     all.sholl.insert(all.sholl.end(), t.sholl.begin(), t.sholl.end());
     all.bars.insert(all.bars.end(), t.bars.begin(), t.bars.end());
+    all.slices.insert(all.slices.end(), t.slices.begin(), t.slices.end());
     rows += t.values.rows();
   }
   all.values.resize(rows, Eigen::Index(all.features.size()));
@@ -177,20 +182,26 @@ FeatureTable stacked(std::span<const FeatureTable> tables) {
 }
 
 FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> rows) {
-  FeatureTable part{.cells = {}, .features = table.features, .values = {}, .sholl = {}, .bars = {}};
+  FeatureTable part{
+      .cells = {}, .features = table.features, .values = {}, .sholl = {}, .bars = {}, .slices = {}};
   part.values.resize(Eigen::Index(rows.size()), table.values.cols());
   for (std::size_t i = 0; i < rows.size(); ++i) {
     part.cells.push_back(table.cells[rows[i]]);
     if (!table.sholl.empty()) part.sholl.push_back(table.sholl[rows[i]]);
     if (!table.bars.empty()) part.bars.push_back(table.bars[rows[i]]);
+    if (!table.slices.empty()) part.slices.push_back(table.slices[rows[i]]);
     part.values.row(Eigen::Index(i)) = table.values.row(Eigen::Index(rows[i]));
   }
   return part;
 }
 
 FeatureTable structure_of(const FeatureTable& table) {
-  FeatureTable part{
-      .cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl, .bars = table.bars};
+  FeatureTable part{.cells = table.cells,
+                    .features = {},
+                    .values = {},
+                    .sholl = table.sholl,
+                    .bars = table.bars,
+                    .slices = table.slices};
   std::vector<Eigen::Index> columns;
   for (std::size_t i = 0; i < table.features.size(); ++i)
     if (!table.features[i].diameters) {
@@ -203,8 +214,12 @@ FeatureTable structure_of(const FeatureTable& table) {
 
 FeatureTable distinct(const FeatureTable& table) {
   const Eigen::Index rows = table.values.rows();
-  FeatureTable out{
-      .cells = table.cells, .features = {}, .values = {}, .sholl = table.sholl, .bars = table.bars};
+  FeatureTable out{.cells = table.cells,
+                   .features = {},
+                   .values = {},
+                   .sholl = table.sholl,
+                   .bars = table.bars,
+                   .slices = table.slices};
   out.values.resize(rows, 2 * table.values.cols());
   std::map<std::pair<double, double>, std::vector<Eigen::Index>>
       alike;  // columns by two sums, before all values

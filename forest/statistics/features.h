@@ -52,6 +52,7 @@ struct FeatureTable {
   Eigen::MatrixXd values;                  // cells × features, NaN where not defined
   std::vector<std::vector<double>> sholl;  // of each cell; may be empty for tables that were not measured
   std::vector<std::vector<Bar>> bars;      // likewise
+  std::vector<std::string> slices;         // that cells come from (dealing.h); empty: each from its own
 
   std::size_t size() const { return cells.size(); }
 };

@@ -7,6 +7,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/statistics/dealing.h"
 
 namespace forest::statistics {
 
@@ -34,7 +35,7 @@ PersistenceImages persistence_images(std::span<const Bars> cells, Eigen::Index s
 }
 
 DistanceTest barcode_distance(const PersistenceImages& all, std::size_t first, std::size_t dealings,
-                              std::uint64_t seed) {
+                              std::uint64_t seed, std::span<const std::uint32_t> slices) {
   const auto n = std::size_t(all.images.rows());
   if (first == 0 || first >= n) return {};
   const Eigen::MatrixXd pixels = all.images.transpose();  // a cell a column
@@ -50,10 +51,7 @@ DistanceTest barcode_distance(const PersistenceImages& all, std::size_t first, s
   std::vector<char> as_far(dealings);
   parallel_for(dealings, 16, [&](std::size_t k) {
     Random random(seed, k, 0x62617263);  // "barc"
-    std::vector<std::uint32_t> deal = order;
-    for (std::uint32_t i = 0; i < std::uint32_t(first); ++i)
-      std::swap(deal[i], deal[i + random.below(std::uint32_t(n) - i)]);
-    as_far[k] = distance(deal) >= found - 1e-12;
+    as_far[k] = distance(dealt(n, slices, random)) >= found - 1e-12;
   });
   return {found, (double(std::ranges::count(as_far, char(1))) + 1.) / (double(dealings) + 1.)};
 }

@@ -30,6 +30,6 @@ PersistenceImages persistence_images(std::span<const Bars> cells, Eigen::Index s
 /// Half the sum of differences between the mean images of the first cells and of the others: 0 for the same, 1 where
 /// nothing lies on top of one another; p by dealing the cells anew.
 DistanceTest barcode_distance(const PersistenceImages& images, std::size_t first, std::size_t dealings,
-                              std::uint64_t seed);
+                              std::uint64_t seed, std::span<const std::uint32_t> slices = {});
 
 }  // namespace forest::statistics

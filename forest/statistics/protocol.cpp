@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/statistics/dealing.h"
 #include "forest/statistics/sample_distance.h"
 #include "forest/statistics/summary.h"
 
@@ -35,7 +36,20 @@ FeatureTable first_rows(const FeatureTable& table, std::size_t count) {
 struct Samples {
   Eigen::MatrixXd values;
   Eigen::Index train, held_out, grown;
+  std::vector<std::uint32_t> slices;  // of the rows
 
+  std::vector<std::uint32_t> slices_of(Eigen::Index first, Eigen::Index first_rows, Eigen::Index second,
+                                       Eigen::Index second_rows) const {
+    std::vector<std::uint32_t> out;
+    if (slices.empty()) return out;
+    out.insert(out.end(), slices.begin() + first, slices.begin() + first + first_rows);
+    out.insert(out.end(), slices.begin() + second, slices.begin() + second + second_rows);
+    return out;
+  }
+  std::vector<std::uint32_t> grown_and_held_out() const {
+    return slices_of(train + held_out, grown, train, held_out);
+  }
+  std::vector<std::uint32_t> train_and_held_out() const { return slices_of(0, train, train, held_out); }
   auto of_train() const { return values.topRows(train); }
   auto of_held_out() const { return values.middleRows(train, held_out); }
   auto of_grown() const { return values.bottomRows(grown); }
@@ -44,7 +58,7 @@ struct Samples {
 Samples samples_of(const std::array<FeatureTable, 3>& tables, bool structure) {
   const FeatureTable all = stacked(tables);
   return {standardised(completed(structure ? structure_of(all) : all)), tables[0].values.rows(),
-          tables[1].values.rows(), tables[2].values.rows()};
+          tables[1].values.rows(), tables[2].values.rows(), numbered(all.slices)};
 }
 
 std::vector<double> column(const Eigen::MatrixXd& values, Eigen::Index c,
@@ -126,13 +140,13 @@ double nearest(const Eigen::MatrixXd& cells, const Eigen::MatrixXd& train) {
 }
 
 DiscriminatorOptions discriminator_options(const ProtocolOptions& options, std::size_t first,
-                                           std::size_t second) {
+                                           std::vector<std::uint32_t> slices) {
   return {.repeats = options.repeats,
           .trees = options.trees,
           .permutations = 0,
           .first = first,
-          .second = second,
-          .seed = options.seed};
+          .seed = options.seed,
+          .slices = std::move(slices)};
 }
 
 void ask(Judgement& j, std::string name, bool pass, std::string reason) {
@@ -160,28 +174,36 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   const bool full = real_control == nullptr;
 
   const Samples structure = samples_of(tables, true), whole = samples_of(tables, false);
-  const auto tell = [&](const auto& a, const auto& b, Classifier by, std::size_t first) {
-    return discriminate(a, b, by, discriminator_options(options, first, 0), progress).auc;
+  const auto tell = [&](const Samples& of, bool real, Classifier by) {
+    return real ? discriminate(of.of_train(), of.of_held_out(), by,
+                               discriminator_options(options, j.compared, of.train_and_held_out()), progress)
+                      .auc
+                : discriminate(of.of_grown(), of.of_held_out(), by,
+                               discriminator_options(options, 0, of.grown_and_held_out()), progress)
+                      .auc;
   };
   constexpr auto forest = Classifier::random_forest;
-  j.auc.structure = tell(structure.of_grown(), structure.of_held_out(), forest, 0);
-  j.auc.real_control =
-      full ? tell(structure.of_train(), structure.of_held_out(), forest, j.compared) : *real_control;
+  j.auc.structure = tell(structure, false, forest);
+  j.auc.real_control = full ? tell(structure, true, forest) : *real_control;
   ask_auc(j, "auc.structure", "structure", j.auc.structure, j.auc.real_control, most_auc);
   if (full) {
-    j.auc.logistic = tell(structure.of_grown(), structure.of_held_out(), Classifier::logistic, 0);
-    j.auc.diameters = tell(whole.of_grown(), whole.of_held_out(), forest, 0);
-    j.auc.real_control_diameters = tell(whole.of_train(), whole.of_held_out(), forest, j.compared);
+    j.auc.logistic = tell(structure, false, Classifier::logistic);
+    j.auc.diameters = tell(whole, false, forest);
+    j.auc.real_control_diameters = tell(whole, true, forest);
     ask_auc(j, "auc.diameters", "structure and diameters", j.auc.diameters, j.auc.real_control_diameters,
             most_auc_diameters);
   }
   j.detectable_auc = detectable_auc(j.compared, j.held_out);
 
-  j.energy_p = energy_distance(whole.of_grown(), whole.of_held_out(), options.dealings, options.seed).p;
+  j.energy_p = energy_distance(whole.of_grown(), whole.of_held_out(), options.dealings, options.seed,
+                               whole.grown_and_held_out())
+                   .p;
   ask(j, "energy_p", j.energy_p > least_p,
       fmt::format("energy distance of grown and held-out cells: p = {:.4f}; more than {} is asked",
                   j.energy_p, least_p));
-  j.mmd_p = mean_discrepancy(whole.of_grown(), whole.of_held_out(), options.dealings, options.seed).p;
+  j.mmd_p = mean_discrepancy(whole.of_grown(), whole.of_held_out(), options.dealings, options.seed,
+                             whole.grown_and_held_out())
+                .p;
   ask(j, "mmd_p", j.mmd_p > least_p,
       fmt::format("maximum mean discrepancy: p = {:.4f}; more than {} is asked", j.mmd_p, least_p));
 

@@ -8,6 +8,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/statistics/dealing.h"
 
 namespace forest::statistics {
 namespace {
@@ -33,8 +34,8 @@ Sums sums_of(const Matrix& pairs, const std::vector<std::uint32_t>& order, Eigen
 
 /// 2 mean(ab) - mean(aa) - mean(bb), found and after each dealing. Sums of one dealing are added in its own order, so a
 /// tie with what was found may be missed by rounding: what is that close counts as a tie.
-DistanceTest dealt(const Matrix& pairs, Eigen::Index first, std::size_t dealings, std::uint64_t seed,
-                   std::uint32_t stream) {
+DistanceTest tested(const Matrix& pairs, Eigen::Index first, std::size_t dealings, std::uint64_t seed,
+                    std::uint32_t stream, std::span<const std::uint32_t> slices) {
   const Eigen::Index n = pairs.rows();
   const double m = double(first), rest = double(n - first);
   const auto distance = [&](const Sums& s) {
@@ -47,10 +48,7 @@ DistanceTest dealt(const Matrix& pairs, Eigen::Index first, std::size_t dealings
   std::vector<char> as_far(dealings);
   parallel_for(dealings, 16, [&](std::size_t k) {
     Random random(seed, k, stream);
-    std::vector<std::uint32_t> deal = order;
-    for (std::uint32_t i = 0; i < std::uint32_t(first); ++i)
-      std::swap(deal[i], deal[i + random.below(std::uint32_t(n) - i)]);
-    as_far[k] = distance(sums_of(pairs, deal, first)) >= found - tie;
+    as_far[k] = distance(sums_of(pairs, dealt(std::size_t(n), slices, random), first)) >= found - tie;
   });
   const auto count = double(std::ranges::count(as_far, char(1)));
   return {found, (count + 1.) / (double(dealings) + 1.)};
@@ -72,16 +70,18 @@ Eigen::MatrixXd distances(const Matrix& a, const Matrix& b) {
   return D;
 }
 
-DistanceTest energy_distance(const Matrix& a, const Matrix& b, std::size_t dealings, std::uint64_t seed) {
+DistanceTest energy_distance(const Matrix& a, const Matrix& b, std::size_t dealings, std::uint64_t seed,
+                             std::span<const std::uint32_t> slices) {
   if (a.rows() == 0 || b.rows() == 0) return {};
   const Matrix all = both(a, b), D = distances(all, all);
-  DistanceTest test = dealt(D, a.rows(), dealings, seed, 0x656e6572);  // "ener"
+  DistanceTest test = tested(D, a.rows(), dealings, seed, 0x656e6572, slices);  // "ener"
   const double between = 2. * D.topRightCorner(a.rows(), b.rows()).mean();
   test.distance = between > 0. ? std::max(0., test.distance / between) : 0.;
   return test;
 }
 
-DistanceTest mean_discrepancy(const Matrix& a, const Matrix& b, std::size_t dealings, std::uint64_t seed) {
+DistanceTest mean_discrepancy(const Matrix& a, const Matrix& b, std::size_t dealings, std::uint64_t seed,
+                              std::span<const std::uint32_t> slices) {
   if (a.rows() == 0 || b.rows() == 0) return {};
   const Matrix all = both(a, b), D = distances(all, all);
   std::vector<double> pairs;
@@ -91,7 +91,7 @@ DistanceTest mean_discrepancy(const Matrix& a, const Matrix& b, std::size_t deal
   std::nth_element(pairs.begin(), middle, pairs.end());
   const double width = middle == pairs.end() || *middle <= 0. ? 1. : *middle;
   const Matrix K = (D.array() / width).square().unaryExpr([](double x) { return -std::exp(-.5 * x); });
-  DistanceTest test = dealt(K, a.rows(), dealings, seed, 0x6d6d6420);  // "mmd "
+  DistanceTest test = tested(K, a.rows(), dealings, seed, 0x6d6d6420, slices);  // "mmd "
   test.distance = std::max(0., test.distance);
   return test;
 }
