@@ -22,6 +22,7 @@ std::function<void()> typical(CLI::App&, Console&);
 std::function<void()> classify(CLI::App&, Console&);
 std::function<void()> judge(CLI::App&, Console&);
 std::function<void()> model(CLI::App&, Console&);
+std::function<void()> fit(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
 std::function<void()> plant(CLI::App&, Console&);
 std::function<void()> bench(CLI::App&, Console&);
@@ -86,6 +87,10 @@ std::span<const Verb> verbs() {
        "  brainforest model edit pyramidal --repo cells.db\n"
        "  brainforest model diff pyramidal --repo cells.db",
        model},
+      {"fit", "Fit a model to traced neurons, which grows more of them",
+       "brainforest fit cells/ -o like_them.lsys\n"
+       "  brainforest fit --repo cells.db --population traced --model like_traced",
+       fit},
       {"grow", "Grow neurons from a grammar",
        "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",

@@ -64,7 +64,7 @@ struct Deriver::State {
   }
 
   double* evaluate(const Program& program, Random& random) {
-    return run(program, slots.data(), cell, grammar.tables, random, stack.data());
+    return run(program, slots.data(), cell, grammar.lookups, random, stack.data());
   }
 
   // Appends modules whose parameters lie on the stack; false when a number is not finite.
@@ -83,7 +83,7 @@ struct Deriver::State {
   void begin(Random& random) {
     nodes.clear(), parameters.clear(), active.clear();
     std::ranges::fill(written, 0);
-    run(grammar.cell, slots.data(), {}, grammar.tables, random, stack.data());
+    run(grammar.cell, slots.data(), {}, grammar.lookups, random, stack.data());
     std::copy_n(slots.begin(), cell.size(), cell.begin());
     evaluate(grammar.axiom_values, random);
     if (!append(grammar.axiom))
@@ -267,6 +267,20 @@ struct Deriver::State {
     if (after != none) nodes[after].previous = at;
   }
 
+  // Fills in the answers to ?P and ?H.
+  void answer() {
+    flatten();
+    lsystem::answer(word, grammar);
+    std::size_t at = 0;
+    for (std::uint32_t n = nodes.empty() ? none : 0; n != none; n = nodes[n].next) {
+      if (nodes[n].symbol == blank) continue;
+      const Module& m = word.modules[at++];
+      if (const Symbol s = grammar.drawn_as[m.symbol];
+          s < turtle_symbols().size() && is_question(turtle_symbols()[s].action))
+        std::copy_n(word.parameters.begin() + m.first, m.count, parameters.begin() + nodes[n].first);
+    }
+  }
+
   void flatten() {
     word.modules.clear(), word.parameters.clear();
     word.modules.reserve(live);
@@ -300,7 +314,10 @@ const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::option
   Random random(seed, index);
   state_->begin(random);
   const int count = steps.value_or(state_->grammar.steps);
-  for (int i = 0; i < count && !state_->active.empty(); ++i) state_->step(random);
+  for (int i = 0; i < count && !state_->active.empty(); ++i) {
+    if (state_->grammar.queries) state_->answer();
+    state_->step(random);
+  }
   state_->flatten();
   return state_->word;
 }

@@ -25,10 +25,11 @@ constexpr std::size_t most_parameters = 64;                             // of on
 
 // What a name in an expression stands for.
 struct Meaning {
-  enum { constant, cell, table, function } kind = constant;
-  double value = 0.;       // of a constant
-  std::int32_t index = 0;  // of a cell value or a table
-  Program body = {};       // of a function: finds its arguments in slots 0 to parameters - 1
+  enum { constant, cell, table, sample, function } kind = constant;
+  double value = 0.;                       // of a constant
+  std::int32_t index = 0;                  // of a cell value, a table or a sample
+  std::vector<std::string> outcomes = {};  // of a sample
+  Program body = {};                       // of a function: finds its arguments in slots 0 to parameters - 1
   std::int32_t parameters = 0, slots = 0;
   bool draws = false;
 };
@@ -51,6 +52,7 @@ constexpr std::array binaries{
     Binary{"%", Op::modulo, 6},       Binary{"^", Op::power, 8},
 };
 constexpr int unary_level = 7;
+const Lookups nothing;
 
 // Compiles expressions at a cursor; knows the slots of the production (or function) it works for.
 class Compiler {
@@ -129,6 +131,9 @@ class Compiler {
     const std::size_t place = text_.at();
     const std::string name = text_.name("in an expression");
     if (text_.takes("(")) return call(out, name, place);
+    if (const auto sample = meanings_.find(name);
+        sample != meanings_.end() && sample->second.kind == Meaning::sample)
+      return outcome(out, name, sample->second);
     for (std::size_t i = 0; i < names_.size(); ++i)
       if (names_[i] == name) return out.push_back({Op::slot, std::int32_t(i), 0.});
     const auto found = meanings_.find(name);
@@ -167,6 +172,11 @@ class Compiler {
       close(arguments(out), 1);
       out.push_back({Op::table, found->second.index, 0.});
       barrier_ = out.size();
+    } else if (found != meanings_.end() && found->second.kind == Meaning::sample) {
+      close(arguments(out), found->second.parameters);
+      out.push_back({Op::row, found->second.index, double(found->second.parameters)});
+      barrier_ = out.size();
+      draws_ = true;
     } else {
       const auto row = std::ranges::find(functions(), name, &Function::name);
       if (row == functions().end())
@@ -178,6 +188,22 @@ class Compiler {
       draws_ |= row->draws;
       emit(out, {row->op, 0, 0.}, row->draws ? 0 : row->parameters);
     }
+  }
+
+  // Of a sample: `forks.part(row)`, or by its name alone its number, which Trace wants.
+  void outcome(Program& out, const std::string& name, const Meaning& sample) {
+    if (!text_.takes(".")) return out.push_back({Op::constant, 0, double(sample.index)});
+    const std::size_t place = text_.at();
+    const std::string column = text_.name("of an outcome");
+    const auto found = std::ranges::find(sample.outcomes, column);
+    if (found == sample.outcomes.end())
+      text_.fail_at(place, fmt::format("sample {} has no outcome '{}'; it has {}", name, column,
+                                       fmt::join(sample.outcomes, ", ")));
+    text_.expect("(", "before the row of an outcome");
+    expression(out);
+    text_.expect(")", "after the row of an outcome");
+    out.push_back({Op::outcome, sample.index, double(found - sample.outcomes.begin())});
+    barrier_ = out.size();
   }
 
   int arguments(Program& out) {
@@ -220,7 +246,7 @@ class Compiler {
     if (!std::all_of(first, out.end() - 1, [](const Instruction& i) { return i.op == Op::constant; })) return;
     Random none(0);
     double stack[8] = {};
-    run({first, out.end()}, nullptr, {}, {}, none, stack);
+    run({first, out.end()}, nullptr, {}, nothing, none, stack);
     out.erase(first, out.end());
     out.push_back({Op::constant, 0, stack[0]});
   }
@@ -306,7 +332,7 @@ class Parser {
     Word word;
     std::vector<double> stack(stack_depth(values));
     Random none(0);
-    run(values, nullptr, {}, {}, none, stack.data());
+    run(values, nullptr, {}, nothing, none, stack.data());
     for (const Shape& s : shapes) {
       const auto first = std::uint32_t(word.parameters.size());
       word.modules.push_back({s.symbol, s.count, first});
@@ -344,7 +370,7 @@ class Parser {
         {"#define", &Parser::define},    {"#ignore", &Parser::ignore},
         {"module", &Parser::modules},    {"cell", &Parser::cell_value},
         {"function", &Parser::function}, {"distribution", &Parser::distribution},
-        {"table", &Parser::table},
+        {"table", &Parser::table},       {"sample", &Parser::sample},
     };
     static constexpr Row settings[] = {
         {"axiom", &Parser::axiom}, {"title", &Parser::title}, {"steps", &Parser::steps},
@@ -463,8 +489,90 @@ class Parser {
       if (table.edges.size() > 1 && !(table.edges.back() > *(table.edges.end() - 2)))
         text_.fail_at(place, "the upper edges of the bins must increase");
     } while (text_.takes(","));
-    meanings_[name] = {.kind = Meaning::table, .index = std::int32_t(grammar_.tables.size())};
-    grammar_.tables.push_back(std::move(table));
+    meanings_[name] = {.kind = Meaning::table, .index = std::int32_t(grammar_.lookups.tables.size())};
+    grammar_.lookups.tables.push_back(std::move(table));
+  }
+
+  // sample forks(kind =, cell !=, tips ~ 0.3 -> part) = 3 1 1.4 -> 0.25 | 0 1 0 1.2: 0.5 3.1 0 1.1, …; …
+  void sample() {
+    const std::string name = new_name("of the sample");
+    Sample sample;
+    sample.name = name;
+    text_.expect("(", "before the conditions of a sample");
+    while (!text_.sees("->") && !text_.sees(")")) {
+      Sample::Condition c{text_.name("of a condition"), Sample::Match::like, 1.};
+      const std::size_t place = (text_.more(), text_.at());
+      if (text_.takes("!="))
+        c.match = Sample::Match::another;
+      else if (text_.takes("="))
+        c.match = Sample::Match::same;
+      else {
+        text_.expect("~", "between a condition and the width of its kernel (or = or != after it)");
+        const std::string_view rest = text_.rest();
+        const auto table = std::ranges::find_if(grammar_.lookups.tables, [&](const Table& t) {
+          return rest.starts_with(t.name) && !is_name(rest[t.name.size()]);
+        });
+        if (table != grammar_.lookups.tables.end()) {  // `path ~ path_width(kind)`
+          text_.takes(table->name);
+          text_.expect("(", "after the table of widths");
+          const std::size_t at = (text_.more(), text_.at());
+          const std::string by = text_.name("of the condition that the width depends on");
+          const auto found = std::ranges::find(sample.conditions, by, &Sample::Condition::name);
+          if (found == sample.conditions.end() || found->match != Sample::Match::same)
+            text_.fail_at(at, fmt::format("'{}' is no condition before this one that must be the same", by));
+          text_.expect(")", "after the condition that the width depends on");
+          c.widths = *table, c.by = std::size_t(found - sample.conditions.begin());
+        } else {
+          c.width = constant();
+        }
+        const auto good = [](double width) { return width > 0.; };
+        if (!good(c.width) || !std::ranges::all_of(c.widths.values, good))
+          text_.fail_at(place, "the width of a kernel must be above 0");
+      }
+      sample.conditions.push_back(std::move(c));
+      if (!text_.takes(",")) break;
+    }
+    if (text_.takes("->")) do
+        sample.outcomes.push_back(text_.name("of an outcome"));
+      while (text_.takes(","));
+    text_.expect(")", "after the conditions and outcomes of a sample");
+    text_.expect("=", "before the rows of a sample");
+    std::vector<double> given(sample.conditions.size()), found(sample.outcomes.size());
+    do {
+      if (!text_.more()) break;
+      for (double& value : given) value = text_.signed_number();
+      if (!given.empty() && !found.empty())
+        text_.expect("->", "between the conditions and the outcomes of a row");
+      for (double& value : found) value = text_.signed_number();
+      std::vector<Trace> branches;
+      while (text_.takes("|")) branches.push_back(trace());
+      sample.add(given, found, std::move(branches));
+    } while (text_.takes(";"));
+    if (!sample.rows()) text_.fail("the sample has no row");
+    sample.finish();
+    meanings_[name] = {.kind = Meaning::sample,
+                       .index = std::int32_t(grammar_.lookups.samples.size()),
+                       .outcomes = sample.outcomes,
+                       .parameters = std::int32_t(sample.conditions.size())};
+    draws_ = true;
+    grammar_.lookups.samples.push_back(std::move(sample));
+  }
+
+  // Heading and diameter before it, then places with their diameters: `0 1 0 1.2: 0.5 3.1 0 1.1, 2 6.4 0.8 0.9`.
+  Trace trace() {
+    const auto place = [&] {
+      const auto x = float(text_.signed_number()), y = float(text_.signed_number());
+      return Vec3(x, y, float(text_.signed_number()));
+    };
+    Trace trace;
+    trace.heading = place().stableNormalized();
+    trace.diameter = float(text_.number());
+    text_.expect(":", "between what a branch begins with and its places");
+    do {
+      const Vec3 at = place();
+      trace.stops.push_back({at, float(text_.number())});
+    } while (text_.takes(","));
+    return trace;
   }
 
   void modules() {
@@ -636,6 +744,11 @@ class Parser {
     for (const Symbol s : ignored_) grammar_.ignored[s] = true;
     for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
       grammar_.drawn_as.push_back(grammar_.symbols[i].starts_with("F_") ? Symbol(Action::draw) : Symbol(i));
+    const auto question = [&](const Shape& s) {
+      return is(s, Action::ask_place) || is(s, Action::ask_heading);
+    };
+    for (const Production& p : grammar_.productions)
+      grammar_.queries |= std::ranges::any_of(p.left, question) || std::ranges::any_of(p.right, question);
     // Cell values live in slots 0 to n - 1 while they are drawn; what their functions need lies above.
     const auto shift = std::int32_t(grammar_.cell_values);
     for (Program& program : cells_) {

@@ -59,12 +59,12 @@ struct Production {
   Program values;  // of all parameters of the successor, in order
 };
 
-/// A statement that gives a name to a value, a function, a distribution or a table.
+/// A statement that gives a name to a value, a function, a distribution, a table or a sample.
 struct Declaration {
   std::string name;
   std::size_t begin = 0, end = 0;   // in Grammar::text
   std::vector<std::uint32_t> uses;  // declarations above, which it needs
-  bool draws = false;               // a distribution
+  bool draws = false;               // a distribution or a sample
 };
 
 /// An L-system, compiled. A plain value; not changed after parse().
@@ -76,7 +76,7 @@ struct Grammar {
   std::vector<std::vector<std::uint32_t>> productions_of;  // by symbol
   std::vector<bool> ignored;                               // by symbol: not seen by contexts
   std::vector<Symbol> drawn_as;  // by symbol: the turtle's that it stands for; F_l and its like are F
-  std::vector<Table> tables;
+  Lookups lookups;
   std::vector<Declaration> declarations;  // in the order of the text
   Program cell;                           // one store a value that is drawn once a neuron
   std::size_t cell_values = 0;
@@ -84,6 +84,7 @@ struct Grammar {
   Program axiom_values;
   std::size_t slots = 0, stack = 0;  // what the largest program needs
   bool context = false;              // some production looks at its neighbours
+  bool queries = false;              // … or asks where the turtle is
 
   int steps = 0;                  // of derivation, when nothing else is said
   std::size_t limit = 1'000'000;  // modules a word may have

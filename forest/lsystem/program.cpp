@@ -73,7 +73,8 @@ double modulo(double x, double y) { return x - y * std::floor(x / y); }
 struct Effect {
   int taken, left;
 };
-Effect effect(Op op) {
+Effect effect(const Instruction& instruction) {
+  const Op op = instruction.op;
   switch (op) {
     case Op::constant:
     case Op::slot:
@@ -87,7 +88,10 @@ Effect effect(Op op) {
     case Op::negate:
     case Op::logical_not:
     case Op::table:
+    case Op::outcome:
       return {1, 1};
+    case Op::row:
+      return {int(instruction.value), 1};
     default:
       break;
   }
@@ -109,7 +113,7 @@ std::size_t stack_depth(const Program& program) {
   // less.
   std::ptrdiff_t depth = 0, most = 0;
   for (const Instruction& i : program) {
-    const Effect e = effect(i.op);
+    const Effect e = effect(i);
     most = std::max(most, depth);
     depth += e.left - e.taken;
     most = std::max(most, depth);
@@ -118,7 +122,7 @@ std::size_t stack_depth(const Program& program) {
 }
 
 double* run(std::span<const Instruction> program, double* slots, std::span<const double> cell,
-            std::span<const Table> tables, Random& random, double* stack) {
+            const Lookups& lookups, Random& random, double* stack) {
   double* top = stack;  // one past the last value
   const auto unary = [&](auto f) { top[-1] = f(top[-1]); };
   const auto binary = [&](auto f) { --top, top[-1] = f(top[-1], top[0]); };
@@ -144,7 +148,22 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         if (*--top == 0.) i += i->index;
         break;
       case Op::table:
-        unary([&](double x) { return tables[std::size_t(i->index)].lookup(x); });
+        unary([&](double x) { return lookups.tables[std::size_t(i->index)].lookup(x); });
+        break;
+      case Op::row: {
+        const Sample& sample = lookups.samples[std::size_t(i->index)];
+        top -= sample.conditions.size();
+        *top = double(sample.draw({top, sample.conditions.size()}, random));
+        ++top;
+        break;
+      }
+      case Op::outcome:
+        unary([&](double row) {
+          const Sample& sample = lookups.samples[std::size_t(i->index)];
+          return row >= 0. && row < double(sample.rows())
+                     ? sample.outcome(std::size_t(row), std::size_t(i->value))
+                     : nonsense;
+        });
         break;
       case Op::add:
         binary([](double a, double b) { return a + b; });

@@ -11,12 +11,13 @@
 #include <vector>
 
 #include "forest/core/random.h"
+#include "forest/lsystem/sample.h"
 
 namespace forest::lsystem {
 
 enum class Op : std::uint8_t {
   // clang-format off
-  constant, slot, cell, store, jump, jump_if_zero, table,
+  constant, slot, cell, store, jump, jump_if_zero, table, row, outcome,
   add, subtract, multiply, divide, power, modulo, negate,
   less, less_equal, greater, greater_equal, equal, not_equal, logical_and, logical_or, logical_not,
   sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, abs, floor, ceil, round, sign, min, max,
@@ -26,8 +27,8 @@ enum class Op : std::uint8_t {
 
 struct Instruction {
   Op op = Op::constant;
-  std::int32_t index = 0;  // of a slot, a cell value or a table; instructions to skip, of a jump
-  double value = 0.;       // of a constant
+  std::int32_t index = 0;  // of a slot, a cell value, a table or a sample; instructions to skip, of a jump
+  double value = 0.;       // of a constant; of a row: how many conditions it takes; of an outcome: its column
 };
 
 using Program = std::vector<Instruction>;
@@ -42,12 +43,10 @@ struct Function {
 };
 std::span<const Function> functions();
 
-/// Values by bin: lookup(x) is the value of the first bin whose upper edge is >= x, else the last.
-struct Table {
-  std::string name;
-  std::vector<double> edges, values;  // edges strictly increasing
-
-  double lookup(double x) const;
+/// What programs look up.
+struct Lookups {
+  std::vector<Table> tables;
+  std::vector<Sample> samples;
 };
 
 /// How far results and operands of a program stand above the stack at most.
@@ -59,6 +58,6 @@ std::size_t stack_depth(const Program& program);
 /// @param stack  room for stack_depth(program) numbers; results begin at stack[0]
 /// @return one past the last result
 double* run(std::span<const Instruction> program, double* slots, std::span<const double> cell,
-            std::span<const Table> tables, Random& random, double* stack);
+            const Lookups& lookups, Random& random, double* stack);
 
 }  // namespace forest::lsystem

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numbers>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
@@ -41,6 +42,18 @@ constexpr TurtleSymbol symbol_table[] = {
     {"Flat", "strength, x, y, z",
      "from here on bend by strength into the plane across a direction, (0, 0, 1) when not given; 0 ends it",
      Action::flat, 1, 4},
+    {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
+    {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
+    {"Trace", "sample, row, branch, scale, mirror, turn, bent, begin, end",
+     "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
+     "about z by the share "
+     "`turn` of the angle from what it left there to the heading; `bent` times as far from its chord; with "
+     "diameters that go evenly from begin, at "
+     "its first place, to end when these are given",
+     Action::trace, 3, 9},
+    {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
+     3, 3},
+    {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
 };
 
 static_assert([] {
@@ -74,22 +87,30 @@ struct State {
 
 class Turtle {
  public:
-  Turtle(const Word& word, const Grammar& grammar, const Annotations& annotations)
-      : word_(word), grammar_(grammar), annotations_(annotations) {
+  Turtle(const Word& word, const Grammar& grammar) : word_(word), grammar_(grammar) {
     state_.frame.col(0) = Eigen::Vector3d::UnitY();
     state_.frame.col(1) = -Eigen::Vector3d::UnitX();
     state_.frame.col(2) = Eigen::Vector3d::UnitZ();
   }
 
-  Morphology run() {
+  Morphology draw(const Annotations& annotations) {
     drawn_.reserve(word_.modules.size() / 2);
-    for (const Module& m : word_.modules)
-      if (const Symbol s = grammar_.drawn_as[m.symbol]; s < std::size(symbol_table)) act(symbol_table[s], m);
-    if (!stack_.empty()) fail("a branch is not closed");
-    return build();
+    walk();
+    return build(annotations);
+  }
+  // Draws nothing, and writes its answers into the word.
+  void answer(std::vector<double>& parameters) {
+    answers_ = &parameters;
+    walk();
   }
 
  private:
+  void walk() {
+    for (const Module& m : word_.modules)
+      if (const Symbol s = grammar_.drawn_as[m.symbol]; s < std::size(symbol_table)) act(symbol_table[s], m);
+    if (!stack_.empty()) fail("a branch is not closed");
+  }
+
   [[noreturn]] void fail(std::string_view what) const {
     throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
   }
@@ -161,6 +182,18 @@ class Turtle {
         return become(SectionKind::glia);
       case Action::kind:
         return become_numbered(parameter(0, 0.));
+      case Action::place:
+        return stand(soma_place_ + Eigen::Vector3d(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
+      case Action::head:
+        return head(direction(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
+      case Action::trace:
+        return trace(branch(parameter(0, -1.), parameter(1, -1.), parameter(2, -1.)), parameter(3, 1.),
+                     int(parameter(4, 0.)), parameter(5, 1.), parameter(6, 1.), parameter(7, -1.),
+                     parameter(8, -1.));
+      case Action::ask_place:
+        return tell(m, state_.position - soma_place_);
+      case Action::ask_heading:
+        return tell(m, state_.frame.col(0));
     }
   }
 
@@ -198,16 +231,7 @@ class Turtle {
     const auto start = float(0.5 * state_.diameter);
     state_.diameter = diameter;
     if (length == 0.) return;
-    if (state_.node == none) {
-      drawn_.push_back({state_.position, start, start, none, 0, state_.tag, state_.kind});
-      state_.node = std::uint32_t(drawn_.size() - 1);
-    }
-    state_.position += length * state_.frame.col(0);
-    if (!state_.position.allFinite()) fail("the turtle has left the world");
-    ++drawn_[state_.node].children;
-    drawn_.push_back(
-        {state_.position, float(0.5 * diameter), start, state_.node, 0, state_.tag, state_.kind});
-    state_.node = std::uint32_t(drawn_.size() - 1);
+    line_to(state_.position + length * state_.frame.col(0), start);
     if (state_.tropism != 0.) bend(state_.towards, state_.tropism);
     if (state_.flat != 0.) {
       const Eigen::Vector3d heading = state_.frame.col(0);
@@ -219,9 +243,83 @@ class Turtle {
     }
   }
 
+  // A segment of the turtle's diameter at its end.
+  void line_to(const Eigen::Vector3d& place, float start_radius) {
+    const Eigen::Vector3d from = std::exchange(state_.position, place);
+    if (!place.allFinite()) fail("the turtle has left the world");
+    if (answers_) return;
+    if (state_.node == none) {
+      drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind});
+      state_.node = std::uint32_t(drawn_.size() - 1);
+    }
+    ++drawn_[state_.node].children;
+    drawn_.push_back(
+        {place, float(0.5 * state_.diameter), start_radius, state_.node, 0, state_.tag, state_.kind});
+    state_.node = std::uint32_t(drawn_.size() - 1);
+  }
+
+  const lsystem::Trace& branch(double sample, double row, double which) const {
+    const auto& samples = grammar_.lookups.samples;
+    if (!(sample >= 0. && sample < double(samples.size()))) fail("Trace names no sample");
+    const Sample& s = samples[std::size_t(sample)];
+    if (!(row >= 0. && row < double(s.rows())))
+      fail(fmt::format("Trace asks for row {} of sample {}, which has {}", row, s.name, s.rows()));
+    const auto branches = s.branches(std::size_t(row));
+    if (!(which >= 0. && which < double(branches.size())))
+      fail(fmt::format("Trace asks for branch {} of row {} of sample {}, which has {}", which, row, s.name,
+                       branches.size()));
+    return branches[std::size_t(which)];
+  }
+
+  void trace(const lsystem::Trace& t, double scale, int mirror, double share, double bent, double begin,
+             double end) {
+    const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., mirror & 2 ? -1. : 1.);
+    const auto mirrored = [&](const Vec3& v) {
+      return Eigen::Vector3d(sides.cwiseProduct(v.cast<double>()));
+    };
+    const Eigen::Vector3d before = mirrored(t.heading), heading = state_.frame.col(0), from = state_.position;
+    const double across = before.x() * heading.y() - before.y() * heading.x(),
+                 along = before.x() * heading.x() + before.y() * heading.y();
+    const Eigen::Quaterniond turn(
+        Eigen::AngleAxisd(share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+    const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
+    const bool given = begin >= 0. && end >= 0.;
+    if (answers_) {
+      line_to(place(t.end()), 0.f);
+    } else {
+      const float whole = t.length(), first = t.stops[0].at.norm();
+      const bool stem = state_.node == none;
+      auto start = float(0.5 * (!given ? double(t.diameter) : stem ? begin : state_.diameter));
+      float length = 0.f;
+      Vec3 last = Vec3::Zero();
+      for (const lsystem::Trace::Stop& stop : t.stops) {
+        length += (stop.at - last).norm(), last = stop.at;
+        const double part = whole > first ? double((length - first) / (whole - first)) : 1.;
+        state_.diameter = given ? begin + part * (end - begin) : double(stop.diameter);
+        const Vec3 on_chord = whole > 0.f ? Vec3(t.end() * (length / whole)) : last;
+        line_to(place(on_chord + float(bent) * (last - on_chord)), start);
+        start = float(0.5 * state_.diameter);
+      }
+    }
+    state_.diameter = given ? end : double(t.stops.back().diameter);
+    if (!t.ahead.isZero(0.f)) head(turn * mirrored(t.ahead));
+  }
+
+  void head(const Eigen::Vector3d& direction) {
+    if (direction.isZero(0.)) return;
+    state_.frame = Eigen::Quaterniond::FromTwoVectors(state_.frame.col(0), direction) * state_.frame;
+    state_.frame.col(0) = direction;
+  }
+
+  void tell(const Module& m, const Eigen::Vector3d& v) {
+    if (answers_) std::copy_n(v.data(), 3, answers_->begin() + m.first);
+  }
+
   void move(double length) {
-    if (length == 0.) return;
-    state_.position += length * state_.frame.col(0);
+    if (length != 0.) stand(state_.position + length * state_.frame.col(0));
+  }
+  void stand(const Eigen::Vector3d& place) {
+    state_.position = place;
     state_.node = none;
   }
 
@@ -245,7 +343,7 @@ class Turtle {
   }
 
   // A section runs on while a point has one drawn daughter, which is the next point, of the same kind.
-  Morphology build() const {
+  Morphology build(const Annotations& annotations) const {
     MorphologyBuilder builder;
     if (soma_)
       builder.set_soma({.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}});
@@ -274,16 +372,16 @@ class Turtle {
       for (std::uint32_t k = begin; k <= i; ++k) section_of[k] = id;
       ++i;
     }
-    for (const auto& [key, value] : annotations_) builder.annotate(key, value);
+    for (const auto& [key, value] : annotations) builder.annotate(key, value);
     return builder.build();
   }
 
   const Word& word_;
   const Grammar& grammar_;
-  const Annotations& annotations_;
   State state_;
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
+  std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
 };
@@ -293,7 +391,9 @@ class Turtle {
 std::span<const TurtleSymbol> turtle_symbols() { return symbol_table; }
 
 Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations) {
-  return Turtle(word, grammar, annotations).run();
+  return Turtle(word, grammar).draw(annotations);
 }
+
+void answer(Word& word, const Grammar& grammar) { Turtle(word, grammar).answer(word.parameters); }
 
 }  // namespace forest::lsystem

@@ -18,6 +18,7 @@ enum class Action : std::uint8_t {
   // clang-format off
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
   push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
+  place, head, trace, ask_place, ask_heading,
   // clang-format on
 };
 
@@ -32,5 +33,12 @@ std::span<const TurtleSymbol> turtle_symbols();
 /// @param annotations  given to the neuron as they are
 /// Throws Error when brackets do not match, a number is not finite or there are two somata.
 Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations = {});
+
+/// Writes into the word's modules ?P and ?H where the turtle is and heads when it comes to them (Prusinkiewicz, James & Měch
+/// 1994, "Synthetic topiary"). Throws as interpret() does.
+void answer(Word& word, const Grammar& grammar);
+constexpr bool is_question(Action action) {
+  return action == Action::ask_place || action == Action::ask_heading;
+}
 
 }  // namespace forest::lsystem

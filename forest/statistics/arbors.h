@@ -26,6 +26,10 @@ class KindSet {
     return set;
   }
   constexpr bool contains(SectionKind kind) const { return (bits_ >> unsigned(kind) & 1u) != 0; }
+  constexpr KindSet operator|(KindSet other) const {
+    other.bits_ |= bits_;
+    return other;
+  }
   constexpr bool operator==(const KindSet&) const = default;
 
  private:

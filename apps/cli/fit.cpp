@@ -1,0 +1,110 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest fit: from traced neurons to a model that grows more of them.
+#include "forest/fitting/resampling.h"
+
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/io/format.h"
+#include "forest/lsystem/grammar.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/grammars.h"
+#include "apps/cli/neurons.h"
+#include "apps/cli/options.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::vector<std::string> files, kinds{"dendrite"};
+  std::string repo, population, model;
+  std::filesystem::path out;
+  fitting::Resampling resampling;
+  bool force = false;
+};
+
+std::vector<Morphology> read_neurons(const Options& options, Console& console) {
+  std::vector<Morphology> neurons;
+  if (!options.files.empty()) {
+    const auto files = neuron_files(options.files, console);
+    neurons.resize(files.size());
+    console.progress().begin("reading", files.size());
+    parallel_for(files.size(), 1, [&](std::size_t i) {
+      neurons[i] = io::read(files[i]).morphology;
+      console.progress().advance();
+    });
+    console.progress().end();
+    return neurons;
+  }
+  const auto repository = repository::Repository::open(options.repo, repository::Access::read);
+  for (const auto& row : pick_neurons(repository, {}, options.population))
+    neurons.push_back(repository.morphology(row.id));
+  return neurons;
+}
+
+void run(const Options& options, Console& console) {
+  const std::vector<Morphology> neurons = read_neurons(options, console);
+  const std::string of = options.files.empty() ? options.population : options.files.front();
+  fitting::Resampling resampling = options.resampling;
+  resampling.kinds = {};
+  for (const std::string& word : options.kinds) resampling.kinds = resampling.kinds | statistics::kind_set(word);
+  const std::string text =
+      fitting::resampling_grammar(neurons, fmt::format("neurons like those of {}", of), resampling);
+  const std::string name = options.model.empty() ? options.out.stem().string() : options.model;
+  const lsystem::Grammar grammar = lsystem::parse(text, name);  // finds our own mistakes before anybody else does
+  if (!options.out.empty()) write_unless_there(options.out, text, options.force);
+  int version = 0;
+  if (!options.model.empty()) {
+    auto repository = repository::Repository::open(options.repo, repository::Access::write);
+    version = repository
+                  .add_model({options.model, text, options.population,
+                              fmt::format("fitted to {} neurons of {}", neurons.size(), of),
+                              distributions_of(grammar)})
+                  .first;
+  }
+  std::vector<std::vector<std::string>> rows;
+  nlohmann::ordered_json samples;
+  for (const lsystem::Sample& s : grammar.lookups.samples) {
+    rows.push_back({s.name, fmt::format("{}", s.rows())});
+    samples[s.name] = s.rows();
+  }
+  console.table({"sample", "rows"}, rows);
+  console.print({{"model", name}, {"version", version}, {"neurons", neurons.size()}, {"samples", samples}});
+}
+
+}  // namespace
+
+std::function<void()> fit(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  CLI::Option_group* from = command.add_option_group("from", "what is fitted");
+  from->add_option("files", options->files, "Files or folders of traced neurons");
+  CLI::Option* population =
+      from->add_option("--population", options->population, "A population of the repository");
+  from->require_option(1);
+  CLI::Option* repo = command.add_option("--repo", options->repo, "The repository");
+  population->needs(repo);
+  CLI::Option_group* into = command.add_option_group("into", "where the model goes");
+  into->add_option("--model", options->model, "Its name in the repository")->needs(repo);
+  into->add_option("-o,--out", options->out, "A file for the grammar");
+  into->require_option(1, 2);
+  command.add_option("--kind", options->kinds, "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
+      ->capture_default_str();
+  command.add_option("--style", options->resampling.style,
+                     "How far the style of the neurons that are drawn from may be from a neuron's own, in standard deviations")
+      ->capture_default_str();
+  command.add_option("--smoothing", options->resampling.smoothing,
+                     "How far a neuron's style may be from that of the traced one whose stems it has")
+      ->capture_default_str();
+  add_force(command, options->force);
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

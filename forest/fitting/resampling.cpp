@@ -1,0 +1,497 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/fitting/resampling.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <iterator>
+#include <map>
+#include <utility>
+#include <vector>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/sample.h"
+#include "forest/statistics/summary.h"
+
+namespace forest::fitting {
+namespace {
+
+using statistics::Arbors;
+using statistics::Branch;
+using Out = std::back_insert_iterator<std::string>;
+
+// What sets the branches of one neuron apart from those of another, and the names that the grammar gives it.
+enum { reach, wander, girth, grain, depth, spread, thinning, extent, number, styles };
+constexpr std::array<const char*, styles> style_names{"reach",  "wander",   "girth",  "grain", "depth",
+                                                      "spread", "thinning", "extent", "forks"};
+using Style = std::array<double, styles>;
+
+constexpr double least_diameter = .05;  // µm: where none was measured
+
+constexpr std::size_t most_daughters = 3;  // of a fork; those with more are not learned from
+
+struct Stem {
+  std::size_t cell;
+  int kind;
+  double tips, ahead, length, diameter, end_diameter;  // ahead: path from its beginning to the farthest tip, µm
+  Vec3 place, heading;                       // of its beginning, from the soma's centre
+  std::vector<Point> points;
+};
+
+struct Fork {
+  std::size_t cell;
+  int kind;
+  double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
+  double side, height, depth;                 // from the soma: across, above and before it, µm
+  Vec3 heading;
+  struct Daughter {
+    double tips, ahead, length, diameter, end_diameter;
+    std::vector<Point> points;
+  };
+  std::vector<Daughter> daughters;  // fewest tips first
+};
+
+// What is true of one kind of section of a neuron.
+struct Manner {
+  Style style{};
+  double thinnest = INFINITY;  // diameter, µm
+  double winding = 0.;         // mean of the logarithm of path / chord
+  double tip = 0.;             // mean of the logarithm of the diameters where branches end, µm
+};
+
+struct Cell {
+  double soma = 0.;  // diameter, µm
+  std::map<int, Manner> kinds;
+  std::vector<Stem> stems;
+};
+
+std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points) {
+  std::vector<lsystem::Trace::Stop> stops;
+  for (const Point& p : points.subspan(1))
+    stops.push_back({p.position() - points[0].position(), 2.f * p.radius});
+  return stops;
+}
+
+// Where a branch heads at its end, and at its beginning.
+Vec3 end_heading(std::span<const Point> points) {
+  return lsystem::heading_at_end(Vec3::Zero(), stops_of(points));
+}
+Vec3 start_heading(std::span<const Point> points) {
+  const std::vector<Point> back(points.rbegin(), points.rend());
+  return -end_heading(back);
+}
+
+double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
+
+/// What is learned from: forks and stems of all neurons, and what each neuron is like.
+struct Traced {
+  std::vector<Cell> cells;
+  std::vector<Fork> forks;
+
+  void take(const Morphology& neuron, const Resampling& options) {
+    if (neuron.soma().kind != SomaKind::none) learn(Arbors(neuron, options.kinds));
+  }
+
+ private:
+  void learn(const Arbors& arbors) { Learner(*this, arbors).learn(); }
+
+  // Of one neuron.
+  struct Learner {
+    Traced& traced;
+    const Arbors& arbors;
+    const Vec3 soma = arbors.origin().position();
+    std::span<const Branch> all = arbors.sections();
+    std::vector<double> beyond = std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
+    std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
+
+    Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
+
+    int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
+    std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
+    bool drawn(std::uint32_t i) const { return points(i).size() >= 2 && all[i].length > 0.; }
+    std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
+
+    void learn() {
+      for (std::size_t i = all.size(); i-- > 0;)
+        if (all[i].parent >= 0) {
+          double& above = beyond[std::size_t(all[i].parent)];
+          above = std::max(above, all[i].length + beyond[i]);
+        }
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (all[i].parent >= 0) daughters[std::size_t(all[i].parent)].push_back(i);
+      Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (all[i].parent < 0 && !arbors.neuron().section(all[i].id).parent.valid() && drawn(i))
+          cell.stems.push_back(stem(i));
+      if (cell.stems.empty()) return;
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (!daughters[i].empty() && daughters[i].size() <= most_daughters &&
+            std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); }))
+          traced.forks.push_back(fork(i));
+      traced.cells.push_back(std::move(cell));
+    }
+
+    Stem stem(std::uint32_t i) const {
+      const Branch& b = all[i];
+      return {.cell = traced.cells.size(),
+              .kind = kind_of(b),
+              .tips = double(b.degree),
+              .ahead = b.length + beyond[i],
+              .length = b.length,
+              .diameter = diameter_of(points(i)[1]),
+              .end_diameter = diameter_of(points(i).back()),
+              .place = points(i).front().position() - soma,
+              .heading = start_heading(points(i)),
+              .points = copy(i)};
+    }
+
+    Fork fork(std::uint32_t i) const {
+      const Branch& b = all[i];
+      const Vec3 place = points(i).back().position() - soma;
+      Fork fork{.cell = traced.cells.size(),
+                .kind = kind_of(b),
+                .tips = double(b.degree),
+                .ahead = beyond[i],
+                .path = b.path_distance,
+                .order = double(arbors.neuron().order(b.id)),
+                .diameter = diameter_of(points(i).back()),
+                .side = double(place.x()),
+                .height = double(place.y()),
+                .depth = double(place.z()),
+                .heading = end_heading(points(i)),
+                .daughters = {}};
+      for (const std::uint32_t d : daughters[i])
+        fork.daughters.push_back({.tips = double(all[d].degree),
+                                  .ahead = beyond[d],
+                                  .length = all[d].length,
+                                  .diameter = diameter_of(points(d)[1]),
+                                  .end_diameter = diameter_of(points(d).back()),
+                                  .points = copy(d)});
+      std::ranges::stable_sort(fork.daughters, {}, &Fork::Daughter::tips);
+      return fork;
+    }
+
+    std::map<int, Manner> manners() const {
+      struct Sums {
+        std::array<std::vector<double>, styles> values;
+        std::vector<double> tips;
+        double farthest = 0., sections = 0., thinnest = INFINITY;
+      };
+      std::map<int, Sums> by_kind;
+      for (std::uint32_t i = 0; i < all.size(); ++i) {
+        Sums& of = by_kind[kind_of(all[i])];
+        of.sections += 1.;
+        of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
+        for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
+        if (all[i].daughters == 0) of.tips.push_back(std::log(diameter_of(points(i).back())));
+        if (drawn(i)) measure(i, of.values);
+      }
+      std::map<int, Manner> manners;
+      for (auto& [kind, of] : by_kind) {
+        of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
+        Manner& manner = manners[kind];
+        for (std::size_t s = 0; s < styles; ++s)
+          manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
+        manner.tip = statistics::mean(of.tips);
+        manner.thinnest = of.thinnest, manner.winding = std::max(.01, manner.style[wander]);
+      }
+      return manners;
+    }
+
+    void measure(std::uint32_t i, std::array<std::vector<double>, styles>& values) const {
+      constexpr double straight = 10.;  // µm: shorter ones tell nothing of how they wind
+      const Branch& b = all[i];
+      const Vec3 chord = points(i).back().position() - points(i).front().position();
+      const double across = double(chord.norm());
+      values[reach].push_back(std::log(b.length));
+      if (b.length > straight && across > 0.) values[wander].push_back(std::log(b.length / across));
+      values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
+      values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
+      values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
+      if (b.parent < 0) return;
+      const auto before = points(std::uint32_t(b.parent));
+      if (across > 0.)
+        values[spread].push_back(std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
+      values[thinning].push_back(std::log(diameter_of(points(i)[1]) / diameter_of(before.back())));
+    }
+  };
+};
+
+double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
+
+// In standard deviations from the mean of all neurons.
+void standardise(std::vector<Cell>& cells) {
+  std::map<int, std::vector<Style*>> by_kind;
+  for (Cell& c : cells)
+    for (auto& [kind, of] : c.kinds) by_kind[kind].push_back(&of.style);
+  for (const auto& [kind, of] : by_kind)
+    for (std::size_t s = 0; s < styles; ++s) {
+      std::vector<double> values;
+      for (const Style* style : of) values.push_back((*style)[s]);
+      const double mean = statistics::mean(values), sd = deviation(values);
+      for (Style* style : of) (*style)[s] = sd > 0. ? ((*style)[s] - mean) / sd : 0.;
+    }
+}
+
+// What grows of all this. @style stands for a neuron's own style.
+constexpr std::string_view growth = R"(
+# Of n tips, those of a daughter that had `part` of `whole` where it was traced, when `others` share the rest: a single one
+# stays single.
+function share(part, whole, n, others) =
+  if(part == 1, 1, max(min(2, n - others), min(n - others, round(n * part / whole))))
+# How many times longer a branch is drawn than it was traced, so that its farthest tip is as far as it should be.
+function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
+# How many times farther from its chord a branch bends than in the neuron it comes from.
+function bending(s, donor) = max(0.5, min(2, sqrt(styles.winding(s) / styles.winding(donor)) * exp(unlike * own_wander)))
+function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
+
+module Plan(i), Twig(kind, donor, tips, ahead, path, order, d)
+module Fork(kind, r, q, tips, path, order, mirror, thick, scale), Limb(kind, r, q, i, tips, path, order, mirror, thick, scale)
+axiom: Soma(cells.soma(me)) Plan(0)
+
+# Stems leave the soma as planned, each drawn from a stem alike.
+stem: Plan(i) : i < cells.stems(me)
+  { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), tips = max(1, round(plans.tips(p) * exp(normal(0, jitter)))),
+    ahead = plans.ahead(p) * exp(normal(0, jitter)), d = plans.d(p), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
+    r = stems(kind, me, log(tips), log(ahead), x, y, z, log(d)@style),
+    scale = longer(ahead, stems.ahead(r)) }
+  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
+       Trace(stems, r, 0, scale, 0, turn, bending(s, styles(stems.donor(r), kind)), plans.begin(p), d)
+       Twig(kind, stems.donor(r), tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d)
+       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
+planned: Plan(i) ->
+
+# A branch with one tip to come ends; another forks, or goes on as another section. Left and right, before and behind are alike.
+end: Twig(kind, donor, tips, ahead, path, order, d) : tips < 2 ->
+fork: Twig(kind, donor, tips, ahead, path, order, d) > ?P(px, py, pz) ?H(x, y, z)
+  { s = styles(me, kind), mx = if(chance(0.5), 1, -1), mz = if(chance(0.5), 1, -1),
+    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z * mz, px * mx, py, pz * mz@style),
+    q = calibres(kind, forks.daughters(r), log(tips), log(max(ahead, 1)), log(d), styles.tip(s) + 0.1 * own_girth, kept * styles.girth(s) + own_girth,
+      kept * styles.thinning(s) + own_thinning) }
+  -> Fork(kind, r, q, tips, path, order + 1, (mx < 0) + 2 * (mz < 0), d / calibres.d(q), longer(ahead, forks.ahead(r)))
+one: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 1
+  -> Limb(kind, r, q, 0, tips, path, order, mirror, thick, scale)
+two: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 2
+  { n = share(forks.n1(r), forks.tips(r), tips, 1) }
+  -> [ Limb(kind, r, q, 0, n, path, order, mirror, thick, scale) ]
+     [ Limb(kind, r, q, 1, tips - n, path, order, mirror, thick, scale) ]
+three: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 3
+  { n = share(forks.n1(r), forks.tips(r), tips, 2), m = share(forks.n2(r), forks.tips(r), tips - n, 1) }
+  -> [ Limb(kind, r, q, 0, n, path, order, mirror, thick, scale) ]
+     [ Limb(kind, r, q, 1, m, path, order, mirror, thick, scale) ]
+     [ Limb(kind, r, q, 2, tips - n - m, path, order, mirror, thick, scale) ]
+limb: Limb(kind, r, q, i, tips, path, order, mirror, thick, scale)
+  { s = styles(me, kind), donor = forks.donor(r), thin = styles.thinnest(s),
+    length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)),
+    beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
+    begin = max(thin, thick * nth(i, calibres.a1(q), calibres.a2(q), calibres.a3(q))),
+    d = max(thin, thick * nth(i, calibres.z1(q), calibres.z2(q), calibres.z3(q))) }
+  -> Trace(forks, r, i, scale, mirror, turn, bending(s, styles(donor, kind)), begin, d)
+     Twig(kind, donor, tips, beyond, path + length, order, d) ?P(0, 0, 0) ?H(0, 0, 0)
+)";
+
+/// Writes the grammar, part by part.
+class Writer {
+ public:
+  Writer(const Traced& traced, const std::string& title, const Resampling& options)
+      : traced_(traced), options_(options) {
+    for (const char* name : style_names) kernels_ += fmt::format(", {} ~ {}", name, options.style);
+    put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
+        traced.cells.size(), traced.forks.size(), title);
+    cells();
+    styles_of_cells();
+    plans();
+    stems();
+    forks();
+    calibres();
+    productions();
+  }
+  std::string text() && { return std::move(text_); }
+
+ private:
+  template <class... T>
+  void put(fmt::format_string<T...> format, T&&... values) {
+    fmt::format_to(Out(text_), format, std::forward<T>(values)...);
+  }
+  // Between the rows of a sample.
+  void row(bool first) { put("{}\n  ", first ? "" : ";"); }
+
+  void cells() {
+    put("\n# Neurons: the diameter of their soma (µm), and how many stems they have.\nsample cells(-> soma, stems) =");
+    for (const Cell& c : traced_.cells) {
+      row(&c == traced_.cells.data());
+      put("{} {}", rounded(c.soma, 1e3), c.stems.size());
+    }
+  }
+
+  void styles_of_cells() {
+    put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and coarsely traced branches are,\n"
+        "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and how often they fork; the\n"
+        "# thinnest diameter (µm), and the mean logarithms of path by chord and of the diameters at tips.\n"
+        "sample styles(cell =, kind = -> {}, thinnest, winding, tip) =",
+        fmt::join(style_names, ", "));
+    bool first = true;
+    for (std::size_t i = 0; i < traced_.cells.size(); ++i)
+      for (const auto& [kind, of] : traced_.cells[i].kinds) {
+        row(std::exchange(first, false));
+        put("{} {} ->", i, kind);
+        style(of.style);
+        put(" {} {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4), rounded(of.tip, 1e3));
+      }
+  }
+
+  void plans() {
+    put("\n\n# Their stems: tips, where they leave the soma's centre (µm) and head, their diameters where they begin and end, and the path to the farthest tip.\n"
+        "sample plans(cell =, stem = -> kind, tips, x, y, z, hx, hy, hz, begin, d, ahead) =");
+    bool first = true;
+    for (std::size_t c = 0; c < traced_.cells.size(); ++c)
+      for (std::size_t i = 0; i < traced_.cells[c].stems.size(); ++i) {
+        const Stem& s = traced_.cells[c].stems[i];
+        row(std::exchange(first, false));
+        put("{} {} -> {} {} ", c, i, s.kind, s.tips);
+        vector(s.place, 1e2);
+        put(" ");
+        vector(s.heading, 1e3);
+        put(" {} {} {}", rounded(s.diameter, 1e3), rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.));
+      }
+  }
+
+  void stems() {
+    put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
+        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, hx ~ 0.35, hy ~ 0.35, hz ~ {}, d ~ 0.3{}\n  -> donor, ahead, length) =",
+        options_.ahead, 2. * options_.heading_across, kernels_);
+    bool first = true;
+    for (const Cell& c : traced_.cells)
+      for (const Stem& s : c.stems) {
+        row(std::exchange(first, false));
+        put("{} {} {} {} ", s.kind, s.cell, logarithm(s.tips), logarithm(s.ahead));
+        vector(s.heading, 1e3);
+        put(" {}", logarithm(s.end_diameter));
+        style(c.kinds.at(s.kind).style);
+        put(" -> {} {} {}", s.cell, rounded(s.ahead, 10.), rounded(s.length, 1e2));
+        trace(s.heading, s.points);
+      }
+  }
+
+  void forks() {
+    const std::span<const Fork> forks = traced_.forks;
+    put("\n\n# Widths of kernels, by kind.\n");
+    widths("near_path", options_.path, [](const Fork& f) { return f.path; });
+    widths("near_order", options_.order, [](const Fork& f) { return f.order; });
+    widths("near_d", options_.diameter, [](const Fork& f) { return std::log(f.diameter); });
+    widths("near_side", options_.height, [](const Fork& f) { return f.side; });
+    widths("near_height", options_.height, [](const Fork& f) { return f.height; });
+    widths("near_before", options_.depth, [](const Fork& f) { return f.depth; });
+    put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the diameter are logarithms; heading and\n"
+        "# place, from the soma), and its daughters, fewest tips first: tips, lengths, paths beyond their ends.\n"
+        "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ near_order(kind), d ~ near_d(kind),\n"
+        "    hx ~ {}, hy ~ {}, hz ~ {}, side ~ near_side(kind), height ~ near_height(kind), before ~ near_before(kind){}\n"
+        "  -> donor, daughters, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3) =",
+        options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across, kernels_);
+    for (const Fork& f : forks) {
+      row(&f == forks.data());
+      put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead), rounded(f.path, 10.), f.order,
+          logarithm(f.diameter));
+      vector(f.heading, 1e3);
+      put(" {} {} {}", rounded(f.side, 10.), rounded(f.height, 10.), rounded(f.depth, 10.));
+      style(traced_.cells[f.cell].kinds.at(f.kind).style);
+      put(" -> {} {} {} {}", f.cell, f.daughters.size(), f.tips, rounded(f.ahead, 10.));
+      const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
+        for (std::size_t i = 0; i < most; ++i)
+          put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);
+      };
+      each(&Fork::Daughter::tips, 2, 1.);
+      each(&Fork::Daughter::length, most_daughters, 1e2);
+      each(&Fork::Daughter::ahead, most_daughters, 10.);
+      for (const Fork::Daughter& d : f.daughters) trace(f.heading, d.points);
+    }
+  }
+
+  void calibres() {
+    put("\n\n# How thick the daughters of a fork begin (a) and end (z), µm.\n"
+        "sample calibres(kind =, daughters =, tips ~ 0.25, ahead ~ 0.5, d ~ 0.04, tip ~ 0.08, girth ~ {0}, thinning ~ {0}\n"
+        "  -> d, a1, a2, a3, z1, z2, z3) =",
+        1.3 * options_.style);
+    for (const Fork& f : traced_.forks) {
+      row(&f == traced_.forks.data());
+      const Style& style = traced_.cells[f.cell].kinds.at(f.kind).style;
+      put("{} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), logarithm(f.tips), logarithm(f.ahead), logarithm(f.diameter),
+          rounded(traced_.cells[f.cell].kinds.at(f.kind).tip, 1e3), rounded(style[girth], 1e2), rounded(style[thinning], 1e2), rounded(f.diameter, 1e3));
+      for (const auto what : {&Fork::Daughter::diameter, &Fork::Daughter::end_diameter})
+        for (std::size_t i = 0; i < most_daughters; ++i)
+          put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, 1e3) : 0.);
+    }
+  }
+
+  void productions() {
+    put("\n\n# This neuron has the stems of a traced one, and a style near that one's.\n"
+        "cell me = cells()\n#define kept {:.4f}\n",
+        std::sqrt(std::max(0., 1. - options_.smoothing * options_.smoothing)));
+    std::string style;
+    for (const char* name : style_names) {
+      put("cell own_{} = normal(0, {})\n", name, options_.smoothing);
+      style += fmt::format(", kept * styles.{0}(s) + own_{0}", name);
+    }
+    put("#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
+        "#define unlike 0.5  # how much of its own wander its branches bend more\n"
+        "#define turn 0.8    # share of the angle between headings where a fork was traced and where it is drawn\n");
+    std::string_view rest = growth;
+    for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
+      text_.append(rest.substr(0, at)).append(style);
+    text_ += rest;
+  }
+
+  // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.
+  void widths(const char* name, double share, auto&& what) {
+    std::map<int, std::vector<double>> values;
+    for (const Fork& f : traced_.forks) values[f.kind].push_back(what(f));
+    std::vector<std::string> bins;
+    for (const auto& [kind, of] : values) {
+      const double sd = deviation(of);
+      bins.push_back(fmt::format("{}: {:.4g}", kind, sd > 0. ? share * sd : 1.));
+    }
+    put("table {} = {}\n", name, fmt::join(bins, ", "));
+  }
+
+  void vector(const Vec3& v, double steps) {
+    put("{} {} {}", rounded(double(v.x()), steps), rounded(double(v.y()), steps), rounded(double(v.z()), steps));
+  }
+  void style(const Style& of) {
+    for (const double s : of) put(" {}", rounded(s, 1e2));
+  }
+  void trace(const Vec3& heading, std::span<const Point> points) {
+    put(" | ");
+    vector(heading, 1e3);
+    put(" {}:", rounded(2. * double(points[0].radius), 1e3));
+    const auto stops = stops_of(points);
+    for (std::size_t i = 0; i < stops.size(); ++i) {
+      put("{} ", i ? "," : "");
+      vector(stops[i].at, 1e2);
+      put(" {}", rounded(double(stops[i].diameter), 1e3));
+    }
+  }
+  static double rounded(double value, double steps) { return std::round(value * steps) / steps; }
+  static double logarithm(double value) { return rounded(std::log(value), 1e3); }
+
+  const Traced& traced_;
+  const Resampling& options_;
+  std::string kernels_, text_;
+};
+
+}  // namespace
+
+std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
+                               const Resampling& options) {
+  Traced traced;
+  for (const Morphology& neuron : neurons) traced.take(neuron, options);
+  if (traced.cells.size() < 2 || traced.forks.empty())
+    throw Error(fmt::format(
+        "{} of {} neurons have a soma, stems and forks of these kinds; a model needs two such neurons, name more of them or other kinds",
+        traced.cells.size(), neurons.size()));
+  standardise(traced.cells);
+  return Writer(traced, title, options).text();
+}
+
+}  // namespace forest::fitting

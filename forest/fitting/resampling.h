@@ -1,0 +1,38 @@
+// SPDX-License-Identifier: Apache-2.0
+// From traced neurons to a grammar that grows more of them. N++ asked for three families: where segments do not end, their
+// trajectories and lengths, and the rotations where they fork. Here all three are drawn together, from forks and stems as
+// they were traced at such a place of such a neuron:
+//
+// - a branch carries the tips that it is still to have, which its daughters share (Samsonovich & Ascoli 2005, Hippocampus
+//   15:166): a tree neither dies out nor explodes;
+// - a fork is drawn with its daughters, by kind, tips, path distance, order, diameter and heading, from another neuron than
+//   the fork before it, so that no two branches in a row come from one neuron;
+// - a neuron has a style of its own, how long, winding, thick and finely traced its branches are, and forks of neurons of a
+//   like style are drawn for it: else neurons would be more alike than traced ones.
+#pragma once
+
+#include <span>
+#include <string>
+
+#include "forest/morphology/morphology.h"
+#include "forest/statistics/arbors.h"
+
+namespace forest::fitting {
+
+struct Resampling {
+  statistics::KindSet kinds = statistics::dendrites;  // of the sections that are modelled
+  // Widths of the kernels by which forks are drawn.
+  double tips = .06, ahead = .12;  // of the logarithms of the tips to come, and of the path to the farthest
+  double path = 1., order = 2., diameter = .5, height = .6, depth = .2;  // in standard deviations among the forks of a kind
+  double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
+  double style = .65;                         // in standard deviations among the neurons
+  double smoothing = .4;                      // of a neuron's style: 0 takes that of a traced neuron as it is
+};
+
+/// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.
+/// @param neurons  at least two with a soma and such sections; others are passed over
+/// Throws Error when there are too few.
+std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
+                               const Resampling& options = {});
+
+}  // namespace forest::fitting

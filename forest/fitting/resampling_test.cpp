@@ -1,0 +1,101 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/fitting/resampling.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/grow.h"
+#include "forest/morphology/measure.h"
+#include "forest/statistics/metric.h"
+#include "forest/statistics/summary.h"
+
+namespace forest::fitting {
+namespace {
+
+using statistics::Arbors;
+
+// Neurons of a simple kind, in a slice: stems that fork and wind.
+std::vector<Morphology> traced(std::size_t count) {
+  const lsystem::Grammar grammar = lsystem::parse(R"(
+steps: 60
+module Tip(d, left, n), Stems(n)
+cell long = uniform(6, 12)
+axiom: Soma(14) Basal Stems(0)
+stem: Stems(n) : n < 4 -> [ -(90 * n + uniform(-20, 20)) f(7) !(2) F(long, 1.6) Tip(1.6, floor(uniform(1, 5)), 0) ] Stems(n + 1)
+fork: Tip(d, left, n) : n > 2 & left > 0
+  -> /(uniform(-30, 30)) [ +(30) Tip(0.8 * d, left - 1, 0) ] -(30) Tip(0.7 * d, left - 1, 0) : 0.4
+grow: Tip(d, left, n) : n < 12 -> &(uniform(-5, 5)) +(uniform(-12, 12)) F(long, d) Tip(d, left, n + 1)
+)",
+                                                     "traced");
+  return lsystem::grow_population(grammar, count, 11);
+}
+
+double mean_of(std::span<const Morphology> neurons, const char* metric) {
+  const statistics::Metric& m = *statistics::find_metric(metric);
+  std::vector<double> values;
+  for (const Morphology& n : neurons) values.push_back(statistics::mean(m.values(Arbors(n))));
+  return statistics::mean(values);
+}
+
+TEST(Resampling, GrowsNeuronsLikeTheTracedOnes) {
+  const std::vector<Morphology> models = traced(40);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "like them"), "fitted");
+  EXPECT_EQ(grammar.title, "like them");
+  const std::vector<Morphology> grown = lsystem::grow_population(grammar, 80, 3);
+  for (const char* metric : {"number_of_neurites", "number_of_leaves", "total_length", "max_branch_order",
+                             "max_path_distance", "contraction", "remote_bifurcation_angles"}) {
+    const double wanted = mean_of(models, metric);
+    EXPECT_NEAR(mean_of(grown, metric), wanted, .2 * std::abs(wanted)) << metric;
+  }
+  // Tips differ between neurons about as much as they did.
+  const auto spread = [](std::span<const Morphology> neurons) {
+    std::vector<double> tips;
+    for (const Morphology& n : neurons)
+      tips.push_back(statistics::find_metric("number_of_leaves")->values(Arbors(n))[0]);
+    return statistics::summarize(tips).sd;
+  };
+  EXPECT_GT(spread(grown), .6 * spread(models));
+  EXPECT_LT(spread(grown), 1.6 * spread(models));
+}
+
+TEST(Resampling, TheSameNeuronsGiveTheSameText) {
+  const std::vector<Morphology> models = traced(6);
+  const std::string text = resampling_grammar(models, "t");
+  EXPECT_EQ(text, resampling_grammar(models, "t"));
+  const lsystem::Grammar grammar = lsystem::parse(text, "t");
+  EXPECT_EQ(lsystem::grow(grammar, 1, 5), lsystem::grow(grammar, 1, 5));
+  EXPECT_NE(lsystem::grow(grammar, 1, 5), lsystem::grow(grammar, 1, 6));
+}
+
+TEST(Resampling, TakesNoTwoBranchesInARowFromOneNeuron) {
+  const std::vector<Morphology> models = traced(8);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const auto& samples = grammar.lookups.samples;
+  const auto forks = std::ranges::find(samples, "forks", &lsystem::Sample::name);
+  ASSERT_NE(forks, samples.end());
+  std::size_t donor = 0;
+  while (forks->outcomes[donor] != "donor") ++donor;
+  Random random(1);
+  std::vector<double> wanted(forks->conditions.size(), 0.);
+  wanted[0] = 3.;
+  for (int cell = 0; cell < 8; ++cell) {
+    wanted[1] = cell;
+    for (int i = 0; i < 20; ++i) EXPECT_NE(forks->outcome(forks->draw(wanted, random), donor), double(cell));
+  }
+}
+
+TEST(Resampling, TooFewNeuronsAreRefused) {
+  std::vector<Morphology> one = traced(1);
+  EXPECT_THROW((void)resampling_grammar(one, "t"), Error);
+  EXPECT_THROW((void)resampling_grammar({}, "t"), Error);
+  std::vector<Morphology> models = traced(4);
+  Resampling axons;
+  axons.kinds = {SectionKind::axon};
+  EXPECT_THROW((void)resampling_grammar(models, "t", axons), Error);
+}
+
+}  // namespace
+}  // namespace forest::fitting

@@ -1,0 +1,102 @@
+// SPDX-License-Identifier: Apache-2.0
+// Traced examples that a grammar draws from: rows of numbers, each with the branches that belong to it. Which row is drawn
+// depends on how like its conditions are to what is wanted, so that branches come as they came in the traced neurons at such
+// a place: nonparametric conditional distributions, as KDE-Neuron has them (Torben-Nielsen, Vanderlooy & Postma 2008,
+// Neuroinformatics 6:257).
+//
+//   sample forks(kind =, cell !=, tips ~ 0.3, path ~ 40 -> part, daughters) =
+//     3 12 1.4 52 -> 0.25 2 | 0 1 0 1.2 : 0.5 3.1 0 1.1, 2 6.4 0.8 0.9 | 0 1 0 0.8 : -1 4 0 0.8;
+//     3 14 0.7 90 -> 0.5 2 | …
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "forest/core/random.h"
+#include "forest/core/vec.h"
+
+namespace forest::lsystem {
+
+/// A branch as it was traced, from its beginning at the origin.
+struct Trace {
+  struct Stop {
+    Vec3 at;             // µm
+    float diameter = 0;  // µm
+  };
+  Vec3 heading;             // unit: of the branch that it leaves, at its end
+  float diameter = 0.f;     // at its beginning, µm
+  std::vector<Stop> stops;  // at least one
+  Vec3 ahead = Vec3::Zero();  // where it heads at its end
+
+  const Vec3& end() const { return stops.back().at; }
+  float length() const {
+    float sum = 0.f;
+    Vec3 last = Vec3::Zero();
+    for (const Stop& stop : stops) sum += (stop.at - last).norm(), last = stop.at;
+    return sum;
+  }
+};
+
+/// Where a path heads that ends with these places: the unit vector over its last `reach` µm, or over all of it when it is
+/// shorter; zero when it has no length. A path through `from`, then through the stops.
+inline constexpr float heading_reach = 20.f;
+Vec3 heading_at_end(const Vec3& from, std::span<const Trace::Stop> stops);
+
+/// Values by bin: lookup(x) is the value of the first bin whose upper edge is >= x, else the last.
+struct Table {
+  std::string name;
+  std::vector<double> edges, values;  // edges strictly increasing
+
+  double lookup(double x) const;
+};
+
+class Sample {
+ public:
+  enum class Match : std::uint8_t {
+    like,     // by a normal kernel of this width
+    same,     // only rows that have this number
+    another,  // only rows that have another one, if there are any
+  };
+  struct Condition {
+    std::string name;
+    Match match = Match::like;
+    double width = 1.;   // of the kernel; or …
+    Table widths = {};   // by the number of another condition, which must be the same
+    std::size_t by = 0;  // that condition
+  };
+
+  std::string name;
+  std::vector<Condition> conditions;
+  std::vector<std::string> outcomes;
+
+  std::size_t rows() const { return branches_.size(); }
+  void add(std::span<const double> conditions, std::span<const double> outcomes, std::vector<Trace> branches);
+  /// To be called after the last row.
+  void finish();
+
+  /// The number of a row. Every row's chance is the product of its kernels; where all are far from what is wanted, the
+  /// nearest ones are drawn. Throws Error when no row has the numbers that must be the same.
+  /// @param wanted  one number a condition, in their order
+  std::size_t draw(std::span<const double> wanted, Random& random) const;
+  double outcome(std::size_t row, std::size_t column) const {
+    return outcome_values_[row * outcomes.size() + column];
+  }
+  std::span<const Trace> branches(std::size_t row) const { return branches_[row]; }
+
+ private:
+  struct Group {  // of rows that are the same where they must be
+    std::vector<float> key;
+    std::vector<std::uint32_t> rows;
+    std::vector<float> widths;   // of the other conditions
+    std::vector<float> columns;  // they themselves, one after the other, in units of their widths
+  };
+  std::vector<float> condition_values_;  // row by row
+  std::vector<double> outcome_values_;
+  std::vector<std::vector<Trace>> branches_;
+  std::vector<Group> groups_;  // by key
+};
+
+}  // namespace forest::lsystem

@@ -1,0 +1,188 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/lsystem/sample.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/lsystem/derive.h"
+#include "forest/lsystem/grammar.h"
+#include "forest/lsystem/turtle.h"
+
+namespace forest::lsystem {
+namespace {
+
+const std::string rows = R"(
+sample twigs(kind =, cell !=, path ~ 2 -> part, cell) =
+  3 0 0 -> 0.5 0 | 0 1 0 2: 0 3 0 1, 0 6 4 1.5;
+  3 1 2 -> 0.25 1 | 0 1 0 1: 1 0 0 1 | 0 1 0 1: -1 0 0 1;
+  3 2 100 -> 0.125 2;
+  4 0 0 -> 0.75 0
+)";
+
+Grammar grammar(const std::string& rest) { return parse("steps: 1\n" + rows + rest, "twigs"); }
+
+const Sample& twigs(const Grammar& g) { return g.lookups.samples.at(0); }
+
+TEST(Sample, IsReadWithItsRowsAndBranches) {
+  const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
+  const Sample& s = twigs(g);
+  EXPECT_EQ(s.name, "twigs");
+  ASSERT_EQ(s.rows(), 4u);
+  EXPECT_EQ(s.outcome(1, 0), .25);
+  EXPECT_EQ(s.outcome(2, 1), 2.);
+  ASSERT_EQ(s.branches(0).size(), 1u);
+  ASSERT_EQ(s.branches(1).size(), 2u);
+  EXPECT_TRUE(s.branches(3).empty());
+  const Trace& t = s.branches(0)[0];
+  EXPECT_EQ(t.heading, Vec3(0, 1, 0));
+  EXPECT_EQ(t.diameter, 2.f);
+  EXPECT_EQ(t.end(), Vec3(0, 6, 4));
+  EXPECT_FLOAT_EQ(t.length(), 8.f);
+}
+
+// Chances are those of the kernel: of two rows 2 apart with a width of 2, asked at the first, 1 to exp(-1/2).
+TEST(Sample, DrawsByItsKernels) {
+  const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
+  Random random(1);
+  int counts[4] = {};
+  constexpr int draws = 20000;
+  for (int i = 0; i < draws; ++i) ++counts[twigs(g).draw(std::array{3., -1., 0.}, random)];
+  EXPECT_EQ(counts[2], 0);  // fifty widths away
+  EXPECT_EQ(counts[3], 0);  // of another kind
+  const double share = 1. / (1. + std::exp(-.5)), expected = draws * share;
+  const double chi = (counts[0] - expected) * (counts[0] - expected) / (expected * (1. - share));
+  EXPECT_LT(chi, 10.8);  // of one degree of freedom, one time in a thousand more
+}
+
+TEST(Sample, TakesAnotherAndTheNearest) {
+  const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
+  Random random(2);
+  for (int i = 0; i < 50; ++i) {
+    EXPECT_EQ(twigs(g).draw(std::array{3., 0., 0.}, random), 1u);    // not of neuron 0
+    EXPECT_EQ(twigs(g).draw(std::array{3., 9., 300.}, random), 2u);   // far from all of them
+    EXPECT_EQ(twigs(g).draw(std::array{4., 0., 0.}, random), 3u);    // there is no other
+  }
+  EXPECT_THROW((void)twigs(g).draw(std::array{5., 0., 0.}, random), Error);
+}
+
+TEST(Sample, IsAskedInExpressions) {
+  const Grammar g = grammar("cell r = twigs(4, 1, 0)\naxiom: A(r)\ngrow: A(x) -> B(x, twigs.part(x), twigs)\n");
+  const Word word = derive(g);
+  EXPECT_EQ(word.parameters, (std::vector<double>{3., .75, 0.}));
+  // The same seed, the same rows.
+  const Grammar many = grammar("axiom: A(twigs(3, -1, 1)) A(twigs(3, -1, 1)) A(twigs(3, -1, 1))\ngrow: A(x) -> B(x)\n");
+  EXPECT_EQ(derive(many, 5, 7).parameters, derive(many, 5, 7).parameters);
+}
+
+TEST(Sample, WidthsMayDependOnWhatIsTheSame) {
+  const Grammar g = parse(
+      "table wide = 3: 0.1, 4: 100\nsample s(kind =, x ~ wide(kind)) = 3 0; 3 1; 4 0; 4 1\naxiom: A\ngrow: A -> B\n",
+      "widths");
+  Random random(3);
+  int others = 0;
+  for (int i = 0; i < 200; ++i) {
+    EXPECT_EQ(g.lookups.samples[0].draw(std::array{3., 0.}, random), 0u);
+    others += g.lookups.samples[0].draw(std::array{4., 0.}, random) == 3u;
+  }
+  EXPECT_NEAR(others, 100, 40);
+}
+
+TEST(Sample, MistakesAreNamed) {
+  const auto refusal = [](const std::string& text) -> std::string {
+    try {
+      (void)parse(text + "\naxiom: A\ngrow: A -> B\n", "wrong");
+    } catch (const InputError& error) {
+      return error.what();
+    }
+    return "";
+  };
+  const std::pair<const char*, const char*> cases[] = {
+      {"sample s(x) = 1", "width of its kernel"},
+      {"sample s(x ~ 0) = 1", "above 0"},
+      {"sample s(x ~ 1 -> y) = 1", "'->' is missing"},
+      {"sample s(x ~ 1 -> y) = 1 -> 2 3", "should end here"},
+      {"sample s(x ~ 1) = ", "has no row"},
+      {"sample s(x =) = 1 | 0 1 0: 1 1 1 1", "a number is missing"},
+      {"sample s(x =) = 1 | 0 1 0 1: 1 1 1", "a number is missing"},
+      {"sample s(x =) = 1 | 0 1 0 1 1 1 1 1", "':' is missing"},
+      {"table t = 1: 1\nsample s(x ~ t(kind)) = 1", "no condition before this one"},
+      {"sample s(x =) = 1; 2\ncell c = s.y(1)", "no outcome 'y'"},
+      {"sample s(x =) = 1; 2\ncell c = s(1, 2)", "takes 1 argument"},
+      {"sample s(x =) = 1; 2\nfunction f(x) = s(x)", "may not draw"},
+  };
+  for (const auto& [text, words] : cases) {
+    const std::string said = refusal(text);
+    EXPECT_NE(said.find(words), std::string::npos) << text << ": " << said;
+    EXPECT_NE(said.find("wrong:"), std::string::npos) << said;
+  }
+}
+
+TEST(Sample, TellsWhereABranchHeads) {
+  const std::vector<Trace::Stop> straight{{{0, 10, 0}, 1}, {{0, 40, 0}, 1}, {{0, 40, 15}, 1}};
+  const Vec3 heading = heading_at_end(Vec3::Zero(), straight);  // over 20 µm: 15 along z, 5 along y
+  EXPECT_NEAR((heading - Vec3(0, 5, 15).normalized()).norm(), 0.f, 1e-6f);
+  EXPECT_EQ(heading_at_end(Vec3::Zero(), {}), Vec3(Vec3::Zero()));
+}
+
+// ── Drawn ──
+
+Morphology drawn(const std::string& word) {
+  const Grammar g = grammar("axiom: Soma(10) " + word + "\nnothing: z -> z\n");
+  return interpret(derive(g, 0, 0, 0), g);
+}
+Vec3 end_of(const std::string& word) { return drawn(word).points().back().position(); }
+void expect_near(const Vec3& a, const Vec3& b) {
+  EXPECT_NEAR((a - b).norm(), 0.f, 1e-5f) << a.transpose() << " and " << b.transpose();
+}
+
+TEST(Trace, IsDrawnAsItWasTraced) {
+  const Morphology m = drawn("At(1, 2, 3) Trace(twigs, 0, 0)");
+  ASSERT_EQ(m.sections().size(), 1u);
+  const auto points = m.points();
+  ASSERT_EQ(points.size(), 3u);
+  EXPECT_EQ(points[0], (Point{1, 2, 3, 1}));
+  EXPECT_EQ(points[1], (Point{1, 5, 3, .5f}));
+  EXPECT_EQ(points[2], (Point{1, 8, 7, .75f}));
+}
+
+TEST(Trace, IsScaledMirroredTurnedAndBent) {
+  expect_near(end_of("Trace(twigs, 0, 0, 2)"), {0, 12, 8});
+  expect_near(end_of("Trace(twigs, 0, 0, 1, 2)"), {0, 6, -4});
+  expect_near(end_of("Trace(twigs, 1, 1, 1, 1)"), {1, 0, 0});
+  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});       // about z, as the slice lies
+  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0)"), {0, 6, 4});
+  // Twice as far from its chord, with the same end; diameters go evenly from 4 to 1.
+  const Morphology m = drawn("Trace(twigs, 0, 0, 1, 0, 1, 2, 4, 1)");
+  const Vec3 on_chord = Vec3(0, 6, 4) * (3.f / 8.f);
+  expect_near(m.points()[1].position(), on_chord + 2.f * (Vec3(0, 3, 0) - on_chord));
+  expect_near(m.points()[2].position(), {0, 6, 4});
+  EXPECT_FLOAT_EQ(m.points()[1].radius, 2.f);
+  EXPECT_FLOAT_EQ(m.points()[2].radius, .5f);
+}
+
+TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {
+  expect_near(end_of("Trace(twigs, 1, 0) F(2)"), {3, 0, 0});
+  expect_near(end_of("Head(0, 0, 1) F(2)"), {0, 0, 2});
+}
+
+TEST(Trace, OfWhatIsNotThereIsRefused) {
+  for (const char* word : {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)"})
+    EXPECT_THROW((void)drawn(word), Error) << word;
+}
+
+// A module that grows up to a ceiling: where it is comes from ?P, where it heads from ?H.
+TEST(Questions, AreAnsweredAfterEveryStep) {
+  const Grammar g = parse(
+      "steps: 20\nmodule Tip(n)\naxiom: f(5) F(1) Tip(0) ?P(0, 0, 0) ?H(0, 0, 0)\n"
+      "up: Tip(n) > ?P(x, y, z) ?H(hx, hy, hz) : y < 30 & hy > 0.9 -> F(10) Tip(n + 1)\n"
+      "side: Tip(n) > ?P(x, y, z) ?H(hx, hy, hz) : hy > 0.9 -> -(90) F(y) \n",
+      "ceiling");
+  const Morphology m = interpret(derive(g), g);
+  // 6, 16, 26, 36: then to the right, as far as it is high.
+  expect_near(m.points().back().position(), {36, 36, 0});
+}
+
+}  // namespace
+}  // namespace forest::lsystem

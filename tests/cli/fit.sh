@@ -1,0 +1,32 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest fit: a model of neurons from files and from a repository, and what it refuses.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+source "$FOREST_SOURCE_DIR/tests/words.sh"
+
+$BRAINFOREST grow --grammar motoneuron --count 12 --seed 1 --out traced --repo cells.db --population traced >/dev/null
+
+$BRAINFOREST fit traced -o like_them.lsys --json >fit.json
+python3 - <<'PY'
+import json
+fit = json.load(open("fit.json"))
+assert fit["neurons"] == 12 and fit["samples"]["cells"] == 12, fit
+assert fit["samples"]["forks"] > 100, fit
+PY
+$BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out one --threads 1 >/dev/null
+$BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out two --threads 2 >/dev/null
+diff -r one two
+
+# From a repository, under a name.
+$BRAINFOREST fit --repo cells.db --population traced --model like_traced >/dev/null
+$BRAINFOREST model list --repo cells.db | grep like_traced | grep -q 'fitted to 12 neurons of traced'
+$BRAINFOREST grow --repo cells.db --model like_traced --count 4 --seed 1 --population grown >/dev/null
+$BRAINFOREST query "select count(*) from neuron where population = 'grown'" --repo cells.db | grep -qw 4
+
+mkdir few && cp "$(find traced -name '*.swc' | sort | head -1)" few
+refuses 'needs two such neurons' $BRAINFOREST fit few -o few.lsys
+[ ! -e few.lsys ]
+refuses 'needs two such neurons' $BRAINFOREST fit traced --kind axon -o axon.lsys
+printf 'mine\n' >kept.lsys
+refuses '--force' $BRAINFOREST fit traced -o kept.lsys
+grep -q mine kept.lsys
