@@ -1,11 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // Models of traced neurons grow neurons of their sizes.
-#include "forest/fitting/resampling.h"
-
 #include <cmath>
 
 #include <gtest/gtest.h>
 
+#include "forest/fitting/resampling.h"
 #include "forest/io/format.h"
 #include "forest/lsystem/grow.h"
 #include "forest/statistics/metric.h"

@@ -1,7 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest fit: from traced neurons to a model that grows more of them.
-#include "forest/fitting/resampling.h"
-
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -10,6 +8,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/fitting/resampling.h"
 #include "forest/io/format.h"
 #include "forest/lsystem/grammar.h"
 
@@ -55,11 +54,13 @@ void run(const Options& options, Console& console) {
   const std::string of = options.files.empty() ? options.population : options.files.front();
   fitting::Resampling resampling = options.resampling;
   resampling.kinds = {};
-  for (const std::string& word : options.kinds) resampling.kinds = resampling.kinds | statistics::kind_set(word);
+  for (const std::string& word : options.kinds)
+    resampling.kinds = resampling.kinds | statistics::kind_set(word);
   const std::string text =
       fitting::resampling_grammar(neurons, fmt::format("neurons like those of {}", of), resampling);
   const std::string name = options.model.empty() ? options.out.stem().string() : options.model;
-  const lsystem::Grammar grammar = lsystem::parse(text, name);  // finds our own mistakes before anybody else does
+  const lsystem::Grammar grammar =
+      lsystem::parse(text, name);  // finds our own mistakes before anybody else does
   if (!options.out.empty()) write_unless_there(options.out, text, options.force);
   int version = 0;
   if (!options.model.empty()) {
@@ -95,13 +96,18 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   into->add_option("--model", options->model, "Its name in the repository")->needs(repo);
   into->add_option("-o,--out", options->out, "A file for the grammar");
   into->require_option(1, 2);
-  command.add_option("--kind", options->kinds, "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
+  command
+      .add_option("--kind", options->kinds,
+                  "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
       ->capture_default_str();
-  command.add_option("--style", options->resampling.style,
-                     "How far the style of the neurons that are drawn from may be from a neuron's own, in standard deviations")
+  command
+      .add_option("--style", options->resampling.style,
+                  "How far the style of the neurons that are drawn from may be from a neuron's own, in "
+                  "standard deviations")
       ->capture_default_str();
-  command.add_option("--smoothing", options->resampling.smoothing,
-                     "How far a neuron's style may be from that of the traced one whose stems it has")
+  command
+      .add_option("--smoothing", options->resampling.smoothing,
+                  "How far a neuron's style may be from that of the traced one whose stems it has")
       ->capture_default_str();
   add_force(command, options->force);
   return [options, &console] { run(*options, console); };

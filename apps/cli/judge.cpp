@@ -191,33 +191,31 @@ std::string report_of(const Judged& judged, const std::string& title) {
 
   report.heading("Where they differ most");
   const std::array<FeatureTable, 2> two{judged.tables[1], judged.tables[2]};
-  const FeatureTable all = stacked(two);
-  struct Gap {
-    double delta;
-    Eigen::Index column;
-  };
-  std::vector<Gap> gaps;
-  const auto split = std::size_t(two[0].values.rows());
-  for (Eigen::Index c = 0; c < all.values.cols(); ++c) {
-    const std::span values(all.values.col(c).data(), all.size());
-    const double delta = std::abs(cliffs_delta(values.first(split), values.subspan(split)).value);
-    if (delta > 0.) gaps.push_back({delta, c});  // no NaN
+  const FeatureTable all = stacked(two), whole = completed(all);
+  std::vector<std::size_t> order;
+  std::vector<double> surely;  // how far the interval of Cliff's delta stays from none
+  for (std::size_t f = 0; f < whole.features.size(); ++f) {
+    const std::span values(whole.values.col(Eigen::Index(f)).data(), whole.size());
+    const Estimate delta = cliffs_delta(values.first(two[0].size()), values.subspan(two[0].size()));
+    surely.push_back(std::max({0., delta.lower, -delta.upper}));
+    if (std::ranges::count(all.features, whole.features[f]))
+      order.push_back(f);  // "… is defined" is no measure
   }
-  std::ranges::stable_sort(gaps, std::greater(), &Gap::delta);
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t f) { return surely[f]; });
   std::vector<StripPanel> panels;
-  for (const Gap& gap : gaps) {
-    if (panels.size() == 9) break;
-    StripPanel panel{.title = all.features[std::size_t(gap.column)].name,
-                     .unit = all.features[std::size_t(gap.column)].unit,
-                     .samples = {}};
+  for (const std::size_t f : unlike(whole, order, 9)) {
+    const Feature& feature = whole.features[f];
+    const auto column = std::ranges::find(all.features, feature) - all.features.begin();
+    StripPanel panel{.title = feature.name, .unit = feature.unit, .samples = {}};
     for (const FeatureTable& t : judged.tables) {
-      const auto values = t.values.col(gap.column);
+      const auto values = t.values.col(column);
       panel.samples.emplace_back(values.begin(), values.end());
     }
     panels.push_back(std::move(panel));
   }
   report.plot(strip_plots(panels, std::array<std::string, 3>{"training", "held out", "grown"}),
-              "The features by which grown and held-out cells are furthest apart (Cliff's delta); every dot "
+              "The features by which grown and held-out cells are most surely apart (Cliff's delta), none "
+              "nearly the same as another; every dot "
               "is a cell.");
   return report.html();
 }

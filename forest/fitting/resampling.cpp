@@ -35,8 +35,9 @@ constexpr std::size_t most_daughters = 3;  // of a fork; those with more are not
 struct Stem {
   std::size_t cell;
   int kind;
-  double tips, ahead, length, diameter, end_diameter;  // ahead: path from its beginning to the farthest tip, µm
-  Vec3 place, heading;                       // of its beginning, from the soma's centre
+  double tips, ahead, length, diameter,
+      end_diameter;     // ahead: path from its beginning to the farthest tip, µm
+  Vec3 place, heading;  // of its beginning, from the soma's centre
   std::vector<Point> points;
 };
 
@@ -103,7 +104,8 @@ struct Traced {
     const Arbors& arbors;
     const Vec3 soma = arbors.origin().position();
     std::span<const Branch> all = arbors.sections();
-    std::vector<double> beyond = std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
+    std::vector<double> beyond =
+        std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
     std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
 
     Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
@@ -213,7 +215,8 @@ struct Traced {
       if (b.parent < 0) return;
       const auto before = points(std::uint32_t(b.parent));
       if (across > 0.)
-        values[spread].push_back(std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
+        values[spread].push_back(
+            std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
       values[thinning].push_back(std::log(diameter_of(points(i)[1]) / diameter_of(before.back())));
     }
   };
@@ -319,7 +322,8 @@ class Writer {
   void row(bool first) { put("{}\n  ", first ? "" : ";"); }
 
   void cells() {
-    put("\n# Neurons: the diameter of their soma (µm), and how many stems they have.\nsample cells(-> soma, stems) =");
+    put("\n# Neurons: the diameter of their soma (µm), and how many stems they have.\nsample cells(-> soma, "
+        "stems) =");
     for (const Cell& c : traced_.cells) {
       row(&c == traced_.cells.data());
       put("{} {}", rounded(c.soma, 1e3), c.stems.size());
@@ -327,8 +331,10 @@ class Writer {
   }
 
   void styles_of_cells() {
-    put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and coarsely traced branches are,\n"
-        "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and how often they fork; the\n"
+    put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and "
+        "coarsely traced branches are,\n"
+        "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and "
+        "how often they fork; the\n"
         "# thinnest diameter (µm), and the mean logarithms of path by chord and of the diameters at tips.\n"
         "sample styles(cell =, kind = -> {}, thinnest, winding, tip) =",
         fmt::join(style_names, ", "));
@@ -343,7 +349,8 @@ class Writer {
   }
 
   void plans() {
-    put("\n\n# Their stems: tips, where they leave the soma's centre (µm) and head, their diameters where they begin and end, and the path to the farthest tip.\n"
+    put("\n\n# Their stems: tips, where they leave the soma's centre (µm) and head, their diameters where "
+        "they begin and end, and the path to the farthest tip.\n"
         "sample plans(cell =, stem = -> kind, tips, x, y, z, hx, hy, hz, begin, d, ahead) =");
     bool first = true;
     for (std::size_t c = 0; c < traced_.cells.size(); ++c)
@@ -360,7 +367,8 @@ class Writer {
 
   void stems() {
     put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
-        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, hx ~ 0.35, hy ~ 0.35, hz ~ {}, d ~ 0.3{}\n  -> donor, ahead, length) =",
+        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, hx ~ 0.35, hy ~ 0.35, hz ~ {}, d ~ 0.3{}\n  "
+        "-> donor, ahead, length) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
     for (const Cell& c : traced_.cells)
@@ -384,16 +392,20 @@ class Writer {
     widths("near_side", options_.height, [](const Fork& f) { return f.side; });
     widths("near_height", options_.height, [](const Fork& f) { return f.height; });
     widths("near_before", options_.depth, [](const Fork& f) { return f.depth; });
-    put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the diameter are logarithms; heading and\n"
-        "# place, from the soma), and its daughters, fewest tips first: tips, lengths, paths beyond their ends.\n"
-        "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, side ~ near_side(kind), height ~ near_height(kind), before ~ near_before(kind){}\n"
+    put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the "
+        "diameter are logarithms; heading and\n"
+        "# place, from the soma), and its daughters, fewest tips first: tips, lengths, paths beyond their "
+        "ends.\n"
+        "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
+        "near_order(kind), d ~ near_d(kind),\n"
+        "    hx ~ {}, hy ~ {}, hz ~ {}, side ~ near_side(kind), height ~ near_height(kind), before ~ "
+        "near_before(kind){}\n"
         "  -> donor, daughters, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
-      put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead), rounded(f.path, 10.), f.order,
-          logarithm(f.diameter));
+      put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead),
+          rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
       put(" {} {} {}", rounded(f.side, 10.), rounded(f.height, 10.), rounded(f.depth, 10.));
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
@@ -411,14 +423,16 @@ class Writer {
 
   void calibres() {
     put("\n\n# How thick the daughters of a fork begin (a) and end (z), µm.\n"
-        "sample calibres(kind =, daughters =, tips ~ 0.25, ahead ~ 0.5, d ~ 0.04, tip ~ 0.08, girth ~ {0}, thinning ~ {0}\n"
+        "sample calibres(kind =, daughters =, tips ~ 0.25, ahead ~ 0.5, d ~ 0.04, tip ~ 0.08, girth ~ {0}, "
+        "thinning ~ {0}\n"
         "  -> d, a1, a2, a3, z1, z2, z3) =",
         1.3 * options_.style);
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
       const Style& style = traced_.cells[f.cell].kinds.at(f.kind).style;
-      put("{} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), logarithm(f.tips), logarithm(f.ahead), logarithm(f.diameter),
-          rounded(traced_.cells[f.cell].kinds.at(f.kind).tip, 1e3), rounded(style[girth], 1e2), rounded(style[thinning], 1e2), rounded(f.diameter, 1e3));
+      put("{} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), logarithm(f.tips), logarithm(f.ahead),
+          logarithm(f.diameter), rounded(traced_.cells[f.cell].kinds.at(f.kind).tip, 1e3),
+          rounded(style[girth], 1e2), rounded(style[thinning], 1e2), rounded(f.diameter, 1e3));
       for (const auto what : {&Fork::Daughter::diameter, &Fork::Daughter::end_diameter})
         for (std::size_t i = 0; i < most_daughters; ++i)
           put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, 1e3) : 0.);
@@ -436,7 +450,8 @@ class Writer {
     }
     put("#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define unlike 0.5  # how much of its own wander its branches bend more\n"
-        "#define turn 0.8    # share of the angle between headings where a fork was traced and where it is drawn\n");
+        "#define turn 0.8    # share of the angle between headings where a fork was traced and where it is "
+        "drawn\n");
     std::string_view rest = growth;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
@@ -456,7 +471,8 @@ class Writer {
   }
 
   void vector(const Vec3& v, double steps) {
-    put("{} {} {}", rounded(double(v.x()), steps), rounded(double(v.y()), steps), rounded(double(v.z()), steps));
+    put("{} {} {}", rounded(double(v.x()), steps), rounded(double(v.y()), steps),
+        rounded(double(v.z()), steps));
   }
   void style(const Style& of) {
     for (const double s : of) put(" {}", rounded(s, 1e2));
@@ -487,9 +503,10 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
   Traced traced;
   for (const Morphology& neuron : neurons) traced.take(neuron, options);
   if (traced.cells.size() < 2 || traced.forks.empty())
-    throw Error(fmt::format(
-        "{} of {} neurons have a soma, stems and forks of these kinds; a model needs two such neurons, name more of them or other kinds",
-        traced.cells.size(), neurons.size()));
+    throw Error(
+        fmt::format("{} of {} neurons have a soma, stems and forks of these kinds; a model needs two such "
+                    "neurons, name more of them or other kinds",
+                    traced.cells.size(), neurons.size()));
   standardise(traced.cells);
   return Writer(traced, title, options).text();
 }

@@ -23,7 +23,8 @@ struct Resampling {
   statistics::KindSet kinds = statistics::dendrites;  // of the sections that are modelled
   // Widths of the kernels by which forks are drawn.
   double tips = .06, ahead = .12;  // of the logarithms of the tips to come, and of the path to the farthest
-  double path = 1., order = 2., diameter = .5, height = .6, depth = .2;  // in standard deviations among the forks of a kind
+  double path = 1., order = 2., diameter = .5, height = .6,
+         depth = .2;                          // in standard deviations among the forks of a kind
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
   double style = .65;                         // in standard deviations among the neurons
   double smoothing = .4;                      // of a neuron's style: 0 takes that of a traced neuron as it is

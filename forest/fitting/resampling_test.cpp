@@ -29,7 +29,7 @@ fork: Tip(d, left, n) : n > 2 & left > 0
   -> /(uniform(-30, 30)) [ +(30) Tip(0.8 * d, left - 1, 0) ] -(30) Tip(0.7 * d, left - 1, 0) : 0.4
 grow: Tip(d, left, n) : n < 12 -> &(uniform(-5, 5)) +(uniform(-12, 12)) F(long, d) Tip(d, left, n + 1)
 )",
-                                                     "traced");
+                                                  "traced");
   return lsystem::grow_population(grammar, count, 11);
 }
 

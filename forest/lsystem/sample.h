@@ -26,9 +26,9 @@ struct Trace {
     Vec3 at;             // µm
     float diameter = 0;  // µm
   };
-  Vec3 heading;             // unit: of the branch that it leaves, at its end
-  float diameter = 0.f;     // at its beginning, µm
-  std::vector<Stop> stops;  // at least one
+  Vec3 heading;               // unit: of the branch that it leaves, at its end
+  float diameter = 0.f;       // at its beginning, µm
+  std::vector<Stop> stops;    // at least one
   Vec3 ahead = Vec3::Zero();  // where it heads at its end
 
   const Vec3& end() const { return stops.back().at; }

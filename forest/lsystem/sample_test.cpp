@@ -61,24 +61,27 @@ TEST(Sample, TakesAnotherAndTheNearest) {
   Random random(2);
   for (int i = 0; i < 50; ++i) {
     EXPECT_EQ(twigs(g).draw(std::array{3., 0., 0.}, random), 1u);    // not of neuron 0
-    EXPECT_EQ(twigs(g).draw(std::array{3., 9., 300.}, random), 2u);   // far from all of them
+    EXPECT_EQ(twigs(g).draw(std::array{3., 9., 300.}, random), 2u);  // far from all of them
     EXPECT_EQ(twigs(g).draw(std::array{4., 0., 0.}, random), 3u);    // there is no other
   }
   EXPECT_THROW((void)twigs(g).draw(std::array{5., 0., 0.}, random), Error);
 }
 
 TEST(Sample, IsAskedInExpressions) {
-  const Grammar g = grammar("cell r = twigs(4, 1, 0)\naxiom: A(r)\ngrow: A(x) -> B(x, twigs.part(x), twigs)\n");
+  const Grammar g =
+      grammar("cell r = twigs(4, 1, 0)\naxiom: A(r)\ngrow: A(x) -> B(x, twigs.part(x), twigs)\n");
   const Word word = derive(g);
   EXPECT_EQ(word.parameters, (std::vector<double>{3., .75, 0.}));
   // The same seed, the same rows.
-  const Grammar many = grammar("axiom: A(twigs(3, -1, 1)) A(twigs(3, -1, 1)) A(twigs(3, -1, 1))\ngrow: A(x) -> B(x)\n");
+  const Grammar many =
+      grammar("axiom: A(twigs(3, -1, 1)) A(twigs(3, -1, 1)) A(twigs(3, -1, 1))\ngrow: A(x) -> B(x)\n");
   EXPECT_EQ(derive(many, 5, 7).parameters, derive(many, 5, 7).parameters);
 }
 
 TEST(Sample, WidthsMayDependOnWhatIsTheSame) {
   const Grammar g = parse(
-      "table wide = 3: 0.1, 4: 100\nsample s(kind =, x ~ wide(kind)) = 3 0; 3 1; 4 0; 4 1\naxiom: A\ngrow: A -> B\n",
+      "table wide = 3: 0.1, 4: 100\nsample s(kind =, x ~ wide(kind)) = 3 0; 3 1; 4 0; 4 1\naxiom: A\ngrow: A "
+      "-> B\n",
       "widths");
   Random random(3);
   int others = 0;
@@ -151,7 +154,7 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
   expect_near(end_of("Trace(twigs, 0, 0, 2)"), {0, 12, 8});
   expect_near(end_of("Trace(twigs, 0, 0, 1, 2)"), {0, 6, -4});
   expect_near(end_of("Trace(twigs, 1, 1, 1, 1)"), {1, 0, 0});
-  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});       // about z, as the slice lies
+  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});  // about z, as the slice lies
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0)"), {0, 6, 4});
   // Twice as far from its chord, with the same end; diameters go evenly from 4 to 1.
   const Morphology m = drawn("Trace(twigs, 0, 0, 1, 0, 1, 2, 4, 1)");
@@ -168,7 +171,8 @@ TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {
 }
 
 TEST(Trace, OfWhatIsNotThereIsRefused) {
-  for (const char* word : {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)"})
+  for (const char* word :
+       {"Trace(twigs, 9, 0)", "Trace(twigs, 3, 0)", "Trace(twigs, 0, 1)", "Trace(7, 0, 0)"})
     EXPECT_THROW((void)drawn(word), Error) << word;
 }
 

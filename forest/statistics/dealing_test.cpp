@@ -47,9 +47,11 @@ TEST(Dealt, SaysNothingOfCellsThatDifferByTheirSliceAlone) {
     rejected += energy_distance(X.topRows(24), X.bottomRows(24), 99, trial, slices).p <= .05;
     rejected_alone += energy_distance(X.topRows(24), X.bottomRows(24), 99, trial).p <= .05;
     DiscriminatorOptions options{.repeats = 3, .trees = 40, .seed = trial};
-    auc_alone += discriminate(X.topRows(24), X.bottomRows(24), Classifier::random_forest, options).auc.value / trials;
+    auc_alone +=
+        discriminate(X.topRows(24), X.bottomRows(24), Classifier::random_forest, options).auc.value / trials;
     options.slices = slices;
-    auc += discriminate(X.topRows(24), X.bottomRows(24), Classifier::random_forest, options).auc.value / trials;
+    auc +=
+        discriminate(X.topRows(24), X.bottomRows(24), Classifier::random_forest, options).auc.value / trials;
   }
   EXPECT_LE(rejected, 5);
   EXPECT_GT(rejected_alone, rejected + 3);

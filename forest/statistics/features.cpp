@@ -239,7 +239,8 @@ FeatureTable distinct(const FeatureTable& table) {
     const Feature& feature = table.features[std::size_t(c)];
     const std::vector<double> values = defined_values(table.values, c);
     if (values.empty()) continue;
-    if (std::ranges::min(values) != std::ranges::max(values)) {
+    const bool rare = 20 * Eigen::Index(values.size()) < rows;
+    if (!rare && std::ranges::min(values) != std::ranges::max(values)) {
       out.values.col(count) = table.values.col(c);
       keep(feature, values);
     }

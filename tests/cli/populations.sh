@@ -65,19 +65,24 @@ cmp first.json stored.json
 fails_with 1 'few' $BRAINFOREST compare --repo cells.db --population one --with few
 fails_with 2 '--with' $BRAINFOREST compare --repo cells.db --population one
 fails_with 2 'two folders' $BRAINFOREST compare
-refuses 'fewer than four' $BRAINFOREST compare one all/*_0.swc
+# Sisters are kept together; an expression that is none is bad usage.
+$BRAINFOREST compare one two $quick --slices '^[a-z]+-1-0000.' --json >sisters.json
+told sisters.json 'd["random_forest"]["value"] < .9 and d["a"]["cells"] == 12'
+fails_with 2 'no regular expression' $BRAINFOREST compare one two --slices '(['
+
+refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc
 
 # How typical: a cell of another kind is not, and it is said by what.
-$BRAINFOREST typical purkinje/*_0.swc --population all --report typical.html --json >typical.json
+$BRAINFOREST typical purkinje/*-00000.swc --population all --report typical.html --json >typical.json
 told typical.json 'd["p"] <= .06 and d["metrics"][0]["abnormal"] and d["cells"] == 36'
 report_holds typical.html 1
-$BRAINFOREST typical all/*_3.swc --population all --json >member.json
+$BRAINFOREST typical all/*-00003.swc --population all --json >member.json
 told member.json 'd["cells"] == 35 and 0 < d["p"] <= 1'  # the cell itself is no part of what it stands beside
 first=$(basename "$(ls one/*.swc | head -n 1)" .swc)
 $BRAINFOREST typical "$first" --repo cells.db --population one --json >stored.json
 told stored.json 'd["cells"] == 11'
-refuses 'fewer than five' $BRAINFOREST typical purkinje/*_0.swc --population all/*_1.swc
-fails_with 2 'population' $BRAINFOREST typical purkinje/*_0.swc
+refuses 'fewer than five' $BRAINFOREST typical purkinje/*-00000.swc --population all/*-00001.swc
+fails_with 2 'population' $BRAINFOREST typical purkinje/*-00000.swc
 
 # Types: two kinds of neurons are found again.
 $BRAINFOREST classify all purkinje --csv types.csv --report types.html --json >types.json
