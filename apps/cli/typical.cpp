@@ -95,6 +95,7 @@ Json json_of(const std::string& cell, const Typicality& t, const std::string& po
           {"p", t.p},
           {"p_whole", t.p_whole},
           {"p_metric", t.p_feature},
+          {"p_missing", t.p_missing},
           {"sentence", sentence(cell, t, population)},
           {"metrics", metrics}};
 }

@@ -63,21 +63,29 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
     const double middle = quantile(values, .5);
     std::vector<double> away;
     for (const double x : values) away.push_back(std::abs(x - middle));
-    double edge = quantile(away, .95);
-    if (edge <= 0.) edge = *std::ranges::max_element(away);  // hardly any cell differs
+    const double edge = quantile(away, .95);
+    const auto strangeness = [&](double x) {
+      if (x <= 0.) return 0.;
+      if (edge > 0.) return x / edge;
+      return .05 * double(n) / double(std::ranges::count_if(away, [&](double other) { return other >= x; }));
+    };
     for (Eigen::Index i = 0; i < n; ++i)
-      strangest[std::size_t(i)] = std::max(strangest[std::size_t(i)], away[std::size_t(i)] / edge);
+      strangest[std::size_t(i)] = std::max(strangest[std::size_t(i)], strangeness(away[std::size_t(i)]));
     const auto known = values.first(std::size_t(last));
     out.oddities.push_back({.feature = table.features[std::size_t(c)],
                             .value = values.back(),
                             .median = quantile(known, .5),
                             .low = quantile(known, .05),
                             .high = quantile(known, .95),
-                            .strangeness = away.back() / edge,
+                            .strangeness = strangeness(away.back()),
                             .p = conformal_p(away)});
   }
   out.p_feature = conformal_p(strangest);
-  out.p = std::min(1., 2. * std::min(out.p_whole, out.p_feature));
+  std::vector<double> missing;
+  const FeatureTable raw = stacked(both);
+  for (Eigen::Index i = 0; i < n; ++i) missing.push_back(double(raw.values.row(i).array().isNaN().count()));
+  out.p_missing = conformal_p(missing);
+  out.p = std::min(1., 3. * std::min({out.p_whole, out.p_feature, out.p_missing}));
   const double usual = quantile(std::span(strangest).first(std::size_t(last)), .95);
   for (Oddity& o : out.oddities) o.abnormal = o.strangeness > usual;
   std::ranges::stable_sort(out.oddities, std::greater(), &Oddity::strangeness);

@@ -17,15 +17,18 @@ struct Oddity {
   double value = 0.;
   double median = 0., low = 0., high = 0.;  // of the population, with 5th and 95th percentile
   double strangeness =
-      0.;         // distance from the median over that which 95 % of cells stay below; 1 is at the edge
-  double p = 1.;  // of this feature alone, two-sided
+      0.;  // distance from the median over that which 95 % of cells stay below; 1 is at the edge. Where
+           // 95 % are at the median, 0.05 over p.
+  double p = 1.;          // of this feature alone, two-sided
   bool abnormal = false;  // stranger than the strangest feature of 95 % of the cells
 };
 
 struct Typicality {
-  double p = 1.;                 // of both below: twice the smaller (Bonferroni)
-  double p_whole = 1.;           // mean distance to the nearest five cells, all features together
-  double p_feature = 1.;         // the strangest single feature
+  double p = 1.;          // of the three below: three times the smallest (Bonferroni)
+  double p_whole = 1.;    // mean distance to the nearest five cells, all features together
+  double p_feature = 1.;  // the strangest single feature
+  double p_missing =
+      1.;  // how many features are not defined: a cell without dendrites is strange in no dendrite's length
   std::size_t cells = 0;         // of the population, without the cell itself
   std::vector<Oddity> oddities;  // the strangest first
 };

@@ -56,6 +56,15 @@ TEST(Typicality, SeesACellThatIsABitOffInEverything) {
   EXPECT_LE(typicality(cells(1, 60), cell).p, .05);
 }
 
+TEST(Typicality, SeesACellOfWhichLittleIsKnown) {
+  FeatureTable cell = cells(79, 1);
+  cell.values.leftCols(25).setConstant(std::nan(""));
+  const Typicality t = typicality(cells(1, 60), cell);
+  EXPECT_NEAR(t.p_missing, 1. / 61., 1e-12);
+  EXPECT_LE(t.p, .05);
+  EXPECT_GT(t.oddities.front().strangeness, 2.);  // "… is defined", which it is in all the others
+}
+
 TEST(Typicality, LeavesTheCellItselfOutOfItsPopulation) {
   const FeatureTable all = cells(1, 20);
   const std::array<std::size_t, 1> third{3};
