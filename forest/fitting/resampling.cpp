@@ -35,9 +35,8 @@ constexpr std::size_t most_daughters = 3;  // of a fork; those with more are not
 struct Stem {
   std::size_t cell;
   int kind;
-  double tips, ahead, length, diameter,
-      end_diameter;     // ahead: path from its beginning to the farthest tip, µm
-  Vec3 place, heading;  // of its beginning, from the soma's centre
+  double tips, ahead, length, end_diameter;  // ahead: path from its beginning to the farthest tip, µm
+  Vec3 place, heading;                       // of its beginning, from the soma's centre
   std::vector<Point> points;
 };
 
@@ -48,7 +47,7 @@ struct Fork {
   double side, height, depth;                 // from the soma: across, above and before it, µm
   Vec3 heading;
   struct Daughter {
-    double tips, ahead, length, diameter, end_diameter;
+    double tips, ahead, length, end_diameter;
     std::vector<Point> points;
   };
   std::vector<Daughter> daughters;  // fewest tips first
@@ -142,7 +141,6 @@ struct Traced {
               .tips = double(b.degree),
               .ahead = b.length + beyond[i],
               .length = b.length,
-              .diameter = diameter_of(points(i)[1]),
               .end_diameter = diameter_of(points(i).back()),
               .place = points(i).front().position() - soma,
               .heading = start_heading(points(i)),
@@ -168,7 +166,6 @@ struct Traced {
         fork.daughters.push_back({.tips = double(all[d].degree),
                                   .ahead = beyond[d],
                                   .length = all[d].length,
-                                  .diameter = diameter_of(points(d)[1]),
                                   .end_diameter = diameter_of(points(d).back()),
                                   .points = copy(d)});
       std::ranges::stable_sort(fork.daughters, {}, &Fork::Daughter::tips);
@@ -258,10 +255,10 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : i < cells.stems(me)
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), tips = max(1, round(plans.tips(p) * exp(normal(0, jitter)))),
     ahead = plans.ahead(p) * exp(normal(0, jitter)), d = plans.d(p), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
-    r = stems(kind, me, log(tips), log(ahead), x, y, z, log(d)@style),
+    r = stems(kind, me, log(tips), log(ahead), log(plans.length(p)), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, turn, bending(s, styles(stems.donor(r), kind)), plans.begin(p), d)
+       Trace(stems, r, 0, scale, 0, turn, bending(s, styles(stems.donor(r), kind)), p)
        Twig(kind, stems.donor(r), tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
@@ -271,7 +268,8 @@ end: Twig(kind, donor, tips, ahead, path, order, d) : tips < 2 ->
 fork: Twig(kind, donor, tips, ahead, path, order, d) > ?P(px, py, pz) ?H(x, y, z)
   { s = styles(me, kind), mx = if(chance(0.5), 1, -1), mz = if(chance(0.5), 1, -1),
     r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z * mz, px * mx, py, pz * mz@style),
-    q = calibres(kind, forks.daughters(r), log(tips), log(max(ahead, 1)), log(d), styles.tip(s) + 0.1 * own_girth, kept * styles.girth(s) + own_girth,
+    q = calibres(kind, forks.daughters(r), log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)),
+      log(d), styles.tip(s) + 0.1 * own_girth, kept * styles.girth(s) + own_girth,
       kept * styles.thinning(s) + own_thinning) }
   -> Fork(kind, r, q, tips, path, order + 1, (mx < 0) + 2 * (mz < 0), d / calibres.d(q), longer(ahead, forks.ahead(r)))
 one: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 1
@@ -289,9 +287,8 @@ limb: Limb(kind, r, q, i, tips, path, order, mirror, thick, scale)
   { s = styles(me, kind), donor = forks.donor(r), thin = styles.thinnest(s),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)),
     beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
-    begin = max(thin, thick * nth(i, calibres.a1(q), calibres.a2(q), calibres.a3(q))),
-    d = max(thin, thick * nth(i, calibres.z1(q), calibres.z2(q), calibres.z3(q))) }
-  -> Trace(forks, r, i, scale, mirror, turn, bending(s, styles(donor, kind)), begin, d)
+    d = max(thin, thick * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
+  -> Trace(forks, r, i, scale, mirror, turn, bending(s, styles(donor, kind)), q, thick, thin)
      Twig(kind, donor, tips, beyond, path + length, order, d) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
 
@@ -349,9 +346,9 @@ class Writer {
   }
 
   void plans() {
-    put("\n\n# Their stems: tips, where they leave the soma's centre (µm) and head, their diameters where "
-        "they begin and end, and the path to the farthest tip.\n"
-        "sample plans(cell =, stem = -> kind, tips, x, y, z, hx, hy, hz, begin, d, ahead) =");
+    put("\n\n# Their stems, in the order of the sample of stems: tips, where they leave the soma's centre "
+        "(µm) and head, their diameter where they end, and the path to the farthest tip.\n"
+        "sample plans(cell =, stem = -> kind, tips, x, y, z, hx, hy, hz, d, ahead, length) =");
     bool first = true;
     for (std::size_t c = 0; c < traced_.cells.size(); ++c)
       for (std::size_t i = 0; i < traced_.cells[c].stems.size(); ++i) {
@@ -361,20 +358,20 @@ class Writer {
         vector(s.place, 1e2);
         put(" ");
         vector(s.heading, 1e3);
-        put(" {} {} {}", rounded(s.diameter, 1e3), rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.));
+        put(" {} {} {}", rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.), rounded(s.length, 1e2));
       }
   }
 
   void stems() {
     put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
-        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, hx ~ 0.35, hy ~ 0.35, hz ~ {}, d ~ 0.3{}\n  "
-        "-> donor, ahead, length) =",
+        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.35, hy ~ 0.35, hz ~ {}, "
+        "d ~ 0.3{}\n  -> donor, ahead, length) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
         row(std::exchange(first, false));
-        put("{} {} {} {} ", s.kind, s.cell, logarithm(s.tips), logarithm(s.ahead));
+        put("{} {} {} {} {} ", s.kind, s.cell, logarithm(s.tips), logarithm(s.ahead), logarithm(s.length));
         vector(s.heading, 1e3);
         put(" {}", logarithm(s.end_diameter));
         style(c.kinds.at(s.kind).style);
@@ -422,20 +419,22 @@ class Writer {
   }
 
   void calibres() {
-    put("\n\n# How thick the daughters of a fork begin (a) and end (z), µm.\n"
-        "sample calibres(kind =, daughters =, tips ~ 0.25, ahead ~ 0.5, d ~ 0.04, tip ~ 0.08, girth ~ {0}, "
-        "thinning ~ {0}\n"
-        "  -> d, a1, a2, a3, z1, z2, z3) =",
+    put("\n\n# The same forks, row by row, asked by how thick they are: the diameters where the branch ends "
+        "and its daughters end, µm.\n"
+        "sample calibres(kind =, daughters =, tips ~ 0.25, first ~ 0.15, ahead ~ 0.4, l1 ~ 0.5, l2 ~ 0.5, d "
+        "~ 0.04, tip ~ 0.08, girth ~ {0}, thinning ~ {0}\n"
+        "  -> d, d1, d2, d3) =",
         1.3 * options_.style);
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
       const Style& style = traced_.cells[f.cell].kinds.at(f.kind).style;
-      put("{} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), logarithm(f.tips), logarithm(f.ahead),
-          logarithm(f.diameter), rounded(traced_.cells[f.cell].kinds.at(f.kind).tip, 1e3),
-          rounded(style[girth], 1e2), rounded(style[thinning], 1e2), rounded(f.diameter, 1e3));
-      for (const auto what : {&Fork::Daughter::diameter, &Fork::Daughter::end_diameter})
-        for (std::size_t i = 0; i < most_daughters; ++i)
-          put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, 1e3) : 0.);
+      put("{} {} {} {} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), logarithm(f.tips),
+          logarithm(f.daughters[0].tips), logarithm(f.ahead), logarithm(f.daughters[0].length),
+          logarithm(f.daughters.size() > 1 ? f.daughters[1].length : 1.), logarithm(f.diameter),
+          rounded(traced_.cells[f.cell].kinds.at(f.kind).tip, 1e3), rounded(style[girth], 1e2),
+          rounded(style[thinning], 1e2), rounded(f.diameter, 1e3));
+      for (std::size_t i = 0; i < most_daughters; ++i)
+        put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].end_diameter, 1e3) : 0.);
     }
   }
 

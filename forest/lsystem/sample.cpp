@@ -43,6 +43,21 @@ Vec3 heading_at_end(const Vec3& from, std::span<const Trace::Stop> stops) {
   return length > 0.f ? Vec3(way / length) : Vec3(Vec3::Zero());
 }
 
+float Trace::diameter_at(float part) const {
+  const float wanted = part * length();
+  float passed = 0.f;
+  Vec3 last = Vec3::Zero();
+  for (std::size_t i = 0; i < stops.size(); ++i) {
+    const float step = (stops[i].at - last).norm();
+    if (passed + step >= wanted)
+      return i == 0 ? stops[0].diameter
+                    : stops[i - 1].diameter + (stops[i].diameter - stops[i - 1].diameter) *
+                                                  (step > 0.f ? (wanted - passed) / step : 1.f);
+    passed += step, last = stops[i].at;
+  }
+  return stops.back().diameter;
+}
+
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,
                  std::vector<Trace> branches) {
   for (const double value : condition_row) condition_values_.push_back(float(value));

@@ -32,6 +32,8 @@ struct Trace {
   Vec3 ahead = Vec3::Zero();  // where it heads at its end
 
   const Vec3& end() const { return stops.back().at; }
+  /// At this share of its length. From the first place on: what leads there belongs to the branch before.
+  float diameter_at(float part) const;
   float length() const {
     float sum = 0.f;
     Vec3 last = Vec3::Zero();

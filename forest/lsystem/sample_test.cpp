@@ -156,13 +156,24 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
   expect_near(end_of("Trace(twigs, 1, 1, 1, 1)"), {1, 0, 0});
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});  // about z, as the slice lies
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0)"), {0, 6, 4});
-  // Twice as far from its chord, with the same end; diameters go evenly from 4 to 1.
-  const Morphology m = drawn("Trace(twigs, 0, 0, 1, 0, 1, 2, 4, 1)");
+  // Twice as far from its chord, with the same end; three times as thick as a branch of another row, which is 1 everywhere, but in
+  // the end no thinner than 3.5.
+  const Morphology m =
+      drawn("Trace(twigs, 0, 0, 1, 0, 1, 2, 1, 3) Trace(twigs, 0, 0, 1, 0, 1, 1, 1, 3, 3.5)");
   const Vec3 on_chord = Vec3(0, 6, 4) * (3.f / 8.f);
   expect_near(m.points()[1].position(), on_chord + 2.f * (Vec3(0, 3, 0) - on_chord));
   expect_near(m.points()[2].position(), {0, 6, 4});
-  EXPECT_FLOAT_EQ(m.points()[1].radius, 2.f);
-  EXPECT_FLOAT_EQ(m.points()[2].radius, .5f);
+  for (const std::size_t i : {0u, 1u, 2u}) EXPECT_FLOAT_EQ(m.points()[i].radius, 1.5f);
+  EXPECT_FLOAT_EQ(m.points().back().radius, 1.75f);
+}
+
+TEST(Trace, TellsItsDiameterAnywhere) {
+  const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
+  const Trace& t = twigs(g).branches(0)[0];  // 1 after 3 µm, 1.5 after 8
+  EXPECT_FLOAT_EQ(t.diameter_at(0.f), 1.f);
+  EXPECT_FLOAT_EQ(t.diameter_at(3.f / 8.f), 1.f);
+  EXPECT_FLOAT_EQ(t.diameter_at(5.5f / 8.f), 1.25f);
+  EXPECT_FLOAT_EQ(t.diameter_at(1.f), 1.5f);
 }
 
 TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {

@@ -44,13 +44,13 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace", "sample, row, branch, scale, mirror, turn, bent, begin, end",
+    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
-     "about z by the share "
-     "`turn` of the angle from what it left there to the heading; `bent` times as far from its chord; with "
-     "diameters that go evenly from begin, at "
-     "its first place, to end when these are given",
-     Action::trace, 3, 9},
+     "about z by the share `turn` of "
+     "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
+     "branch of row `like`, "
+     "times `thickness`, and no thinner than `thinnest`",
+     Action::trace, 3, 10},
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
     {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
@@ -187,9 +187,7 @@ class Turtle {
       case Action::head:
         return head(direction(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::trace:
-        return trace(branch(parameter(0, -1.), parameter(1, -1.), parameter(2, -1.)), parameter(3, 1.),
-                     int(parameter(4, 0.)), parameter(5, 1.), parameter(6, 1.), parameter(7, -1.),
-                     parameter(8, -1.));
+        return trace(m);
       case Action::ask_place:
         return tell(m, state_.position - soma_place_);
       case Action::ask_heading:
@@ -271,8 +269,16 @@ class Turtle {
     return branches[std::size_t(which)];
   }
 
-  void trace(const lsystem::Trace& t, double scale, int mirror, double share, double bent, double begin,
-             double end) {
+  void trace(const Module& m) {
+    const std::span<const double> values = word_.of(m);
+    const auto value = [&](std::size_t i, double otherwise) {
+      return i < values.size() ? values[i] : otherwise;
+    };
+    const lsystem::Trace& t = branch(values[0], values[1], values[2]);
+    const lsystem::Trace& calibre = branch(values[0], value(7, values[1]), values[2]);
+    const double scale = value(3, 1.), turn_share = value(5, 1.), bent = value(6, 1.),
+                 thickness = value(8, 1.), thinnest = value(9, 0.);
+    const auto mirror = int(value(4, 0.));
     const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., mirror & 2 ? -1. : 1.);
     const auto mirrored = [&](const Vec3& v) {
       return Eigen::Vector3d(sides.cwiseProduct(v.cast<double>()));
@@ -281,27 +287,26 @@ class Turtle {
     const double across = before.x() * heading.y() - before.y() * heading.x(),
                  along = before.x() * heading.x() + before.y() * heading.y();
     const Eigen::Quaterniond turn(
-        Eigen::AngleAxisd(share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+        Eigen::AngleAxisd(turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
-    const bool given = begin >= 0. && end >= 0.;
+    const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
     if (answers_) {
       line_to(place(t.end()), 0.f);
     } else {
-      const float whole = t.length(), first = t.stops[0].at.norm();
-      const bool stem = state_.node == none;
-      auto start = float(0.5 * (!given ? double(t.diameter) : stem ? begin : state_.diameter));
+      const float whole = t.length();
+      auto start = float(0.5 * thick(calibre.diameter));
       float length = 0.f;
       Vec3 last = Vec3::Zero();
       for (const lsystem::Trace::Stop& stop : t.stops) {
         length += (stop.at - last).norm(), last = stop.at;
-        const double part = whole > first ? double((length - first) / (whole - first)) : 1.;
-        state_.diameter = given ? begin + part * (end - begin) : double(stop.diameter);
-        const Vec3 on_chord = whole > 0.f ? Vec3(t.end() * (length / whole)) : last;
+        const float part = whole > 0.f ? length / whole : 1.f;
+        state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
+        const Vec3 on_chord = t.end() * part;
         line_to(place(on_chord + float(bent) * (last - on_chord)), start);
         start = float(0.5 * state_.diameter);
       }
     }
-    state_.diameter = given ? end : double(t.stops.back().diameter);
+    state_.diameter = thick(calibre.stops.back().diameter);
     if (!t.ahead.isZero(0.f)) head(turn * mirrored(t.ahead));
   }
 
