@@ -45,24 +45,24 @@ Vec3 heading_at_end(const Vec3& from, std::span<const Trace::Stop> stops) {
 
 float Trace::diameter_at(float part) const {
   const float wanted = part * length();
-  float passed = 0.f;
-  Vec3 last = Vec3::Zero();
-  for (std::size_t i = 0; i < stops.size(); ++i) {
-    const float step = (stops[i].at - last).norm();
-    if (passed + step >= wanted)
-      return i == 0 ? stops[0].diameter
-                    : stops[i - 1].diameter + (stops[i].diameter - stops[i - 1].diameter) *
-                                                  (step > 0.f ? (wanted - passed) / step : 1.f);
-    passed += step, last = stops[i].at;
-  }
-  return stops.back().diameter;
+  const auto i = std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin());
+  if (i == 0) return stops.front().diameter;
+  if (i == stops.size()) return stops.back().diameter;
+  return std::lerp(stops[i - 1].diameter, stops[i].diameter,
+                   (wanted - lengths[i - 1]) / (lengths[i] - lengths[i - 1]));
 }
 
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,
                  std::vector<Trace> branches) {
   for (const double value : condition_row) condition_values_.push_back(float(value));
   outcome_values_.insert(outcome_values_.end(), outcome_row.begin(), outcome_row.end());
-  for (Trace& t : branches) t.ahead = heading_at_end(Vec3::Zero(), t.stops);
+  for (Trace& t : branches) {
+    t.ahead = heading_at_end(Vec3::Zero(), t.stops);
+    float length = 0.f;
+    Vec3 last = Vec3::Zero();
+    for (const Trace::Stop& stop : t.stops)
+      t.lengths.push_back(length += (stop.at - last).norm()), last = stop.at;
+  }
   branches_.push_back(std::move(branches));
 }
 

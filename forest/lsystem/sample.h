@@ -26,20 +26,17 @@ struct Trace {
     Vec3 at;             // µm
     float diameter = 0;  // µm
   };
-  Vec3 heading;               // unit: of the branch that it leaves, at its end
-  float diameter = 0.f;       // at its beginning, µm
-  std::vector<Stop> stops;    // at least one
-  Vec3 ahead = Vec3::Zero();  // where it heads at its end
+  Vec3 heading;             // unit: of the branch that it leaves, at its end
+  float diameter = 0.f;     // at its beginning, µm
+  std::vector<Stop> stops;  // at least one
+  // Worked out by Sample::add().
+  Vec3 ahead = Vec3::Zero();        // where it heads at its end
+  std::vector<float> lengths = {};  // from its beginning to each place, µm
 
   const Vec3& end() const { return stops.back().at; }
+  float length() const { return lengths.back(); }
   /// At this share of its length. From the first place on: what leads there belongs to the branch before.
   float diameter_at(float part) const;
-  float length() const {
-    float sum = 0.f;
-    Vec3 last = Vec3::Zero();
-    for (const Stop& stop : stops) sum += (stop.at - last).norm(), last = stop.at;
-    return sum;
-  }
 };
 
 /// Where a path heads that ends with these places: the unit vector over its last `reach` µm, or over all of it when it is

@@ -295,14 +295,12 @@ class Turtle {
     } else {
       const float whole = t.length();
       auto start = float(0.5 * thick(calibre.diameter));
-      float length = 0.f;
-      Vec3 last = Vec3::Zero();
-      for (const lsystem::Trace::Stop& stop : t.stops) {
-        length += (stop.at - last).norm(), last = stop.at;
-        const float part = whole > 0.f ? length / whole : 1.f;
+      for (std::size_t i = 0; i < t.stops.size(); ++i) {
+        const lsystem::Trace::Stop& stop = t.stops[i];
+        const float part = whole > 0.f ? t.lengths[i] / whole : 1.f;
         state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
         const Vec3 on_chord = t.end() * part;
-        line_to(place(on_chord + float(bent) * (last - on_chord)), start);
+        line_to(place(on_chord + float(bent) * (stop.at - on_chord)), start);
         start = float(0.5 * state_.diameter);
       }
     }
