@@ -84,16 +84,15 @@ void ask_each_feature(const std::array<FeatureTable, 3>& tables, const ProtocolO
   std::vector<std::vector<double>> real_spread(static_cast<std::size_t>(features));
   // Real cells dealt to two samples of the same sizes, as far as there are enough; the same dealings for all features.
   const std::size_t n_held = held_out.size(), n_grown = std::min(grown.size(), real.size() - n_held);
+  const std::vector<std::uint32_t> slices =
+      numbered(std::span(all.slices).first(std::min(all.slices.size(), real.size())));
   std::vector<std::vector<std::uint8_t>> dealt(
       options.resamples);  // of each real cell: 1 or 2, 0 for neither
   parallel_for(dealt.size(), 16, [&](std::size_t k) {
     Random random(options.seed, k, 0x6d767320);  // "mvs "
-    std::vector<std::uint32_t> deal = real;
+    const std::vector<std::uint32_t> deal = statistics::dealt(real.size(), slices, random);
     dealt[k].assign(real.size(), 0);
-    for (std::uint32_t i = 0; i < n_held + n_grown; ++i) {
-      std::swap(deal[i], deal[i + random.below(std::uint32_t(deal.size()) - i)]);
-      dealt[k][deal[i]] = i < n_held ? 1 : 2;
-    }
+    for (std::size_t i = 0; i < n_held + n_grown; ++i) dealt[k][deal[i]] = i < n_held ? 1 : 2;
   });
   parallel_for(std::size_t(features), 1, [&](std::size_t f) {
     const auto c = Eigen::Index(f);
