@@ -18,6 +18,10 @@ std::function<void()> convert(CLI::App&, Console&);
 std::function<void()> check(CLI::App&, Console&);
 std::function<void()> measure(CLI::App&, Console&);
 std::function<void()> distributions(CLI::App&, Console&);
+std::function<void()> compare(CLI::App&, Console&);
+std::function<void()> typical(CLI::App&, Console&);
+std::function<void()> classify(CLI::App&, Console&);
+std::function<void()> judge(CLI::App&, Console&);
 std::function<void()> model(CLI::App&, Console&);
 std::function<void()> fit(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
@@ -71,6 +75,19 @@ std::span<const Verb> verbs() {
        "brainforest distributions cells/ --kind basal --by order\n"
        "  brainforest distributions --repo cells.db --population L5 --keep",
        distributions},
+      {"compare", "Say whether two populations can be told apart, by what, and how surely",
+       "brainforest compare pyramidal/ basket/ --kind dendrite --report apart.html\n"
+       "  brainforest compare --repo cells.db --population traced --with grown",
+       compare},
+      {"typical", "Say how typical neurons are of a population, and what makes them abnormal",
+       "brainforest typical cell7.swc --population cells/\n"
+       "  brainforest typical cell7 --repo cells.db --population L5",
+       typical},
+      {"classify", "Find types of neurons, how many there are, and what defines them",
+       "brainforest classify cells/ --csv types.csv --report types.html", classify},
+      {"judge",
+       "Judge whether grown neurons are indistinguishable from traced ones, which the model never saw",
+       "brainforest judge --train fitted/ --held-out others/ --grown grown/ --features features.csv", judge},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"
        "  brainforest model edit pyramidal --repo cells.db\n"

@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/morphology/transform.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "forest/morphology/measure.h"
@@ -55,6 +58,51 @@ TEST(Centred, ANeuronWithoutSomaIsHeldByItsFirstRoot) {
   EXPECT_EQ(centre(tree(false)), Vec3(12, 25, 30));
   EXPECT_EQ(centred(tree(false)).points()[0].position(), Vec3(0, 0, 0));
   EXPECT_EQ(centred(Morphology()), Morphology());
+}
+
+TEST(Stretched, ScalesOneAxisFromTheSoma) {
+  const Morphology before = tree(true), after = stretched(before, {1, 1, 1.2f});
+  ASSERT_EQ(after.points().size(), before.points().size());
+  for (std::size_t i = 0; i < before.points().size(); ++i) {
+    EXPECT_EQ(after.points()[i].x, before.points()[i].x);
+    EXPECT_NEAR(after.points()[i].z - 30.f, 1.2f * (before.points()[i].z - 30.f), 1e-4);
+    EXPECT_EQ(after.points()[i].radius, before.points()[i].radius);
+  }
+  EXPECT_EQ(after.soma(), before.soma());
+  EXPECT_EQ(after.annotations(), before.annotations());
+}
+
+TEST(Jittered, TurnsDaughtersAndKeepsLengths) {
+  const Morphology before = tree(true), after = jittered(before, 10.f, 1, 5);
+  ASSERT_EQ(after.points().size(), before.points().size());
+  EXPECT_NE(after, before);
+  EXPECT_EQ(after, jittered(before, 10.f, 1, 5));
+  EXPECT_NE(after, jittered(before, 10.f, 2, 5));
+  EXPECT_EQ(jittered(before, 0.f, 1, 5).points().size(), before.points().size());
+  for (std::size_t i = 0; i < before.sections().size(); ++i) {
+    EXPECT_NEAR(section_length(after, SectionId(i)), section_length(before, SectionId(i)), 1e-3);
+    EXPECT_EQ(after.sections()[i], before.sections()[i]);
+  }
+  EXPECT_EQ(after.points(SectionId(0))[1].position(),
+            before.points(SectionId(0))[1].position());  // stems stay
+}
+
+TEST(Jittered, TurnsByAnglesOfItsDeviation) {
+  double squares = 0.;
+  constexpr int trials = 2000;
+  const Morphology before = tree(true);
+  const auto way = [](const Morphology& m, std::size_t s) {
+    return Vec3(m.points(SectionId(s)).back().position() - m.points(SectionId(s)).front().position())
+        .normalized();
+  };
+  for (int k = 0; k < trials; ++k) {
+    const Morphology after = jittered(before, 10.f, 1, std::uint64_t(k));
+    for (const std::size_t s : {1u, 2u}) {
+      const double turned = degrees(std::acos(std::clamp(way(before, s).dot(way(after, s)), -1.f, 1.f)));
+      squares += turned * turned / (2. * trials);
+    }
+  }
+  EXPECT_NEAR(std::sqrt(squares), 10., .5);
 }
 
 }  // namespace

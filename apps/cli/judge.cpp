@@ -1,0 +1,281 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest judge: the acceptance test of grown neurons.
+#include <algorithm>
+#include <array>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/parallel.h"
+#include "forest/morphology/transform.h"
+#include "forest/statistics/metric.h"
+#include "forest/statistics/protocol.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/judging.h"
+#include "apps/cli/options.h"
+#include "apps/cli/plots.h"
+#include "apps/cli/report.h"
+#include "apps/cli/samples.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+
+using namespace statistics;
+using Json = nlohmann::ordered_json;
+
+namespace {
+
+Json interval_of(const Estimate& e) { return {{"value", e.value}, {"lower", e.lower}, {"upper", e.upper}}; }
+
+std::string shown(const Estimate& e) {
+  return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.lower, e.upper);
+}
+
+std::string verdict(const Judgement& j) {
+  const auto failed = std::ranges::count(j.criteria, false, &Criterion::pass);
+  const std::string cells =
+      fmt::format("{} grown, {} held-out and {} training cells", j.compared, j.held_out, j.train);
+  if (j.pass)
+    return fmt::format(
+        "PASS: by {} the grown cells cannot be told from traced ones; a random forest tells them with AUC "
+        "{:.3f}, real training cells with {:.3f}.",
+        cells, j.auc.structure.value, j.auc.real_control.value);
+  return fmt::format(
+      "FAIL: {} of {} criteria are not met by {}; a random forest tells grown from held-out cells with AUC "
+      "{:.3f}, real training cells with {:.3f}.",
+      failed, j.criteria.size(), cells, j.auc.structure.value, j.auc.real_control.value);
+}
+
+std::string power_of(const Judgement& j) {
+  return fmt::format("{}of {} and {} cells an AUC of {:.2f} would be seen in four of five cases",
+                     j.detectable_auc > .7 ? "underpowered: " : "", j.compared, j.held_out, j.detectable_auc);
+}
+
+/// Real training cells, changed so that the protocol must see it.
+Control changed(std::string name, const Sample& real, std::span<const Group> groups, Console& console,
+                const std::function<Morphology(std::size_t)>& change) {
+  Sample sample{.name = name, .cells = real.cells, .types = {}, .neurons = {}};
+  sample.neurons.resize(real.neurons.size());
+  parallel_for(real.neurons.size(), 2, [&](std::size_t i) { sample.neurons[i] = change(i); });
+  return {std::move(name), measured(sample, groups, console)};
+}
+
+}  // namespace
+
+Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& grown,
+                     const Sample* parametric, const std::string& kind, const ProtocolOptions& options,
+                     Console& console, const std::string& slices) {
+  const std::vector<Group> groups = groups_of(kind);
+  Judged judged{.tables = {measured(train, groups, console), measured(held_out, groups, console),
+                           measured(grown, groups, console)},
+                .judgement = {}};
+  std::vector<Control> controls;
+  if (parametric) controls.push_back({"burke", measured(*parametric, groups, console)});
+  controls.push_back(changed("stretched", train, groups, console, [&](std::size_t i) {
+    return stretched(train.neurons[i], {1.f, 1.f, 1.2f});
+  }));
+  controls.push_back(changed("jittered", train, groups, console, [&](std::size_t i) {
+    return jittered(train.neurons[i], 10.f, options.seed, i);
+  }));
+  if (!slices.empty()) {
+    for (FeatureTable* traced : {&judged.tables[0], &judged.tables[1]}) set_slices(*traced, slices);
+    for (std::size_t i = 0; i < grown.cells.size(); ++i)
+      judged.tables[2].slices.push_back(fmt::format("grown {}", i));
+    for (Control& control : controls)
+      if (control.name == "burke")
+        for (std::size_t i = 0; i < control.cells.size(); ++i)
+          control.cells.slices.push_back(fmt::format("burke {}", i));
+      else
+        control.cells.slices = judged.tables[0].slices;
+  }
+  judged.judgement =
+      judge(judged.tables[0], judged.tables[1], judged.tables[2], controls, options, console.progress());
+  return judged;
+}
+
+Json json_of(const Judgement& j, std::uint64_t seed) {
+  Json controls = Json::object();
+  for (const char* name : {"burke", "stretched", "jittered"}) controls[name] = nullptr;  // not asked
+  for (const ControlResult& c : j.controls) {
+    controls[c.name] = interval_of(c.auc);
+    controls[c.name]["rejected"] = c.rejected;
+  }
+  Json criteria = Json::array();
+  for (const Criterion& c : j.criteria)
+    criteria.push_back({{"name", c.name}, {"pass", c.pass}, {"reason", c.reason}});
+  return {
+      {"pass", j.pass},
+      {"auc",
+       {{"structure", interval_of(j.auc.structure)},
+        {"diameters", interval_of(j.auc.diameters)},
+        {"real_control", interval_of(j.auc.real_control)},
+        {"real_control_diameters", interval_of(j.auc.real_control_diameters)},
+        {"logistic", interval_of(j.auc.logistic)}}},
+      {"energy_p", j.energy_p},
+      {"mmd_p", j.mmd_p},
+      {"ks_rejections", j.ks_rejections.size()},
+      {"mvs_max", j.mvs_max},
+      {"sholl_inside", j.sholl_inside},
+      {"copying",
+       {{"neighbour_ratio", j.neighbour_ratio},
+        {"longest_run", j.longest_run ? Json(*j.longest_run) : Json()}}},
+      {"controls", controls},
+      {"seeds", Json::array({seed})},
+      {"mvs",
+       {{"median", j.mvs_median}, {"worst", j.mvs_feature}, {"ratio", j.mvs_ratio}, {"limit", j.mvs_limit}}},
+      {"ks_features", j.ks_rejections},
+      {"cells", {{"train", j.train}, {"held_out", j.held_out}, {"grown", j.grown}, {"compared", j.compared}}},
+      {"features", j.features},
+      {"detectable_auc", j.detectable_auc},
+      {"criteria", criteria}};
+}
+
+void tell_judgement(const Judgement& j, Console& console) {
+  console.say(verdict(j));
+  console.say("");
+  std::vector<std::vector<std::string>> lines;
+  for (const Criterion& c : j.criteria) lines.push_back({c.pass ? "pass" : "FAIL", c.name, c.reason});
+  console.table({"", "criterion", "why"}, lines);
+  console.say("");
+  console.say(fmt::format("Power: {}. Logistic regression, for comparison: AUC {}.", power_of(j),
+                          shown(j.auc.logistic)));
+}
+
+std::string report_of(const Judged& judged, const std::string& title) {
+  const Judgement& j = judged.judgement;
+  Report report(title, verdict(j));
+  report.figures({{"AUC, structure", fmt::format("{:.3f}", j.auc.structure.value)},
+                  {"AUC, with diameters", fmt::format("{:.3f}", j.auc.diameters.value)},
+                  {"AUC, real control", fmt::format("{:.3f}", j.auc.real_control.value)},
+                  {"energy distance, p", fmt::format("{:.3f}", j.energy_p)},
+                  {"features rejected", fmt::format("{} of {}", j.ks_rejections.size(), j.features)},
+                  {"nearest training cell", fmt::format("{:.2f} ×", j.neighbour_ratio)}});
+
+  report.heading("Told from held-out cells by a random forest");
+  std::vector<IntervalRow> rows;
+  const auto add = [&](const char* label, const Estimate& e, std::size_t colour, std::string note = {}) {
+    rows.push_back({.label = label,
+                    .value = e.value,
+                    .lower = e.lower,
+                    .upper = e.upper,
+                    .note = std::move(note),
+                    .colour = colour});
+  };
+  add("grown, structure", j.auc.structure, 1, "≤ 0.60");
+  add("grown, with diameters", j.auc.diameters, 1, "≤ 0.65");
+  add("real training cells, structure", j.auc.real_control, 0);
+  add("real training cells, with diameters", j.auc.real_control_diameters, 0);
+  for (const ControlResult& c : j.controls)
+    add(("control: " + c.name).c_str(), c.auc, 3, c.rejected ? "rejected ✓" : "missed");
+  report.plot(interval_plot(rows, {.low = .3,
+                                   .high = 1.,
+                                   .marks = {.5, .6},
+                                   .title = "area under the curve (0.5: guessing; 1: surely told apart)"}),
+              "Mean over repeated cross-validations with 95 % intervals of the cells; " + power_of(j) + ".");
+
+  report.heading("Criteria");
+  std::vector<std::vector<std::string>> lines;
+  for (const Criterion& c : j.criteria) lines.push_back({c.pass ? "✓" : "✗", c.name, c.reason});
+  report.table({"", "criterion", "why"}, lines);
+
+  report.heading("Sholl");
+  report.plot(curve_plot(std::array<CurveLine, 2>{CurveLine{"held out", j.sholl.mean, j.sholl.lower,
+                                                            j.sholl.upper, 0},
+                                                  CurveLine{"grown", j.sholl_grown, {}, {}, 1}},
+                         sholl_step, "distance from the soma (µm)", "crossings a cell"),
+              "The band holds, in 95 % of the cases, as many other real cells at 95 % of radii.");
+
+  report.heading("Where they differ most");
+  const std::array<FeatureTable, 2> two{judged.tables[1], judged.tables[2]};
+  const FeatureTable all = stacked(two), whole = completed(all);
+  std::vector<std::size_t> order;
+  std::vector<double> surely;  // how far the interval of Cliff's delta stays from none
+  for (std::size_t f = 0; f < whole.features.size(); ++f) {
+    const std::span values(whole.values.col(Eigen::Index(f)).data(), whole.size());
+    const Estimate delta = cliffs_delta(values.first(two[0].size()), values.subspan(two[0].size()));
+    surely.push_back(std::max({0., delta.lower, -delta.upper}));
+    if (std::ranges::count(all.features, whole.features[f]))
+      order.push_back(f);  // "… is defined" is no measure
+  }
+  std::ranges::stable_sort(order, std::greater(), [&](std::size_t f) { return surely[f]; });
+  std::vector<StripPanel> panels;
+  for (const std::size_t f : unlike(whole, order, 9)) {
+    const Feature& feature = whole.features[f];
+    const auto column = std::ranges::find(all.features, feature) - all.features.begin();
+    StripPanel panel{.title = feature.name, .unit = feature.unit, .samples = {}};
+    for (const FeatureTable& t : judged.tables) {
+      const auto values = t.values.col(column);
+      panel.samples.emplace_back(values.begin(), values.end());
+    }
+    panels.push_back(std::move(panel));
+  }
+  report.plot(strip_plots(panels, std::array<std::string, 3>{"training", "held out", "grown"}),
+              "The features by which grown and held-out cells are most surely apart (Cliff's delta), none "
+              "nearly the same as another; every dot "
+              "is a cell.");
+  return report.html();
+}
+
+namespace {
+
+struct Options {
+  std::vector<std::string> train, held_out, grown, parametric;
+  std::string repo, slices, kind = "dendrite";
+  std::filesystem::path features, report;
+  std::uint32_t repeats = 50;
+  std::uint64_t seed = 0;
+  bool force = false;
+};
+
+void run(const Options& options, Console& console) {
+  const Sample train = read_sample(options.train, options.repo, console),
+               held_out = read_sample(options.held_out, options.repo, console),
+               grown = read_sample(options.grown, options.repo, console);
+  Sample parametric;
+  if (!options.parametric.empty()) parametric = read_sample(options.parametric, options.repo, console);
+  const Judged judged =
+      judge_samples(train, held_out, grown, options.parametric.empty() ? nullptr : &parametric, options.kind,
+                    {.repeats = options.repeats, .seed = options.seed}, console, options.slices);
+  if (!options.features.empty())
+    write_unless_there(options.features,
+                       features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
+                       options.force);
+  if (!options.report.empty())
+    write_unless_there(options.report, report_of(judged, "Grown neurons on trial: " + grown.name),
+                       options.force);
+  console.print(json_of(judged.judgement, options.seed));
+  tell_judgement(judged.judgement, console);
+}
+
+}  // namespace
+
+std::function<void()> judge(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  const auto sample = [&](const char* name, std::vector<std::string>& words, const char* help) {
+    return command.add_option(name, words, help)->type_name("FILES");
+  };
+  sample("--train", options->train,
+         "Neurons that the model was fitted to: files, folders, populations of --repo")
+      ->required();
+  sample("--held-out", options->held_out, "Neurons of the same population that it never saw")->required();
+  sample("--grown", options->grown, "Neurons that it grew")->required();
+  sample("--burke", options->parametric, "Neurons of a parametric model, which the protocol must reject");
+  command.add_option("--repo", options->repo, "Take populations of this repository")->type_name("REPO");
+  add_kind(command, options->kind);
+  add_slices(command, options->slices);
+  add_whole(command, "--repeats", options->repeats, "Cross-validations that an AUC is the mean of", 1, 10000);
+  add_seed(command, options->seed, "The same seed gives the same judgement");
+  command
+      .add_option("--features", options->features,
+                  "Write the features of all cells to this file, for other programs")
+      ->type_name("FILE");
+  add_report(command, options->report);
+  add_force(command, options->force);
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

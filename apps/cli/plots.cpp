@@ -1,0 +1,356 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/plots.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <fmt/format.h>
+
+#include "forest/statistics/summary.h"
+#include "forest/statistics/two_samples.h"
+
+#include "apps/cli/report.h"
+
+namespace forest::cli {
+namespace {
+
+constexpr std::array<std::string_view, 8> colours{"#0072B2", "#D55E00", "#009E73", "#CC79A7",
+                                                  "#E69F00", "#56B4E9", "#8C6D31", "#666666"};
+constexpr double width = 880.;
+
+/// A drawing that grows downwards.
+class Svg {
+ public:
+  template <class... Args>
+  void add(fmt::format_string<Args...> format, Args&&... args) {
+    fmt::format_to(std::back_inserter(body_), format, std::forward<Args>(args)...);
+    body_ += '\n';
+  }
+  void text(double x, double y, std::string_view words, std::string_view anchor = "start", double size = 12.,
+            double opacity = 1.) {
+    add(R"(<text x="{:.1f}" y="{:.1f}" text-anchor="{}" font-size="{}" fill="currentColor" fill-opacity="{:.2f}">{}</text>)",
+        x, y, anchor, size, opacity, escaped_html(words));
+  }
+  void line(double x1, double y1, double x2, double y2, double opacity = .2, std::string_view more = "") {
+    add(R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="currentColor" stroke-opacity="{:.2f}" {}/>)",
+        x1, y1, x2, y2, opacity, more);
+  }
+  std::string done(double height, std::string_view label) const {
+    return fmt::format(
+        R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {0} {1:.0f}" role="img" aria-label="{2}" )"
+        R"(font-family="'DejaVu Sans', Verdana, sans-serif">)"
+        "\n{3}</svg>\n",
+        width, height, escaped_html(label), body_);
+  }
+
+ private:
+  std::string body_;
+};
+
+std::string number(double x) {
+  if (std::abs(x) < 1e-12) return "0";
+  const double size = std::abs(x);
+  if (size >= 1e4 && size < 1e7) return fmt::format("{:.0f}", x);
+  return size >= 1e7 || size < 1e-3 ? fmt::format("{:.1e}", x) : fmt::format("{:.4g}", x);
+}
+
+/// Round numbers from low to high, about so many.
+std::vector<double> ticks(double low, double high, int count) {
+  const double span = high - low;
+  if (!(span > 0.) || !std::isfinite(span)) return {low};
+  const double rough = span / count, power = std::pow(10., std::floor(std::log10(rough)));
+  double step = 10. * power;
+  for (const double factor : {1., 2., 5.})
+    if (factor * power >= rough) {
+      step = factor * power;
+      break;
+    }
+  std::vector<double> out;
+  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) out.push_back(k * step);
+  return out;
+}
+
+struct Scale {
+  double low, high, from, to;
+  double operator()(double x) const { return from + (x - low) / (high - low) * (to - from); }
+};
+
+/// Room on both sides; a single value gets some too.
+Scale scale_of(double low, double high, double from, double to, double margin = .05) {
+  if (!(low <= high)) low = 0., high = 1.;
+  const double room = high > low ? margin * (high - low) : std::max(1., .1 * std::abs(low));
+  return {low - room, high + room, from, to};
+}
+
+void legend(Svg& svg, std::span<const std::string> names, double x, double y) {
+  for (std::size_t i = 0; i < names.size(); ++i) {
+    svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="5" fill="{}"/>)", x, y - 4., colour_of(i));
+    svg.text(x + 10., y, names[i], "start", 12.);
+    std::size_t glyphs = 0;
+    for (const char c : names[i]) glyphs += (c & 0xc0) != 0x80;
+    x += 30. + 7.4 * double(glyphs);
+  }
+}
+
+void axes(Svg& svg, const Scale& x, const Scale& y, const std::string& x_title, const std::string& y_title) {
+  for (const double t : ticks(x.low, x.high, 8)) {
+    svg.line(x(t), y.from, x(t), y.to, .08);
+    svg.text(x(t), y.from + 16., number(t), "middle", 11., .7);
+  }
+  for (const double t : ticks(y.low, y.high, 5)) {
+    svg.line(x.from, y(t), x.to, y(t), .08);
+    svg.text(x.from - 8., y(t) + 4., number(t), "end", 11., .7);
+  }
+  svg.line(x.from, y.from, x.to, y.from, .5);
+  svg.text(.5 * (x.from + x.to), y.from + 36., x_title, "middle", 12., .85);
+  const double middle = .5 * (y.from + y.to);
+  svg.add(
+      R"~(<text transform="translate(18 {:.1f}) rotate(-90)" text-anchor="middle" font-size="12" fill="currentColor" fill-opacity=".85">{}</text>)~",
+      middle, escaped_html(y_title));
+}
+
+std::string polyline(std::span<const double> values, double step, const Scale& x, const Scale& y) {
+  std::string points;
+  for (std::size_t i = 0; i < values.size(); ++i)
+    points += fmt::format("{:.1f},{:.1f} ", x(step * double(i + 1)), y(values[i]));
+  return points;
+}
+
+}  // namespace
+
+std::string_view colour_of(std::size_t i) { return colours[i % colours.size()]; }
+
+std::string interval_plot(std::span<const IntervalRow> rows, const IntervalAxis& axis) {
+  Svg svg;
+  constexpr double row_height = 24.;
+  double top = axis.left.empty() && axis.right.empty() ? 14. : 34.;
+  const Scale x{axis.low, axis.high, 330., 780.};
+  const double bottom = top + row_height * double(rows.size());
+  if (!axis.left.empty()) svg.text(x.from, 18., "◂ " + axis.left, "start", 12., .75);
+  if (!axis.right.empty()) svg.text(x.to, 18., axis.right + " ▸", "end", 12., .75);
+  for (const double t : ticks(axis.low, axis.high, 6)) {
+    svg.line(x(t), top, x(t), bottom, .08);
+    svg.text(x(t), bottom + 17., number(t), "middle", 11., .7);
+  }
+  for (const double m : axis.marks) svg.line(x(m), top - 4., x(m), bottom, .55, R"(stroke-dasharray="4 3")");
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    const IntervalRow& r = rows[i];
+    const double y = top + row_height * (double(i) + .5), opacity = r.faint ? .35 : 1.;
+    if (i % 2 == 0)
+      svg.add(R"(<rect x="0" y="{:.1f}" width="{}" height="{}" fill="currentColor" fill-opacity=".035"/>)",
+              y - .5 * row_height, width, row_height);
+    svg.text(318., y + 4., r.label, "end", 12., r.faint ? .6 : 1.);
+    const auto inside = [&](double v) { return x(std::clamp(v, axis.low, axis.high)); };
+    if (std::isfinite(r.value)) {
+      svg.add(
+          R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="3" stroke-linecap="round" stroke-opacity="{:.2f}"/>)",
+          inside(r.lower), y, inside(r.upper), y, colour_of(r.colour), .55 * opacity);
+      svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="5" fill="{}" fill-opacity="{:.2f}"/>)", inside(r.value),
+              y, colour_of(r.colour), opacity);
+    }
+    svg.text(794., y + 4., r.note, "start", 11., .75);
+  }
+  svg.text(.5 * (x.from + x.to), bottom + 38., axis.title, "middle", 12., .85);
+  return svg.done(bottom + 48., axis.title);
+}
+
+std::string strip_plots(std::span<const StripPanel> panels, std::span<const std::string> names) {
+  Svg svg;
+  constexpr std::size_t columns = 3;
+  constexpr double panel_width = 280., gap = 20., title = 44., row = 46.;
+  const std::size_t samples = names.size();
+  const double height = title + row * double(samples) + 34.;
+  legend(svg, names, 8., 18.);
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const StripPanel& panel = panels[p];
+    const double left = double(p % columns) * (panel_width + gap), top = 30. + double(p / columns) * height;
+    double low = INFINITY, high = -INFINITY;
+    for (const auto& sample : panel.samples)
+      for (const double v : sample)
+        if (std::isfinite(v)) low = std::min(low, v), high = std::max(high, v);
+    if (panel.marked) low = std::min(low, *panel.marked), high = std::max(high, *panel.marked);
+    const Scale x = scale_of(low, high, left + 8., left + panel_width - 8.);
+    svg.text(left + 8., top + 20., panel.title, "start", panel.title.size() > 38 ? 10.5 : 12.);
+    if (!panel.unit.empty()) svg.text(left + 8., top + 35., panel.unit, "start", 10.5, .65);
+    const double bottom = top + title + row * double(samples);
+    for (const double t : ticks(x.low, x.high, 4)) {
+      svg.line(x(t), top + title, x(t), bottom, .08);
+      svg.text(x(t), bottom + 15., number(t), "middle", 10.5, .7);
+    }
+    svg.line(x.from, bottom, x.to, bottom, .4);
+    for (std::size_t s = 0; s < panel.samples.size(); ++s) {
+      std::vector<double> values;
+      for (const double v : panel.samples[s])
+        if (std::isfinite(v)) values.push_back(v);
+      if (values.empty()) continue;
+      std::ranges::sort(values);
+      const double base = top + title + row * (double(s) + 1.) - 14.;
+      // Density (Gaussian kernel, Silverman's width) above the line, dots below it.
+      const statistics::Summary summary = statistics::summarize(values);
+      const double quartiles = statistics::quantile(values, .75) - statistics::quantile(values, .25);
+      double kernel = .9 * std::min(summary.sd, quartiles > 0. ? quartiles / 1.34 : summary.sd) *
+                      std::pow(double(values.size()), -.2);
+      kernel = std::max(kernel, .004 * (x.high - x.low));
+      std::vector<double> density(141, 0.);
+      const auto place = [&](std::size_t at) {  // from the smallest to the largest value
+        return values.front() + (values.back() - values.front()) * double(at) / double(density.size() - 1);
+      };
+      for (std::size_t i = 0; i < density.size(); ++i)
+        for (const double v : values) density[i] += std::exp(-.5 * std::pow((place(i) - v) / kernel, 2.));
+      const double most = *std::ranges::max_element(density);
+      std::string path = fmt::format("M{:.1f} {:.1f}", x(values.front()), base);
+      for (std::size_t i = 0; i < density.size(); ++i)
+        path += fmt::format("L{:.1f} {:.1f}", x(place(i)), base - 26. * density[i] / most);
+      svg.add(R"(<path d="{}L{:.1f} {:.1f}Z" fill="{}" fill-opacity=".28"/>)", path, x(values.back()), base,
+              colour_of(s));
+      std::array<double, 3> free{-INFINITY, -INFINITY, -INFINITY};  // where the last dot of each line ends
+      for (const double v : values) {
+        std::size_t line = 0;
+        while (line + 1 < free.size() && x(v) < free[line]) ++line;
+        free[line] = x(v) + 4.2;
+        svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="2" fill="{}" fill-opacity=".75"/>)", x(v),
+                base + 3.5 + 3.6 * double(line), colour_of(s));
+      }
+      const double q1 = x(statistics::quantile(values, .25)), q3 = x(statistics::quantile(values, .75)),
+                   median = x(summary.median);
+      svg.add(R"(<line x1="{:.1f}" y1="{:.1f}" x2="{:.1f}" y2="{:.1f}" stroke="{}" stroke-width="2.5"/>)", q1,
+              base, q3, base, colour_of(s));
+      svg.add(
+          R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}" stroke-width="2.5"/>)",
+          median, base - 6., base + 2., colour_of(s));
+    }
+    if (panel.marked)
+      svg.add(
+          R"(<path d="M{0:.1f} {1:.1f}l-5 -9h10z M{0:.1f} {1:.1f}V{2:.1f}" fill="#D55E00" stroke="#D55E00" stroke-width="1.6"/>)",
+          x(*panel.marked), top + title + 4., bottom);
+  }
+  const std::size_t rows = (panels.size() + columns - 1) / columns;
+  return svg.done(34. + height * double(rows), "Values of single cells");
+}
+
+std::string curve_plot(std::span<const CurveLine> lines, double step, const std::string& x_title,
+                       const std::string& y_title) {
+  Svg svg;
+  double high = 0.;
+  std::size_t longest = 1;
+  for (const CurveLine& l : lines)
+    for (const auto* values : {&l.values, &l.lower, &l.upper}) {
+      for (const double v : *values) high = std::max(high, v);
+      // What is nothing to the eye does not make the axis long.
+      for (std::size_t i = values->size(); i-- > longest;)
+        if ((*values)[i] > .012 * high) longest = std::max(longest, i + 1);
+    }
+  const Scale x{0., step * double(longest), 70., width - 20.}, y{0., std::max(high * 1.05, 1e-9), 310., 34.};
+  axes(svg, x, y, x_title, y_title);
+  std::vector<std::string> names;
+  for (const CurveLine& l : lines) {
+    const auto visible = [&](const std::vector<double>& v) {
+      return std::span(v).first(std::min(v.size(), longest));
+    };
+    if (!l.upper.empty()) {
+      std::string back;
+      const auto low = visible(l.lower);
+      for (std::size_t i = low.size(); i-- > 0;)
+        back += fmt::format("{:.1f},{:.1f} ", x(step * double(i + 1)), y(low[i]));
+      svg.add(R"(<polygon points="{}{}" fill="{}" fill-opacity=".2"/>)",
+              polyline(visible(l.upper), step, x, y), back, colour_of(l.colour));
+    }
+    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2.2" stroke-linejoin="round"/>)",
+            polyline(visible(l.values), step, x, y), colour_of(l.colour));
+    names.resize(std::max(names.size(), l.colour + 1));
+    names[l.colour] = l.name;
+  }
+  legend(svg, names, 78., 20.);
+  return svg.done(356., y_title);
+}
+
+std::string scatter_plot(std::span<const Dot> dots, std::span<const std::string> names,
+                         const std::string& x_title, const std::string& y_title) {
+  Svg svg;
+  double x0 = INFINITY, x1 = -INFINITY, y0 = INFINITY, y1 = -INFINITY;
+  for (const Dot& d : dots)
+    x0 = std::min(x0, d.x), x1 = std::max(x1, d.x), y0 = std::min(y0, d.y), y1 = std::max(y1, d.y);
+  const Scale x = scale_of(x0, x1, 70., width - 20.), y = scale_of(y0, y1, 430., 34.);
+  axes(svg, x, y, x_title, y_title);
+  for (const Dot& d : dots)
+    svg.add(
+        R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="{}" fill-opacity=".72" stroke="{}" stroke-width="{}"><title>{}</title></circle>)",
+        x(d.x), y(d.y), d.ring ? 8. : 4.5, colour_of(d.colour), d.ring ? "currentColor" : colour_of(d.colour),
+        d.ring ? 2. : .5, escaped_html(d.name));
+  legend(svg, names, 78., 20.);
+  return svg.done(476., "Cells in the plane of two components");
+}
+
+std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, double reach,
+                       const std::string& x_title, const std::string& y_title) {
+  Svg svg;
+  constexpr double panel = 240., gap = 48., top = 34.;
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const HeatPanel& h = panels[p];
+    const double left = 56. + double(p) * (panel + gap), pixel = panel / double(side);
+    double most = 1e-300;
+    for (const double v : h.values) most = std::max(most, std::abs(v));
+    svg.text(left, top - 14., h.title);
+    for (std::size_t i = 0; i < h.values.size() && i < side * side; ++i) {
+      const double share =
+          std::sqrt(std::abs(h.values[i]) / most);  // so that rare branches show beside frequent ones
+      if (share < .03) continue;
+      svg.add(
+          R"(<rect x="{:.1f}" y="{:.1f}" width="{:.2f}" height="{:.2f}" fill="{}" fill-opacity="{:.2f}"/>)",
+          left + pixel * double(i % side), top + panel - pixel * double(i / side + 1), pixel + .15,
+          pixel + .15, colour_of(h.difference ? h.values[i] > 0. : h.colour), share);
+    }
+    const Scale x{0., reach, left, left + panel}, y{0., reach, top + panel, top};
+    svg.line(x(0.), y(0.), x(reach), y(reach), .3, R"(stroke-dasharray="3 3")");
+    svg.line(left, top + panel, left + panel, top + panel, .5);
+    svg.line(left, top, left, top + panel, .5);
+    for (const double t : ticks(0., reach, 4)) {
+      svg.text(x(t), top + panel + 16., number(t), "middle", 10.5, .7);
+      if (p == 0) svg.text(left - 6., y(t) + 4., number(t), "end", 10.5, .7);
+    }
+    svg.text(left + .5 * panel, top + panel + 36., x_title, "middle", 11.5, .85);
+  }
+  svg.add(
+      R"~(<text transform="translate(14 {:.1f}) rotate(-90)" text-anchor="middle" font-size="11.5" fill="currentColor" fill-opacity=".85">{}</text>)~",
+      top + .5 * panel, escaped_html(y_title));
+  return svg.done(top + panel + 48., "Persistence images");
+}
+
+std::string chance_plot(std::span<const double> null, double found, double lower, double upper,
+                        const std::string& title) {
+  Svg svg;
+  double low = std::min(.3, lower), high = 1.;
+  for (const double v : null) low = std::min(low, v);
+  const Scale x{low, high + .01, 40., width - 20.};
+  constexpr double base = 170., top = 40.;
+  constexpr double bin = .02;
+  std::vector<double> counts(std::size_t((high - low) / bin) + 2, 0.);
+  for (const double v : null) ++counts[std::size_t((v - low) / bin)];
+  const double most = std::max(1., *std::ranges::max_element(counts));
+  for (std::size_t i = 0; i < counts.size(); ++i)
+    if (counts[i] > 0.)
+      svg.add(
+          R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" rx="1.5" fill="currentColor" fill-opacity=".28"/>)",
+          x(low + bin * double(i)) + 1., base - (base - top - 20.) * counts[i] / most,
+          x(low + bin) - x(low) - 2., (base - top - 20.) * counts[i] / most);
+  for (const double t : ticks(low, high, 8)) svg.text(x(t), base + 17., number(t), "middle", 11., .7);
+  svg.line(x.from, base, x.to, base, .5);
+  svg.add(
+      R"(<line x1="{0:.1f}" y1="{2}" x2="{1:.1f}" y2="{2}" stroke="#D55E00" stroke-width="4" stroke-linecap="round" stroke-opacity=".5"/>)",
+      x(lower), x(upper), top + 4.);
+  svg.add(R"(<line x1="{0:.1f}" y1="{1}" x2="{0:.1f}" y2="{2}" stroke="#D55E00" stroke-width="2"/>)",
+          x(found), top + 4., base);
+  svg.add(R"(<circle cx="{:.1f}" cy="{}" r="6" fill="#D55E00"/>)", x(found), top + 4.);
+  svg.text(x(found), top - 10., fmt::format("found: {:.3f}", found), found > .85 ? "end" : "middle", 12.);
+  if (!null.empty()) {
+    const double middle = std::accumulate(null.begin(), null.end(), 0.) / double(null.size());
+    svg.text(x(middle), top + 10., fmt::format("by chance ({} dealings)", null.size()), "middle", 11., .7);
+  }
+  svg.text(.5 * (x.from + x.to), base + 38., title, "middle", 12., .85);
+  return svg.done(base + 48., title);
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,181 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/samples.h"
+
+#include <algorithm>
+#include <regex>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/io/format.h"
+#include "forest/io/workbook.h"
+#include "forest/repository/repository.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/neurons.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// "cell7" of "cells/cell7.CNG.swc".
+std::string cell_name(const fs::path& file) {
+  fs::path name = file.filename();
+  if (name.has_extension() && name.stem().has_extension() && name.stem().extension() == ".CNG")
+    name = name.stem();
+  return name.stem().string();
+}
+
+std::string folder_name(const fs::path& path) {
+  const fs::path whole = fs::absolute(path).lexically_normal();
+  return (whole.has_filename() ? whole : whole.parent_path()).filename().string();
+}
+
+Sample of_files(const std::vector<std::string>& words, Console& console) {
+  const std::vector<fs::path> files = neuron_files(words, console);
+  struct Read {
+    Morphology neuron;
+    std::string error;
+    bool skipped = false;
+  };
+  std::vector<Read> read(files.size());
+  console.progress().begin("reading", files.size());
+  parallel_for(files.size(), 4, [&](std::size_t i) {
+    try {
+      read[i].neuron = io::read(files[i]).morphology;
+    } catch (const Error& error) {
+      read[i].error = error.what();
+      read[i].skipped = may_skip(error, files[i], words);
+    }
+    console.progress().advance();
+  });
+  console.progress().end();
+  Sample sample;
+  sample.name = words.size() == 1 ? folder_name(words[0]) : counted(files.size(), "file");
+  std::size_t failed = 0;
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    if (!read[i].error.empty()) {
+      console.warn(read[i].skipped ? read[i].error + "; skipped" : read[i].error);
+      failed += !read[i].skipped;
+      continue;
+    }
+    sample.cells.push_back(cell_name(files[i]));
+    sample.types.push_back(folder_name(fs::absolute(files[i]).parent_path()));
+    sample.neurons.push_back(std::move(read[i].neuron));
+  }
+  if (failed)  // a comparison of some of the cells would look like one of all
+    throw Error(
+        fmt::format("{} of {} files could not be read; mend them or leave them out", failed, files.size()));
+  return sample;
+}
+
+Sample of_repository(const std::string& population, const std::string& place) {
+  using namespace repository;
+  Repository open = Repository::open(place, Access::read);
+  Sample sample;
+  sample.name = population.empty() ? place : population;
+  for (const NeuronRow& row : pick_neurons(open, {}, population)) {
+    sample.cells.push_back(population.empty() ? row.population + '/' + row.name : row.name);
+    sample.types.push_back(row.type.empty() ? row.population : row.type);
+    sample.neurons.push_back(open.morphology(row.id));
+  }
+  return sample;
+}
+
+}  // namespace
+
+Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console) {
+  Sample sample;
+  if (repo.empty()) {
+    sample = of_files(words, console);
+  } else {
+    for (const std::string& word : words.empty() ? std::vector<std::string>{""} : words) {
+      Sample part = of_repository(word, repo);
+      sample.name += (sample.name.empty() ? "" : " + ") + part.name;
+      std::ranges::move(part.cells, std::back_inserter(sample.cells));
+      std::ranges::move(part.types, std::back_inserter(sample.types));
+      std::ranges::move(part.neurons, std::back_inserter(sample.neurons));
+    }
+  }
+  if (sample.neurons.empty()) throw Error(fmt::format("{} holds no neuron; name another", sample.name));
+  return sample;
+}
+
+statistics::FeatureTable measured(const Sample& sample, std::span<const statistics::Group> groups,
+                                  Console& console) {
+  std::vector<statistics::Measured> rows(sample.neurons.size());
+  console.progress().begin("measuring", rows.size());
+  parallel_for(rows.size(), 2, [&](std::size_t i) {
+    rows[i] = statistics::measure(sample.neurons[i], groups);
+    console.progress().advance();
+  });
+  console.progress().end();
+  return statistics::table_of(sample.cells, groups, rows);
+}
+
+std::string features_csv(std::span<const statistics::FeatureTable> tables,
+                         std::span<const std::string> groups) {
+  io::TableSheet sheet{.name = "features", .columns = {{"cell", ""}, {"group", ""}}, .rows = {}};
+  for (const statistics::Feature& f : tables[0].features)
+    sheet.columns.push_back({f.name + (f.diameters ? " [diameters]" : ""), f.unit});
+  for (std::size_t t = 0; t < tables.size(); ++t)
+    for (std::size_t i = 0; i < tables[t].size(); ++i) {
+      auto& row = sheet.rows.emplace_back();
+      row.emplace_back(tables[t].cells[i]);
+      row.emplace_back(groups[t]);
+      for (const double x : tables[t].values.row(Eigen::Index(i)))
+        row.emplace_back(x);  // NaN becomes an empty cell
+    }
+  return io::csv_of(sheet);
+}
+
+void set_slices(statistics::FeatureTable& table, const std::string& expression) {
+  const std::regex pattern(expression);
+  table.slices.clear();
+  for (const std::string& cell : table.cells) {
+    std::smatch found;
+    const bool any = std::regex_search(cell, found, pattern) && found.length() > 0;
+    table.slices.push_back(any ? found.str() : "only " + cell);
+  }
+}
+
+void add_slices(CLI::App& command, std::string& expression) {
+  command
+      .add_option("--slices", expression,
+                  "Cells in whose names this regular expression finds the same are sisters, of one slice or "
+                  "animal, and "
+                  "dealt together")
+      ->type_name("REGEX")
+      ->check([](const std::string& text) -> std::string {
+        try {
+          std::regex pattern(text);
+          return {};
+        } catch (const std::regex_error&) {
+          return "--slices is no regular expression; an example is '^[A-Z]+[0-9]+'";
+        }
+      });
+}
+
+void add_kind(CLI::App& command, std::string& kind) {
+  command.add_option("--kind", kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
+      ->type_name("KIND")
+      ->capture_default_str()
+      ->check([](const std::string& word) -> std::string {
+        try {
+          statistics::kind_set(word);
+          return {};
+        } catch (const Error& error) {
+          return error.what();
+        }
+      });
+}
+
+void add_report(CLI::App& command, fs::path& report) {
+  command.add_option("--report", report, "Write a report with plots to this HTML file")->type_name("FILE");
+}
+
+}  // namespace forest::cli

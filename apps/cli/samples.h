@@ -1,0 +1,53 @@
+// SPDX-License-Identifier: Apache-2.0
+// Populations on the command line: folders and files of neurons, or populations of a repository, to be compared.
+#pragma once
+
+#include <filesystem>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forest/morphology/morphology.h"
+#include "forest/statistics/features.h"
+
+namespace CLI {
+class App;
+}
+
+namespace forest::cli {
+
+class Console;
+
+struct Sample {
+  std::string name;                // of the folder, the file or the population
+  std::vector<std::string> cells;  // names, of files without folder and extension
+  std::vector<std::string>
+      types;  // that were given: in a repository, or the folder of each file; may be empty
+  std::vector<Morphology> neurons;
+};
+
+/// @param words  files or folders; populations when there is a repository ("" for all of its neurons)
+/// What cannot be read is told and left out. Throws Error when nothing is left.
+Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console);
+
+/// Features of the cells, on all cores.
+statistics::FeatureTable measured(const Sample& sample, std::span<const statistics::Group> groups,
+                                  Console& console);
+
+/// A table for other programs: a row a cell, its group first. What depends on diameters has " [diameters]" behind its name.
+std::string features_csv(std::span<const statistics::FeatureTable> tables,
+                         std::span<const std::string> groups);
+
+/// Names the slice of each cell: what the regular expression finds in its name, or the cell itself where it finds nothing.
+void set_slices(statistics::FeatureTable& table, const std::string& expression);
+
+/// --slices, a regular expression.
+void add_slices(CLI::App& command, std::string& expression);
+
+/// --kind, as the verb measure has it.
+void add_kind(CLI::App& command, std::string& kind);
+
+/// --report, and its writing.
+void add_report(CLI::App& command, std::filesystem::path& report);
+
+}  // namespace forest::cli

@@ -1,0 +1,200 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest typical: how typical neurons are of a population, and what makes them abnormal.
+#include "forest/statistics/typical.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/repository/repository.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/neurons.h"
+#include "apps/cli/options.h"
+#include "apps/cli/plots.h"
+#include "apps/cli/report.h"
+#include "apps/cli/samples.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+using namespace statistics;
+using Json = nlohmann::ordered_json;
+
+struct Options {
+  std::vector<std::string> cells, population;
+  std::string repo, kind = "all";
+  std::filesystem::path report;
+  bool force = false;
+};
+
+/// Files are files; other words are neurons of the repository.
+Sample cells_of(const Options& options, Console& console) {
+  Sample sample;
+  std::vector<std::string> files, names;
+  std::error_code none;
+  for (const std::string& word : options.cells)
+    (options.repo.empty() || std::filesystem::exists(word, none) ? files : names).push_back(word);
+  if (!files.empty()) sample = read_sample(files, {}, console);
+  if (!names.empty()) {
+    using namespace repository;
+    Repository open = Repository::open(options.repo, Access::read);
+    for (const NeuronRow& row :
+         pick_neurons(open, names, options.population.size() == 1 ? options.population[0] : "")) {
+      sample.cells.push_back(row.name);
+      sample.neurons.push_back(open.morphology(row.id));
+    }
+  }
+  return sample;
+}
+
+/// As a cell's values read: "total_length 4210 µm (5110–9800)".
+std::string words_of(const Oddity& o) {
+  return fmt::format("{} {:.4g}{}{} ({:.4g}–{:.4g} in the population)", o.feature.name, o.value,
+                     o.feature.unit.empty() ? "" : " ", o.feature.unit, o.low, o.high);
+}
+
+std::string sentence(const std::string& cell, const Typicality& t, const std::string& population) {
+  const auto abnormal = std::ranges::count_if(t.oddities, &Oddity::abnormal);
+  std::string out = fmt::format("{} is {} of {} (p = {:.3g}, {} cells): ", cell,
+                                t.p <= .05  ? "not typical"
+                                : t.p <= .2 ? "at the edge of what is typical"
+                                            : "typical",
+                                population, t.p, t.cells);
+  if (abnormal == 0)
+    return out + (t.oddities.empty()
+                      ? "nothing can be said of it."
+                      : "no metric is abnormal; the most unusual is " + words_of(t.oddities.front()) + ".");
+  out +=
+      fmt::format("{} abnormal, ", abnormal == 1 ? "one metric is" : fmt::format("{} metrics are", abnormal));
+  return out + "above all " + words_of(t.oddities.front()) + ".";
+}
+
+Json json_of(const std::string& cell, const Typicality& t, const std::string& population) {
+  Json metrics = Json::array();
+  for (const Oddity& o : t.oddities)
+    metrics.push_back({{"name", o.feature.name},
+                       {"unit", o.feature.unit},
+                       {"value", o.value},
+                       {"median", o.median},
+                       {"low", o.low},
+                       {"high", o.high},
+                       {"strangeness", o.strangeness},
+                       {"p", o.p},
+                       {"abnormal", o.abnormal}});
+  return {{"cell", cell},
+          {"population", population},
+          {"cells", t.cells},
+          {"p", t.p},
+          {"p_whole", t.p_whole},
+          {"p_metric", t.p_feature},
+          {"p_missing", t.p_missing},
+          {"sentence", sentence(cell, t, population)},
+          {"metrics", metrics}};
+}
+
+/// The strangest metrics, none nearly the same (in the population) as one before it.
+std::vector<const Oddity*> telling(const Typicality& t, const FeatureTable& population, std::size_t count) {
+  const FeatureTable full = completed(population);
+  std::vector<std::size_t> order;
+  for (const Oddity& o : t.oddities)
+    if (const auto at = std::ranges::find(full.features, o.feature); at != full.features.end())
+      order.push_back(std::size_t(at - full.features.begin()));
+  std::vector<const Oddity*> chosen;
+  for (const std::size_t column : unlike(full, order, count))
+    chosen.push_back(&*std::ranges::find(t.oddities, full.features[column], &Oddity::feature));
+  return chosen;
+}
+
+void run(const Options& options, Console& console) {
+  const Sample cells = cells_of(options, console),
+               population = read_sample(options.population, options.repo, console);
+  const std::vector<Group> groups = groups_of(options.kind);
+  const FeatureTable known = measured(population, groups, console), asked = measured(cells, groups, console);
+  std::vector<Typicality> answers;
+  for (std::size_t i = 0; i < asked.size(); ++i)
+    answers.push_back(typicality(known, rows_of(asked, std::array<std::size_t, 1>{i})));
+
+  Json out = Json::array();
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const Typicality& t = answers[i];
+    out.push_back(json_of(cells.cells[i], t, population.name));
+    console.say(sentence(cells.cells[i], t, population.name));
+    if (answers.size() > 1) continue;
+    console.say("");
+    std::vector<std::vector<std::string>> lines;
+    for (const Oddity* o : telling(t, known, 12))
+      lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
+                       fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),
+                       fmt::format("{:.3f}", o->p), o->abnormal ? "abnormal" : ""});
+    console.table({"metric", "unit", "value", "median", "5–95 %", "p", ""}, lines);
+  }
+  console.print(out.size() == 1 ? out[0] : out);
+
+  if (options.report.empty()) return;
+  std::string answer;
+  for (std::size_t i = 0; i < answers.size(); ++i)
+    answer += (i ? " " : "") + sentence(cells.cells[i], answers[i], population.name);
+  Report report(fmt::format("How typical of {}?", population.name), answer);
+  for (std::size_t i = 0; i < answers.size(); ++i) {
+    const Typicality& t = answers[i];
+    report.heading(cells.cells[i]);
+    report.figures({{"p", fmt::format("{:.3f}", t.p)},
+                    {"p of the whole", fmt::format("{:.3f}", t.p_whole)},
+                    {"p of the strangest metric", fmt::format("{:.3f}", t.p_feature)},
+                    {"metrics that are abnormal",
+                     fmt::format("{}", std::ranges::count_if(t.oddities, &Oddity::abnormal))},
+                    {"cells it stands beside", fmt::format("{}", t.cells)}});
+    std::vector<StripPanel> panels;
+    std::vector<std::vector<std::string>> lines;
+    for (const Oddity* o : telling(t, known, 40)) {
+      const auto column = std::ranges::find(known.features, o->feature) - known.features.begin();
+      if (std::size_t(column) < known.features.size() && panels.size() < 12) {
+        const auto values = known.values.col(column);
+        panels.push_back({.title = o->feature.name,
+                          .unit = o->feature.unit,
+                          .samples = {std::vector<double>(values.begin(), values.end())},
+                          .marked = o->value});
+      }
+      lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
+                       fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),
+                       fmt::format("{:.3f}", o->p), o->abnormal ? "abnormal" : ""});
+    }
+    report.plot(strip_plots(panels, std::array<std::string, 1>{population.name}),
+                "The strangest metrics first, none nearly the same as another. Every dot is a cell of the "
+                "population, the "
+                "arrow is " +
+                    cells.cells[i] + ".");
+    report.table({"metric", "unit", "value", "median", "5–95 %", "p", ""}, lines);
+  }
+  write_unless_there(options.report, report.html(), options.force);
+  console.say(fmt::format("The report is {}", options.report.string()));
+}
+
+}  // namespace
+
+std::function<void()> typical(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  command.add_option("cells", options->cells, "Files of neurons, or with --repo their names")
+      ->required()
+      ->type_name("CELLS");
+  command
+      .add_option("--population", options->population,
+                  "Files or folders of neurons, or a population of --repo")
+      ->required()
+      ->type_name("FILES");
+  command.add_option("--repo", options->repo, "The repository that holds the population")->type_name("REPO");
+  add_kind(command, options->kind);
+  add_report(command, options->report);
+  add_force(command, options->force);
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// Can a trained eye tell two samples apart? A classifier learns from most cells of both and scores the rest; the area
+// under the curve (AUC) is the chance that it ranks a cell of the second above one of the first: 1 for surely told
+// apart, 0.5 for guessing.
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+#include <vector>
+
+#include <Eigen/Core>
+
+#include "forest/core/progress.h"
+#include "forest/statistics/two_samples.h"
+
+namespace forest::statistics {
+
+enum class Classifier : std::uint8_t { random_forest, logistic };
+
+struct DiscriminatorOptions {
+  std::size_t repeats = 50;  // cross-validations, each with folds of its own
+  std::size_t folds =
+      5;  // fewer where a sample is so small that a fold would hold less than two of its cells
+  std::size_t trees = 200;            // of a random forest
+  double ridge = 30.;                 // of a logistic regression; scikit-learn's C is its inverse
+  std::size_t permutations = 0;       // cross-validations with kinds dealt anew: what guessing reaches
+  std::size_t first = 0, second = 0;  // cells of each that a repeat draws, without repetition; 0 for all
+  std::uint64_t seed = 0;
+  std::vector<std::uint32_t> slices =
+      {};  // of the cells, first sample first (dealing.h): a slice is never trained on and tested
+};
+
+struct Discrimination {
+  /// Mean over repeats and folds; the interval is that of the cells (area_interval of what each contributed).
+  Estimate auc{.5, 0., 1.};
+  std::vector<double> repeats;  // the AUC of each
+  std::vector<double> null;     // of each permutation, sorted
+  double p = 1.;  // share of permutations, with what was found, that reach it; 1 without permutations
+  std::vector<double>
+      scores;  // of each cell, first sample first: mean over repeats where it was among the tested
+};
+
+/// Rows are cells, columns standardised features. Throws Error when a sample has fewer than four cells.
+Discrimination discriminate(const Eigen::MatrixXd& first, const Eigen::MatrixXd& second,
+                            Classifier classifier, const DiscriminatorOptions& options,
+                            Progress& progress = Progress::none());
+
+/// The smallest AUC above 0.5 that samples of these sizes tell from guessing in four of five cases, at a level of 5 %,
+/// one-sided (Hanley & McNeil 1982).
+double detectable_auc(std::size_t first, std::size_t second);
+
+/// The smallest |Cohen's d| of one feature among `features` that is found in four of five cases at a level of 5 % over
+/// all of them (two-sided, Bonferroni's bound, normal approximation).
+double detectable_effect(std::size_t first, std::size_t second, std::size_t features);
+
+}  // namespace forest::statistics

@@ -1,0 +1,108 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/statistics/protocol.h"
+
+#include <algorithm>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/random.h"
+
+namespace forest::statistics {
+namespace {
+
+/// Cells of one population: features that share a size of the cell, one of them of diameters, and a curve.
+FeatureTable cells(std::uint64_t seed, std::size_t count, double angle_shift = 0., double size_spread = 1.) {
+  FeatureTable t;
+  for (int f = 0; f < 12; ++f) t.features.push_back({"feature " + std::to_string(f), "µm", f >= 9});
+  t.values.resize(Eigen::Index(count), 12);
+  for (std::size_t i = 0; i < count; ++i) {
+    Random random(seed, i);
+    const double size = random.normal(0., size_spread);
+    t.cells.push_back(std::to_string(seed) + "-" + std::to_string(i));
+    for (Eigen::Index f = 0; f < 12; ++f)
+      t.values(Eigen::Index(i), f) = 10. + (f % 2 ? size : 0.) + random.normal() + (f < 3 ? angle_shift : 0.);
+    Curve curve;
+    for (int r = 0; r < 20; ++r) curve.push_back(std::max(0., (10. + size) * (20. - r) * r / 100.));
+    t.sholl.push_back(curve);
+  }
+  return t;
+}
+
+constexpr ProtocolOptions quick{.repeats = 8, .trees = 40, .dealings = 299, .resamples = 200, .seed = 3};
+
+const Criterion& criterion(const Judgement& j, std::string_view name) {
+  const auto at = std::ranges::find(j.criteria, name, &Criterion::name);
+  EXPECT_NE(at, j.criteria.end()) << name;
+  return *at;
+}
+
+TEST(Protocol, PassesCellsOfTheSamePopulationMostly) {
+  std::size_t asked = 0, passed = 0;
+  for (std::uint64_t trial = 0; trial < 10; ++trial) {
+    ProtocolOptions options = quick;
+    options.longest_run = 2;
+    const Judgement j =
+        judge(cells(10 + trial, 60), cells(30 + trial, 60), cells(50 + trial, 60), {}, options);
+    for (const Criterion& c : j.criteria) ++asked, passed += c.pass;
+  }
+  EXPECT_GT(double(passed), .85 * double(asked))
+      << "each is missed by real cells in about one of twenty cases";
+}
+
+TEST(Protocol, RejectsWhatIsShiftedAndSaysWhy) {
+  const std::vector<Control> controls{{"stretched", cells(4, 50, 1.5)}, {"the same", cells(5, 50)}};
+  const Judgement j = judge(cells(1, 50), cells(2, 40), cells(3, 70, 2.), controls, quick);
+  EXPECT_FALSE(j.pass);
+  EXPECT_EQ(j.compared, 50u);
+  EXPECT_EQ(j.train, 50u);
+  EXPECT_EQ(j.held_out, 40u);
+  EXPECT_EQ(j.grown, 70u);
+  EXPECT_GT(j.auc.structure.value, .9);
+  EXPECT_LT(j.auc.real_control.value, .65);
+  EXPECT_FALSE(criterion(j, "auc.structure").pass);
+  EXPECT_FALSE(criterion(j, "energy_p").pass);
+  EXPECT_FALSE(criterion(j, "mmd_p").pass);
+  EXPECT_FALSE(criterion(j, "ks_rejections").pass);
+  EXPECT_FALSE(criterion(j, "mvs_max").pass);
+  EXPECT_GE(j.ks_rejections.size(), 3u);
+  EXPECT_GT(j.mvs_max, .2);
+  ASSERT_EQ(j.controls.size(), 2u);
+  EXPECT_TRUE(j.controls[0].rejected);
+  EXPECT_GT(j.controls[0].auc.value, .8);
+  EXPECT_FALSE(j.controls[0].reasons.empty());
+  EXPECT_LT(j.controls[1].auc.value, .7);
+}
+
+TEST(Protocol, SeesCopiesAndLongRuns) {
+  ProtocolOptions options = quick;
+  options.longest_run = 7;
+  const FeatureTable train = cells(1, 40);
+  const Judgement j = judge(train, cells(2, 40), train, {}, options);
+  EXPECT_EQ(j.neighbour_ratio, 0.);
+  EXPECT_FALSE(criterion(j, "copying.neighbour_ratio").pass);
+  EXPECT_FALSE(criterion(j, "copying.longest_run").pass);
+  EXPECT_FALSE(j.pass);
+}
+
+TEST(Protocol,
+     SeesThatAllCellsAreAlike) {  // no differences between cells: the means are right, the spread is not
+  const Judgement j = judge(cells(1, 60), cells(2, 60), cells(3, 60, 0., 0.), {}, quick);
+  EXPECT_FALSE(j.pass);
+}
+
+TEST(Protocol, RefusesTooFewCellsAndUnlikeTables) {
+  EXPECT_THROW(judge(cells(1, 3), cells(2, 9), cells(3, 9), {}, quick), Error);
+  FeatureTable unlike = cells(3, 9);
+  unlike.features[0].name = "another";
+  EXPECT_THROW(judge(cells(1, 9), cells(2, 9), unlike, {}, quick), Error);
+}
+
+TEST(Protocol, JudgesAFewCellsAndSaysWhatTheyAllow) {
+  const Judgement j = judge(cells(1, 5), cells(2, 4), cells(3, 30), {}, quick);
+  EXPECT_EQ(j.compared, 5u);
+  EXPECT_GT(j.detectable_auc, .85);
+}
+
+}  // namespace
+}  // namespace forest::statistics

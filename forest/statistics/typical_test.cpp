@@ -1,0 +1,76 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/statistics/typical.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/random.h"
+
+namespace forest::statistics {
+namespace {
+
+FeatureTable cells(std::uint64_t seed, std::size_t count) {
+  FeatureTable t;
+  for (int f = 0; f < 30; ++f) t.features.push_back({"feature " + std::to_string(f), "", false});
+  t.values.resize(Eigen::Index(count), 30);
+  for (std::size_t i = 0; i < count; ++i) {
+    Random random(seed, i);
+    t.cells.push_back(std::to_string(i));
+    for (Eigen::Index f = 0; f < 30; ++f)
+      t.values(Eigen::Index(i), f) =
+          f % 3 ? random.normal() : std::exp(random.normal());  // some with long tails
+  }
+  return t;
+}
+
+TEST(Typicality, GivesEveryPEquallyOftenToCellsOfThePopulation) {
+  int small = 0, tiny = 0;
+  for (std::uint64_t trial = 0; trial < 300; ++trial) {
+    const Typicality t = typicality(cells(trial, 39), cells(10000 + trial, 1));
+    small += t.p_whole <= .1;
+    tiny += t.p <= .05;
+  }
+  EXPECT_NEAR(small, 30, 16);
+  EXPECT_LT(tiny, 28);  // at most 15 expected
+}
+
+TEST(Typicality, NamesTheMetricThatMakesACellAbnormal) {
+  FeatureTable cell = cells(77, 1);
+  cell.values(0, 7) = 9.;
+  const Typicality t = typicality(cells(1, 60), cell);
+  EXPECT_LE(t.p, .05);
+  EXPECT_EQ(t.oddities.front().feature.name, "feature 7");
+  EXPECT_TRUE(t.oddities.front().abnormal);
+  EXPECT_FALSE(t.oddities.back().abnormal);
+  EXPECT_GT(t.oddities.front().value, t.oddities.front().high);
+  EXPECT_EQ(t.cells, 60u);
+}
+
+TEST(Typicality, SeesACellThatIsABitOffInEverything) {
+  FeatureTable cell = cells(78, 1);
+  cell.values.array() += 1.6;
+  EXPECT_LE(typicality(cells(1, 60), cell).p, .05);
+}
+
+TEST(Typicality, SeesACellOfWhichLittleIsKnown) {
+  FeatureTable cell = cells(79, 1);
+  cell.values.leftCols(25).setConstant(std::nan(""));
+  const Typicality t = typicality(cells(1, 60), cell);
+  EXPECT_NEAR(t.p_missing, 1. / 61., 1e-12);
+  EXPECT_LE(t.p, .05);
+  EXPECT_GT(t.oddities.front().strangeness, 2.);  // "… is defined", which it is in all the others
+}
+
+TEST(Typicality, LeavesTheCellItselfOutOfItsPopulation) {
+  const FeatureTable all = cells(1, 20);
+  const std::array<std::size_t, 1> third{3};
+  EXPECT_EQ(typicality(all, rows_of(all, third)).cells, 19u);
+  EXPECT_THROW(typicality(cells(1, 4), cells(2, 1)), Error);
+}
+
+}  // namespace
+}  // namespace forest::statistics

@@ -1,0 +1,114 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest compare, typical, classify and judge: what they say of grown neurons, what they refuse, that a seed and not
+# the number of threads decides.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+source "$FOREST_SOURCE_DIR/tests/words.sh"
+
+$BRAINFOREST grow --grammar pyramidal --count 36 --seed 1 --out all >/dev/null
+mkdir one two three mixed
+n=0
+for file in all/*.swc; do
+  n=$((n + 1))
+  if [ $n -le 12 ]; then cp "$file" one/; elif [ $n -le 24 ]; then cp "$file" two/; else cp "$file" three/; fi
+done
+$BRAINFOREST grow --grammar purkinje --count 12 --seed 1 --out purkinje >/dev/null
+
+# Two kinds are told apart, two halves of one kind are not.
+quick="--repeats 5 --permutations 99"
+$BRAINFOREST compare one purkinje $quick --csv features.csv --report apart.html --json >apart.json
+told apart.json 'd["told_apart"] and d["random_forest"]["value"] > .95 and d["random_forest"]["p"] <= .02'
+told apart.json 'd["a"] == {"name": "one", "cells": 12} and d["b"]["name"] == "purkinje"'
+told apart.json 'd["metrics"][0]["p_holm"] < .01 and abs(d["metrics"][0]["cliffs_delta"]["value"]) == 1'
+told apart.json 'abs(sum(m["importance"] for m in d["metrics"]) - 1) < 1e-9'
+$BRAINFOREST compare one two $quick --json >same.json
+told same.json 'not d["told_apart"] and d["power"]["auc"] > .6 and d["energy"]["p"] > .05'
+$BRAINFOREST compare one two $quick >same.txt
+grep -q 'cannot be told apart by these cells' same.txt
+
+# The table that others judge by: a row a cell, groups, what depends on diameters marked.
+/usr/bin/python3 - <<'PY'
+import csv
+rows = list(csv.DictReader(open("features.csv", encoding="utf-8-sig")))
+assert len(rows) == 24 and {r["group"] for r in rows} == {"one", "purkinje"}, rows[0]
+assert "all total_length (µm)" in rows[0] and "all total_volume [diameters] (µm³)" in rows[0], list(rows[0])
+PY
+
+# A report is one file that loads nothing, and every plot in it is well-formed.
+report_holds() {  # file, least number of plots
+  /usr/bin/python3 - "$1" "$2" <<'PY'
+import re, sys
+import xml.etree.ElementTree as xml
+text = open(sys.argv[1], encoding="utf-8").read()
+plots = re.findall(r"<svg.*?</svg>", text, re.S)
+assert len(plots) >= int(sys.argv[2]), len(plots)
+for plot in plots:
+    xml.fromstring(plot)
+    assert "nan" not in re.sub(r">[^<]*<", "", plot).lower() and "inf" not in re.sub(r">[^<]*<", "", plot).lower(), plot[:300]
+assert not re.search(r'(src|href)\s*=|@import|url\(', text), "it loads something"
+PY
+}
+report_holds apart.html 5
+refuses 'is there' $BRAINFOREST compare one two $quick --report apart.html
+$BRAINFOREST compare one two $quick --report apart.html --force >/dev/null
+
+# A seed decides, threads do not.
+$BRAINFOREST compare one two $quick --seed 3 --threads 1 --json >first.json
+$BRAINFOREST compare one two $quick --seed 3 --threads 4 --json >second.json
+cmp first.json second.json
+
+# A repository gives the same as the files in it.
+$BRAINFOREST import one --repo cells.db --population one >/dev/null
+$BRAINFOREST import two --repo cells.db --population two >/dev/null
+$BRAINFOREST compare --repo cells.db --population one --with two $quick --seed 3 --json >stored.json
+cmp first.json stored.json
+fails_with 1 'few' $BRAINFOREST compare --repo cells.db --population one --with few
+fails_with 2 '--with' $BRAINFOREST compare --repo cells.db --population one
+fails_with 2 'two folders' $BRAINFOREST compare
+# Sisters are kept together; an expression that is none is bad usage.
+$BRAINFOREST compare one two $quick --slices '^[a-z]+-1-0000.' --json >sisters.json
+told sisters.json 'd["random_forest"]["value"] < .9 and d["a"]["cells"] == 12'
+fails_with 2 'no regular expression' $BRAINFOREST compare one two --slices '(['
+
+refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc
+
+# How typical: a cell of another kind is not, and it is said by what.
+$BRAINFOREST typical purkinje/*-00000.swc --population all --report typical.html --json >typical.json
+told typical.json 'd["p"] <= .09 and d["metrics"][0]["abnormal"] and d["cells"] == 36'
+report_holds typical.html 1
+$BRAINFOREST typical all/*-00003.swc --population all --json >member.json
+told member.json 'd["cells"] == 35 and 0 < d["p"] <= 1'  # the cell itself is no part of what it stands beside
+first=$(basename "$(ls one/*.swc | head -n 1)" .swc)
+$BRAINFOREST typical "$first" --repo cells.db --population one --json >stored.json
+told stored.json 'd["cells"] == 11'
+refuses 'fewer than five' $BRAINFOREST typical purkinje/*-00000.swc --population all/*-00001.swc
+fails_with 2 'population' $BRAINFOREST typical purkinje/*-00000.swc
+
+# Types: two kinds of neurons are found again.
+$BRAINFOREST classify all purkinje --csv types.csv --report types.html --json >types.json
+told types.json 'd["adjusted_rand"] > .9 and len(d["types"]) >= 2 and d["types"][0]["metrics"]'
+[ "$(wc -l <types.csv)" = 49 ]
+report_holds types.html 3
+$BRAINFOREST classify all purkinje --types 2 --threads 1 --json >first.json
+$BRAINFOREST classify all purkinje --types 2 --threads 4 --json >second.json
+cmp first.json second.json
+refuses 'into 20 types' $BRAINFOREST classify one --types 20
+fails_with 2 'files or --repo' $BRAINFOREST classify
+
+# The judge: cells of another kind are no passable growth; the controls say whether it could have seen.
+$BRAINFOREST judge --train one --held-out two --grown purkinje --repeats 3 --features judged.csv --report judged.html --json >judged.json
+told judged.json 'd["pass"] is False and d["auc"]["structure"]["value"] > .9 and d["ks_rejections"] > 0 and d["energy_p"] < .05'
+told judged.json 'list(d)[:10] == ["pass", "auc", "energy_p", "mmd_p", "ks_rejections", "mvs_max", "sholl_inside", "copying", "controls", "seeds"]'
+told judged.json 'set(d["controls"]) == {"burke", "stretched", "jittered"} and d["controls"]["burke"] is None'
+told judged.json '{"value", "lower", "upper"} <= set(d["auc"]["real_control"]) and d["copying"]["longest_run"] is None'
+report_holds judged.html 3
+/usr/bin/python3 - <<'PY'
+import csv
+groups = [r["group"] for r in csv.DictReader(open("judged.csv", encoding="utf-8-sig"))]
+assert [groups.count(g) for g in ("train", "held_out", "grown")] == [12, 12, 12], groups
+PY
+$BRAINFOREST judge --train one --held-out two --grown three --burke purkinje --repeats 3 --json >alike.json
+told alike.json 'd["auc"]["structure"]["value"] < .85 and d["controls"]["burke"]["rejected"] and d["mmd_p"] > .01'
+$BRAINFOREST judge --train one --held-out two --grown one --repeats 3 >copied.txt
+grep -q 'FAIL *copying.neighbour_ratio' copied.txt
+fails_with 2 'grown' $BRAINFOREST judge --train one --held-out two
