@@ -9,12 +9,17 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/parallel.h"
+#include "forest/fitting/burke.h"
+#include "forest/fitting/copying.h"
+#include "forest/lsystem/derive.h"
+#include "forest/lsystem/grow.h"
 #include "forest/morphology/transform.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/protocol.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
+#include "apps/cli/grammars.h"
 #include "apps/cli/judging.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
@@ -224,22 +229,62 @@ namespace {
 
 struct Options {
   std::vector<std::string> train, held_out, grown, parametric;
-  std::string repo, slices, kind = "dendrite";
+  std::string model, repo, slices, kind = "dendrite";
   std::filesystem::path features, report;
-  std::uint32_t repeats = 50;
+  std::uint32_t repeats = 50, count = 0;
   std::uint64_t seed = 0;
   bool force = false;
 };
 
+/// A grammar's file or built-in name, or a model of the repository.
+lsystem::Grammar model_of(const Options& options) {
+  return options.repo.empty() ? find_grammar(options.model) : grammar_of_model(options.repo, options.model);
+}
+
+Sample grown_from(const lsystem::Grammar& grammar, const std::string& name, std::size_t count,
+                  std::uint64_t seed, Console& console) {
+  Sample sample{.name = name, .cells = {}, .types = {}, .neurons = {}};
+  sample.neurons = lsystem::grow_population(grammar, count, seed, console.progress());
+  for (std::size_t i = 0; i < count; ++i) sample.cells.push_back(fmt::format("{}-{}-{:05}", name, seed, i));
+  return sample;
+}
+
+/// Of all grown neurons, the most branches in a row from one traced neuron, where the model tells.
+std::optional<std::size_t> longest_run_of(const lsystem::Grammar& grammar, std::size_t count,
+                                          std::uint64_t seed) {
+  std::optional<std::size_t> longest;
+  lsystem::Deriver deriver(grammar);
+  for (std::size_t i = 0; i < count; ++i)
+    longest = std::max(longest, fitting::longest_run(deriver.derive(seed, i), grammar));
+  return longest;
+}
+
 void run(const Options& options, Console& console) {
   const Sample train = read_sample(options.train, options.repo, console),
-               held_out = read_sample(options.held_out, options.repo, console),
-               grown = read_sample(options.grown, options.repo, console);
-  Sample parametric;
-  if (!options.parametric.empty()) parametric = read_sample(options.parametric, options.repo, console);
+               held_out = read_sample(options.held_out, options.repo, console);
+  Sample grown, parametric;
+  std::optional<std::size_t> longest_run;
+  if (options.model.empty()) {
+    grown = read_sample(options.grown, options.repo, console);
+  } else {
+    const lsystem::Grammar grammar = model_of(options);
+    const std::size_t count = options.count ? options.count : held_out.neurons.size();
+    grown = grown_from(grammar, grammar.name, count, options.seed, console);
+    longest_run = longest_run_of(grammar, count, options.seed);
+  }
+  if (!options.parametric.empty()) {
+    parametric = read_sample(options.parametric, options.repo, console);
+  } else if (!options.model
+                  .empty()) {  // the control that the protocol must reject, fitted to the same neurons
+    const std::string text = fitting::burke_grammar(
+        train.neurons, "burke", {.kinds = statistics::kind_set(options.kind), .seed = options.seed});
+    parametric =
+        grown_from(lsystem::parse(text, "burke"), "burke", held_out.neurons.size(), options.seed, console);
+  }
   const Judged judged =
-      judge_samples(train, held_out, grown, options.parametric.empty() ? nullptr : &parametric, options.kind,
-                    {.repeats = options.repeats, .seed = options.seed}, console, options.slices);
+      judge_samples(train, held_out, grown, parametric.neurons.empty() ? nullptr : &parametric, options.kind,
+                    {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
+                    options.slices);
   if (!options.features.empty())
     write_unless_there(options.features,
                        features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
@@ -262,8 +307,16 @@ std::function<void()> judge(CLI::App& command, Console& console) {
          "Neurons that the model was fitted to: files, folders, populations of --repo")
       ->required();
   sample("--held-out", options->held_out, "Neurons of the same population that it never saw")->required();
-  sample("--grown", options->grown, "Neurons that it grew")->required();
-  sample("--burke", options->parametric, "Neurons of a parametric model, which the protocol must reject");
+  CLI::Option_group* judged = command.add_option_group("judged", "what is judged");
+  CLI::Option* model = judged->add_option("--model", options->model,
+                                          "A model: a grammar's file, or with --repo its name there");
+  judged->add_option("--grown", options->grown, "Neurons that it grew")->type_name("FILES");
+  judged->require_option(1);
+  add_whole(command, "--count", options->count, "Neurons to grow; 0: as many as are held out", 0, 1'000'000);
+  command.get_option("--count")->needs(model);
+  sample(
+      "--burke", options->parametric,
+      "Neurons of a parametric model, which the protocol must reject; with --model one is fitted and grown");
   command.add_option("--repo", options->repo, "Take populations of this repository")->type_name("REPO");
   add_kind(command, options->kind);
   add_slices(command, options->slices);

@@ -87,7 +87,9 @@ std::span<const Verb> verbs() {
        "brainforest classify cells/ --csv types.csv --report types.html", classify},
       {"judge",
        "Judge whether grown neurons are indistinguishable from traced ones, which the model never saw",
-       "brainforest judge --train fitted/ --held-out others/ --grown grown/ --features features.csv", judge},
+       "brainforest judge --model like_them.lsys --train fitted/ --held-out others/ --report judged.html\n"
+       "  brainforest judge --grown grown/ --train fitted/ --held-out others/ --features features.csv",
+       judge},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"
        "  brainforest model edit pyramidal --repo cells.db\n"

@@ -51,6 +51,7 @@ struct Fork {
     std::vector<Point> points;
   };
   std::vector<Daughter> daughters;  // fewest tips first
+  bool turned = false;              // … though the one with more came first
 };
 
 // What is true of one kind of section of a neuron.
@@ -168,6 +169,7 @@ struct Traced {
                                   .length = all[d].length,
                                   .end_diameter = diameter_of(points(d).back()),
                                   .points = copy(d)});
+      fork.turned = fork.daughters.front().tips > fork.daughters.back().tips;
       std::ranges::stable_sort(fork.daughters, {}, &Fork::Daughter::tips);
       return fork;
     }
@@ -274,10 +276,14 @@ fork: Twig(kind, donor, tips, ahead, path, order, d) > ?P(px, py, pz) ?H(x, y, z
   -> Fork(kind, r, q, tips, path, order + 1, (mx < 0) + 2 * (mz < 0), d / calibres.d(q), longer(ahead, forks.ahead(r)))
 one: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 1
   -> Limb(kind, r, q, 0, tips, path, order, mirror, thick, scale)
-two: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 2
+two: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 2 & !forks.turned(r)
   { n = share(forks.n1(r), forks.tips(r), tips, 1) }
   -> [ Limb(kind, r, q, 0, n, path, order, mirror, thick, scale) ]
      [ Limb(kind, r, q, 1, tips - n, path, order, mirror, thick, scale) ]
+turned: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 2 & forks.turned(r)
+  { n = share(forks.n1(r), forks.tips(r), tips, 1) }
+  -> [ Limb(kind, r, q, 1, tips - n, path, order, mirror, thick, scale) ]
+     [ Limb(kind, r, q, 0, n, path, order, mirror, thick, scale) ]
 three: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 3
   { n = share(forks.n1(r), forks.tips(r), tips, 2), m = share(forks.n2(r), forks.tips(r), tips - n, 1) }
   -> [ Limb(kind, r, q, 0, n, path, order, mirror, thick, scale) ]
@@ -391,13 +397,13 @@ class Writer {
     widths("near_before", options_.depth, [](const Fork& f) { return f.depth; });
     put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the "
         "diameter are logarithms; heading and\n"
-        "# place, from the soma), and its daughters, fewest tips first: tips, lengths, paths beyond their "
-        "ends.\n"
+        "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
+        "lengths, paths beyond their ends.\n"
         "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
         "    hx ~ {}, hy ~ {}, hz ~ {}, side ~ near_side(kind), height ~ near_height(kind), before ~ "
         "near_before(kind){}\n"
-        "  -> donor, daughters, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3) =",
+        "  -> donor, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
@@ -406,7 +412,7 @@ class Writer {
       vector(f.heading, 1e3);
       put(" {} {} {}", rounded(f.side, 10.), rounded(f.height, 10.), rounded(f.depth, 10.));
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} {}", f.cell, f.daughters.size(), f.tips, rounded(f.ahead, 10.));
+      put(" -> {} {} {} {} {}", f.cell, f.daughters.size(), int(f.turned), f.tips, rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
           put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);

@@ -32,3 +32,14 @@ refuses 'needs two such neurons' $BRAINFOREST fit traced --kind axon -o axon.lsy
 printf 'mine\n' >kept.lsys
 refuses '--force' $BRAINFOREST fit traced -o kept.lsys
 grep -q mine kept.lsys
+
+# The judge grows from the model and fits the control that it must reject.
+$BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
+$BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --repeats 2 --json >judged.json
+python3 - <<'PY'
+import json
+judged = json.load(open("judged.json"))
+assert judged["cells"]["grown"] == 10, judged["cells"]
+assert judged["copying"]["longest_run"] == 1, judged["copying"]
+assert judged["controls"]["burke"]["rejected"] in (True, False)
+PY
