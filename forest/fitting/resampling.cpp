@@ -46,6 +46,11 @@ struct Fork {
   double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
   double side, height, depth;                 // from the soma: across, above and before it, µm
   Vec3 heading;
+  // How far to the right of the way out from the soma it heads, in the plane of the slice.
+  double lean() const {
+    return (side * double(heading.y()) - height * double(heading.x())) /
+           std::max(1., std::hypot(side, height, depth));
+  }
   struct Daughter {
     double tips, ahead, length, end_diameter;
     std::vector<Point> points;
@@ -260,20 +265,22 @@ stem: Plan(i) : i < cells.stems(me)
     r = stems(kind, me, log(tips), log(ahead), log(plans.length(p)), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, turn, bending(s, styles(stems.donor(r), kind)), p)
+       Trace(stems, r, 0, scale, 0, 0, bending(s, styles(stems.donor(r), kind)), p)
        Twig(kind, stems.donor(r), tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
 
-# A branch with one tip to come ends; another forks, or goes on as another section. Left and right, before and behind are alike.
+# A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
+# neuron may lie anywhere between the faces of its slice.
 end: Twig(kind, donor, tips, ahead, path, order, d) : tips < 2 ->
 fork: Twig(kind, donor, tips, ahead, path, order, d) > ?P(px, py, pz) ?H(x, y, z)
-  { s = styles(me, kind), mx = if(chance(0.5), 1, -1), mz = if(chance(0.5), 1, -1),
-    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z * mz, px * mx, py, pz * mz@style),
+  { s = styles(me, kind), mx = if(chance(0.5), 1, -1),
+    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
+      mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz@style),
     q = calibres(kind, forks.daughters(r), log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)),
       log(d), styles.tip(s) + 0.1 * own_girth, kept * styles.girth(s) + own_girth,
       kept * styles.thinning(s) + own_thinning) }
-  -> Fork(kind, r, q, tips, path, order + 1, (mx < 0) + 2 * (mz < 0), d / calibres.d(q), longer(ahead, forks.ahead(r)))
+  -> Fork(kind, r, q, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)))
 one: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 1
   -> Limb(kind, r, q, 0, tips, path, order, mirror, thick, scale)
 two: Fork(kind, r, q, tips, path, order, mirror, thick, scale) : forks.daughters(r) == 2 & !forks.turned(r)
@@ -303,7 +310,8 @@ class Writer {
  public:
   Writer(const Traced& traced, const std::string& title, const Resampling& options)
       : traced_(traced), options_(options) {
-    for (const char* name : style_names) kernels_ += fmt::format(", {} ~ {}", name, options.style);
+    for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
+      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s], (s == grain ? .3 : 1.) * options.style);
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
         traced.cells.size(), traced.forks.size(), title);
     cells();
@@ -370,7 +378,7 @@ class Writer {
 
   void stems() {
     put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
-        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.35, hy ~ 0.35, hz ~ {}, "
+        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, "
         "d ~ 0.3{}\n  -> donor, ahead, length) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
@@ -401,16 +409,19 @@ class Writer {
         "lengths, paths beyond their ends.\n"
         "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, side ~ near_side(kind), height ~ near_height(kind), before ~ "
+        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
+        "before ~ "
         "near_before(kind){}\n"
         "  -> donor, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3) =",
-        options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across, kernels_);
+        options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
+        options_.lean, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
       put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead),
           rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
-      put(" {} {} {}", rounded(f.side, 10.), rounded(f.height, 10.), rounded(f.depth, 10.));
+      put(" {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.side, 10.), rounded(f.height, 10.),
+          rounded(f.depth, 10.));
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
       put(" -> {} {} {} {} {}", f.cell, f.daughters.size(), int(f.turned), f.tips, rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {

@@ -26,6 +26,7 @@ struct Resampling {
   double path = 1., order = 2., diameter = .5, height = .6,
          depth = .2;                          // in standard deviations among the forks of a kind
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
+  double lean = .12;                          // of how far aside of the way out it heads
   double style = .65;                         // in standard deviations among the neurons
   double smoothing = .4;                      // of a neuron's style: 0 takes that of a traced neuron as it is
 };
