@@ -110,6 +110,16 @@ std::vector<const Difference*> telling(const Comparison& c, const FeatureTable& 
   return chosen;
 }
 
+std::vector<std::vector<std::string>> rows_of_tests(const Comparison& c) {
+  return {{"random forest, all features", shown(c.forest.auc), shown_p(c.forest.p)},
+          {"random forest, structure", shown(c.structure.auc), "-"},
+          {"logistic regression, all features", shown(c.logistic.auc), shown_p(c.logistic.p)},
+          {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
+          {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
+          {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
+          {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}};
+}
+
 std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& tables,
                       const std::array<std::string, 2>& names, const Options& options) {
   const FeatureTable all = stacked(tables), whole = completed(all);
@@ -132,14 +142,7 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
           "are dealt to the two populations at random. Of these numbers of cells an area of {:.2f} would "
           "be seen in four of five cases.",
           c.detectable_auc));
-  report.table({"test", "result", "p"},
-               {{"random forest, all features", shown(c.forest.auc), shown_p(c.forest.p)},
-                {"random forest, structure", shown(c.structure.auc), "-"},
-                {"logistic regression, all features", shown(c.logistic.auc), shown_p(c.logistic.p)},
-                {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
-                {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
-                {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
-                {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}});
+  report.table({"test", "result", "p"}, rows_of_tests(c));
 
   report.heading("By what?");
   std::vector<IntervalRow> rows;
@@ -254,14 +257,7 @@ void run(const Options& options, Console& console) {
   console.print(json_of(c, names, options));
   console.say(sentence(c, names[0], names[1]));
   console.say("");
-  console.table({"test", "result", "p"},
-                {{"random forest, all features", shown(c.forest.auc), shown_p(c.forest.p)},
-                 {"random forest, structure", shown(c.structure.auc), "-"},
-                 {"logistic regression", shown(c.logistic.auc), shown_p(c.logistic.p)},
-                 {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
-                 {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
-                 {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
-                 {"Sholl inside the band", fmt::format("{:.0f} % of radii", 100. * c.sholl_inside), "-"}});
+  console.table({"test", "result", "p"}, rows_of_tests(c));
   console.say("");
   std::vector<std::vector<std::string>> lines;
   for (const Difference* d : telling(c, completed(stacked(tables)), 12)) lines.push_back(row_of(*d));

@@ -9,17 +9,15 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
-#include "forest/core/parallel.h"
 #include "forest/fitting/burke.h"
 #include "forest/fitting/hillman.h"
-#include "forest/io/format.h"
 #include "forest/repository/repository.h"
 #include "forest/statistics/segment_families.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
-#include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
+#include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -38,47 +36,6 @@ struct Options {
   std::filesystem::path grammar;  // to write
   std::string form = "burke";
 };
-
-std::vector<Morphology> cells_of(const Options& options, Console& console) {
-  std::vector<std::string> errors;
-  std::vector<Morphology> cells;
-  if (!options.repo.empty()) {
-    using namespace repository;
-    const Repository repository = Repository::open(options.repo, Access::read);
-    for (const NeuronRow& row : pick_neurons(repository, {}, options.population))
-      cells.push_back(repository.morphology(row.id));
-    if (cells.empty())
-      throw Error(fmt::format("{} holds no neuron; import or grow some first", options.repo));
-    return cells;
-  }
-  const auto files = neuron_files(options.files, console);
-  cells.resize(files.size()), errors.resize(files.size());
-  std::vector<char> read(files.size(), 0), skipped(files.size(), 0);
-  console.progress().begin("reading", files.size());
-  parallel_for(files.size(), 1, [&](std::size_t i) {
-    try {
-      cells[i] = io::read(files[i]).morphology;
-      read[i] = 1;
-    } catch (const Error& error) {
-      errors[i] = error.what();
-      skipped[i] = may_skip(error, files[i], options.files);
-    }
-    console.progress().advance();
-  });
-  console.progress().end();
-  std::vector<Morphology> good;
-  std::size_t failed = 0;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    if (read[i]) good.push_back(std::move(cells[i]));
-    if (!errors[i].empty()) console.warn(skipped[i] ? errors[i] + "; skipped" : errors[i]);
-    failed += !read[i] && !skipped[i];
-  }
-  if (failed)  // distributions of a part would be taken for those of all
-    throw Error(
-        fmt::format("{} of {} neurons could not be read; mend them or leave them out", failed, files.size()));
-  if (good.empty()) throw Error("no neuron could be read, so nothing was fitted");
-  return good;
-}
 
 std::string shown(double value) { return std::isnan(value) ? "-" : fmt::format("{:.4g}", value); }
 
@@ -190,7 +147,9 @@ Json json_of(const SegmentFamilies& f) {
 void run(const Options& options, Console& console) {
   const KindSet kinds = kind_set(options.kind);
   const Given by = *given_of(options.by);
-  const std::vector<Morphology> cells = cells_of(options, console);
+  const Sample sample = options.repo.empty() ? read_sample(options.files, "", console)
+                                             : read_sample({options.population}, options.repo, console);
+  const std::vector<Morphology>& cells = sample.neurons;
   const SegmentFamilies families =
       segment_families(cells,
                        {.kinds = kinds,

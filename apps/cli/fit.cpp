@@ -7,16 +7,14 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
-#include "forest/core/parallel.h"
 #include "forest/fitting/resampling.h"
-#include "forest/io/format.h"
 #include "forest/lsystem/grammar.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
-#include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
+#include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -30,28 +28,12 @@ struct Options {
   bool force = false;
 };
 
-std::vector<Morphology> read_neurons(const Options& options, Console& console) {
-  std::vector<Morphology> neurons;
-  if (!options.files.empty()) {
-    const auto files = neuron_files(options.files, console);
-    neurons.resize(files.size());
-    console.progress().begin("reading", files.size());
-    parallel_for(files.size(), 1, [&](std::size_t i) {
-      neurons[i] = io::read(files[i]).morphology;
-      console.progress().advance();
-    });
-    console.progress().end();
-    return neurons;
-  }
-  const auto repository = repository::Repository::open(options.repo, repository::Access::read);
-  for (const auto& row : pick_neurons(repository, {}, options.population))
-    neurons.push_back(repository.morphology(row.id));
-  return neurons;
-}
-
 void run(const Options& options, Console& console) {
-  const std::vector<Morphology> neurons = read_neurons(options, console);
-  const std::string of = options.files.empty() ? options.population : options.files.front();
+  const bool files = !options.files.empty();
+  const Sample sample = read_sample(files ? options.files : std::vector{options.population},
+                                    files ? "" : options.repo, console);
+  const std::vector<Morphology>& neurons = sample.neurons;
+  const std::string& of = sample.name;
   fitting::Resampling resampling = options.resampling;
   resampling.kinds = {};
   for (const std::string& word : options.kinds)

@@ -69,7 +69,7 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
   }
   if (failed)  // a comparison of some of the cells would look like one of all
     throw Error(
-        fmt::format("{} of {} files could not be read; mend them or leave them out", failed, files.size()));
+        fmt::format("{} of {} neurons could not be read; mend them or leave them out", failed, files.size()));
   return sample;
 }
 
