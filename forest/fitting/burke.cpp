@@ -238,28 +238,18 @@ std::string text_of(const KindModel& m) {
   return t + text_of(m.stems, *m.form, fmt::format("Tip_{}(d, 0)", k));
 }
 
-std::string text_of(const std::vector<KindModel>& kinds, const Values& somata, std::size_t cells,
-                    const std::string& name, double step) {
-  double steps = 0., modules = 0.;
-  std::string axiom, parts;
-  for (const KindModel& m : kinds) {
-    const double long_way = m.extent / step + 3. + double(*std::ranges::max_element(m.stems.counts));
-    steps = std::max(steps, long_way);
-    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_abreast, 5));
-    axiom += fmt::format(" Stems_{0}(stems_{0})", m.form->suffix);
-    parts += text_of(m);
-  }
-  // The axiom needs the modules and cells above it, so it stands last.
-  return fmt::format(
-      "# Estimated from {} traced cells: what a branch does next depends on its diameter alone, after Burke, "
-      "Marks &\n"
-      "# Ulfhake, J Neurosci 12:2403 (1992). Chances are by µm of branch, by maximum likelihood; lengths are "
-      "µm.\n"
-      "title: {} (after Burke, Marks & Ulfhake 1992)\n"
-      "steps: {:.0f}\nlimit: {:.0f}\n\n#define dL {}  # µm grown in a step\n{}cell soma = "
-      "soma_diameter()\n{}\naxiom: Soma(soma){}\n",
-      cells, title_of(name), std::clamp(std::ceil(steps), 1., 1e6), std::clamp(modules, 1e5, 1e8),
-      number_text(step), drawn_as("soma_diameter", somata, {"truncnormal", "normal"}), parts, axiom);
+std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, std::size_t cells,
+                    const std::string& name) {
+  std::vector<Part> parts;
+  for (const KindModel& m : kinds)
+    parts.push_back({*m.form, m.stems, m.most_abreast, m.extent / shared.step + 3., text_of(m)});
+  return assembled(fmt::format("# Estimated from {} traced cells: what a branch does next depends on its "
+                               "diameter alone, after Burke, Marks &\n"
+                               "# Ulfhake, J Neurosci 12:2403 (1992). Chances are by µm of branch, by "
+                               "maximum likelihood; lengths are µm.\n",
+                               cells),
+                   title_of(name) + " (after Burke, Marks & Ulfhake 1992)", "µm grown in a step", shared,
+                   parts);
 }
 
 }  // namespace
@@ -273,7 +263,7 @@ std::string burke_grammar(std::span<const Morphology> cells, const std::string& 
     KindModel model = measured(cells, form, shared.step);
     if (model.sections > 0 && !model.girths.empty()) kinds.push_back(std::move(model));
   }
-  const auto text = [&] { return text_of(kinds, shared.somata, cells.size(), name, shared.step); };
+  const auto text = [&] { return text_of(kinds, shared, cells.size(), name); };
   std::vector<Correction*> corrections;
   for (KindModel& m : kinds) corrections.push_back(&m.correction);
   correct(corrections, text, options.rounds, options.seed);

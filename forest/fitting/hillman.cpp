@@ -111,27 +111,16 @@ std::string text_of(const KindModel& m) {
 
 std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, std::size_t cells,
                     const std::string& name) {
-  double steps = 0., modules = 0.;
-  std::string axiom, parts;
-  for (const KindModel& m : kinds) {
-    const double long_way =
-        3. * m.extent / shared.step + 200. + double(*std::ranges::max_element(m.stems.counts));
-    steps = std::max(steps, long_way);
-    modules += 10. * long_way * 4. * double(std::max<std::size_t>(m.most_abreast, 5));
-    axiom += fmt::format(" Stems_{0}(stems_{0})", m.form->suffix);
-    parts += text_of(m);
-  }
-  return fmt::format(
-      "# Estimated from {} traced cells in the parameters of Hillman (1979), as L-Neuron grows by them "
-      "(Ascoli & Krichmar,\n"
-      "# Neurocomputing 32:1003, 2000): a branch forks when it is still thicker than a threshold. Lengths "
-      "are µm.\n"
-      "title: {} (after Hillman 1979 and Ascoli & Krichmar 2000)\n"
-      "steps: {:.0f}\nlimit: {:.0f}\n\n#define dL {}  # µm between points\n{}cell soma = "
-      "soma_diameter()\n{}\naxiom: Soma(soma){}\n",
-      cells, title_of(name), std::clamp(std::ceil(steps), 1., 1e6), std::clamp(modules, 1e5, 1e8),
-      number_text(shared.step), drawn_as("soma_diameter", shared.somata, {"truncnormal", "normal"}), parts,
-      axiom);
+  std::vector<Part> parts;
+  for (const KindModel& m : kinds)
+    parts.push_back({*m.form, m.stems, m.most_abreast, 3. * m.extent / shared.step + 200., text_of(m)});
+  return assembled(fmt::format("# Estimated from {} traced cells in the parameters of Hillman (1979), as "
+                               "L-Neuron grows by them (Ascoli & Krichmar,\n"
+                               "# Neurocomputing 32:1003, 2000): a branch forks when it is still thicker "
+                               "than a threshold. Lengths are µm.\n",
+                               cells),
+                   title_of(name) + " (after Hillman 1979 and Ascoli & Krichmar 2000)", "µm between points",
+                   shared, parts);
 }
 
 }  // namespace

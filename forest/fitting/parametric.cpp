@@ -226,6 +226,25 @@ Cells cells_of(std::span<const Morphology> cells, KindSet kinds, const std::stri
   return out;
 }
 
+std::string assembled(const std::string& comment, const std::string& title, const std::string& piece,
+                      const Cells& shared, std::span<const Part> parts) {
+  double steps = 0., modules = 0.;
+  std::string axiom, texts;
+  for (const Part& p : parts) {
+    const double long_way = p.steps + double(*std::ranges::max_element(p.stems.counts));
+    steps = std::max(steps, long_way);
+    modules += 10. * long_way * 4. * double(std::max<std::size_t>(p.most_abreast, 5));
+    axiom += fmt::format(" Stems_{0}(stems_{0})", p.form.suffix);
+    texts += p.text;
+  }
+  return fmt::format(
+      "{}title: {}\nsteps: {:.0f}\nlimit: {:.0f}\n\n#define dL {}  # {}\n{}cell soma = soma_diameter()\n{}\n"
+      "axiom: Soma(soma){}\n",
+      comment, title, std::clamp(std::ceil(steps), 1., 1e6), std::clamp(modules, 1e5, 1e8),
+      statistics::number_text(shared.step), piece,
+      drawn_as("soma_diameter", shared.somata, {"truncnormal", "normal"}), texts, axiom);
+}
+
 void correct(std::span<Correction*> kinds, const std::function<std::string()>& text, int rounds,
              std::uint64_t seed) {
   constexpr std::size_t grown = 80;

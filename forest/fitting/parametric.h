@@ -59,6 +59,20 @@ struct Cells {                 // what all kinds of a population share
 /// Throws Error when there is no section of these kinds.
 Cells cells_of(std::span<const Morphology> cells, statistics::KindSet kinds, const std::string& name);
 
+/// What a grammar needs of one kind.
+struct Part {
+  const Form& form;
+  const Stems& stems;
+  std::size_t most_abreast;  // branches, in any cell
+  double steps;              // of growth, those of the stems aside
+  std::string text;          // its declarations and productions
+};
+/// The grammar of a population: the comment and the title it begins with, what is shared, its parts, and the axiom, which needs the
+/// modules and cells above it and so stands last.
+/// @param piece  what the shared step is
+std::string assembled(const std::string& comment, const std::string& title, const std::string& piece,
+                      const Cells& shared, std::span<const Part> parts);
+
 /// One kind whose number of tips is to be `tips`: `more` multiplies what makes it fork.
 struct Correction {
   SectionKind kind;
