@@ -83,14 +83,20 @@ struct Repository::Impl {
 
   void undo() noexcept;
 
+  /// Stores what waits to be stored together with more of its kind.
+  void settle() const {
+    if (insert) insert->finish();
+  }
+
   /// Calls `body` in the open transaction or one of its own; one of its own is committed, or undone when
-  /// `body` throws.
+  /// `body` throws. With `settled`, all that was stored before can be seen by `body`.
   template <class Body>
-  auto write(Body&& body) {
+  auto write(Body&& body, bool settled = true) {
     return guarded([&] {
       if (writing) {
         if (failed) throw Error(place + ": the open transaction has failed before; begin another");
         try {
+          if (settled) settle();
           return body();
         } catch (const soci::soci_error&) {
           failed = true;
@@ -101,6 +107,7 @@ struct Repository::Impl {
       writing = true;
       try {
         auto result = body();
+        settle();
         sql << "commit";
         writing = false;
         return result;
@@ -124,7 +131,10 @@ struct Repository::Impl {
           }
         }
       };
-      if (!writing) database->begin_reading();
+      if (writing)
+        settle();
+      else
+        database->begin_reading();
       const End end{writing ? nullptr : &sql};
       return body();
     });

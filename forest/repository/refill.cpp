@@ -35,6 +35,7 @@ void Repository::Impl::refill_shapes() {
     all.packed_points = packed(m.points(), runs_of(all.rows));
     all.run_shape();
   }
+  all.finish();
   sql << "drop table old_sections";
 }
 
@@ -64,6 +65,7 @@ void Repository::Impl::refill_metrics() {
       all.run_metrics();
     }
   }
+  all.finish();
 }
 
 /// Before version 4 the text of a grammar was one line.

@@ -86,7 +86,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
   Prepared::Data& data = *prepared.data_;
   const std::uint64_t sum = data.sum;
 
-  return impl.write([&] {
+  const auto store = [&]() -> Added {
     if (!impl.insert) impl.insert = std::make_unique<Statements>(*impl.database);
     Statements& insert = *impl.insert;
     insert.fingerprint = fingerprint(neuron.provenance, sum);
@@ -133,7 +133,8 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
                         shown(neuron.population), shown(neuron.name)));
       insert.name = fmt::format("{}-{}", neuron.name, number++);
     }
-  });
+  };
+  return impl.write(store, false);  // it asks for no metrics
 }
 
 Repository::Transaction Repository::begin() {
@@ -156,6 +157,7 @@ void Repository::Transaction::commit() {
   Impl& impl = *impl_;
   impl.guarded([&] {
     if (impl.failed) throw Error(impl.place + ": the transaction has failed and is undone; begin another");
+    impl.settle();
     impl.sql << "commit";  // when this throws, the destructor undoes
   });
   impl.writing = false;

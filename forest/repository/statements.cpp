@@ -108,7 +108,7 @@ Statements::Statements(Database& database)
   sections_.with_whole("length_pm", s.length).with_whole("area_nm2", s.area);
   sections_.with_whole("start_diameter_pm", s.start_diameter).with_whole("end_diameter_pm", s.end_diameter);
   sections_.with_whole("end_x_pm", s.end_x).with_whole("end_y_pm", s.end_y).with_whole("end_z_pm", s.end_z);
-  metrics_.with("neuron", id).with("metric", rows.metric).with("value", rows.metric_value);
+  metrics_.with("neuron", metric_neuron_).with("metric", metric_).with("value", metric_value_);
   spines_.with("neuron", id).with("number", numbers_).with("section", spine_section_);
   constexpr const char* spine_columns[] = {"position", "head_x",        "head_y",
                                            "head_z",   "head_diameter", "neck_diameter"};
@@ -145,10 +145,35 @@ void Statements::run_shape() {
   run_metrics();
 }
 
-void Statements::run_metrics() { metrics_.run(rows.metric.size()); }
+void Statements::wait_metrics() {
+  for (std::size_t i = 0; i < rows.metric.size(); ++i)
+    waiting_.push_back({rows.metric[i], id, rows.metric_value[i]});
+}
+
+void Statements::run_metrics() {
+  constexpr std::size_t enough = 1 << 16;  // a megabyte
+  wait_metrics();
+  if (waiting_.size() >= enough) finish();
+}
+
+void Statements::finish() {
+  take_waiting();
+  metrics_.run(metric_.size());
+}
+
+void Statements::take_waiting() {
+  std::ranges::stable_sort(waiting_, {}, &Value::metric);
+  metric_.clear(), metric_neuron_.clear(), metric_value_.clear();
+  for (const Value& v : waiting_) {
+    metric_.push_back(v.metric);
+    metric_neuron_.push_back(v.neuron);
+    metric_value_.push_back(v.value);
+  }
+  waiting_.clear();
+}
 
 std::string Statements::deviation(Database& database, const Morphology& m) {
-  fill(m), fill_shape();
+  fill(m), fill_shape(), wait_metrics(), take_waiting();
   number(std::max(rows.arbors.size(), rows.spines.size()));
   struct Part {
     const Insert& insert;

@@ -35,7 +35,11 @@ class Statements {
 
   /// What version 2 of the tables keeps otherwise than version 1: points, sections, metrics.
   void run_shape();
+
+  /// Metrics wait until those of some hundred neurons are there: their table is in the order of metrics, and a neuron's values
+  /// alone would each go to another page.
   void run_metrics();
+  void finish();  // stores those that wait; before they are asked for, and before the end of the transaction
 
   /// What the tables hold otherwise than this neuron, of all that follows from its points: "length of sections is 1 in row 2,
   /// not 14.5", and how much more there is. Empty when nothing is.
@@ -46,6 +50,16 @@ class Statements {
   void number(std::size_t count);
   void fill(const Morphology& m);
   void fill_shape();
+  void wait_metrics();
+  void take_waiting();
+
+  struct Value {
+    int metric, neuron;
+    double value;
+  };
+  std::vector<Value> waiting_;
+  Ints metric_, metric_neuron_;  // those that no longer wait, as columns
+  Reals metric_value_;
 
   int stems_ = 0, section_count_ = 0, point_count_ = 0, spine_count_ = 0, packing_ = 0;
   double length_ = 0., area_ = 0.;
