@@ -7,6 +7,9 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/random.h"
+#include "forest/fitting/copying.h"
+#include "forest/lsystem/derive.h"
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/measure.h"
 #include "forest/statistics/metric.h"
@@ -70,14 +73,20 @@ TEST(Resampling, TheSameNeuronsGiveTheSameText) {
   EXPECT_NE(lsystem::grow(grammar, 1, 5), lsystem::grow(grammar, 1, 6));
 }
 
-TEST(Resampling, TakesNoTwoBranchesInARowFromOneNeuron) {
+TEST(Resampling, TakesThreeBranchesInARowFromOneNeuronAtMost) {
   const std::vector<Morphology> models = traced(8);
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  lsystem::Deriver deriver(grammar);
+  std::size_t longest = 0;
+  for (std::uint64_t i = 0; i < 100; ++i)
+    longest = std::max(longest, longest_run(deriver.derive(2, i), grammar).value_or(0));
+  EXPECT_EQ(longest, 3u);  // they do go on as in the neuron that they come from
+
+  // A fork that is drawn anew comes from another neuron than the branch it ends.
   const auto& samples = grammar.lookups.samples;
   const auto forks = std::ranges::find(samples, "forks", &lsystem::Sample::name);
   ASSERT_NE(forks, samples.end());
-  std::size_t donor = 0;
-  while (forks->outcomes[donor] != "donor") ++donor;
+  const auto donor = std::size_t(std::ranges::find(forks->outcomes, "donor") - forks->outcomes.begin());
   Random random(1);
   std::vector<double> wanted(forks->conditions.size(), 0.);
   wanted[0] = 3.;
@@ -85,6 +94,25 @@ TEST(Resampling, TakesNoTwoBranchesInARowFromOneNeuron) {
     wanted[1] = cell;
     for (int i = 0; i < 20; ++i) EXPECT_NE(forks->outcome(forks->draw(wanted, random), donor), double(cell));
   }
+}
+
+TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
+  const std::vector<Morphology> models = traced(12);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const auto stems = [](std::span<const Morphology> neurons) {
+    std::vector<Vec3> places;
+    for (const Morphology& n : neurons) {
+      const Point first = n.points(n.roots()[0]).front(), soma = n.soma().sphere();
+      places.push_back(first.position() - soma.position());
+    }
+    return places;
+  };
+  const std::vector<Vec3> theirs = stems(models), grown = stems(lsystem::grow_population(grammar, 24, 5));
+  for (const Vec3& place : theirs)
+    for (std::size_t half : {0, 12})
+      EXPECT_EQ(std::ranges::count_if(std::span(grown).subspan(half, 12),
+                                      [&](const Vec3& g) { return (g - place).norm() < .02f; }),
+                1);
 }
 
 TEST(Resampling, TooFewNeuronsAreRefused) {

@@ -286,8 +286,10 @@ class Turtle {
     const Eigen::Vector3d before = mirrored(t.heading), heading = state_.frame.col(0), from = state_.position;
     const double across = before.x() * heading.y() - before.y() * heading.x(),
                  along = before.x() * heading.x() + before.y() * heading.y();
+    // Two that head nearly along z hardly have an angle about it.
+    const double level = before.head<2>().norm() * heading.head<2>().norm();
     const Eigen::Quaterniond turn(
-        Eigen::AngleAxisd(turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+        Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
     if (answers_) {
