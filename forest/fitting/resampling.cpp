@@ -68,7 +68,8 @@ struct Manner {
 };
 
 struct Cell {
-  double soma = 0.;  // diameter, µm
+  double soma = 0.;    // diameter, µm
+  double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
   std::map<int, Manner> kinds;
   std::vector<Stem> stems;
 };
@@ -91,13 +92,23 @@ Vec3 start_heading(std::span<const Point> points) {
 
 double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
 
+// Of a section in the tree of its kind.
+struct Place {
+  std::int32_t parent =
+      -1;  // none for a stem, which leaves the soma, a section of another kind, or where a fibre begins
+  double path = 0., order = 0.;  // of its end, and of itself, counted from the stem
+  double beyond = 0.;            // path from its end to its farthest tip, µm
+  double tips = 0.;
+  std::vector<std::uint32_t> daughters = {};
+};
+
 /// What is learned from: forks and stems of all neurons, and what each neuron is like.
 struct Traced {
   std::vector<Cell> cells;
   std::vector<Fork> forks;
 
   void take(const Morphology& neuron, const Resampling& options) {
-    if (neuron.soma().kind != SomaKind::none) learn(Arbors(neuron, options.kinds));
+    if (!neuron.roots().empty()) learn(Arbors(neuron, options.kinds));
   }
 
  private:
@@ -109,33 +120,46 @@ struct Traced {
     const Arbors& arbors;
     const Vec3 soma = arbors.origin().position();
     std::span<const Branch> all = arbors.sections();
-    std::vector<double> beyond =
-        std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
-    std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
+    std::vector<Place> places = std::vector<Place>(all.size());
 
     Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
 
     int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
+    // A root of one point, from which others leave: no branch.
+    bool begins(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
     bool drawn(std::uint32_t i) const { return points(i).size() >= 2 && all[i].length > 0.; }
     std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
 
     void learn() {
-      for (std::size_t i = all.size(); i-- > 0;)
-        if (all[i].parent >= 0) {
-          double& above = beyond[std::size_t(all[i].parent)];
-          above = std::max(above, all[i].length + beyond[i]);
+      for (std::uint32_t i = 0; i < all.size(); ++i) {
+        Place& place = places[i];
+        place.path = all[i].length;
+        if (const std::int32_t above = all[i].parent; above >= 0 &&
+                                                      kind_of(all[i]) == kind_of(all[std::size_t(above)]) &&
+                                                      !begins(std::uint32_t(above))) {
+          Place& parent = places[std::size_t(above)];
+          place.parent = above, place.path += parent.path, place.order = parent.order + 1.;
+          parent.daughters.push_back(i);
         }
-      for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (all[i].parent >= 0) daughters[std::size_t(all[i].parent)].push_back(i);
+      }
+      for (std::size_t i = all.size(); i-- > 0;) {
+        Place& place = places[i];
+        if (place.daughters.empty()) place.tips = 1.;
+        if (place.parent < 0) continue;
+        Place& above = places[std::size_t(place.parent)];
+        above.tips += place.tips;
+        above.beyond = std::max(above.beyond, all[i].length + place.beyond);
+      }
       Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
+      if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (all[i].parent < 0 && !arbors.neuron().section(all[i].id).parent.valid() && drawn(i))
-          cell.stems.push_back(stem(i));
+        if (places[i].parent < 0 && drawn(i)) cell.stems.push_back(stem(i));
       if (cell.stems.empty()) return;
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (!daughters[i].empty() && daughters[i].size() <= most_daughters &&
-            std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); }))
+        if (const auto& daughters = places[i].daughters;
+            !daughters.empty() && daughters.size() <= most_daughters &&
+            std::ranges::all_of(daughters, [&](std::uint32_t d) { return drawn(d); }))
           traced.forks.push_back(fork(i));
       traced.cells.push_back(std::move(cell));
     }
@@ -144,8 +168,8 @@ struct Traced {
       const Branch& b = all[i];
       return {.cell = traced.cells.size(),
               .kind = kind_of(b),
-              .tips = double(b.degree),
-              .ahead = b.length + beyond[i],
+              .tips = places[i].tips,
+              .ahead = b.length + places[i].beyond,
               .length = b.length,
               .end_diameter = diameter_of(points(i).back()),
               .place = points(i).front().position() - soma,
@@ -158,19 +182,19 @@ struct Traced {
       const Vec3 place = points(i).back().position() - soma;
       Fork fork{.cell = traced.cells.size(),
                 .kind = kind_of(b),
-                .tips = double(b.degree),
-                .ahead = beyond[i],
-                .path = b.path_distance,
-                .order = double(arbors.neuron().order(b.id)),
+                .tips = places[i].tips,
+                .ahead = places[i].beyond,
+                .path = places[i].path,
+                .order = places[i].order,
                 .diameter = diameter_of(points(i).back()),
                 .side = double(place.x()),
                 .height = double(place.y()),
                 .depth = double(place.z()),
                 .heading = end_heading(points(i)),
                 .daughters = {}};
-      for (const std::uint32_t d : daughters[i])
-        fork.daughters.push_back({.tips = double(all[d].degree),
-                                  .ahead = beyond[d],
+      for (const std::uint32_t d : places[i].daughters)
+        fork.daughters.push_back({.tips = places[d].tips,
+                                  .ahead = places[d].beyond,
                                   .length = all[d].length,
                                   .end_diameter = diameter_of(points(d).back()),
                                   .points = copy(d)});
@@ -187,11 +211,12 @@ struct Traced {
       };
       std::map<int, Sums> by_kind;
       for (std::uint32_t i = 0; i < all.size(); ++i) {
+        if (begins(i)) continue;
         Sums& of = by_kind[kind_of(all[i])];
         of.sections += 1.;
         of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
         for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
-        if (all[i].daughters == 0) of.tips.push_back(std::log(diameter_of(points(i).back())));
+        if (places[i].daughters.empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
         if (drawn(i)) measure(i, of.values);
       }
       std::map<int, Manner> manners;
@@ -216,8 +241,8 @@ struct Traced {
       values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
       values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
       values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
-      if (b.parent < 0) return;
-      const auto before = points(std::uint32_t(b.parent));
+      if (places[i].parent < 0) return;
+      const auto before = points(std::uint32_t(places[i].parent));
       if (across > 0.)
         values[spread].push_back(
             std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
@@ -242,7 +267,13 @@ void standardise(std::vector<Cell>& cells) {
     }
 }
 
-// What grows of all this. @style stands for a neuron's own style.
+// What a neuron begins with.
+constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)", with_fibre = R"(module Begin
+axiom: Begin Plan(0)
+body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
+fibre: Begin -> Kind(plans.kind(plans(me, 0))) Fibre(cells.fibre(me)))";
+
+// What grows of all this. @style stands for a neuron's own style, @begin for one of the above.
 constexpr std::string_view growth = R"(
 # Of n tips, those of a daughter that had `part` of `whole` where it was traced, when `others` share the rest: a single one
 # stays single.
@@ -256,7 +287,7 @@ function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 
 module Plan(i), Twig(kind, donor, tips, ahead, path, order, d)
 module Fork(kind, r, q, tips, path, order, mirror, thick, scale), Limb(kind, r, q, i, tips, path, order, mirror, thick, scale)
-axiom: Soma(cells.soma(me)) Plan(0)
+@begin
 
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : i < cells.stems(me)
@@ -333,11 +364,12 @@ class Writer {
   void row(bool first) { put("{}\n  ", first ? "" : ";"); }
 
   void cells() {
-    put("\n# Neurons: the diameter of their soma (µm), and how many stems they have.\nsample cells(-> soma, "
-        "stems) =");
+    put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
+        "(else -1), and how "
+        "many stems they have.\nsample cells(-> soma, fibre, stems) =");
     for (const Cell& c : traced_.cells) {
       row(&c == traced_.cells.data());
-      put("{} {}", rounded(c.soma, 1e3), c.stems.size());
+      put("{} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), c.stems.size());
     }
   }
 
@@ -468,7 +500,10 @@ class Writer {
         "#define unlike 0.5  # how much of its own wander its branches bend more\n"
         "#define turn 0.8    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n");
-    std::string_view rest = growth;
+    const bool somata = std::ranges::all_of(traced_.cells, [](const Cell& c) { return c.fibre < 0.; });
+    std::string rules(growth);
+    rules.replace(rules.find("@begin"), 6, somata ? with_soma : with_fibre);
+    std::string_view rest = rules;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
     text_ += rest;
@@ -520,7 +555,7 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
   for (const Morphology& neuron : neurons) traced.take(neuron, options);
   if (traced.cells.size() < 2 || traced.forks.empty())
     throw Error(
-        fmt::format("{} of {} neurons have a soma, stems and forks of these kinds; a model needs two such "
+        fmt::format("{} of {} neurons have stems and forks of these kinds; a model needs two such "
                     "neurons, name more of them or other kinds",
                     traced.cells.size(), neurons.size()));
   standardise(traced.cells);
