@@ -19,8 +19,8 @@ namespace forest {
 namespace {
 
 std::vector<Morphology> grown(const std::string& name, std::size_t count) {
-  return lsystem::grow_population(
-      lsystem::parse_file(FOREST_SOURCE_DIR "/data/grammars/" + name + ".lsys"), count, 1906);
+  return lsystem::grow_population(lsystem::parse_file(FOREST_SOURCE_DIR "/data/grammars/" + name + ".lsys"),
+                                  count, 1906);
 }
 
 std::vector<double> values(const std::vector<Morphology>& cells, const char* metric) {
@@ -55,7 +55,8 @@ TEST(Glia, MicrogliaHaveThePublishedFigures) {
                          {"sholl_critical_radius", 20., 6.},  // 15 µm in rats, 26 µm in the traced cells
                          {"segment_radii", .38, .04}});
   for (const Morphology& m : cells) {
-    EXPECT_TRUE(std::ranges::all_of(m.sections(), [](const Section& s) { return s.kind == SectionKind::glia; }));
+    EXPECT_TRUE(
+        std::ranges::all_of(m.sections(), [](const Section& s) { return s.kind == SectionKind::glia; }));
     EXPECT_GE(m.roots().size(), 2u);
     EXPECT_LE(m.roots().size(), 5u);
   }
@@ -88,8 +89,11 @@ TEST(Glia, AstrocytesFillTheirTerritory) {
     Random random(3, 1);
     for (int i = 0; i < 200; ++i, ++asked) {
       const Vec3 to(float(random.normal()), float(random.normal()), float(random.normal()));
-      const Vec3 at = to.normalized() * (8.f + 14.f * float(std::cbrt(random.uniform())));  // beyond the soma, within the border
-      near += std::ranges::any_of(m.points(), [&](const Point& p) { return (p.position() - at).norm() < 5.f; });
+      const Vec3 at =
+          to.normalized() *
+          (8.f + 14.f * float(std::cbrt(random.uniform())));  // beyond the soma, within the border
+      near +=
+          std::ranges::any_of(m.points(), [&](const Point& p) { return (p.position() - at).norm() < 5.f; });
     }
   }
   EXPECT_GT(near, .68 * asked);
@@ -98,7 +102,8 @@ TEST(Glia, AstrocytesFillTheirTerritory) {
 TEST(Glia, AreSound) {
   for (const char* name : {"astrocyte", "microglia"})
     for (const Morphology& m : grown(name, 5))
-      for (const Finding& f : validate(m)) EXPECT_EQ(f.severity, Severity::note) << name << ": " << f.sentence;
+      for (const Finding& f : validate(m))
+        EXPECT_EQ(f.severity, Severity::note) << name << ": " << f.sentence;
 }
 
 TEST(Glia, MicrogliaAreLikeTheTracedOnes) {
@@ -108,10 +113,11 @@ TEST(Glia, MicrogliaAreLikeTheTracedOnes) {
   ASSERT_EQ(traced.size(), 12u);
   const auto cells = grown("microglia", 60);
   for (const char* metric : {"number_of_neurites", "number_of_leaves", "total_length", "max_radial_distance",
-                             "max_path_distance", "section_term_lengths", "section_bif_lengths", "contraction",
-                             "partition_asymmetry", "sholl_maximum", "hull_volume"}) {
+                             "max_path_distance", "section_term_lengths", "section_bif_lengths",
+                             "contraction", "partition_asymmetry", "sholl_maximum", "hull_volume"}) {
     const auto wanted = values(traced, metric);
-    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted), statistics::summarize(wanted).sd)
+    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted),
+                statistics::summarize(wanted).sd)
         << metric;
   }
 }
@@ -124,7 +130,8 @@ TEST(Glia, AstrocytesAreAsManyTipsAndAsLongAsThoseOfACircuit) {
   const auto cells = grown("astrocyte", 20);
   for (const char* metric : {"number_of_leaves", "total_length", "total_width", "sholl_maximum"}) {
     const auto wanted = values(others, metric);
-    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted), statistics::summarize(wanted).sd)
+    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted),
+                statistics::summarize(wanted).sd)
         << metric;
   }
 }

@@ -8,7 +8,6 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
-#include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/fitting/burke.h"
 #include "forest/fitting/copying.h"
@@ -282,10 +281,6 @@ void leave_out(const Options& options, Console& console) {
 
 void run(const Options& options, Console& console) {
   if (options.held_out.empty()) return leave_out(options, console);
-  if (options.model.empty() && options.grown.empty())
-    throw Error("judge needs --model or --grown to set beside the held-out cells; give one of them");
-  if (options.count && options.model.empty())
-    throw Error("--count is how many --model grows; give that or leave it out");
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
   Sample grown, parametric;
@@ -360,6 +355,12 @@ std::function<void()> judge(CLI::App& command, Console& console) {
       ->type_name("FILE");
   add_report(command, options->report);
   add_force(command, options->force);
+  command.parse_complete_callback([options] {
+    if (!options->held_out.empty() && options->model.empty() && options->grown.empty())
+      throw CLI::RequiredError("--model or --grown, beside --held-out");
+    if (options->count && !options->grown.empty())
+      throw CLI::ValidationError("--count is how many neurons a model grows; leave it out with --grown");
+  });
   return [options, &console] { run(*options, console); };
 }
 
