@@ -92,16 +92,6 @@ Vec3 start_heading(std::span<const Point> points) {
 
 double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
 
-// Of a section in the tree of its kind.
-struct Place {
-  std::int32_t parent =
-      -1;  // none for a stem, which leaves the soma, a section of another kind, or where a fibre begins
-  double path = 0., order = 0.;  // of its end, and of itself, counted from the stem
-  double beyond = 0.;            // path from its end to its farthest tip, µm
-  double tips = 0.;
-  std::vector<std::uint32_t> daughters = {};
-};
-
 /// What is learned from: forks and stems of all neurons, and what each neuron is like.
 struct Traced {
   std::vector<Cell> cells;
@@ -120,7 +110,11 @@ struct Traced {
     const Arbors& arbors;
     const Vec3 soma = arbors.origin().position();
     std::span<const Branch> all = arbors.sections();
-    std::vector<Place> places = std::vector<Place>(all.size());
+    std::vector<double> beyond =
+        std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
+    std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
+    std::vector<std::uint32_t> stems = std::vector<std::uint32_t>(all.size());  // that sections grow from
+    std::vector<double> tips = std::vector<double>(all.size(), 0.);
 
     Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
 
@@ -128,38 +122,40 @@ struct Traced {
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
     // A root of one point, from which others leave: no branch.
     bool begins(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
+    // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
+    // point where a fibre begins.
+    std::int32_t above(std::size_t i) const {
+      const std::int32_t parent = all[i].parent;
+      return parent < 0 || begins(std::uint32_t(parent)) ||
+                     kind_of(all[std::size_t(parent)]) != kind_of(all[i])
+                 ? -1
+                 : parent;
+    }
     bool drawn(std::uint32_t i) const { return points(i).size() >= 2 && all[i].length > 0.; }
     std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
 
     void learn() {
-      for (std::uint32_t i = 0; i < all.size(); ++i) {
-        Place& place = places[i];
-        place.path = all[i].length;
-        if (const std::int32_t above = all[i].parent; above >= 0 &&
-                                                      kind_of(all[i]) == kind_of(all[std::size_t(above)]) &&
-                                                      !begins(std::uint32_t(above))) {
-          Place& parent = places[std::size_t(above)];
-          place.parent = above, place.path += parent.path, place.order = parent.order + 1.;
-          parent.daughters.push_back(i);
+      for (std::size_t i = all.size(); i-- > 0;)
+        if (above(i) >= 0) {
+          double& before = beyond[std::size_t(above(i))];
+          before = std::max(before, all[i].length + beyond[i]);
         }
-      }
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (above(i) >= 0) daughters[std::size_t(above(i))].push_back(i);
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        stems[i] = above(i) < 0 ? i : stems[std::size_t(above(i))];
       for (std::size_t i = all.size(); i-- > 0;) {
-        Place& place = places[i];
-        if (place.daughters.empty()) place.tips = 1.;
-        if (place.parent < 0) continue;
-        Place& above = places[std::size_t(place.parent)];
-        above.tips += place.tips;
-        above.beyond = std::max(above.beyond, all[i].length + place.beyond);
+        if (daughters[i].empty()) tips[i] = 1.;
+        if (above(i) >= 0) tips[std::size_t(above(i))] += tips[i];
       }
       Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
       if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (places[i].parent < 0 && drawn(i)) cell.stems.push_back(stem(i));
+        if (above(i) < 0 && drawn(i)) cell.stems.push_back(stem(i));
       if (cell.stems.empty()) return;
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (const auto& daughters = places[i].daughters;
-            !daughters.empty() && daughters.size() <= most_daughters &&
-            std::ranges::all_of(daughters, [&](std::uint32_t d) { return drawn(d); }))
+        if (!daughters[i].empty() && daughters[i].size() <= most_daughters &&
+            std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); }))
           traced.forks.push_back(fork(i));
       traced.cells.push_back(std::move(cell));
     }
@@ -168,8 +164,8 @@ struct Traced {
       const Branch& b = all[i];
       return {.cell = traced.cells.size(),
               .kind = kind_of(b),
-              .tips = places[i].tips,
-              .ahead = b.length + places[i].beyond,
+              .tips = tips[i],
+              .ahead = b.length + beyond[i],
               .length = b.length,
               .end_diameter = diameter_of(points(i).back()),
               .place = points(i).front().position() - soma,
@@ -182,19 +178,19 @@ struct Traced {
       const Vec3 place = points(i).back().position() - soma;
       Fork fork{.cell = traced.cells.size(),
                 .kind = kind_of(b),
-                .tips = places[i].tips,
-                .ahead = places[i].beyond,
-                .path = places[i].path,
-                .order = places[i].order,
+                .tips = tips[i],
+                .ahead = beyond[i],
+                .path = b.path_distance - (all[stems[i]].path_distance - all[stems[i]].length),
+                .order = double(arbors.neuron().order(b.id) - arbors.neuron().order(all[stems[i]].id)),
                 .diameter = diameter_of(points(i).back()),
                 .side = double(place.x()),
                 .height = double(place.y()),
                 .depth = double(place.z()),
                 .heading = end_heading(points(i)),
                 .daughters = {}};
-      for (const std::uint32_t d : places[i].daughters)
-        fork.daughters.push_back({.tips = places[d].tips,
-                                  .ahead = places[d].beyond,
+      for (const std::uint32_t d : daughters[i])
+        fork.daughters.push_back({.tips = tips[d],
+                                  .ahead = beyond[d],
                                   .length = all[d].length,
                                   .end_diameter = diameter_of(points(d).back()),
                                   .points = copy(d)});
@@ -216,7 +212,7 @@ struct Traced {
         of.sections += 1.;
         of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
         for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
-        if (places[i].daughters.empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
+        if (daughters[i].empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
         if (drawn(i)) measure(i, of.values);
       }
       std::map<int, Manner> manners;
@@ -241,8 +237,8 @@ struct Traced {
       values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
       values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
       values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
-      if (places[i].parent < 0) return;
-      const auto before = points(std::uint32_t(places[i].parent));
+      if (above(i) < 0) return;
+      const auto before = points(std::uint32_t(above(i)));
       if (across > 0.)
         values[spread].push_back(
             std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
@@ -267,13 +263,14 @@ void standardise(std::vector<Cell>& cells) {
     }
 }
 
-// What a neuron begins with.
-constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)", with_fibre = R"(module Begin
+// What a neuron begins with, in `growth` and when there are some without a soma.
+constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)\n", with_fibre = R"(module Begin
 axiom: Begin Plan(0)
 body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
-fibre: Begin -> Kind(plans.kind(plans(me, 0))) Fibre(cells.fibre(me)))";
+fibre: Begin -> Kind(plans.kind(plans(me, 0))) Fibre(cells.fibre(me))
+)";
 
-// What grows of all this. @style stands for a neuron's own style, @begin for one of the above.
+// What grows of all this. @style stands for a neuron's own style.
 constexpr std::string_view growth = R"(
 # Of n tips, those of a daughter that had `part` of `whole` where it was traced, when `others` share the rest: a single one
 # stays single.
@@ -287,7 +284,7 @@ function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 
 module Plan(i), Twig(kind, donor, tips, ahead, path, order, d)
 module Fork(kind, r, q, tips, path, order, mirror, thick, scale), Limb(kind, r, q, i, tips, path, order, mirror, thick, scale)
-@begin
+axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : i < cells.stems(me)
@@ -500,9 +497,9 @@ class Writer {
         "#define unlike 0.5  # how much of its own wander its branches bend more\n"
         "#define turn 0.8    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n");
-    const bool somata = std::ranges::all_of(traced_.cells, [](const Cell& c) { return c.fibre < 0.; });
     std::string rules(growth);
-    rules.replace(rules.find("@begin"), 6, somata ? with_soma : with_fibre);
+    if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
+      rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
     std::string_view rest = rules;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
