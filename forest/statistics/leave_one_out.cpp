@@ -21,6 +21,7 @@ namespace {
 
 constexpr double level = .05;
 constexpr std::size_t least_traced = 3, least_grown = 19;
+constexpr std::size_t ranked_at_level = 59;  // grown cells: typicality's smallest p is 3 / (n + 1)
 
 /// A left-out cell, those that the model saw, and those that it grew, one below the other.
 struct Beside {
@@ -229,13 +230,16 @@ std::string sentence(const LeaveOneOut& r) {
       "cases, from an AUC of {:.2f} on. ",
       r.traced, r.detectable_auc);
   out += r.told_apart() ? "Even so they are told apart: " : "They are not told apart, which says little: ";
+  out += r.grown < ranked_at_level
+             ? fmt::format("a cell could only be strange among {} grown ones, not among {}", ranked_at_level,
+                           r.grown)
+             : fmt::format(
+                   "{} of {} cells {} strange among {} grown without them ({:.2g} would be by chance)",
+                   r.strange, r.traced, r.strange == 1 ? "is" : "are", r.grown, level * double(r.traced));
   out += fmt::format(
-      "{} of {} cells {} strange among {} grown without them ({:.2g} would be by chance), in all pairs of a "
-      "left-out and a grown "
-      "cell a random forest knows which is which with AUC {:.2f} ({:.2f}–{:.2f}) by structure, and {} of {} "
-      "features lie to "
-      "one side",
-      r.strange, r.traced, r.strange == 1 ? "is" : "are", r.grown, level * double(r.traced),
+      ", in all pairs of a left-out and a grown cell a random forest knows which is which with AUC {:.2f} "
+      "({:.2f}–{:.2f}) by "
+      "structure, and {} of {} features lie to one side",
       r.structure.value, r.structure.lower, r.structure.upper, r.rejections, r.features.size());
   if (r.rejections) out += ", above all " + r.features.front().feature.name;
   return out + ".";
