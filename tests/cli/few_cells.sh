@@ -8,7 +8,7 @@ source "$FOREST_SOURCE_DIR/tests/words.sh"
 "$program" judge --leave-one-out --train few --count 19 --repeats 3 --report few.html --features few.csv --json >few.json
 told few.json "d['pass'] is None and d['leave_one_out'] and d['refitted'] and d['cells'] == {'traced': 5, 'grown_for_each': 19}"
 told few.json "d['detectable_auc'] > .75 and 'cannot show' in d['sentence'] and len(d['left_out']) == 5"
-told few.json "all(0 < c['p'] <= 1 and 0 <= c['auc']['structure'] <= 1 for c in d['left_out']) and d['copying']['longest_run'] == 1"
+told few.json "all(0 < c['p'] <= 1 and 0 <= c['auc']['structure'] <= 1 for c in d['left_out']) and 1 <= d['copying']['longest_run'] <= 3"
 grep -q 'cannot show' few.html
 /usr/bin/python3 - <<'PY'
 import csv
