@@ -75,7 +75,8 @@ struct Manner {
 };
 
 struct Cell {
-  double soma = 0.;  // diameter, µm
+  double soma = 0.;    // diameter, µm
+  double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
   std::map<int, Manner> kinds;
   std::vector<Stem> stems;
 };
@@ -105,7 +106,7 @@ struct Traced {
   std::map<int, Style> deviations;  // among cells, by kind
 
   void take(const Morphology& neuron, const Resampling& options) {
-    if (neuron.soma().kind != SomaKind::none) learn(Arbors(neuron, options.kinds));
+    if (!neuron.roots().empty()) learn(Arbors(neuron, options.kinds));
   }
 
  private:
@@ -122,11 +123,24 @@ struct Traced {
     std::vector<int> fork_at = std::vector<int>(all.size(), none);  // its number among all forks
     std::vector<Vec3> farthest = std::vector<Vec3>(all.size());     // that tip
     std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
+    std::vector<std::uint32_t> stems = std::vector<std::uint32_t>(all.size());  // that sections grow from
+    std::vector<double> tips = std::vector<double>(all.size(), 0.);
 
     Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
 
     int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
+    // A root of one point, from which others leave: no branch.
+    bool begins(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
+    // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
+    // point where a fibre begins.
+    std::int32_t above(std::size_t i) const {
+      const std::int32_t parent = all[i].parent;
+      return parent < 0 || begins(std::uint32_t(parent)) ||
+                     kind_of(all[std::size_t(parent)]) != kind_of(all[i])
+                 ? -1
+                 : parent;
+    }
     bool drawn(std::uint32_t i) const { return points(i).size() >= 2 && all[i].length > 0.; }
     bool learned(std::uint32_t i) const {  // the fork at the end of this section
       return !daughters[i].empty() && daughters[i].size() <= most_daughters &&
@@ -137,20 +151,26 @@ struct Traced {
     void learn() {
       for (std::uint32_t i = 0; i < all.size(); ++i) farthest[i] = points(i).back().position();
       for (std::size_t i = all.size(); i-- > 0;)
-        if (all[i].parent >= 0) {
-          const auto above = std::size_t(all[i].parent);
-          if (all[i].length + beyond[i] < beyond[above]) continue;
-          beyond[above] = all[i].length + beyond[i];
-          farthest[above] = farthest[i];
+        if (above(i) >= 0) {
+          const auto before = std::size_t(above(i));
+          if (all[i].length + beyond[i] < beyond[before]) continue;
+          beyond[before] = all[i].length + beyond[i];
+          farthest[before] = farthest[i];
         }
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (all[i].parent >= 0) daughters[std::size_t(all[i].parent)].push_back(i);
+        if (above(i) >= 0) daughters[std::size_t(above(i))].push_back(i);
       for (std::uint32_t i = 0, row = std::uint32_t(traced.forks.size()); i < all.size(); ++i)
         if (learned(i)) fork_at[i] = int(row++);
-      Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (all[i].parent < 0 && !arbors.neuron().section(all[i].id).parent.valid() && drawn(i))
-          cell.stems.push_back(stem(i));
+        stems[i] = above(i) < 0 ? i : stems[std::size_t(above(i))];
+      for (std::size_t i = all.size(); i-- > 0;) {
+        if (daughters[i].empty()) tips[i] = 1.;
+        if (above(i) >= 0) tips[std::size_t(above(i))] += tips[i];
+      }
+      Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
+      if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (above(i) < 0 && drawn(i)) cell.stems.push_back(stem(i));
       if (cell.stems.empty()) return;
       for (std::uint32_t i = 0; i < all.size(); ++i)
         if (learned(i)) traced.forks.push_back(fork(i));
@@ -161,7 +181,7 @@ struct Traced {
       const Branch& b = all[i];
       return {.cell = traced.cells.size(),
               .kind = kind_of(b),
-              .tips = double(b.degree),
+              .tips = tips[i],
               .ahead = b.length + beyond[i],
               .length = b.length,
               .end_diameter = diameter_of(points(i).back()),
@@ -177,10 +197,10 @@ struct Traced {
       const Vec3 place = points(i).back().position() - soma;
       Fork fork{.cell = traced.cells.size(),
                 .kind = kind_of(b),
-                .tips = double(b.degree),
+                .tips = tips[i],
                 .ahead = beyond[i],
-                .path = b.path_distance,
-                .order = double(arbors.neuron().order(b.id)),
+                .path = b.path_distance - (all[stems[i]].path_distance - all[stems[i]].length),
+                .order = double(arbors.neuron().order(b.id) - arbors.neuron().order(all[stems[i]].id)),
                 .diameter = diameter_of(points(i).back()),
                 .side = double(place.x()),
                 .height = double(place.y()),
@@ -189,7 +209,7 @@ struct Traced {
                 .aim = (farthest[i] - points(i).back().position()).normalized(),
                 .daughters = {}};
       for (const std::uint32_t d : daughters[i])
-        fork.daughters.push_back({.tips = double(all[d].degree),
+        fork.daughters.push_back({.tips = tips[d],
                                   .ahead = beyond[d],
                                   .length = all[d].length,
                                   .end_diameter = diameter_of(points(d).back()),
@@ -212,11 +232,12 @@ struct Traced {
       };
       std::map<int, Sums> by_kind;
       for (std::uint32_t i = 0; i < all.size(); ++i) {
+        if (begins(i)) continue;
         Sums& of = by_kind[kind_of(all[i])];
         of.sections += 1.;
         of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
         for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
-        if (all[i].daughters == 0) of.tips.push_back(std::log(diameter_of(points(i).back())));
+        if (daughters[i].empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
         if (drawn(i)) measure(i, of.values);
       }
       std::map<int, Manner> manners;
@@ -241,8 +262,8 @@ struct Traced {
       values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
       values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
       values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
-      if (b.parent < 0) return;
-      const auto before = points(std::uint32_t(b.parent));
+      if (above(i) < 0) return;
+      const auto before = points(std::uint32_t(above(i)));
       if (across > 0.)
         values[spread].push_back(
             std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
@@ -267,6 +288,13 @@ void standardise(Traced& traced) {
       for (Style* style : of) (*style)[s] = sd > 0. ? ((*style)[s] - mean) / sd : 0.;
     }
 }
+
+// What a neuron begins with, in `growth` and when there are some without a soma.
+constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)\n", with_fibre = R"(module Begin
+axiom: Begin Plan(0)
+body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
+fibre: Begin -> Kind(plans.kind(plans(me, 0))) Fibre(cells.fibre(me))
+)";
 
 // What grows of all this. @style stands for a neuron's own style.
 constexpr std::string_view growth = R"(
@@ -383,11 +411,12 @@ class Writer {
   void row(bool first) { put("{}\n  ", first ? "" : ";"); }
 
   void cells() {
-    put("\n# Neurons: the diameter of their soma (µm), and how many stems they have.\nsample cells(-> soma, "
-        "stems) =");
+    put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
+        "(else -1), and how "
+        "many stems they have.\nsample cells(-> soma, fibre, stems) =");
     for (const Cell& c : traced_.cells) {
       row(&c == traced_.cells.data());
-      put("{} {}", rounded(c.soma, 1e3), c.stems.size());
+      put("{} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), c.stems.size());
     }
   }
 
@@ -582,7 +611,10 @@ class Writer {
         "#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n");
-    std::string_view rest = growth;
+    std::string rules(growth);
+    if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
+      rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
+    std::string_view rest = rules;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
     text_ += rest;
@@ -634,7 +666,7 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
   for (const Morphology& neuron : neurons) traced.take(neuron, options);
   if (traced.cells.size() < 2 || traced.forks.empty())
     throw Error(
-        fmt::format("{} of {} neurons have a soma, stems and forks of these kinds; a model needs two such "
+        fmt::format("{} of {} neurons have stems and forks of these kinds; a model needs two such "
                     "neurons, name more of them or other kinds",
                     traced.cells.size(), neurons.size()));
   standardise(traced);

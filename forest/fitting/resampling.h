@@ -34,7 +34,9 @@ struct Resampling {
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.
-/// @param neurons  at least two with a soma and such sections; others are passed over
+/// @param neurons  at least two with such sections; others are passed over. Neurons without a soma begin at their first root, as
+///                 insects' do whose arbors all leave one fibre. What changes its kind on the way (an axon on a dendrite) is a
+///                 stem of its own, which begins where it began.
 /// Throws Error when there are too few.
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
                                const Resampling& options = {});

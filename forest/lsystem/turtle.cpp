@@ -54,6 +54,8 @@ constexpr TurtleSymbol symbol_table[] = {
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
     {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
+    {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
+     Action::fibre, 1, 1},
 };
 
 static_assert([] {
@@ -182,6 +184,8 @@ class Turtle {
         return become(SectionKind::glia);
       case Action::kind:
         return become_numbered(parameter(0, 0.));
+      case Action::fibre:
+        return begin(parameter(0, state_.diameter));
       case Action::place:
         return stand(soma_place_ + Eigen::Vector3d(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::head:
@@ -320,10 +324,20 @@ class Turtle {
     if (answers_) std::copy_n(v.data(), 3, answers_->begin() + m.first);
   }
 
+  // A root of one point. Somata are kept together by their soma; this keeps together what has none.
+  void begin(double diameter) {
+    state_.diameter = std::max(0., diameter);
+    if (answers_) return;
+    const auto radius = float(0.5 * state_.diameter);
+    drawn_.push_back({state_.position, radius, radius, none, 0, state_.tag, state_.kind});
+    state_.node = std::uint32_t(drawn_.size() - 1);
+  }
+
   void move(double length) {
     if (length != 0.) stand(state_.position + length * state_.frame.col(0));
   }
   void stand(const Eigen::Vector3d& place) {
+    if (place == state_.position) return;
     state_.position = place;
     state_.node = none;
   }

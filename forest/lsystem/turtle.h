@@ -18,7 +18,7 @@ enum class Action : std::uint8_t {
   // clang-format off
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
   push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
-  place, head, trace, ask_place, ask_heading,
+  place, head, trace, ask_place, ask_heading, fibre,
   // clang-format on
 };
 
