@@ -329,7 +329,6 @@ Deriver::Deriver(const Grammar& grammar, const cortex::Site& site)
 Deriver::~Deriver() = default;
 Deriver::Deriver(Deriver&&) noexcept = default;
 const cortex::Site& Deriver::site() const { return state_->site; }
-void Deriver::move_to(const cortex::Site& site) { state_->site = site; }
 
 const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
   Random random(seed, index);

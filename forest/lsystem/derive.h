@@ -28,7 +28,6 @@ class Deriver {
 
   /// Where its neurons grow.
   const cortex::Site& site() const;
-  void move_to(const cortex::Site& site);
 
  private:
   struct State;
