@@ -207,15 +207,18 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
     title[0] = char(std::toupper(static_cast<unsigned char>(title[0])));
     report.heading(title);
     report.plot(density_plots(panels),
-                "Bars: what was measured. Curve: the density of the chosen family. Upright lines: values that come back "
+                "Bars: what was measured. Curve: the density of the chosen family. Upright lines: values "
+                "that come back "
                 "exactly, with their share. The outermost 1 % may lie outside.");
     report.table({"quantity", "family", "parameter", "value", "from", "to"}, parameters);
     report.text("All families that could be fitted, the chosen one first:");
     report.table({"quantity", "family", "parameters", "log likelihood", "AICc", "BIC", "chosen"}, candidates);
   }
   report.text(
-      "Intervals are of 95 %. The distance is the largest difference between the distribution functions of the values "
-      "and of what was fitted; p says how often values that really were drawn from it lie as far from it. Of many "
+      "Intervals are of 95 %. The distance is the largest difference between the distribution functions of "
+      "the values "
+      "and of what was fitted; p says how often values that really were drawn from it lie as far from it. Of "
+      "many "
       "traced values every family is rejected: then look at the distance.");
   return report.html();
 }

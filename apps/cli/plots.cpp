@@ -375,12 +375,12 @@ std::string density_plots(std::span<const DensityPanel> panels) {
             points, colour_of(1));
     for (const auto& [value, share] : panel.atoms) {
       if (!(value >= x.low && value <= x.high)) continue;
-      svg.add(
-          R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}" stroke-width="3"/>)",
-          x(value), base, base - plot * std::min(1., share), colour_of(2));
+      svg.add(R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}" stroke-width="3"/>)",
+              x(value), base, base - plot * std::min(1., share), colour_of(2));
       const bool right = x(value) > .5 * (x.from + x.to);
       svg.text(x(value) + (right ? -6. : 6.), base - plot * std::min(.95, share) - 2.,
-               fmt::format("{:.0f} % are {}", 100. * share, number(value)), right ? "end" : "start", 10.5, .8);
+               fmt::format("{:.0f} % are {}", 100. * share, number(value)), right ? "end" : "start", 10.5,
+               .8);
     }
     for (const double t : ticks(x.low, x.high, 6)) {
       svg.line(x(t), base, x(t), base + 4., .4);

@@ -84,7 +84,7 @@ struct DensityPanel {
   std::vector<double> values;
   std::function<double(double)> density;
   std::vector<std::pair<double, double>> atoms = {};  // value, share
-  double step = 0.;  // values are whole multiples of this; 0: they are not
+  double step = 0.;                                   // values are whole multiples of this; 0: they are not
 };
 
 std::string density_plots(std::span<const DensityPanel> panels);

@@ -69,7 +69,7 @@ RC_GTEST_PROP(Environment, FindsTheNearestSomaAsLookingAtAllOfThemDoes, ()) {
       if ((s.centre.cast<double>() - own).norm() > double(s.radius))
         nearest = std::min(nearest, (s.centre.cast<double>() - place).norm() - double(s.radius));
     const auto found = e.nearest_soma(place, own);
-    RC_ASSERT(found.distance == nearest);
+    RC_ASSERT(std::abs(found.distance - nearest) < 1e-9);
     if (found.soma) {
       RC_ASSERT((place + found.direction * (found.distance + double(somata[*found.soma].radius)) -
                  somata[*found.soma].centre.cast<double>())

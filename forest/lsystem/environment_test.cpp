@@ -197,7 +197,7 @@ TEST(Retraction, DendritesShrinkFromTheirTipsUntilOneIsLeft) {
   const Grammar g = shipped("retraction");
   Deriver deriver(g);
   double most = 0.;
-  for (std::uint64_t index = 0; index < 30; ++index) {
+  for (std::uint64_t index = 0; index < 10; ++index) {
     std::size_t highest = 0, last = 0, shrank = 0;
     std::vector<Point> before;  // the first dendrite
     for (int step = 1; step <= g.steps; ++step) {
@@ -219,7 +219,7 @@ TEST(Retraction, DendritesShrinkFromTheirTipsUntilOneIsLeft) {
     EXPECT_GT(grown.sections().size(), 3u) << index;  // the one that is left became a tree
     most += double(shrank);
   }
-  EXPECT_GT(most, 100.);
+  EXPECT_GT(most, 30.);
 }
 
 }  // namespace
