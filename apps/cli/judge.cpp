@@ -150,7 +150,7 @@ void tell_judgement(const Judgement& j, Console& console) {
                           shown(j.auc.logistic)));
 }
 
-std::string report_of(const Judged& judged, const std::string& title) {
+std::string report_of(const Judged& judged, const Riddle& riddle, const std::string& title) {
   const Judgement& j = judged.judgement;
   Report report(title, verdict(j));
   report.figures({{"AUC, structure", fmt::format("{:.3f}", j.auc.structure.value)},
@@ -186,6 +186,10 @@ std::string report_of(const Judged& judged, const std::string& title) {
   std::vector<std::vector<std::string>> lines;
   for (const Criterion& c : j.criteria) lines.push_back({c.pass ? "✓" : "✗", c.name, c.reason});
   report.table({"", "criterion", "why"}, lines);
+
+  report.heading("Which is which?");
+  report.plot(riddle.drawing, "Held-out and grown neurons, as many of each, in an order of chance.");
+  report.folded("The answer", riddle.answer);
 
   report.heading("Sholl");
   report.plot(curve_plot(std::array<CurveLine, 2>{CurveLine{"held out", j.sholl.mean, j.sholl.lower,
@@ -311,7 +315,11 @@ void run(const Options& options, Console& console) {
                        features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
                        options.force);
   if (!options.report.empty())
-    write_unless_there(options.report, report_of(judged, "Grown neurons on trial: " + grown.name),
+    write_unless_there(options.report,
+                       report_of(judged,
+                                 which_is_which(held_out.neurons, grown.neurons, 6,
+                                                statistics::kind_set(options.kind), options.seed),
+                                 "Grown neurons on trial: " + grown.name),
                        options.force);
   console.print(json_of(judged.judgement, options.seed));
   tell_judgement(judged.judgement, console);

@@ -13,6 +13,7 @@
 #include "forest/statistics/protocol.h"
 
 #include "apps/cli/samples.h"
+#include "apps/cli/silhouettes.h"
 
 namespace forest::cli {
 
@@ -55,6 +56,6 @@ void judge_leaving_out(const LeftOutTrial& trial, Console& console);
 
 nlohmann::ordered_json json_of(const statistics::Judgement& judgement, std::uint64_t seed);
 void tell_judgement(const statistics::Judgement& judgement, Console& console);
-std::string report_of(const Judged& judged, const std::string& title);  // HTML
+std::string report_of(const Judged& judged, const Riddle& riddle, const std::string& title);  // HTML
 
 }  // namespace forest::cli

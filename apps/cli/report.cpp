@@ -65,6 +65,11 @@ void Report::text(std::string_view paragraph) {
   body_ += fmt::format("<p>{}</p>\n", escaped_html(paragraph));
 }
 
+void Report::folded(std::string_view title, std::string_view paragraph) {
+  body_ += fmt::format("<details><summary>{}</summary><p>{}</p></details>\n", escaped_html(title),
+                       escaped_html(paragraph));
+}
+
 void Report::figures(const std::vector<std::pair<std::string, std::string>>& values) {
   body_ += "<div class=\"figures\">";
   for (const auto& [name, value] : values)

@@ -18,6 +18,7 @@ class Report {
 
   void heading(std::string_view text);
   void text(std::string_view paragraph);
+  void folded(std::string_view title, std::string_view paragraph);  // seen when one asks for it
   /// Numbers to be read at a glance: {"AUC", "0.97"}.
   void figures(const std::vector<std::pair<std::string, std::string>>& values);
   void plot(std::string_view svg, std::string_view caption);

@@ -101,7 +101,14 @@ told judged.json 'd["pass"] is False and d["auc"]["structure"]["value"] > .9 and
 told judged.json 'list(d)[:10] == ["pass", "auc", "energy_p", "mmd_p", "ks_rejections", "mvs_max", "sholl_inside", "copying", "controls", "seeds"]'
 told judged.json 'set(d["controls"]) == {"burke", "stretched", "jittered"} and d["controls"]["burke"] is None'
 told judged.json '{"value", "lower", "upper"} <= set(d["auc"]["real_control"]) and d["copying"]["longest_run"] is None'
-report_holds judged.html 3
+report_holds judged.html 4
+/usr/bin/python3 - <<'PY'
+import re
+page = open("judged.html").read()
+traced, grown = re.search(r"Traced are ([A-L, ]+); grown are ([A-L, ]+)\.", page).groups()
+assert sorted(traced.split(", ") + grown.split(", ")) == list("ABCDEFGHIJKL") and len(traced) == len(grown), (traced, grown)
+assert all(re.search(rf"<text [^>]*>{letter}</text>", page) for letter in "ABCDEFGHIJKL")
+PY
 /usr/bin/python3 - <<'PY'
 import csv
 groups = [r["group"] for r in csv.DictReader(open("judged.csv", encoding="utf-8-sig"))]
