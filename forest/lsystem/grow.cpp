@@ -13,15 +13,15 @@ Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t ind
   return {{"grammar", grammar.name}, {"seed", std::to_string(seed)}, {"index", std::to_string(index)}};
 }
 
-Morphology grown(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
+}  // namespace
+
+Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
   return interpret(deriver.derive(seed, index), grammar, source(grammar, seed, index));
 }
 
-}  // namespace
-
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
   Deriver deriver(grammar);
-  return grown(deriver, grammar, seed, index);
+  return grow(deriver, grammar, seed, index);
 }
 
 Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
@@ -38,7 +38,7 @@ std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t coun
   parallel_ranges(count, 1, [&](std::size_t begin, std::size_t end) {
     Deriver deriver(grammar);
     for (std::size_t i = begin; i < end; ++i) {
-      neurons[i] = grown(deriver, grammar, seed, first + i);
+      neurons[i] = grow(deriver, grammar, seed, first + i);
       progress.advance();
     }
   });

@@ -16,8 +16,11 @@ class Deriver;
 /// The neuron `index` of the population `seed`: a pure function. It says in its annotations where it comes from. Throws as Deriver::derive and interpret do.
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
 
+/// The same; one object a thread keeps memory between neurons (Deriver).
+Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
+
 /// The same neuron as it was after some steps of derivation, which are the time of its growth; its annotations say after how
-/// many. One object a thread keeps memory between them (Deriver).
+/// many.
 Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
                    int steps);
 
