@@ -77,7 +77,8 @@ Piece make(const lsystem::Grammar& grammar, const CellsJob& job, std::size_t blo
 }
 
 /// The file is there already, whole and the same. Throws Error when something else is.
-std::optional<CellsGrown> there_already(const lsystem::Grammar& grammar, const CellsJob& job) {
+std::optional<CellsGrown> there_already(const lsystem::Grammar& grammar, const CellsJob& job,
+                                        Progress& progress) {
   std::error_code none;
   if (job.force || !fs::exists(job.place, none)) return {};
   const MappedFile mapped(job.place);
@@ -87,7 +88,12 @@ std::optional<CellsGrown> there_already(const lsystem::Grammar& grammar, const C
     const std::size_t blocks = wanted.blocks();
     if (file.head().cells == wanted.cells && file.head().about == wanted.about &&
         file.block(blocks - 1) == grow_block(grammar, job, blocks - 1)) {
-      parallel_for(blocks, 16, [&](std::size_t b) { (void)file.block(b); });
+      progress.begin("checking what is there", blocks);
+      parallel_for(blocks, 16, [&](std::size_t b) {
+        (void)file.block(b);
+        progress.advance();
+      });
+      progress.end();
       return CellsGrown{grammar, file.total(), job.count, mapped.text().size()};
     }
   }
@@ -141,7 +147,7 @@ CellsGrown lead(const std::function<lsystem::Grammar()>& find, const CellsJob& j
                 Console& console) {
   const lsystem::Grammar grammar = find();
   std::optional<io::CellsWriter> file;
-  const auto done = there_already(grammar, job);
+  const auto done = there_already(grammar, job, console.progress());
   if (!done) {
     file.emplace(job.place, head_of(grammar, job), job.force, console.progress());
     check_last_block(*file, grammar, job);

