@@ -15,7 +15,7 @@ grow --grammar motoneuron --count 130 --seed 7 --out folder --json >folder.json
 told one.json 'd["neurons"] == 130 and d["there_before"] == 0'
 told one.json '(lambda f: d["segments"] == f["segments"] and abs(d["length"] / f["length"] - 1) < 1e-9)(json.load(open("folder.json")))'
 [ "$(stat -c %s one.cells)" -lt "$(cat folder/*.swc | wc -c)" ]
-"$BRAINFOREST" convert one.cells --format swc --out back >out.txt
+"$BRAINFOREST" convert one.cells --format swc --out back >out.txt 2>err.txt
 [ "$(ls back | wc -l)" = 130 ]
 for swc in folder/*.swc; do cmp "$swc" "back/one-$(basename "$swc")"; done
 "$BRAINFOREST" import one.cells --repo cells.db --population motoneurons >out.txt

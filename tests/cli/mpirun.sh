@@ -25,20 +25,23 @@ done
 grow 4 bes --count 70 --out few4.cells >/dev/null
 cmp few.cells few4.cells
 
-# Killed with four, gone on with by two and by one.
+# Killed with four and with two, gone on with by one.
+many="--grammar motoneuron --count 6000 --seed 3"
+"$BRAINFOREST" grow $many --out many.cells >/dev/null
 for n in 4 2; do
-  setsid bash -c "exec mpirun --oversubscribe --allow-run-as-root -n $n '$BRAINFOREST' grow --grammar motoneuron --count 700 --seed 3 --out killed.cells" >/dev/null 2>&1 &
-  for wait in $(seq 100); do
-    [ "$(stat -c %s killed.cells.part 2>/dev/null || echo 0)" -gt 500000 ] && break
-    sleep 0.05
+  size=$(stat -c %s killed.cells.part 2>/dev/null || echo 0)
+  setsid mpirun --oversubscribe --allow-run-as-root -n $n "$BRAINFOREST" grow $many --out killed.cells >/dev/null 2>&1 &
+  for wait in $(seq 500); do
+    [ "$(stat -c %s killed.cells.part 2>/dev/null || echo 0)" -gt $((size + 500000)) ] && break
+    sleep 0.02
   done
   kill -9 -$! 2>/dev/null || true
   wait $! 2>/dev/null || true
   for wait in $(seq 100); do flock -n killed.cells.part true && break; sleep 0.1; done  # programs that lost their mpirun end
+  [ -e killed.cells.part ] && [ ! -e killed.cells ]
 done
-[ -e killed.cells.part ] && [ ! -e killed.cells ]
-"$BRAINFOREST" grow --grammar motoneuron --count 700 --seed 3 --out killed.cells --json >killed.json
-cmp alone.cells killed.cells
+"$BRAINFOREST" grow $many --out killed.cells --json >killed.json
+cmp many.cells killed.cells
 told killed.json 'd["there_before"] > 0'
 
 # All is there already: nothing changes.
@@ -49,9 +52,9 @@ told again.json 'd["there_before"] == 700'
 cat >sometimes.lsys <<'LSYS'
 limit: 2000
 steps: 40
-distribution chance = uniform(0, 1)
+distribution luck = uniform(0, 1)
 axiom: Soma(10) B
-begin: B { c = chance() } -> A(c)
+begin: B { c = luck() } -> A(c)
 rabbits: A(c) : c > 0.99 -> F [+ A(c)] A(c)
 walk: A(c) -> F A(c)
 LSYS
