@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Any bytes are a grammar, a neuron as a string, or an error with a sentence. What is a grammar grows for a few steps.
+// Any bytes are a grammar, a neuron as a string, or an error with a sentence. What is a grammar grows for a few steps, alone
+// and among somata below a pia.
 #include <algorithm>
 #include <cstdint>
 #include <cstdlib>
@@ -23,6 +24,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
         std::abort();
       }
     (void)lsystem::interpret(lsystem::derive(grammar, 1, 0, 6), grammar);
+    static const cortex::Environment around({{"L1", 90.f, 120.f}}, {{{3, 8, 0}, 4.f}, {{-5, 12, 2}, 6.f}},
+                                            {{{40, 0, 0}, 1.f, 20.f}});
+    const cortex::Site site{&around, {0, 0, 0}};
+    (void)lsystem::interpret(lsystem::derive(grammar, 1, 0, 6, site), grammar, {}, site);
   } catch (const Error&) {
   }
   try {

@@ -1,8 +1,10 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest distributions: what the branches of a population are drawn from, in the three families of N++.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -17,6 +19,8 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
+#include "apps/cli/plots.h"
+#include "apps/cli/report.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
 
@@ -33,7 +37,7 @@ struct Options {
   std::uint32_t least = 85, replicates = 99;
   std::uint64_t seed = 0;
   bool keep = false, force = false;
-  std::filesystem::path grammar;  // to write
+  std::filesystem::path grammar, report;  // to write
   std::string form = "burke";
 };
 
@@ -144,6 +148,81 @@ Json json_of(const SegmentFamilies& f) {
           {"quantities", quantities}};
 }
 
+std::string percent(const Estimate& e) {
+  return fmt::format("{:.1f} % ({:.1f}–{:.1f})", 100. * e.value, 100. * e.lower, 100. * e.upper);
+}
+
+std::string note_of(const DistributionFit& f) {
+  return fmt::format("{}, {}; distance {}{}", f.name, counted(f.count, "value"), shown(f.kolmogorov),
+                     std::isnan(f.p) ? "" : fmt::format(", p {}", shown(f.p)));
+}
+
+std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const Sample& sample,
+                      const Options& options) {
+  Report report("Distributions of " + sample.name,
+                fmt::format("The {} of {} (kind {}) fork with a chance of {}; the others end.",
+                            counted(f.sections, "segment"), counted(f.cells, "cell"), options.kind,
+                            percent(f.nontermination)));
+  report.heading("Segment nontermination");
+  report.text("The chance that a segment forks, by what is known at its end, with intervals of 95 %.");
+  for (const auto& table : f.tables) {
+    std::vector<IntervalRow> rows;
+    const std::string unit(unit_of(table.given));
+    for (const ChanceBin& b : table.bins)
+      rows.push_back({.label = fmt::format("{} up to {}{}{}", name_of(table.given), shown(b.upper),
+                                           unit.empty() ? "" : " ", unit),
+                      .value = b.chance.value,
+                      .lower = b.chance.lower,
+                      .upper = b.chance.upper,
+                      .note = counted(b.count, "segment")});
+    if (!rows.empty())
+      report.plot(interval_plot(rows, {.low = 0., .high = 1., .marks = {}, .title = "chance to fork"}),
+                  fmt::format("By {}.", name_of(table.given)));
+  }
+  for (const auto family : {Quantity::trajectory, Quantity::rotations, Quantity::calibre}) {
+    std::vector<DensityPanel> panels;
+    std::vector<std::vector<std::string>> parameters, candidates;
+    for (std::size_t i = 0; i < f.quantities.size(); ++i) {
+      const FittedQuantity& q = f.quantities[i];
+      if (q.family != family || q.fit.count == 0) continue;
+      DensityPanel panel{.title = std::string(q.name),
+                         .unit = std::string(q.unit),
+                         .note = note_of(q.fit),
+                         .values = seen.quantities[i].values,
+                         .density = [&d = q.fit.distribution](double x) { return d.density(x); },
+                         .step = q.fit.distribution.step};
+      for (const Atom& atom : q.fit.distribution.atoms) panel.atoms.emplace_back(atom.value, atom.weight);
+      panels.push_back(std::move(panel));
+      bool first = true;
+      for (const Estimate& e : q.fit.estimates)
+        parameters.push_back({first ? std::string(q.name) : "", std::exchange(first, false) ? q.fit.name : "",
+                              e.name, shown(e.value), shown(e.lower), shown(e.upper)});
+      for (const auto& c : q.fit.candidates)
+        candidates.push_back({&c == &q.fit.candidates.front() ? std::string(q.name) : "", c.name,
+                              std::to_string(c.parameters), shown(c.log_likelihood), shown(c.aicc),
+                              shown(c.bic), &c == &q.fit.candidates.front() ? "✓" : ""});
+    }
+    if (panels.empty()) continue;
+    std::string title(name_of(family));
+    title[0] = char(std::toupper(static_cast<unsigned char>(title[0])));
+    report.heading(title);
+    report.plot(density_plots(panels),
+                "Bars: what was measured. Curve: the density of the chosen family. Upright lines: values "
+                "that come back "
+                "exactly, with their share. The outermost 1 % may lie outside.");
+    report.table({"quantity", "family", "parameter", "value", "from", "to"}, parameters);
+    report.text("All families that could be fitted, the chosen one first:");
+    report.table({"quantity", "family", "parameters", "log likelihood", "AICc", "BIC", "chosen"}, candidates);
+  }
+  report.text(
+      "Intervals are of 95 %. The distance is the largest difference between the distribution functions of "
+      "the values "
+      "and of what was fitted; p says how often values that really were drawn from it lie as far from it. Of "
+      "many "
+      "traced values every family is rejected: then look at the distance.");
+  return report.html();
+}
+
 void run(const Options& options, Console& console) {
   const KindSet kinds = kind_set(options.kind);
   const Given by = *given_of(options.by);
@@ -168,6 +247,9 @@ void run(const Options& options, Console& console) {
     write_unless_there(options.grammar, write(cells, name, {.kinds = kinds, .seed = options.seed}),
                        options.force);
   }
+  if (!options.report.empty())
+    write_unless_there(options.report, report_of(families, segment_values(cells, kinds), sample, options),
+                       options.force);
   Json kept = Json::array();
   if (options.keep) {
     repository::Repository repository = repository::Repository::open(options.repo, repository::Access::write);
@@ -187,6 +269,7 @@ void run(const Options& options, Console& console) {
   if (!options.grammar.empty())
     console.say(fmt::format("\n{} grows such cells: brainforest grow --grammar {} --count 10 --out grown/",
                             options.grammar.string(), options.grammar.string()));
+  if (!options.report.empty()) console.say(fmt::format("\nThe report is {}", options.report.string()));
   Json out = json_of(families);
   out["kind"] = options.kind, out["by"] = options.by, out["kept"] = std::move(kept);
   console.print(out);
@@ -241,6 +324,7 @@ std::function<void()> distributions(CLI::App& command, Console& console) {
       .add_option("--form", options->form, "Of that grammar: burke (chances by µm) or hillman (a threshold)")
       ->check(CLI::IsMember({"burke", "hillman"}))
       ->capture_default_str();
+  add_report(command, options->report);
   add_force(command, options->force);
   command.parse_complete_callback([options] {
     if (options->files.empty() && options->repo.empty()) throw CLI::RequiredError("files or --repo");

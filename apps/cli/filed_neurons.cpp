@@ -14,10 +14,12 @@ FiledNeurons::FiledNeurons(std::vector<std::filesystem::path> files)
     if (is_cells_file(files_[f])) try {
         mapped_[f] = std::make_unique<MappedFile>(files_[f]);
         const std::string_view text = mapped_[f]->text();
-        cells_[f] = io::read_each(io::format_of(files_[f], text), text, repository::escaped(files_[f].string()));
+        cells_[f] =
+            io::read_each(io::format_of(files_[f], text), text, repository::escaped(files_[f].string()));
       } catch (const InputError&) {  // told when it is read
       }
-    for (std::size_t c = 0, count = cells_[f] ? cells_[f]->count : 1; c < count; ++c) neurons_.emplace_back(f, c);
+    for (std::size_t c = 0, count = cells_[f] ? cells_[f]->count : 1; c < count; ++c)
+      neurons_.emplace_back(f, c);
   }
 }
 

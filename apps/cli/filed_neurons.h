@@ -28,8 +28,8 @@ class FiledNeurons {
 
  private:
   std::vector<std::filesystem::path> files_;
-  std::vector<std::unique_ptr<MappedFile>> mapped_;      // of files of cells
-  std::vector<std::optional<io::CellReader>> cells_;     // the same
+  std::vector<std::unique_ptr<MappedFile>> mapped_;           // of files of cells
+  std::vector<std::optional<io::CellReader>> cells_;          // the same
   std::vector<std::pair<std::size_t, std::size_t>> neurons_;  // file and cell
 };
 

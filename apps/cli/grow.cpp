@@ -19,6 +19,7 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/environment_options.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/grow_cells.h"
@@ -36,6 +37,7 @@ struct Options {
   std::uint64_t seed = 0;
   std::uint32_t time_lapse = 0;  // steps between pictures of a growing neuron; 0: only the grown one
   bool force = false;
+  EnvironmentOptions environment;
 };
 
 constexpr std::size_t batch = 2000;  // neurons compared at a time
@@ -144,7 +146,8 @@ std::string name_of(const Options& options, const lsystem::Grammar& grammar, std
 
 /// Refuses when a file is there that does not hold the neuron it is named after. Only where there are files is anything
 /// grown for this.
-void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, Console& console) {
+void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, const cortex::Site& site,
+                       Console& console) {
   if (options.force || options.out.empty() || !holds_files(options.out)) return;
   Overwrites overwrites;
   const io::Format& format = *io::find_format("swc");
@@ -156,11 +159,12 @@ void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, 
     std::vector<bool> there;
     for (const auto& file : files) there.push_back(std::filesystem::exists(file));
     if (std::ranges::find(there, true) == there.end()) continue;
-    const auto neurons = lsystem::grow_population(grammar, count, options.seed, console.progress(), first);
+    const auto neurons =
+        lsystem::grow_population(grammar, count, options.seed, console.progress(), first, site);
     for (std::size_t i = 0; i < count; ++i)
       if (there[i]) overwrites.look(files[i], format.write(neurons[i]));
   }
-  lsystem::Deriver deriver(grammar);
+  lsystem::Deriver deriver(grammar, site);
   for (const int step : moments(options, grammar))
     for (std::size_t i = 0; i < options.count; ++i)
       if (const auto file = file_of(options.out, name_at(name_of(options, grammar, i), step));
@@ -206,7 +210,9 @@ void run(const Options& options, Console& console) {
         "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "
         "mpirun out");
   const lsystem::Grammar grammar = grammar_of(options);
-  refuse_to_replace(options, grammar, console);
+  const Surroundings surroundings(options.environment, console);
+  const cortex::Site& site = surroundings.site();
+  refuse_to_replace(options, grammar, site, console);
   std::vector<std::unique_ptr<Destination>> destinations;
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
   if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
@@ -217,9 +223,9 @@ void run(const Options& options, Console& console) {
   parallel_in_order(
       options.count,
       [&](std::size_t i) {
-        Ready ready{lsystem::grow(grammar, options.seed, i), {}, {}};
+        Ready ready{lsystem::grow(grammar, options.seed, i, site), {}, {}};
         if (!options.repo.empty()) ready.prepared.emplace(ready.neuron);
-        lsystem::Deriver deriver(grammar);
+        lsystem::Deriver deriver(grammar, site);
         for (const int step : steps)
           ready.younger.push_back({step, lsystem::grow_to(deriver, grammar, options.seed, i, step)});
         return ready;
@@ -266,6 +272,7 @@ std::function<void()> grow(CLI::App& command, Console& console) {
           ->type_name("STEPS")
           ->needs(out);
   must_be_whole(*lapse, 1, 1'000'000);
+  add_environment(command, options->environment);
   add_force(command, options->force);
   command.add_option("--population", options->population, "Their population; by default the grammar's name")
       ->needs(repo);
@@ -274,6 +281,9 @@ std::function<void()> grow(CLI::App& command, Console& console) {
     if (options->time_lapse)
       throw CLI::ValidationError(
           "--time-lapse: the younger neurons are written as SWC files; name a folder with --out");
+    if (!options->environment.file.empty())
+      throw CLI::ValidationError(
+          "--environment: neurons that ask what is around them go into a folder or a repository");
     if (repo->count() && !model->count())
       throw CLI::ValidationError(
           "--repo: a file of cells is grown by itself; import it into the repository afterwards");

@@ -233,13 +233,15 @@ struct Options {
   std::filesystem::path features, report;
   std::uint32_t repeats = 50, count = 0;
   std::uint64_t seed = 0;
-  bool force = false;
+  bool leave_one_out = false, force = false;
 };
 
 /// A grammar's file or built-in name, or a model of the repository.
 lsystem::Grammar model_of(const Options& options) {
   return options.repo.empty() ? find_grammar(options.model) : grammar_of_model(options.repo, options.model);
 }
+
+}  // namespace
 
 Sample grown_from(const lsystem::Grammar& grammar, const std::string& name, std::size_t count,
                   std::uint64_t seed, Console& console) {
@@ -249,7 +251,6 @@ Sample grown_from(const lsystem::Grammar& grammar, const std::string& name, std:
   return sample;
 }
 
-/// Of all grown neurons, the most branches in a row from one traced neuron, where the model tells.
 std::optional<std::size_t> longest_run_of(const lsystem::Grammar& grammar, std::size_t count,
                                           std::uint64_t seed) {
   std::optional<std::size_t> longest;
@@ -259,7 +260,27 @@ std::optional<std::size_t> longest_run_of(const lsystem::Grammar& grammar, std::
   return longest;
 }
 
+namespace {
+
+void leave_out(const Options& options, Console& console) {
+  LeftOutTrial trial{.traced = read_sample(options.train, options.repo, console),
+                     .kind = options.kind,
+                     .slices = options.slices,
+                     .count = options.count ? options.count : 99,
+                     .repeats = options.repeats,
+                     .seed = options.seed,
+                     .features = options.features,
+                     .report = options.report,
+                     .force = options.force};
+  std::optional<lsystem::Grammar> model;
+  std::optional<Sample> grown;
+  if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
+  if (!options.grown.empty()) trial.grown = &grown.emplace(read_sample(options.grown, options.repo, console));
+  judge_leaving_out(trial, console);
+}
+
 void run(const Options& options, Console& console) {
+  if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
   Sample grown, parametric;
@@ -306,14 +327,20 @@ std::function<void()> judge(CLI::App& command, Console& console) {
   sample("--train", options->train,
          "Neurons that the model was fitted to: files, folders, populations of --repo")
       ->required();
-  sample("--held-out", options->held_out, "Neurons of the same population that it never saw")->required();
+  CLI::Option* held_out =
+      sample("--held-out", options->held_out, "Neurons of the same population that it never saw");
+  command
+      .add_flag("--leave-one-out", options->leave_one_out,
+                "For few cells, and what is done without --held-out: each is left out in turn, set beside "
+                "cells of a model "
+                "fitted to the others, or beside those of --model or --grown, which saw none of them")
+      ->excludes(held_out);
   CLI::Option_group* judged = command.add_option_group("judged", "what is judged");
-  CLI::Option* model = judged->add_option("--model", options->model,
-                                          "A model: a grammar's file, or with --repo its name there");
+  judged->add_option("--model", options->model, "A model: a grammar's file, or with --repo its name there");
   judged->add_option("--grown", options->grown, "Neurons that it grew")->type_name("FILES");
-  judged->require_option(1);
-  add_whole(command, "--count", options->count, "Neurons to grow; 0: as many as are held out", 0, 1'000'000);
-  command.get_option("--count")->needs(model);
+  judged->require_option(0, 1);
+  add_whole(command, "--count", options->count,
+            "Neurons to grow; 0: as many as are held out, or 99 for each that is left out", 0, 1'000'000);
   sample(
       "--burke", options->parametric,
       "Neurons of a parametric model, which the protocol must reject; with --model one is fitted and grown");
@@ -328,6 +355,12 @@ std::function<void()> judge(CLI::App& command, Console& console) {
       ->type_name("FILE");
   add_report(command, options->report);
   add_force(command, options->force);
+  command.parse_complete_callback([options] {
+    if (!options->held_out.empty() && options->model.empty() && options->grown.empty())
+      throw CLI::RequiredError("--model or --grown, beside --held-out");
+    if (options->count && !options->grown.empty())
+      throw CLI::ValidationError("--count is how many neurons a model grows; leave it out with --grown");
+  });
   return [options, &console] { run(*options, console); };
 }
 

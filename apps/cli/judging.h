@@ -3,10 +3,13 @@
 #pragma once
 
 #include <array>
+#include <filesystem>
+#include <optional>
 #include <string>
 
 #include <nlohmann/json_fwd.hpp>
 
+#include "forest/lsystem/grammar.h"
 #include "forest/statistics/protocol.h"
 
 #include "apps/cli/samples.h"
@@ -26,6 +29,29 @@ Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& 
                      const Sample* parametric, const std::string& kind,
                      const statistics::ProtocolOptions& options, Console& console,
                      const std::string& slices = {});
+
+/// Neurons that the grammar grows, called NAME-SEED-NUMBER.
+Sample grown_from(const lsystem::Grammar& grammar, const std::string& name, std::size_t count,
+                  std::uint64_t seed, Console& console);
+
+/// Of these neurons, the most branches in a row from one traced neuron, where the model tells.
+std::optional<std::size_t> longest_run_of(const lsystem::Grammar& grammar, std::size_t count,
+                                          std::uint64_t seed);
+
+/// Few cells: each is left out in turn (statistics/leave_one_out.h).
+struct LeftOutTrial {
+  Sample traced;
+  const lsystem::Grammar* model = nullptr;  // that saw none of them …
+  const Sample* grown =
+      nullptr;  // … or what such a one grew; with neither, one is fitted to the others each time
+  std::string kind = "dendrite", slices = {};
+  std::size_t count = 99;  // neurons to grow for each
+  std::size_t repeats = 50;
+  std::uint64_t seed = 0;
+  std::filesystem::path features = {}, report = {};
+  bool force = false;
+};
+void judge_leaving_out(const LeftOutTrial& trial, Console& console);
 
 nlohmann::ordered_json json_of(const statistics::Judgement& judgement, std::uint64_t seed);
 void tell_judgement(const statistics::Judgement& judgement, Console& console);

@@ -68,8 +68,10 @@ std::function<void()> plant(CLI::App& command, Console& console) {
                   "A recipe (TOML), or the name of one that ships: column-1000, column-10000")
       ->required()
       ->type_name("FILE|NAME");
-  command.add_option("--repo", options->repo, "The repository the neurons come from")
-      ->required()
+  command
+      .add_option(
+          "--repo", options->repo,
+          "The repository the neurons come from; not needed where all types of the recipe have a grammar")
       ->type_name("REPO");
   command
       .add_option("--out", options->out,

@@ -3,18 +3,23 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <optional>
 #include <set>
 
 #include <fmt/format.h>
 
+#include "forest/circuit/environment.h"
 #include "forest/circuit/plant.h"
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/lsystem/derive.h"
+#include "forest/lsystem/grow.h"
 #include "forest/morphology/transform.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/grammars.h"
 
 namespace forest::cli {
 namespace {
@@ -24,18 +29,110 @@ using repository::Access;
 using repository::NeuronRow;
 using repository::Repository;
 
+const std::string& grammar_of(const circuit::Recipe& recipe, std::size_t type) {
+  static const std::string none;
+  return type < recipe.grammars.size() ? recipe.grammars[type] : none;
+}
+
+/// The neurons of a type that grow where they stand: as many somata at first, of which the largest decides how far all of
+/// them are planted from one another.
+struct Seedlings {
+  lsystem::Grammar grammar;
+  std::vector<float> radii;  // of their somata, by the index of the neuron
+};
+
+std::vector<std::optional<Seedlings>> seedlings_of(const circuit::Recipe& recipe, std::uint64_t seed) {
+  const auto wanted = circuit::counts(recipe);
+  std::vector<std::optional<Seedlings>> all(recipe.types.size());
+  for (std::size_t type = 0; type < all.size(); ++type) {
+    if (grammar_of(recipe, type).empty()) continue;
+    std::size_t count = 0;
+    for (const auto& layer : wanted) count += layer[type];
+    Seedlings s{find_grammar(grammar_of(recipe, type)), std::vector<float>(count)};
+    parallel_ranges(count, 64, [&](std::size_t begin, std::size_t end) {
+      lsystem::Deriver deriver(s.grammar);
+      for (std::size_t i = begin; i < end; ++i)
+        s.radii[i] = lsystem::grow_to(deriver, s.grammar, seed, i, 0).soma().sphere().radius;
+    });
+    all[type] = std::move(s);
+  }
+  return all;
+}
+
+/// Grows what stands for seedlings in the circuit, in place of their candidates.
+void grow_in_place(Planted& planted, const std::vector<std::optional<Seedlings>>& seedlings,
+                   std::uint64_t seed, Progress& progress) {
+  circuit::Circuit& circuit = planted.circuit;
+  std::vector<std::size_t> index(circuit.instances.size());  // of its grammar
+  std::vector<std::size_t> count(seedlings.size());
+  std::vector<Sphere> somata;
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    const circuit::Instance& instance = circuit.instances[i];
+    index[i] = count[instance.type]++;
+    const auto& own = seedlings[instance.type];
+    somata.push_back(
+        {instance.position,
+         own ? own->radii[index[i]] : planted.morphologies[instance.morphology].soma().sphere().radius});
+  }
+  std::vector<cortex::Slab> layers;
+  for (const circuit::Layer& layer : circuit.layers) layers.push_back({layer.name, layer.bottom, layer.top});
+  const cortex::Environment environment(std::move(layers), std::move(somata));
+
+  std::vector<Morphology> grown(index.size());
+  progress.begin("growing", index.size());
+  parallel_for(index.size(), 1, [&](std::size_t i) {
+    const circuit::Instance& instance = circuit.instances[i];
+    if (const auto& own = seedlings[instance.type])
+      grown[i] = centred(lsystem::grow(own->grammar, seed, index[i], {&environment, instance.position}));
+    progress.advance();
+  });
+  progress.end();
+
+  // The morphologies that are still planted, then the grown ones.
+  std::vector<std::string> names;
+  std::vector<Morphology> morphologies;
+  std::vector<std::uint32_t> number(planted.morphologies.size());
+  std::vector<char> stays(number.size());
+  for (const circuit::Instance& i : circuit.instances)
+    if (!seedlings[i.type]) stays[i.morphology] = 1;
+  std::set<std::string> taken;
+  for (std::size_t m = 0; m < number.size(); ++m)
+    if (stays[m]) {
+      number[m] = std::uint32_t(names.size());
+      taken.insert(circuit.morphologies[m]);
+      names.push_back(circuit.morphologies[m]), morphologies.push_back(planted.morphologies[m]);
+    }
+  for (std::size_t i = 0; i < index.size(); ++i) {
+    circuit::Instance& instance = circuit.instances[i];
+    if (!seedlings[instance.type]) {
+      instance.morphology = number[instance.morphology];
+      continue;
+    }
+    std::string name = fmt::format("{}-{:05}", circuit.types[instance.type].name, index[i]);
+    for (name = repository::file_name(name); !taken.insert(name).second;) name += "x";
+    instance.morphology = std::uint32_t(names.size());
+    instance.orientation = Quat::Identity();  // it has turned as it would
+    names.push_back(std::move(name)), morphologies.push_back(std::move(grown[i]));
+  }
+  circuit.morphologies = std::move(names), planted.morphologies = std::move(morphologies);
+}
+
 /// The neurons of every population that the recipe plants from.
 std::vector<NeuronRow> rows_for(const circuit::Recipe& recipe, const std::string& repo) {
   const auto wanted = circuit::counts(recipe);
-  const Repository repository = Repository::open(repo, Access::read);
   std::vector<NeuronRow> rows;
+  std::optional<Repository> repository;
   std::set<std::string> populations;
   for (std::size_t type = 0; type < recipe.types.size(); ++type) {
     const std::string& population = recipe.types[type].population;
     if (std::ranges::all_of(wanted, [&](const auto& layer) { return layer[type] == 0; }) ||
-        !populations.insert(population).second)
+        !grammar_of(recipe, type).empty() || !populations.insert(population).second)
       continue;
-    const auto found = repository.neurons(population);
+    if (repo.empty())
+      throw Error(fmt::format("recipe {} plants {}s from population {}; name its repository with --repo",
+                              recipe.name, recipe.types[type].name, population));
+    if (!repository) repository.emplace(Repository::open(repo, Access::read));
+    const auto found = repository->neurons(population);
     if (found.empty())
       throw Error(fmt::format(
           "{0}: recipe {1} plants {2}s from population {3}, which is empty; grow neurons into it "
@@ -95,8 +192,9 @@ circuit::Recipe find_recipe(const std::string& name_or_path) {
 
 Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
                               Progress& progress) {
+  const auto seedlings = seedlings_of(recipe, seed);
   const auto rows = rows_for(recipe, repo);
-  const auto names = names_of(rows);
+  auto names = names_of(rows);
   std::vector<Morphology> neurons(rows.size());
   std::vector<circuit::Candidate> candidates(rows.size());
   progress.begin("loading", rows.size());
@@ -111,11 +209,23 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
   });
   progress.end();
 
-  Planted planted{circuit::plant(recipe, candidates, seed, progress), {}};
+  // A candidate for all seedlings of a type; its population is one that no repository has.
+  circuit::Recipe planted_by = recipe;
+  for (std::size_t type = 0; type < seedlings.size(); ++type)
+    if (seedlings[type] && !seedlings[type]->radii.empty()) {
+      planted_by.types[type].population = "\n" + recipe.types[type].name;
+      names.push_back(planted_by.types[type].population);
+      neurons.emplace_back();
+      candidates.push_back({names.back(), names.back(), std::ranges::max(seedlings[type]->radii), 0.f});
+    }
+  Planted planted{circuit::plant(planted_by, candidates, seed, progress), {}};
+  planted.circuit.types = recipe.types;
   for (std::size_t i = 0; i < names.size(); ++i)  // the circuit keeps the order of the candidates
     if (planted.morphologies.size() < planted.circuit.morphologies.size() &&
         planted.circuit.morphologies[planted.morphologies.size()] == names[i])
       planted.morphologies.push_back(neurons[i]);
+  if (std::ranges::any_of(seedlings, [](const auto& s) { return s.has_value(); }))
+    grow_in_place(planted, seedlings, seed, progress);
   mark_glia(planted);
   return planted;
 }

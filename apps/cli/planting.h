@@ -20,7 +20,9 @@ struct Planted {
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
 };
 
-/// Plants the neurons of a repository. A morphology is called as its neuron, made safe as a file name.
+/// Plants the neurons of a repository, and grows those of types with a grammar where they stand: below the pia, in the layers,
+/// among the somata of all others. A morphology is called as its neuron, made safe as a file name.
+/// @param repo  may be empty when all types have a grammar
 /// Throws Error when a population that the recipe plants from is empty, with the commands that fill it.
 Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
                               Progress& progress);

@@ -319,6 +319,80 @@ std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, doub
   return svg.done(top + panel + 48., "Persistence images");
 }
 
+std::string density_plots(std::span<const DensityPanel> panels) {
+  Svg svg;
+  constexpr std::size_t columns = 2;
+  constexpr double panel_width = 430., gap = 20., head = 46., plot = 150., height = head + plot + 44.;
+  for (std::size_t p = 0; p < panels.size(); ++p) {
+    const DensityPanel& panel = panels[p];
+    const double left = double(p % columns) * (panel_width + gap), top = double(p / columns) * height;
+    svg.text(left + 8., top + 18., panel.title);
+    svg.text(left + 8., top + 34., panel.note, "start", 10.5, .65);
+    std::vector<double> values, smooth;
+    for (const double v : panel.values)
+      if (std::isfinite(v)) values.push_back(v);
+    if (values.empty()) continue;
+    std::ranges::sort(values);
+    std::ranges::copy_if(values, std::back_inserter(smooth), [&](double v) {
+      return std::ranges::none_of(panel.atoms, [&](const auto& atom) {
+        return std::abs(v - atom.first) <= 1e-9 * std::max(1., std::abs(v));
+      });
+    });
+    // The outermost five of a thousand may lie far out; they count, but make no axis long.
+    double low = statistics::quantile(values, .005), high = statistics::quantile(values, .995);
+    const Scale x = scale_of(low, high, left + 8., left + panel_width - 8., .04);
+    const double quartiles = statistics::quantile(values, .75) - statistics::quantile(values, .25);
+    double bin = 2. * quartiles * std::pow(double(values.size()), -1. / 3.);  // Freedman & Diaconis 1981
+    bin = std::clamp(bin, (x.high - x.low) / 60., (x.high - x.low) / 8.);
+    if (panel.step > 0.) bin = panel.step * std::max(1., std::round(bin / panel.step));
+    const double first = panel.step > 0. ? (std::floor(x.low / panel.step) - .5) * panel.step : x.low;
+    std::vector<double> bars(std::size_t(std::clamp((x.high - first) / bin, 0., 1e4)) + 1, 0.);
+    for (const double v : smooth)
+      if (v >= x.low && v <= x.high)
+        bars[std::min(std::size_t((v - first) / bin), bars.size() - 1)] += 1. / (double(values.size()) * bin);
+    std::vector<double> curve(181, 0.);
+    const auto place = [&](std::size_t i) {
+      return x.low + (x.high - x.low) * double(i) / double(curve.size() - 1);
+    };
+    for (std::size_t i = 0; i < curve.size(); ++i)
+      if (const double d = panel.density(place(i)); std::isfinite(d)) curve[i] = d;
+    double most = std::max(1e-300, *std::ranges::max_element(bars));
+    // A density may rise without bound at the edge of its support.
+    most = std::max(most, std::min(*std::ranges::max_element(curve), 2. * most));
+    const double base = top + head + plot;
+    const auto up = [&](double density) { return base - plot * std::min(1., density / most); };
+    for (std::size_t i = 0; i < bars.size(); ++i) {
+      if (bars[i] == 0.) continue;
+      const double from = std::max(x.from, x(first + bin * double(i))),
+                   to = std::min(x.to, x(first + bin * double(i + 1)));
+      svg.add(R"(<rect x="{:.1f}" y="{:.1f}" width="{:.1f}" height="{:.1f}" fill="{}" fill-opacity=".32"/>)",
+              from + .4, up(bars[i]), std::max(.5, to - from - .8), base - up(bars[i]), colour_of(0));
+    }
+    std::string points;
+    for (std::size_t i = 0; i < curve.size(); ++i)
+      points += fmt::format("{:.1f},{:.1f} ", x(place(i)), up(curve[i]));
+    svg.add(R"(<polyline points="{}" fill="none" stroke="{}" stroke-width="2.2" stroke-linejoin="round"/>)",
+            points, colour_of(1));
+    for (const auto& [value, share] : panel.atoms) {
+      if (!(value >= x.low && value <= x.high)) continue;
+      svg.add(R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}" stroke-width="3"/>)",
+              x(value), base, base - plot * std::min(1., share), colour_of(2));
+      const bool right = x(value) > .5 * (x.from + x.to);
+      svg.text(x(value) + (right ? -6. : 6.), base - plot * std::min(.95, share) - 2.,
+               fmt::format("{:.0f} % are {}", 100. * share, number(value)), right ? "end" : "start", 10.5,
+               .8);
+    }
+    for (const double t : ticks(x.low, x.high, 6)) {
+      svg.line(x(t), base, x(t), base + 4., .4);
+      svg.text(x(t), base + 16., number(t), "middle", 10.5, .7);
+    }
+    svg.line(x.from, base, x.to, base, .5);
+    svg.text(.5 * (x.from + x.to), base + 31., panel.unit, "middle", 10.5, .7);
+  }
+  const std::size_t rows = (panels.size() + columns - 1) / columns;
+  return svg.done(height * double(rows), "Values and the densities fitted to them");
+}
+
 std::string chance_plot(std::span<const double> null, double found, double lower, double upper,
                         const std::string& title) {
   Svg svg;

@@ -4,10 +4,12 @@
 #pragma once
 
 #include <cstddef>
+#include <functional>
 #include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace forest::cli {
@@ -74,6 +76,18 @@ struct HeatPanel {
 
 std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, double reach,
                        const std::string& x_title, const std::string& y_title);
+
+/// Values as bars, and the density that was fitted to them. Atoms, values that come back exactly, are lines with their share and
+/// count in no bar; bars and curve have the area that atoms leave to 1.
+struct DensityPanel {
+  std::string title, unit, note;
+  std::vector<double> values;
+  std::function<double(double)> density;
+  std::vector<std::pair<double, double>> atoms = {};  // value, share
+  double step = 0.;                                   // values are whole multiples of this; 0: they are not
+};
+
+std::string density_plots(std::span<const DensityPanel> panels);
 
 /// How often chance reached which value, and what was found.
 std::string chance_plot(std::span<const double> null, double found, double lower, double upper,

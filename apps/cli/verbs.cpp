@@ -88,7 +88,8 @@ std::span<const Verb> verbs() {
       {"judge",
        "Judge whether grown neurons are indistinguishable from traced ones, which the model never saw",
        "brainforest judge --model like_them.lsys --train fitted/ --held-out others/ --report judged.html\n"
-       "  brainforest judge --grown grown/ --train fitted/ --held-out others/ --features features.csv",
+       "  brainforest judge --grown grown/ --train fitted/ --held-out others/ --features features.csv\n"
+       "  brainforest judge --leave-one-out --train few/",
        judge},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"

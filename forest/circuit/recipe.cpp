@@ -3,106 +3,25 @@
 
 #include <algorithm>
 #include <cmath>
-#include <initializer_list>
 #include <numeric>
-#include <sstream>
-#include <toml.hpp>
 #include <unordered_set>
 
 #include <fmt/format.h>
 
+#include "forest/circuit/toml_node.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
 namespace forest::circuit {
 namespace {
 
-constexpr double most_neurons = 1e8;     // more do not fit the memory of any machine this runs on
-constexpr double fraction_slack = 1e-3;  // people write 0.33 + 0.33 + 0.34
+constexpr double most_neurons = Node::most;  // more do not fit the memory of any machine this runs on
+constexpr double fraction_slack = 1e-3;      // people write 0.33 + 0.33 + 0.34
 
-/// A TOML value with the place it came from, read key by key; every complaint names its line.
-class Node {
- public:
-  Node(const toml::value& value, const std::string& file, std::string where)
-      : value_(value), file_(file), where_(std::move(where)) {}
-
-  [[noreturn]] void refuse(const std::string& sentence) const {
-    throw InputError(file_, value_.location().line(), sentence);
-  }
-
-  /// A table may hold these keys and no others; a misspelled key must not be passed over in silence.
-  void allow(std::initializer_list<std::string_view> keys) const {
-    const auto* offender = static_cast<const toml::value*>(nullptr);
-    std::string name;
-    for (const auto& [key, value] : table()) {
-      if (std::ranges::find(keys, std::string_view(key)) != keys.end()) continue;
-      // The table is unordered: name the first in the file.
-      if (!offender || value.location().line() < offender->location().line()) offender = &value, name = key;
-    }
-    if (offender)
-      Node(*offender, file_, where_)
-          .refuse(fmt::format("{} has no key \"{}\"; its keys are {}", where_, name, fmt::join(keys, ", ")));
-  }
-
-  std::optional<Node> find(const std::string& key) const {
-    const auto& all = table();
-    const auto found = all.find(key);
-    if (found == all.end()) return std::nullopt;
-    return Node(found->second, file_, where_ + "'s " + key);
-  }
-  Node at(const std::string& key) const {
-    if (auto node = find(key)) return *node;
-    refuse(fmt::format("{} lacks \"{}\"; add it", where_, key));
-  }
-
-  std::string string() const {
-    if (!value_.is_string()) refuse(where_ + " must be a text in quotation marks");
-    std::string text = value_.as_string().str;
-    if (text.empty()) refuse(where_ + " is empty; give it a name");
-    return text;
-  }
-  bool boolean() const {
-    if (!value_.is_boolean()) refuse(where_ + " must be true or false");
-    return value_.as_boolean();
-  }
-  double number(double low, double high, const char* unit) const {
-    const double x = value_.is_integer()    ? double(value_.as_integer())
-                     : value_.is_floating() ? value_.as_floating()
-                                            : std::nan("");
-    if (!(x >= low && x <= high))
-      refuse(fmt::format("{} must be a number from {:g} to {:g}{}{}", where_, low, high, *unit ? " " : "",
-                         unit));
-    return x;
-  }
-  std::uint32_t whole() const {
-    if (!value_.is_integer() || value_.as_integer() < 0 || double(value_.as_integer()) > most_neurons)
-      refuse(fmt::format("{} must be a whole number from 0 to {:.0f}", where_, most_neurons));
-    return std::uint32_t(value_.as_integer());
-  }
-  const toml::table& table() const {
-    if (!value_.is_table()) refuse(where_ + " must be a table of keys and values");
-    return value_.as_table();
-  }
-  std::vector<Node> tables(const std::string& key) const {
-    const Node list = at(key);
-    if (!list.value_.is_array() || list.value_.as_array().empty())
-      list.refuse(fmt::format("write each {} as a table of its own, headed [[{}]]", key, key));
-    std::vector<Node> nodes;
-    for (const toml::value& value : list.value_.as_array())
-      nodes.emplace_back(value, file_, fmt::format("{} {}", key, nodes.size() + 1));
-    return nodes;
-  }
-
- private:
-  const toml::value& value_;
-  const std::string& file_;
-  std::string where_;
-};
-
-constexpr double longest = 1e5;  // µm: ten centimetres, the largest brain slab anyone plants
+constexpr double longest = Node::longest;
 
 CellType read_type(const Node& node) {
-  node.allow({"name", "population", "excitatory", "glia"});
+  node.allow({"name", "population", "grammar", "excitatory", "glia"});
   CellType type;
   type.name = node.at("name").string();
   type.population = node.find("population") ? node.at("population").string() : type.name;
@@ -166,6 +85,11 @@ Recipe read_root(const Node& root) {
   std::unordered_set<std::string> seen;
   for (const Node& node : root.tables("type")) {
     recipe.types.push_back(read_type(node));
+    const auto grammar = node.find("grammar");
+    recipe.grammars.push_back(grammar ? grammar->string() : "");
+    if (grammar && node.find("population"))
+      grammar->refuse(
+          fmt::format("type {} has a grammar and a population; give one of them", recipe.types.back().name));
     if (!seen.insert(recipe.types.back().name).second)
       node.refuse(fmt::format("two types are called {}; names must differ", recipe.types.back().name));
   }
@@ -183,44 +107,10 @@ Recipe read_root(const Node& root) {
   return recipe;
 }
 
-// toml11 draws its message over several lines with a picture of the source; the first line holds the reason.
-std::string reason(const std::exception& error) {
-  std::string text = error.what();
-  text.erase(std::min(text.find('\n'), text.size()));
-  for (const std::string_view prefix : {"[error] ", "toml::"})
-    if (text.starts_with(prefix)) text.erase(0, prefix.size());
-  if (const auto colon = text.find(": "); colon != std::string::npos && text.find(' ') > colon)
-    text.erase(0, colon + 2);
-  return text.empty() ? "it cannot be parsed" : text;
-}
-
-// The parser recurses; text that opens brackets without end would exhaust the stack.
-void refuse_deep_nesting(std::string_view text, const std::string& file) {
-  constexpr int deepest = 64;
-  int depth = 0;
-  std::size_t line = 1;
-  for (const char c : text) {
-    if (c == '\n') ++line;
-    if (c == '[' || c == '{') ++depth;
-    if (c == ']' || c == '}') depth = std::max(0, depth - 1);
-    if (depth > deepest)
-      throw InputError(file, line, "brackets are nested too deeply for a recipe; close them");
-  }
-}
-
 }  // namespace
 
 Recipe parse_recipe(std::string_view text, const std::string& file) {
-  refuse_deep_nesting(text, file);
-  toml::value root;
-  try {
-    std::istringstream stream{std::string(text)};
-    root = toml::parse(stream, file);
-  } catch (const toml::exception& error) {
-    throw InputError(file, error.location().line(), "this is not TOML: " + reason(error) + "; correct it");
-  } catch (const std::exception& error) {
-    throw InputError(file, 0, "this is not TOML: " + reason(error) + "; correct it");
-  }
+  const toml::value root = parse_toml(text, file);
   return read_root(Node(root, file, "the recipe"));
 }
 

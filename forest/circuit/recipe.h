@@ -29,6 +29,9 @@ struct Recipe {
   std::string name = "column";
   float radius = 0.f;  // of the column, µm, > 0
   std::vector<CellType> types;
+  /// Of each type the grammar by which its neurons grow where they stand, among the others; empty: they come from its
+  /// population. A vector shorter than `types` stands for empty ones.
+  std::vector<std::string> grammars = {};
   std::vector<Layer> layers;  // from the pia downwards
   /// The exact number of neurons in all. Densities then only say how they are shared among the layers without
   /// a count.

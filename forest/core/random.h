@@ -19,6 +19,9 @@ class Random {
   explicit Random(std::uint64_t seed, std::uint64_t item = 0, std::uint32_t stream = 0)
       : seed_(seed), item_(item), stream_(stream) {}
 
+  std::uint64_t seed() const { return seed_; }
+  std::uint64_t item() const { return item_; }
+
   std::uint32_t operator()();  // 32 uniform bits
   static constexpr result_type min() { return 0; }
   static constexpr result_type max() { return 0xffffffffu; }

@@ -26,13 +26,17 @@ struct Resampling {
   double path = 1., order = 2., diameter = .5, height = .6,
          depth = .2;                          // in standard deviations among the forks of a kind
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
+  double aim = .15;                           // of the unit vector to the farthest tip: likewise
   double lean = .12;                          // of how far aside of the way out it heads
-  double style = .65;                         // in standard deviations among the neurons
-  double smoothing = .4;                      // of a neuron's style: 0 takes that of a traced neuron as it is
+  double style = .45;                         // in standard deviations among the neurons
+  double smoothing = .3;                      // of a neuron's style: 0 takes that of a traced neuron as it is
+  std::size_t kin = 4;                        // neurons alike, by whose differences it is changed
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.
-/// @param neurons  at least two with a soma and such sections; others are passed over
+/// @param neurons  at least two with such sections; others are passed over. Neurons without a soma begin at their first root, as
+///                 insects' do whose arbors all leave one fibre. What changes its kind on the way (an axon on a dendrite) is a
+///                 stem of its own, which begins where it began.
 /// Throws Error when there are too few.
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
                                const Resampling& options = {});

@@ -2,11 +2,16 @@
 #include "forest/fitting/resampling.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <set>
 
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/random.h"
+#include "forest/fitting/copying.h"
+#include "forest/lsystem/derive.h"
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/measure.h"
 #include "forest/statistics/metric.h"
@@ -70,14 +75,20 @@ TEST(Resampling, TheSameNeuronsGiveTheSameText) {
   EXPECT_NE(lsystem::grow(grammar, 1, 5), lsystem::grow(grammar, 1, 6));
 }
 
-TEST(Resampling, TakesNoTwoBranchesInARowFromOneNeuron) {
+TEST(Resampling, TakesThreeBranchesInARowFromOneNeuronAtMost) {
   const std::vector<Morphology> models = traced(8);
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  lsystem::Deriver deriver(grammar);
+  std::size_t longest = 0;
+  for (std::uint64_t i = 0; i < 100; ++i)
+    longest = std::max(longest, longest_run(deriver.derive(2, i), grammar).value_or(0));
+  EXPECT_EQ(longest, 3u);  // they do go on as in the neuron that they come from
+
+  // A fork that is drawn anew comes from another neuron than the branch it ends.
   const auto& samples = grammar.lookups.samples;
   const auto forks = std::ranges::find(samples, "forks", &lsystem::Sample::name);
   ASSERT_NE(forks, samples.end());
-  std::size_t donor = 0;
-  while (forks->outcomes[donor] != "donor") ++donor;
+  const auto donor = std::size_t(std::ranges::find(forks->outcomes, "donor") - forks->outcomes.begin());
   Random random(1);
   std::vector<double> wanted(forks->conditions.size(), 0.);
   wanted[0] = 3.;
@@ -85,6 +96,97 @@ TEST(Resampling, TakesNoTwoBranchesInARowFromOneNeuron) {
     wanted[1] = cell;
     for (int i = 0; i < 20; ++i) EXPECT_NE(forks->outcome(forks->draw(wanted, random), donor), double(cell));
   }
+}
+
+TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
+  const std::vector<Morphology> models = traced(12);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const auto stems = [](std::span<const Morphology> neurons) {
+    std::vector<Vec3> places;
+    for (const Morphology& n : neurons) {
+      const Point first = n.points(n.roots()[0]).front(), soma = n.soma().sphere();
+      places.push_back(first.position() - soma.position());
+    }
+    return places;
+  };
+  const std::vector<Vec3> theirs = stems(models), grown = stems(lsystem::grow_population(grammar, 24, 5));
+  for (const Vec3& place : theirs)
+    for (std::size_t half : {0, 12})
+      EXPECT_EQ(std::ranges::count_if(std::span(grown).subspan(half, 12),
+                                      [&](const Vec3& g) { return (g - place).norm() < .02f; }),
+                1);
+}
+
+// Arbors that leave one point, and no soma.
+Morphology insect(std::uint64_t i, int stems) {
+  Random random(7, i);
+  MorphologyBuilder builder;
+  const Point root{10.f, 20.f, 30.f, 1.5f};
+  const SectionId begin = builder.add_section({}, SectionKind::axon, std::array{root});
+  const auto branch = [&](SectionId parent, const Point& from, double angle, auto&& again, int left) -> void {
+    std::vector<Point> points{from};
+    for (int k = 0; k < 4; ++k) {
+      Point p = points.back();
+      p.x += float(5. * std::cos(angle)), p.y += float(5. * std::sin(angle)), p.z += float(random.normal());
+      p.radius = .5f;
+      points.push_back(p);
+    }
+    const SectionId id = builder.add_section(parent, SectionKind::axon, points);
+    if (left > 0)
+      for (const double side : {-.5, .6})
+        again(id, points.back(), angle + side + .1 * random.normal(), again, left - 1);
+  };
+  for (int s = 0; s < stems; ++s) branch(begin, root, 2. * s + .2 * random.normal(), branch, 1 + s % 2);
+  return builder.build();
+}
+
+TEST(Resampling, WhatHasNoSomaBeginsAtItsFibre) {
+  const std::vector<Morphology> models{insect(0, 3), insect(1, 2), insect(2, 4)};
+  Resampling axons;
+  axons.kinds = {SectionKind::axon};
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "insects", axons), "insects");
+  std::set<std::size_t> stems;
+  for (std::uint64_t i = 0; i < 20; ++i) {
+    const Morphology grown = lsystem::grow(grammar, 1, i);
+    EXPECT_EQ(grown.soma().kind, SomaKind::none);
+    ASSERT_EQ(grown.roots().size(), 1u);
+    EXPECT_EQ(grown.points(grown.roots()[0]).size(), 1u);
+    EXPECT_EQ(grown.points()[0].radius, 1.5f);
+    for (const Section& s : grown.sections()) EXPECT_EQ(s.kind, SectionKind::axon);
+    stems.insert(grown.children(grown.roots()[0]).size());
+  }
+  EXPECT_EQ(stems, (std::set<std::size_t>{2, 3, 4}));
+}
+
+TEST(Resampling, AnAxonOnADendriteIsAStemOfItsOwn) {
+  std::vector<Morphology> models;
+  for (const Morphology& n : traced(6)) {  // its last section that ends is an axon that forks once
+    MorphologyBuilder builder;
+    builder.set_soma(n.soma());
+    SectionId last;
+    for (std::uint32_t i = 0; i < n.sections().size(); ++i) {
+      const Section& s = n.section(SectionId(i));
+      const SectionId id = builder.add_section(s.parent, s.kind, n.points(SectionId(i)));
+      if (n.is_terminal(SectionId(i))) last = id;
+    }
+    Point from = n.points(last).back(), on = from, left, right;
+    from.radius = .2f, on.radius = .2f, on.y -= 30.f, left = right = on;
+    left.x -= 20.f, right.x += 20.f;
+    const SectionId axon = builder.add_section(last, SectionKind::axon, std::array{from, on});
+    builder.add_section(axon, SectionKind::axon, std::array{on, left});
+    builder.add_section(axon, SectionKind::axon, std::array{on, right});
+    models.push_back(builder.build());
+  }
+  Resampling whole;
+  whole.kinds = statistics::KindSet::all();
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "whole", whole), "whole");
+  double sections = 0.;
+  for (const Morphology& grown : lsystem::grow_population(grammar, 20, 2)) {
+    const Arbors axon(grown, {SectionKind::axon});
+    EXPECT_EQ(axon.stems().size(), 1u);
+    sections += double(axon.sections().size());
+  }
+  EXPECT_NEAR(sections / 20., 3., 1.);
 }
 
 TEST(Resampling, TooFewNeuronsAreRefused) {

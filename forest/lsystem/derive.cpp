@@ -39,6 +39,7 @@ struct Candidate {
 
 struct Deriver::State {
   const Grammar& grammar;
+  cortex::Site site;
   std::vector<Node> nodes;
   std::vector<double> parameters;
   std::vector<std::uint32_t> active, later;  // nodes that productions may rewrite, in the order of the word
@@ -50,8 +51,9 @@ struct Deriver::State {
   std::vector<std::uint32_t> seen;   // nodes matched by contexts
   Word word;
 
-  explicit State(const Grammar& g)
+  State(const Grammar& g, const cortex::Site& where)
       : grammar(g),
+        site(where),
         slots(g.slots + 1),
         stack(g.stack + 1),
         cell(g.cell_values),
@@ -283,10 +285,10 @@ struct Deriver::State {
     if (after != none) nodes[after].previous = at;
   }
 
-  // Fills in the answers to ?P and ?H.
+  // Fills in the answers to ?P, ?H and their like.
   void answer() {
     flatten();
-    lsystem::answer(word, grammar);
+    lsystem::answer(word, grammar, site);
     std::size_t at = 0;
     for (std::uint32_t n = nodes.empty() ? none : 0; n != none; n = nodes[n].next) {
       if (nodes[n].symbol == blank) continue;
@@ -322,9 +324,11 @@ struct Deriver::State {
   }
 };
 
-Deriver::Deriver(const Grammar& grammar) : state_(std::make_unique<State>(grammar)) {}
+Deriver::Deriver(const Grammar& grammar, const cortex::Site& site)
+    : state_(std::make_unique<State>(grammar, site)) {}
 Deriver::~Deriver() = default;
 Deriver::Deriver(Deriver&&) noexcept = default;
+const cortex::Site& Deriver::site() const { return state_->site; }
 
 const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
   Random random(seed, index);
@@ -338,8 +342,9 @@ const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::option
   return state_->word;
 }
 
-Word derive(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
-  return Deriver(grammar).derive(seed, index, steps);
+Word derive(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, std::optional<int> steps,
+            const cortex::Site& site) {
+  return Deriver(grammar, site).derive(seed, index, steps);
 }
 
 }  // namespace forest::lsystem

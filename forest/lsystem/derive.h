@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 // Derivation: in each step all modules of the word are rewritten at once, by what the word was before the
-// step. A word is a pure function of (grammar, seed, index, steps).
+// step. A word is a pure function of (grammar, seed, index, steps) and of the site, when the grammar asks what is there.
 #pragma once
 
 #include <memory>
 #include <optional>
 
+#include "forest/cortex/environment.h"
 #include "forest/lsystem/grammar.h"
 
 namespace forest::lsystem {
@@ -14,7 +15,7 @@ namespace forest::lsystem {
 /// outlive it.
 class Deriver {
  public:
-  explicit Deriver(const Grammar& grammar);
+  explicit Deriver(const Grammar& grammar, const cortex::Site& site = {});
   ~Deriver();
   Deriver(Deriver&&) noexcept;
 
@@ -25,12 +26,15 @@ class Deriver {
   /// rewrite.
   const Word& derive(std::uint64_t seed = 0, std::uint64_t index = 0, std::optional<int> steps = {});
 
+  /// Where its neurons grow.
+  const cortex::Site& site() const;
+
  private:
   struct State;
   std::unique_ptr<State> state_;
 };
 
 Word derive(const Grammar& grammar, std::uint64_t seed = 0, std::uint64_t index = 0,
-            std::optional<int> steps = {});
+            std::optional<int> steps = {}, const cortex::Site& site = {});
 
 }  // namespace forest::lsystem

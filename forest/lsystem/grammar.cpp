@@ -792,7 +792,7 @@ class Parser {
     for (std::size_t i = 0; i < grammar_.symbols.size(); ++i)
       grammar_.drawn_as.push_back(grammar_.symbols[i].starts_with("F_") ? Symbol(Action::draw) : Symbol(i));
     const auto question = [&](const Shape& s) {
-      return is(s, Action::ask_place) || is(s, Action::ask_heading);
+      return s.symbol < turtle_symbols().size() && is_question(turtle_symbols()[s.symbol].action);
     };
     for (const Production& p : grammar_.productions)
       grammar_.queries |= std::ranges::any_of(p.left, question) || std::ranges::any_of(p.right, question);

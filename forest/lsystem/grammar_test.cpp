@@ -2,6 +2,9 @@
 #include "forest/lsystem/grammar.h"
 
 #include <cmath>
+#include <map>
+#include <set>
+#include <utility>
 
 #include <fmt/format.h>
 #include <gtest/gtest.h>
@@ -102,6 +105,33 @@ TEST(Expression, DistributionsHaveTheirMomentsAndLimits) {
     EXPECT_NEAR(mean, d.mean, 5 * std::sqrt(d.variance / count)) << d.expression;
     EXPECT_NEAR((squares / count - mean * mean) / d.variance, 1., .08) << d.expression;
   }
+}
+
+// Every block of n neurons has each card once, and every neuron each card as often over many seeds.
+TEST(Expression, CardsAreDealt) {
+  constexpr int cards = 7;
+  const Grammar g = parse("axiom: A\ng: A -> B(dealt(7), dealt(1), dealt(7))\n", "test");
+  Deriver deriver(g);
+  std::map<std::pair<int, int>, int> seen;  // place in the block, card
+  constexpr int seeds = 3000;
+  for (int seed = 0; seed < seeds; ++seed) {
+    std::set<double> block;
+    for (int place = 0; place < cards; ++place) {
+      const Word& word = deriver.derive(std::uint64_t(seed), std::uint64_t(cards * (seed % 3) + place), 1);
+      EXPECT_EQ(word.parameters[0], word.parameters[2]);
+      EXPECT_EQ(word.parameters[1], 0.);
+      block.insert(word.parameters[0]);
+      ++seen[{place, int(word.parameters[0])}];
+    }
+    EXPECT_EQ(block.size(), std::size_t(cards));
+  }
+  double chi2 = 0.;
+  constexpr double expected = double(seeds) / cards;
+  for (int place = 0; place < cards; ++place)
+    for (int card = 0; card < cards; ++card) chi2 += std::pow(seen[{place, card}] - expected, 2) / expected;
+  EXPECT_LT(chi2, 67.985);  // 36 degrees of freedom, p = .001
+  for (const char* none : {"dealt(0)", "dealt(2.5)", "dealt(2000000)"})
+    EXPECT_THROW(value_of(none), Error) << none;
 }
 
 TEST(Grammar, BindingsUseADrawTwice) {

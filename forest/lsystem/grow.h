@@ -1,11 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A synthetic neuron is grammar + seed + index, nothing more.
+// A synthetic neuron is grammar + seed + index, and the site where it grows, when the grammar asks what is there.
 #pragma once
 
 #include <cstdint>
 #include <vector>
 
 #include "forest/core/progress.h"
+#include "forest/cortex/environment.h"
 #include "forest/lsystem/grammar.h"
 #include "forest/morphology/morphology.h"
 
@@ -14,9 +15,10 @@ namespace forest::lsystem {
 class Deriver;
 
 /// The neuron `index` of the population `seed`: a pure function. It says in its annotations where it comes from. Throws as Deriver::derive and interpret do.
-Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
+Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
+                const cortex::Site& site = {});
 
-/// The same; one object a thread keeps memory between neurons (Deriver).
+/// The same, where the deriver is; one object a thread keeps memory between neurons (Deriver).
 Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
 
 /// The same neuron as it was after some steps of derivation, which are the time of its growth; its annotations say after how
@@ -26,6 +28,7 @@ Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed,
 
 /// Neurons first to first + count - 1, on all cores; the same at any number of threads.
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,
-                                        Progress& progress = Progress::none(), std::uint64_t first = 0);
+                                        Progress& progress = Progress::none(), std::uint64_t first = 0,
+                                        const cortex::Site& site = {});
 
 }  // namespace forest::lsystem

@@ -41,6 +41,8 @@ constexpr Function function_table[] = {
     {"vonmises", 2, Op::vonmises, true, "mean direction in degrees, concentration"},
     {"poisson", 1, Op::poisson, true, "mean"},
     {"chance", 1, Op::chance, true, "1 with probability p, else 0"},
+    {"dealt", 1, Op::dealt, true,
+     "the neuron's card of n: 0 to n - 1, each once among neurons 0 to n - 1, n to 2 n - 1, …"},
 };
 
 constexpr double nonsense =
@@ -75,6 +77,23 @@ double poisson(Random& random, double mean) {
     for (double product = random.uniform(); product > bound; product *= random.uniform()) ++count;
   }
   return count;
+}
+
+// The neuron's number in its block of `cards` neurons, after the block was shuffled by Fisher & Yates.
+double dealt(const Random& random, double cards) {
+  constexpr double most = 1e6;
+  if (!(cards >= 1. && cards <= most && cards == std::floor(cards))) return nonsense;
+  const auto count = std::uint32_t(cards);
+  Random shuffle(random.seed(), random.item() / count, 0xdea1);
+  auto place = std::uint32_t(random.item() % count);
+  for (std::uint32_t i = count; i-- > 1;) {  // one card is followed, to where it comes to lie
+    const std::uint32_t other = shuffle.below(i + 1);
+    if (place == i)
+      place = other;
+    else if (place == other)
+      return i;
+  }
+  return place;
 }
 
 double modulo(double x, double y) { return x - y * std::floor(x / y); }
@@ -306,6 +325,9 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         break;
       case Op::chance:
         unary([&](double a) { return double(random.uniform() < a); });
+        break;
+      case Op::dealt:
+        unary([&](double a) { return dealt(random, a); });
         break;
       case Op::truncnormal:
         top -= 3;

@@ -21,7 +21,7 @@ enum class Op : std::uint8_t {
   add, subtract, multiply, divide, power, modulo, negate,
   less, less_equal, greater, greater_equal, equal, not_equal, logical_and, logical_or, logical_not,
   sin, cos, tan, asin, acos, atan, atan2, exp, log, sqrt, abs, floor, ceil, round, sign, min, max,
-  uniform, normal, truncnormal, lognormal, gamma, exponential, weibull, vonmises, poisson, chance,
+  uniform, normal, truncnormal, lognormal, gamma, exponential, weibull, vonmises, poisson, chance, dealt,
   // clang-format on
 };
 

@@ -48,8 +48,7 @@ float Trace::diameter_at(float part) const {
   const auto i = std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin());
   if (i == 0) return stops.front().diameter;
   if (i == stops.size()) return stops.back().diameter;
-  return std::lerp(stops[i - 1].diameter, stops[i].diameter,
-                   (wanted - lengths[i - 1]) / (lengths[i] - lengths[i - 1]));
+  return stops[wanted - lengths[i - 1] < lengths[i] - wanted ? i - 1 : i].diameter;
 }
 
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,

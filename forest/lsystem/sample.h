@@ -35,7 +35,8 @@ struct Trace {
 
   const Vec3& end() const { return stops.back().at; }
   float length() const { return lengths.back(); }
-  /// At this share of its length. From the first place on: what leads there belongs to the branch before.
+  /// At the place nearest to this share of its length: a tracer sets diameters in steps. The first place of all is not asked,
+  /// for what leads there belongs to the branch before.
   float diameter_at(float part) const;
 };
 

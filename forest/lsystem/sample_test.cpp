@@ -172,7 +172,8 @@ TEST(Trace, TellsItsDiameterAnywhere) {
   const Trace& t = twigs(g).branches(0)[0];  // 1 after 3 µm, 1.5 after 8
   EXPECT_FLOAT_EQ(t.diameter_at(0.f), 1.f);
   EXPECT_FLOAT_EQ(t.diameter_at(3.f / 8.f), 1.f);
-  EXPECT_FLOAT_EQ(t.diameter_at(5.5f / 8.f), 1.25f);
+  EXPECT_FLOAT_EQ(t.diameter_at(5.f / 8.f), 1.f);  // in steps, as tracers set them
+  EXPECT_FLOAT_EQ(t.diameter_at(6.f / 8.f), 1.5f);
   EXPECT_FLOAT_EQ(t.diameter_at(1.f), 1.5f);
 }
 

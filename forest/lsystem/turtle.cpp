@@ -10,6 +10,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/lsystem/exclusion.h"
 
 namespace forest::lsystem {
 namespace {
@@ -51,9 +52,31 @@ constexpr TurtleSymbol symbol_table[] = {
      "branch of row `like`, "
      "times `thickness`, and no thinner than `thinnest`",
      Action::trace, 3, 10},
+    {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
+     Action::fibre, 1, 1},
+    {"Avoid", "gap",
+     "from here on keep this far from somata, the own one included, and below the pia, by bending around; "
+     "below 0 ends it",
+     Action::avoid, 1, 1},
+    {"Seek", "strength",
+     "from here on bend by strength to where attractors are denser, below 0 away from it; 0 ends it",
+     Action::seek, 1, 1},
+    {"Shun", "strength, reach",
+     "from here on bend away from the nearest soma of another cell by strength, which falls with the "
+     "distance by a "
+     "factor of e within the reach; 0 ends it",
+     Action::shun, 1, 2},
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
     {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
+    {"?D", "depth, layer, above, below",
+     "… how deep below the pia it is, in which layer, and how far from the upper and lower border of that",
+     Action::ask_depth, 1, 4},
+    {"?N", "distance, x, y, z",
+     "… how far the surface of the nearest soma of another cell is, and the unit vector to its centre",
+     Action::ask_near, 1, 4},
+    {"?A", "density, x, y, z", "… how dense attractors are, and the unit vector to where they are denser",
+     Action::ask_attraction, 1, 4},
 };
 
 static_assert([] {
@@ -77,7 +100,9 @@ struct Drawn {
 struct State {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
   Eigen::Matrix3d frame;  // columns: heading, left, up
-  double diameter = 1., tropism = 0., outward = 0., flat = 0.;
+  double diameter = 1., tropism = 0., outward = 0., flat = 0., seek = 0., shun = 0.;
+  double shun_reach = 10.;
+  double avoid = -1.;                                  // µm kept free; below 0: it goes through everything
   Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
   Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
   std::uint32_t node = none;                           // the drawn point the turtle stands on
@@ -87,7 +112,11 @@ struct State {
 
 class Turtle {
  public:
-  Turtle(const Word& word, const Grammar& grammar) : word_(word), grammar_(grammar) {
+  Turtle(const Word& word, const Grammar& grammar, const cortex::Site& site)
+      : word_(word),
+        grammar_(grammar),
+        environment_(site.environment ? *site.environment : nothing()),
+        at_(site.at.cast<double>()) {
     state_.frame.col(0) = Eigen::Vector3d::UnitY();
     state_.frame.col(1) = -Eigen::Vector3d::UnitX();
     state_.frame.col(2) = Eigen::Vector3d::UnitZ();
@@ -101,21 +130,61 @@ class Turtle {
   // Draws nothing, and writes its answers into the word.
   void answer(std::vector<double>& parameters) {
     answers_ = &parameters;
-    walk();
+    const std::vector<std::uint32_t> ends = ends_of_silent_branches();
+    for (std::uint32_t i = 0; i < ends.size(); ++i)
+      if (ends[i] != none)
+        i = ends[i];
+      else
+        act(word_.modules[i]);
   }
 
  private:
   void walk() {
-    for (const Module& m : word_.modules)
-      if (const Symbol s = grammar_.drawn_as[m.symbol]; s < std::size(symbol_table)) act(symbol_table[s], m);
+    for (const Module& m : word_.modules) act(m);
     if (!stack_.empty()) fail("a branch is not closed");
+  }
+
+  // For every [ of a branch in which nothing is asked its ], else none; for all modules up to the last question.
+  std::vector<std::uint32_t> ends_of_silent_branches() const {
+    std::vector<std::uint32_t> ends, open;
+    std::size_t asked = 0;  // modules up to the last question
+    std::vector<bool> silent{true};
+    for (const Module& m : word_.modules) {
+      const auto i = std::uint32_t(ends.size());
+      ends.push_back(none);
+      const Symbol s = grammar_.drawn_as[m.symbol];
+      if (s >= std::size(symbol_table)) continue;
+      const Action action = symbol_table[s].action;
+      if (action == Action::push) {
+        open.push_back(i), silent.push_back(true);
+      } else if (action == Action::pop) {
+        if (open.empty()) fail("a ] closes nothing");
+        if (silent.back()) ends[open.back()] = i;
+        const bool was_silent = silent.back();
+        open.pop_back(), silent.pop_back();
+        silent.back() = silent.back() && was_silent;
+      } else if (is_question(action) || action == Action::soma) {  // from which places are counted
+        silent.back() = false;
+        if (is_question(action)) asked = i + 1;
+      }
+    }
+    ends.resize(asked);
+    return ends;
+  }
+
+  static const cortex::Environment& nothing() {
+    static const cortex::Environment empty;
+    return empty;
   }
 
   [[noreturn]] void fail(std::string_view what) const {
     throw Error(fmt::format("{}: {}; mend the grammar", grammar_.file, what));
   }
 
-  void act(const TurtleSymbol& symbol, const Module& m) {
+  void act(const Module& m) {
+    const Symbol drawn_as = grammar_.drawn_as[m.symbol];
+    if (drawn_as >= std::size(symbol_table)) return;
+    const TurtleSymbol& symbol = symbol_table[drawn_as];
     const std::span<const double> values = word_.of(m);
     const auto parameter = [&](std::size_t i, double otherwise) {
       if (i >= values.size()) return otherwise;
@@ -182,16 +251,41 @@ class Turtle {
         return become(SectionKind::glia);
       case Action::kind:
         return become_numbered(parameter(0, 0.));
+      case Action::fibre:
+        return begin(parameter(0, state_.diameter));
       case Action::place:
         return stand(soma_place_ + Eigen::Vector3d(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::head:
         return head(direction(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::trace:
         return trace(m);
+      case Action::avoid:
+        state_.avoid = parameter(0, 0.);
+        return;
+      case Action::seek:
+        state_.seek = parameter(0, 0.);
+        return;
+      case Action::shun:
+        state_.shun = parameter(0, 0.);
+        state_.shun_reach = std::max(1e-6, parameter(1, state_.shun_reach));
+        return;
       case Action::ask_place:
-        return tell(m, state_.position - soma_place_);
+        return tell(m, Eigen::Vector3d(state_.position - soma_place_));
       case Action::ask_heading:
-        return tell(m, state_.frame.col(0));
+        return tell(m, Eigen::Vector3d(state_.frame.col(0)));
+      case Action::ask_depth: {
+        const auto stratum = environment_.stratum(here());
+        return tell(m,
+                    Eigen::Vector4d(environment_.depth(here()), stratum.layer, stratum.above, stratum.below));
+      }
+      case Action::ask_near: {
+        const auto nearest = environment_.nearest_soma(here(), at_);
+        return tell(m, with_direction(nearest.distance, nearest.direction));
+      }
+      case Action::ask_attraction: {
+        const auto field = environment_.field(here());
+        return tell(m, with_direction(field.density, field.direction));
+      }
     }
   }
 
@@ -229,7 +323,17 @@ class Turtle {
     const auto start = float(0.5 * state_.diameter);
     state_.diameter = diameter;
     if (length == 0.) return;
-    line_to(state_.position + length * state_.frame.col(0), start);
+    const Eigen::Vector3d wanted = length * state_.frame.col(0),
+                          step = clear(wanted, std::max(double(start), 0.5 * diameter));
+    if (step.isZero(0.)) return;  // there is no room
+    line_to(state_.position + step, start);
+    if (step != wanted) head(step / std::copysign(step.norm(), length));
+    if (state_.seek != 0.)
+      if (const auto field = environment_.field(here()); field.density != 0.)
+        bend(field.direction, state_.seek);
+    if (state_.shun != 0.)
+      if (const auto nearest = environment_.nearest_soma(here(), at_); nearest.soma)
+        bend(-nearest.direction, state_.shun * std::exp(-std::max(0., nearest.distance) / state_.shun_reach));
     if (state_.tropism != 0.) bend(state_.towards, state_.tropism);
     if (state_.flat != 0.) {
       const Eigen::Vector3d heading = state_.frame.col(0);
@@ -239,6 +343,23 @@ class Turtle {
       const Eigen::Vector3d out = state_.position - soma_place_;
       if (const double distance = out.norm(); distance > 0.) bend(out / distance, state_.outward);
     }
+  }
+
+  Eigen::Vector3d here() const { return at_ + state_.position; }  // in the tissue
+
+  // What it draws in place of this step, so that a neurite of this radius keeps out of what it avoids.
+  Eigen::Vector3d clear(const Eigen::Vector3d& step, double radius) {
+    if (state_.avoid < 0.) return step;
+    if (!step.allFinite()) fail("the turtle has left the world");
+    const double apart = state_.avoid + radius;
+    obstacles_.balls.clear();
+    if (soma_) obstacles_.balls.push_back({soma_place_, double(soma_->radius) + apart});
+    environment_.for_somata(here(), step.norm() + apart, [&](const Sphere& soma) {
+      if (!cortex::Environment::encloses(soma, at_))
+        obstacles_.balls.push_back({soma.centre.cast<double>() - at_, double(soma.radius) + apart});
+    });
+    if (const auto pia = environment_.pia()) obstacles_.ceiling = *pia - at_.y() - apart;
+    return clear_step(state_.position, step, state_.frame.col(1), obstacles_);
   }
 
   // A segment of the turtle's diameter at its end.
@@ -286,11 +407,15 @@ class Turtle {
     const Eigen::Vector3d before = mirrored(t.heading), heading = state_.frame.col(0), from = state_.position;
     const double across = before.x() * heading.y() - before.y() * heading.x(),
                  along = before.x() * heading.x() + before.y() * heading.y();
+    // Two that head nearly along z hardly have an angle about it.
+    const double level = before.head<2>().norm() * heading.head<2>().norm();
     const Eigen::Quaterniond turn(
-        Eigen::AngleAxisd(turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+        Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
-    if (answers_) {
+    const bool free = state_.avoid < 0.;
+    Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // by what it avoided
+    if (answers_ && free) {
       line_to(place(t.end()), 0.f);
     } else {
       const float whole = t.length();
@@ -300,7 +425,15 @@ class Turtle {
         const float part = whole > 0.f ? t.lengths[i] / whole : 1.f;
         state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
         const Vec3 on_chord = t.end() * part;
-        line_to(place(on_chord + float(bent) * (stop.at - on_chord)), start);
+        Eigen::Vector3d next = place(on_chord + float(bent) * (stop.at - on_chord));
+        if (!free) {
+          const Eigen::Vector3d wanted = next + slip - state_.position,
+                                step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
+          slip += step - wanted;
+          next = state_.position + step;
+          if (step.isZero(0.)) continue;
+        }
+        line_to(next, start);
         start = float(0.5 * state_.diameter);
       }
     }
@@ -314,14 +447,28 @@ class Turtle {
     state_.frame.col(0) = direction;
   }
 
-  void tell(const Module& m, const Eigen::Vector3d& v) {
-    if (answers_) std::copy_n(v.data(), 3, answers_->begin() + m.first);
+  template <class Vector>
+  void tell(const Module& m, const Vector& answer) {  // as much of it as is asked
+    if (answers_) std::copy_n(answer.data(), std::size_t(m.count), answers_->begin() + m.first);
+  }
+  static Eigen::Vector4d with_direction(double number, const Eigen::Vector3d& direction) {
+    return {number, direction.x(), direction.y(), direction.z()};
+  }
+
+  // A root of one point. Somata are kept together by their soma; this keeps together what has none.
+  void begin(double diameter) {
+    state_.diameter = std::max(0., diameter);
+    if (answers_) return;
+    const auto radius = float(0.5 * state_.diameter);
+    drawn_.push_back({state_.position, radius, radius, none, 0, state_.tag, state_.kind});
+    state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
   void move(double length) {
     if (length != 0.) stand(state_.position + length * state_.frame.col(0));
   }
   void stand(const Eigen::Vector3d& place) {
+    if (place == state_.position) return;
     state_.position = place;
     state_.node = none;
   }
@@ -387,16 +534,22 @@ class Turtle {
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
+  const cortex::Environment& environment_;
+  Eigen::Vector3d at_;  // of the turtle's origin in the tissue
+  Obstacles obstacles_;
 };
 
 }  // namespace
 
 std::span<const TurtleSymbol> turtle_symbols() { return symbol_table; }
 
-Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations) {
-  return Turtle(word, grammar).draw(annotations);
+Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations,
+                     const cortex::Site& site) {
+  return Turtle(word, grammar, site).draw(annotations);
 }
 
-void answer(Word& word, const Grammar& grammar) { Turtle(word, grammar).answer(word.parameters); }
+void answer(Word& word, const Grammar& grammar, const cortex::Site& site) {
+  Turtle(word, grammar, site).answer(word.parameters);
+}
 
 }  // namespace forest::lsystem

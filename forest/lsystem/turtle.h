@@ -7,6 +7,7 @@
 #include <span>
 #include <string_view>
 
+#include "forest/cortex/environment.h"
 #include "forest/lsystem/grammar.h"
 #include "forest/morphology/morphology.h"
 
@@ -18,7 +19,8 @@ enum class Action : std::uint8_t {
   // clang-format off
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
   push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
-  place, head, trace, ask_place, ask_heading,
+  place, head, trace, fibre, avoid, seek, shun,
+  ask_place, ask_heading, ask_depth, ask_near, ask_attraction,  // questions are the last
   // clang-format on
 };
 
@@ -31,14 +33,14 @@ std::span<const TurtleSymbol> turtle_symbols();
 
 /// Draws the word. Symbols that are none of the turtle's are passed over.
 /// @param annotations  given to the neuron as they are
+/// @param site         what the turtle finds around it
 /// Throws Error when brackets do not match, a number is not finite or there are two somata.
-Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations = {});
+Morphology interpret(const Word& word, const Grammar& grammar, const Annotations& annotations = {},
+                     const cortex::Site& site = {});
 
-/// Writes into the word's modules ?P and ?H where the turtle is and heads when it comes to them (Prusinkiewicz, James & Měch
-/// 1994, "Synthetic topiary"). Throws as interpret() does.
-void answer(Word& word, const Grammar& grammar);
-constexpr bool is_question(Action action) {
-  return action == Action::ask_place || action == Action::ask_heading;
-}
+/// Writes into the word's modules ?P, ?H and their like where the turtle is when it comes to them and what is there
+/// (Prusinkiewicz, James & Měch 1994, "Synthetic topiary"). Throws as interpret() does.
+void answer(Word& word, const Grammar& grammar, const cortex::Site& site = {});
+constexpr bool is_question(Action action) { return action >= Action::ask_place; }
 
 }  // namespace forest::lsystem

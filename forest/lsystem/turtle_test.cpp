@@ -38,6 +38,22 @@ TEST(Turtle, HeadsToThePiaWithItsLeftAtMinusX) {
   expect_near(end_of("f(2)F(1)"), {0, 3, 0});
 }
 
+TEST(Turtle, AFibreKeepsTogetherWhatLeavesIt) {
+  const Morphology insect =
+      drawn("Axon Fibre(3) [ At(0, 0, 0) F(5, 1) ] [ At(0, 0, 0) +F(4, 1) ] [ At(0, 0, 7) -F(4, 1) ]");
+  EXPECT_EQ(insect.soma().kind, SomaKind::none);
+  ASSERT_EQ(insect.sections().size(), 4u);
+  ASSERT_EQ(insect.roots().size(), 2u);  // the last one stands elsewhere
+  const SectionId root = insect.roots()[0];
+  EXPECT_EQ(insect.points(root).size(), 1u);
+  EXPECT_EQ(insect.points(root)[0].radius, 1.5f);
+  EXPECT_EQ(insect.children(root).size(), 2u);
+  // A single one goes on from it.
+  const Morphology one = drawn("Axon Fibre(3) [ At(0, 0, 0) F(5, 1) ]");
+  ASSERT_EQ(one.sections().size(), 1u);
+  EXPECT_EQ(one.points().size(), 2u);
+}
+
 TEST(Turtle, LevelsItsLeft) {
   // After $ a turn to the left stays horizontal, whatever was rolled before.
   for (const char* before : {"+(40)/(77)", "&(30)\\(10)+(20)", "^(100)/(5)-(60)"})

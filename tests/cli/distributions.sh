@@ -31,6 +31,28 @@ assert abs(length["estimates"][0]["value"] - 105) < 5 and length["family"] in ("
 assert all(e["lower"] is None or e["lower"] <= e["value"] <= e["upper"] for q in a.values() for e in q["estimates"])
 PY
 
+# A report that loads nothing: every quantity with its values, curve, parameters and candidates. It replaces nothing else.
+$BRAINFOREST distributions cells --kind basal --replicates 19 --report report.html >told.txt
+grep -q 'The report is report.html' told.txt
+/usr/bin/python3 - <<'PY'
+import re, json
+from xml.etree import ElementTree
+text = open("report.html", encoding="utf-8").read()
+assert not re.search(r'(src|href)=|url\(|@import|<script', text)
+plots = re.findall(r"<svg.*?</svg>", text, re.S)
+assert len(plots) >= 5
+for svg in plots:
+    ElementTree.fromstring(svg)  # well-formed
+    assert "nan" not in svg and "inf\"" not in svg
+for q in json.load(open("files.json"))["quantities"]:
+    assert (q["name"] in text) == (q["count"] > 0), q["name"]
+    if q["count"]:
+        assert all(c["family"] in text for c in q["candidates"])
+PY
+$BRAINFOREST distributions cells --kind basal --replicates 19 --report report.html >/dev/null  # again: nothing changes
+echo changed >>report.html
+fails_with 1 'report.html' $BRAINFOREST distributions cells --kind basal --replicates 19 --report report.html
+
 # By what they depend on; each bin holds enough values.
 $BRAINFOREST distributions cells --kind basal --by order --least 60 --replicates 0 --json >by.json
 python3 - <<'PY'

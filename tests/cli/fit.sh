@@ -40,6 +40,6 @@ python3 - <<'PY'
 import json
 judged = json.load(open("judged.json"))
 assert judged["cells"]["grown"] == 10, judged["cells"]
-assert judged["copying"]["longest_run"] == 1, judged["copying"]
+assert 1 <= judged["copying"]["longest_run"] <= 3, judged["copying"]
 assert judged["controls"]["burke"]["rejected"] in (True, False)
 PY

@@ -146,6 +146,7 @@ grow --model bes --repo models.db --count 3 --seed 1 --out model.cells >/dev/nul
 cmp models.db before.db
 
 fails_with 2 'time-lapse' grow --grammar bes --out x.cells --time-lapse 10
+fails_with 2 'environment' grow --grammar bes --out x.cells --environment column-1000
 fails_with 2 'import it' grow --grammar bes --out x.cells --repo x.db
 mkdir dir.cells  # a folder of that name is a folder
 grow --grammar bes --count 1 --out dir.cells >/dev/null
