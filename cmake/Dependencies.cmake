@@ -26,3 +26,5 @@ find_library(SOCI_POSTGRESQL soci_postgresql REQUIRED)
 find_package(SQLite3 REQUIRED)
 pkg_check_modules(CURL REQUIRED IMPORTED_TARGET libcurl)
 pkg_check_modules(LIBPQ REQUIRED IMPORTED_TARGET libpq)
+set(MPI_CXX_SKIP_MPICXX ON) # MPI's interface for C
+find_package(MPI COMPONENTS CXX) # optional: growing on several machines

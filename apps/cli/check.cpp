@@ -125,13 +125,13 @@ void check_file(Checked& checked, const Options& options, const fs::path& to, co
     const MappedFile file(checked.path);
     const io::Format& format = io::format_of(checked.path, file.text());
     checked.format = format.name;
-    const auto cells = io::read_all(format, file.text(), escaped(checked.path.string()));
-    for (const io::Cell& cell : cells) look_at(cell, checked);
+    const io::CellReader cells = io::read_each(format, file.text(), escaped(checked.path.string()));
+    for (std::size_t i = 0; i < cells.count; ++i) look_at(cells.read(i), checked);
     if (to.empty() || !checked.can_be_mended()) return;
-    if (cells.size() > 1)
-      checked.together = cells.size();
+    if (cells.count > 1)
+      checked.together = cells.count;
     else
-      repair(format, cells[0], file.text(), to, put, checked);
+      repair(format, cells.read(0), file.text(), to, put, checked);
   } catch (const InputError& error) {
     checked.error = error.what();
     checked.skipped = may_skip(error, checked.path, options.files);

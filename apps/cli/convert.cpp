@@ -71,41 +71,58 @@ struct Conversion {
 
 using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
 
+/// Where the cells of a file go, each by its own name when there are several.
+std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to) {
+  if (cells.count == 1) return {to};
+  std::vector<std::string> names(cells.count);
+  parallel_for(cells.count, 16, [&](std::size_t i) {
+    try {
+      names[i] = cells.name(i);
+    } catch (const InputError&) {  // told when its turn comes
+    }
+  });
+  std::vector<fs::path> places;
+  std::set<std::string> taken;
+  for (std::size_t i = 0; i < cells.count; ++i) {
+    std::string cell = names[i].empty() ? std::to_string(i + 1) : repository::file_name(names[i]);
+    const std::string wanted = cell;
+    for (int number = 2; !taken.insert(cell).second; ++number) cell = fmt::format("{}-{}", wanted, number);
+    places.push_back(to.parent_path() / (to.stem().string() + "-" + cell + to.extension().string()));
+  }
+  return places;
+}
+
 /// The conversions of one file: one, or one for each of its cells.
 std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const Target& target,
                                      const Options& options, const Put& put) {
   std::vector<Conversion> done;
-  std::set<std::string> names;  // of its cells
   try {
     const MappedFile file(from);
-    const std::string name = escaped(from.string());
-    const auto cells = io::read_all(io::format_of(from, file.text()), file.text(), name);
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      Conversion& conversion = done.emplace_back();
-      conversion.from = from;
-      conversion.to = to;
-      if (cells.size() > 1) {
-        std::string cell =
-            cells[i].name.empty() ? std::to_string(i + 1) : repository::file_name(cells[i].name);
-        const std::string wanted = cell;
-        for (int number = 2; !names.insert(cell).second; ++number)
-          cell = fmt::format("{}-{}", wanted, number);
-        conversion.to.replace_filename(to.stem().string() + "-" + cell + to.extension().string());
+    const io::CellReader cells =
+        io::read_each(io::format_of(from, file.text()), file.text(), escaped(from.string()));
+    const std::vector<fs::path> places = places_of(cells, to);
+    done.resize(cells.count);
+    parallel_for(cells.count, 4, [&](std::size_t i) {
+      Conversion& conversion = done[i];
+      conversion.from = from, conversion.to = places[i];
+      try {
+        io::Cell cell = cells.read(i);
+        conversion.warnings = std::move(cell.read.warnings);
+        const Morphology& m = cell.read.morphology;
+        if (target.neuron) {
+          conversion.losses = io::losses(m, target.neuron->keeps);
+          put(conversion.to, target.neuron->write(m));
+        } else {
+          const io::Model model =
+              io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
+          put(conversion.to, target.model->write(model));
+        }
+      } catch (const LimitError& error) {
+        conversion.error = fmt::format("{}: {}", escaped(from.string()), error.what());
+      } catch (const InputError& error) {  // the other cells may be sound
+        conversion.error = error.what();
       }
-      conversion.warnings = cells[i].read.warnings;
-      const Morphology& m = cells[i].read.morphology;
-      if (target.neuron) {
-        conversion.losses = io::losses(m, target.neuron->keeps);
-        put(conversion.to, target.neuron->write(m));
-      } else {
-        const io::Model model =
-            io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
-        put(conversion.to, target.model->write(model));
-      }
-    }
-  } catch (const LimitError& error) {
-    if (done.empty()) done.push_back({from, {}, {}, {}, {}, false});
-    done.back().error = fmt::format("{}: {}", escaped(from.string()), error.what());
+    });
   } catch (const InputError& error) {
     done.emplace_back(Conversion{from, {}, {}, {}, error.what(), may_skip(error, from, options.files)});
   }

@@ -147,4 +147,9 @@ bool holds_files(const fs::path& folder) {
   return fs::is_directory(folder, none) && !fs::is_empty(folder, none);
 }
 
+bool is_cells_file(const fs::path& path) {
+  std::error_code none;
+  return extension_of(path) == io::find_format("cells")->extensions[0] && !fs::is_directory(path, none);
+}
+
 }  // namespace forest::cli

@@ -48,4 +48,7 @@ void refuse_existing(const std::vector<std::filesystem::path>& files);
 /// Whether there may be something to overwrite: the folder is there and not empty.
 bool holds_files(const std::filesystem::path& folder);
 
+/// Whether this is a file of cells (io/cells.h) by its name, there or not; a folder of such a name is none.
+bool is_cells_file(const std::filesystem::path& path);
+
 }  // namespace forest::cli

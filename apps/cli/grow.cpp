@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// brainforest grow: neurons from a grammar, into a repository or a folder of SWC files.
+// brainforest grow: neurons from a grammar, into a repository, a folder of SWC files or one file of cells.
 #include "forest/lsystem/grow.h"
 
 #include <algorithm>
@@ -22,7 +22,9 @@
 #include "apps/cli/environment_options.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
+#include "apps/cli/grow_cells.h"
 #include "apps/cli/options.h"
+#include "apps/cli/ranks.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -139,7 +141,7 @@ class IntoFolder final : public Destination {
 };
 
 std::string name_of(const Options& options, const lsystem::Grammar& grammar, std::size_t index) {
-  return fmt::format("{}-{}-{:05}", grammar.name, options.seed, index);
+  return grown_name(grammar, options.seed, index);
 }
 
 /// Refuses when a file is there that does not hold the neuron it is named after. Only where there are files is anything
@@ -171,9 +173,43 @@ void refuse_to_replace(const Options& options, const lsystem::Grammar& grammar, 
   overwrites.refuse();
 }
 
+lsystem::Grammar grammar_of(const Options& options) {
+  return options.model.empty() ? find_grammar(options.grammar)
+                               : grammar_of_model(options.repo, options.model);
+}
+
+void report(const Options& options, const lsystem::Grammar& grammar, const io::CellsTotal& total,
+            nlohmann::ordered_json more, Console& console) {
+  nlohmann::ordered_json out{{"grammar", grammar.name},    {"title", grammar.title},
+                             {"seed", options.seed},       {"neurons", options.count},
+                             {"segments", total.segments}, {"length", total.length}};
+  out.update(more);
+  console.print(out);
+  const double count = double(options.count);
+  console.table(
+      {"grammar", "neurons", "segments each", "length each (µm)"},
+      {{grammar.name, fmt::format("{}", options.count), fmt::format("{:.0f}", double(total.segments) / count),
+        fmt::format("{:.0f}", total.length / count)}});
+}
+
+void run_into_cells(const Options& options, Console& console) {
+  const auto ranks = join_ranks();
+  const CellsGrown grown =
+      grow_cells([&] { return grammar_of(options); },
+                 {options.out, options.count, options.seed, options.force}, *ranks, console);
+  if (!ranks->first()) return;
+  report(options, grown.grammar, grown.total,
+         {{"file", options.out.string()}, {"bytes", grown.bytes}, {"there_before", grown.there}}, console);
+  if (grown.there) console.say(fmt::format("{} of them were there already", grown.there));
+}
+
 void run(const Options& options, Console& console) {
-  const lsystem::Grammar grammar =
-      options.model.empty() ? find_grammar(options.grammar) : grammar_of_model(options.repo, options.model);
+  if (is_cells_file(options.out)) return run_into_cells(options, console);
+  if (started_ranks() > 1)
+    throw Error(
+        "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "
+        "mpirun out");
+  const lsystem::Grammar grammar = grammar_of(options);
   const Surroundings surroundings(options.environment, console);
   const cortex::Site& site = surroundings.site();
   refuse_to_replace(options, grammar, site, console);
@@ -182,8 +218,7 @@ void run(const Options& options, Console& console) {
   if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
 
   const std::vector<int> steps = moments(options, grammar);
-  std::size_t segments = 0;
-  double length = 0.;
+  io::CellsTotal total;
   console.progress().begin("growing", options.count);
   parallel_in_order(
       options.count,
@@ -198,24 +233,14 @@ void run(const Options& options, Console& console) {
       [&](std::size_t i, Ready&& ready) {
         const std::string name = name_of(options, grammar, i);
         for (const auto& destination : destinations) destination->put(ready, name, i);
-        segments += ready.neuron.segment_count();
-        length += total_length(ready.neuron);
+        total.segments += ready.neuron.segment_count();
+        total.length += total_length(ready.neuron);
         console.progress().advance();
       });
   console.progress().end();
   for (const auto& destination : destinations) destination->finish();
 
-  console.print({{"grammar", grammar.name},
-                 {"title", grammar.title},
-                 {"seed", options.seed},
-                 {"neurons", options.count},
-                 {"segments", segments},
-                 {"length", length},
-                 {"steps", steps}});
-  const double count = double(options.count);
-  console.table({"grammar", "neurons", "segments each", "length each (µm)"},
-                {{grammar.name, fmt::format("{}", options.count),
-                  fmt::format("{:.0f}", double(segments) / count), fmt::format("{:.0f}", length / count)}});
+  report(options, grammar, total, {{"steps", steps}}, console);
 }
 
 }  // namespace
@@ -235,7 +260,9 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   add_seed(command, options->seed, "The same seed grows the same neurons");
   CLI::Option_group* into = command.add_option_group("into", "where the neurons go");
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
-  CLI::Option* out = into->add_option("--out", options->out, "Write them into this folder as SWC files");
+  CLI::Option* out = into->add_option("--out", options->out,
+                                      "Write them into this folder as SWC files, or into one file where it "
+                                      "ends in .cells; that is gone on with when the program was killed");
   into->require_option(1, 2);
   model->needs(repo);
   CLI::Option* lapse =
@@ -249,6 +276,18 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   add_force(command, options->force);
   command.add_option("--population", options->population, "Their population; by default the grammar's name")
       ->needs(repo);
+  command.parse_complete_callback([options, repo, model] {
+    if (!is_cells_file(options->out)) return;
+    if (options->time_lapse)
+      throw CLI::ValidationError(
+          "--time-lapse: the younger neurons are written as SWC files; name a folder with --out");
+    if (!options->environment.file.empty())
+      throw CLI::ValidationError(
+          "--environment: neurons that ask what is around them go into a folder or a repository");
+    if (repo->count() && !model->count())
+      throw CLI::ValidationError(
+          "--repo: a file of cells is grown by itself; import it into the repository afterwards");
+  });
   return [options, &console] { run(*options, console); };
 }
 

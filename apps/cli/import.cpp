@@ -55,37 +55,79 @@ struct Arrival {
   std::size_t sections = 0, warnings = 0;
 };
 
-/// The neurons of a file: nearly always one.
-std::vector<Arrival> read(const fs::path& path, const Options& options) {
-  std::vector<Arrival> arrivals;
-  const std::string stem = escaped(path.stem().string());
-  try {
-    const MappedFile file(path);
-    const std::string hash = hash_hex(file.bytes());
-    auto cells = io::read_all(io::format_of(path, file.text()), file.text(), escaped(path.string()));
-    for (std::size_t i = 0; i < cells.size(); ++i) {
-      Arrival& arrival = arrivals.emplace_back();
-      arrival.path = path;
-      arrival.name = stem;
-      arrival.hash = hash;
-      if (cells.size() > 1) {  // cells of one file are told apart by their names in it
-        const std::string cell = escaped(cells[i].name);
-        arrival.name += "-" + (is_name(cell) ? cell : std::to_string(i + 1));
-        arrival.hash += fmt::format("#{}", i + 1);
-      }
-      arrival.sections = cells[i].read.morphology.sections().size();
-      arrival.warnings = cells[i].read.warnings.size();
-      arrival.oddities = std::move(cells[i].read.warnings);
-      arrival.prepared.emplace(std::move(cells[i].read.morphology));
-    }
-  } catch (const Error& error) {
-    arrivals.resize(1);
-    arrivals[0] = {};
-    arrivals[0].path = path;
-    arrivals[0].error = error.what();
-    arrivals[0].skipped = may_skip(error, path, options.files);
+/// A file that is open while its cells are read.
+struct Opened {
+  MappedFile file;
+  std::string hash;
+  io::CellReader cells;
+
+  explicit Opened(const fs::path& path)
+      : file(path),
+        hash(hash_hex(file.bytes())),
+        cells(io::read_each(io::format_of(path, file.text()), file.text(), escaped(path.string()))) {}
+};
+
+/// What is read at a time: a file, or some cells of one that holds more than fit into memory.
+struct Source {
+  fs::path path;
+  std::shared_ptr<const Opened> opened;
+  std::size_t begin = 0, end = 0;
+};
+
+Arrival read(const fs::path& path, const Opened& opened, std::size_t i) {
+  io::Cell cell = opened.cells.read(i);
+  Arrival arrival;
+  arrival.path = path;
+  arrival.name = escaped(path.stem().string());
+  arrival.hash = opened.hash;
+  if (opened.cells.count > 1) {  // cells of one file are told apart by their names in it
+    const std::string name = escaped(cell.name);
+    arrival.name += "-" + (is_name(name) ? name : std::to_string(i + 1));
+    arrival.hash += fmt::format("#{}", i + 1);
   }
+  arrival.sections = cell.read.morphology.sections().size();
+  arrival.warnings = cell.read.warnings.size();
+  arrival.oddities = std::move(cell.read.warnings);
+  arrival.prepared.emplace(std::move(cell.read.morphology));
+  return arrival;
+}
+
+/// The neurons of a source: nearly always one.
+std::vector<Arrival> read(const Source& source, const Options& options) {
+  std::vector<Arrival> arrivals;
+  const auto guarded = [&](const auto& act) {
+    try {
+      act();
+    } catch (const Error& error) {
+      Arrival& failed = arrivals.emplace_back();
+      failed.path = source.path;
+      failed.error = error.what();
+      failed.skipped = may_skip(error, source.path, options.files);
+    }
+  };
+  guarded([&] {
+    const auto opened = source.opened ? source.opened : std::make_shared<const Opened>(source.path);
+    for (std::size_t i = source.begin, end = source.opened ? source.end : opened->cells.count; i < end; ++i)
+      guarded([&] { arrivals.push_back(read(source.path, *opened, i)); });
+  });
   return arrivals;
+}
+
+/// Files of cells in pieces, so that as little of them is in memory as of others.
+std::vector<Source> sources_of(const std::vector<fs::path>& paths) {
+  constexpr std::size_t piece = 8;
+  std::vector<Source> sources;
+  for (const fs::path& path : paths) {
+    try {
+      const auto opened = is_cells_file(path) ? std::make_shared<const Opened>(path) : nullptr;
+      if (!opened) sources.push_back({path, nullptr});
+      for (std::size_t i = 0; opened && i < opened->cells.count; i += piece)
+        sources.push_back({path, opened, i, std::min(i + piece, opened->cells.count)});
+    } catch (const InputError&) {  // told when its turn comes
+      sources.push_back({path, nullptr});
+    }
+  }
+  return sources;
 }
 
 const char* outcome(const Arrival& file) {
@@ -95,8 +137,32 @@ const char* outcome(const Arrival& file) {
                                      : "stored";
 }
 
-void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
+/// A line each; one for all that came alike from a file of very many.
+std::vector<std::vector<std::string>> lines_of(const std::vector<Arrival>& files) {
+  constexpr std::ptrdiff_t many = 50;
   std::vector<std::vector<std::string>> lines;
+  for (auto begin = files.begin(); begin != files.end();) {
+    const auto end = std::find_if(begin, files.end(), [&](const Arrival& file) {
+      return file.path != begin->path || outcome(file) != std::string_view(outcome(*begin));
+    });
+    const std::string path = escaped(begin->path.string());
+    if (end - begin > many) {
+      std::size_t sections = 0, warnings = 0;
+      for (auto file = begin; file != end; ++file) sections += file->sections, warnings += file->warnings;
+      lines.push_back({path, fmt::format("{} neurons", end - begin), std::to_string(sections),
+                       std::to_string(warnings), outcome(*begin)});
+      begin = end;
+    }
+    for (; begin != end; ++begin)
+      lines.push_back(begin->added
+                          ? std::vector{path, begin->added->name, std::to_string(begin->sections),
+                                        std::to_string(begin->warnings), std::string(outcome(*begin))}
+                          : std::vector<std::string>{path, "-", "-", "-", outcome(*begin)});
+  }
+  return lines;
+}
+
+void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t stored = 0, there = 0, failed = 0, skipped = 0, warnings = 0;
   for (const Arrival& file : files) {
@@ -108,17 +174,14 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                     {"sections", file.sections},
                     {"warnings", file.warnings}});
       (file.added->already_there ? there : stored) += 1;
-      lines.push_back({path, file.added->name, std::to_string(file.sections), std::to_string(file.warnings),
-                       outcome(file)});
     } else {
       entry["error"] = file.error;
       ++(file.skipped ? skipped : failed);
-      lines.push_back({path, "-", "-", "-", outcome(file)});
     }
     warnings += file.warnings;
     list.push_back(std::move(entry));
   }
-  console.table({"file", "neuron", "sections", "warnings", ""}, lines);
+  console.table({"file", "neuron", "sections", "warnings", ""}, lines_of(files));
   console.say(fmt::format(
       "{} stored, {} already there, {} not read, {} skipped{}", stored, there, failed, skipped,
       warnings
@@ -165,18 +228,18 @@ void run(const Options& options, Console& console) {
   }
   if (options.dry_run)
     throw Error("--dry-run tells what a workbook would change; leave it out to import files");
-  const std::vector<fs::path> paths = neuron_files(options.files, console);
+  const std::vector<Source> sources = sources_of(neuron_files(options.files, console));
   std::vector<Arrival> files;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
-  const std::size_t window = 64;  // files in memory at a time
+  const std::size_t window = 64;  // sources in memory at a time
   std::size_t done = 0;
-  console.progress().begin("importing", paths.size());
-  for (std::size_t first = 0; first < paths.size(); first += window) {
-    const std::size_t count = std::min(window, paths.size() - first), begin = files.size();
+  console.progress().begin("importing", sources.size());
+  for (std::size_t first = 0; first < sources.size(); first += window) {
+    const std::size_t count = std::min(window, sources.size() - first), begin = files.size();
     std::vector<std::vector<Arrival>> arrived(count);
     parallel_for(count, 1, [&](std::size_t i) {
-      arrived[i] = read(paths[first + i], options);
+      arrived[i] = read(sources[first + i], options);
       console.progress().advance();
     });
     for (auto& arrivals : arrived) std::ranges::move(arrivals, std::back_inserter(files));

@@ -22,6 +22,7 @@
 #include "forest/statistics/summary.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/filed_neurons.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
@@ -77,16 +78,23 @@ struct Neurons {
   std::vector<std::string> names, groups;  // groups: only with --by; of a file its folder
   std::vector<repository::NeuronId> ids;   // of a repository's
   std::function<std::function<Morphology(std::size_t)>()> reader;  // reads the i-th; each thread has its own
+  std::function<bool(const Error&, std::size_t)> may_skip;         // of a file's, as in files.h
 };
 
 Neurons of_files(const Options& options, Console& console) {
-  std::vector<std::filesystem::path> files = neuron_files(options.files, console);
+  const auto files = std::make_shared<const FiledNeurons>(neuron_files(options.files, console));
   Neurons neurons;
-  for (const auto& file : files) neurons.names.push_back(file.string());
+  neurons.names.resize(files->size());
+  parallel_for(files->size(), 64, [&](std::size_t i) {
+    const std::string cell = files->cell(i);
+    neurons.names[i] = (cell.empty() ? files->file(i) : files->file(i) / cell).string();
+  });
   if (!options.by.empty())
-    for (const auto& file : files) neurons.groups.push_back(file.parent_path().filename().string());
-  neurons.reader = [files = std::move(files)] {
-    return [&files](std::size_t i) { return io::read(files[i]).morphology; };
+    for (std::size_t i = 0; i < files->size(); ++i)
+      neurons.groups.push_back(files->file(i).parent_path().filename().string());
+  neurons.reader = [files] { return [files](std::size_t i) { return files->read(i); }; };
+  neurons.may_skip = [files, named = options.files](const Error& error, std::size_t i) {
+    return may_skip(error, files->file(i), named);
   };
   return neurons;
 }
@@ -382,7 +390,7 @@ void run(const Options& options, Console& console) {
         measured[i].rows = rows(options, picks, neurons.names[i], Arbors(read(i), kinds));
       } catch (const Error& error) {
         measured[i].error = error.what();
-        measured[i].skipped = options.repo.empty() && may_skip(error, neurons.names[i], options.files);
+        measured[i].skipped = options.repo.empty() && neurons.may_skip(error, i);
       }
       console.progress().advance();
     }

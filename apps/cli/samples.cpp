@@ -9,11 +9,11 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
-#include "forest/io/format.h"
 #include "forest/io/workbook.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/filed_neurons.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 
@@ -36,7 +36,7 @@ std::string folder_name(const fs::path& path) {
 }
 
 Sample of_files(const std::vector<std::string>& words, Console& console) {
-  const std::vector<fs::path> files = neuron_files(words, console);
+  const FiledNeurons files(neuron_files(words, console));
   struct Read {
     Morphology neuron;
     std::string error;
@@ -46,10 +46,10 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
   console.progress().begin("reading", files.size());
   parallel_for(files.size(), 4, [&](std::size_t i) {
     try {
-      read[i].neuron = io::read(files[i]).morphology;
+      read[i].neuron = files.read(i);
     } catch (const Error& error) {
       read[i].error = error.what();
-      read[i].skipped = may_skip(error, files[i], words);
+      read[i].skipped = may_skip(error, files.file(i), words);
     }
     console.progress().advance();
   });
@@ -63,8 +63,9 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
       failed += !read[i].skipped;
       continue;
     }
-    sample.cells.push_back(cell_name(files[i]));
-    sample.types.push_back(folder_name(fs::absolute(files[i]).parent_path()));
+    const std::string cell = files.cell(i);
+    sample.cells.push_back(cell.empty() ? cell_name(files.file(i)) : cell);
+    sample.types.push_back(folder_name(fs::absolute(files.file(i)).parent_path()));
     sample.neurons.push_back(std::move(read[i].neuron));
   }
   if (failed)  // a comparison of some of the cells would look like one of all

@@ -101,7 +101,9 @@ std::span<const Verb> verbs() {
        "  brainforest fit --repo cells.db --population traced --model like_traced",
        fit},
       {"grow", "Grow neurons from a grammar",
-       "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db", grow},
+       "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db\n"
+       "  brainforest grow --grammar pyramidal --count 1000000 --seed 1 --out grown.cells",
+       grow},
       {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
       {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest",

@@ -11,6 +11,7 @@
 #include <utility>
 
 #include <fmt/format.h>
+#include <sys/file.h>
 #include <sys/mman.h>
 #include <sys/stat.h>
 
@@ -231,6 +232,57 @@ void ScratchFile::read(std::uint64_t at, std::span<std::byte> into) const {
     into = into.subspan(std::size_t(got));
     at += std::uint64_t(got);
   }
+}
+
+PartFile::PartFile(const std::filesystem::path& wanted) : place_(followed(wanted)), part_(place_) {
+  part_ += ".part";
+  for (;;) {
+    file_ = ::open(part_.c_str(), O_RDWR | O_CREAT | O_CLOEXEC | O_NOFOLLOW | O_NONBLOCK, 0644);
+    struct stat ours {
+    }, there{};
+    if (file_ < 0 || ::fstat(file_, &ours) != 0) fail("created");
+    if (!S_ISREG(ours.st_mode))
+      throw Error(fmt::format("{}: is {} and no file; remove it or choose another place", part_.string(),
+                              kind_of(ours.st_mode)));
+    if (::flock(file_, LOCK_EX | LOCK_NB) != 0 && errno == EWOULDBLOCK)
+      throw Error(
+          fmt::format("{}: is being written by another program; wait until it has ended", part_.string()));
+    size_ = std::uint64_t(ours.st_size);
+    // Who held it may have given it its name in the meantime.
+    if (::stat(part_.c_str(), &there) == 0 && there.st_ino == ours.st_ino && there.st_dev == ours.st_dev)
+      return;
+    ::close(file_);
+  }
+}
+
+PartFile::~PartFile() {
+  if (file_ >= 0) ::close(file_);
+}
+
+void PartFile::cut(std::uint64_t size) {
+  if (size < size_ && ::ftruncate(file_, off_t(size)) != 0) fail("cut");
+  size_ = std::min(size, size_);
+}
+
+void PartFile::write(std::span<const std::byte> bytes) {
+  if (::lseek(file_, off_t(size_), SEEK_SET) < 0 || !write_all(file_, bytes)) fail("written");
+  const std::uint64_t begin = size_ / piece * piece, full = (size_ + bytes.size()) / piece * piece;
+  if (full > begin) send(file_, begin, full - begin);
+  size_ += bytes.size();
+}
+
+void PartFile::commit() {
+  if (::fsync(file_) != 0 && errno != EINVAL) fail("written");
+  if (::rename(part_.c_str(), place_.c_str()) != 0) fail("renamed");
+}
+
+void PartFile::discard() { ::unlink(part_.c_str()); }
+
+void PartFile::fail(const char* what) const {
+  throw Error(
+      fmt::format("{}: cannot be {} ({}); check that the folder exists and the disk has room, then start "
+                  "again: it goes on where it stopped",
+                  part_.string(), what, std::strerror(errno)));
 }
 
 void write_file(const std::filesystem::path& path, std::span<const std::byte> bytes) {

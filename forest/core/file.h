@@ -74,6 +74,32 @@ class ScratchFile {
   int file_ = -1;
 };
 
+/// A file that is made over hours. Until commit() it lies beside its place, with .part behind its name; a program that was
+/// killed leaves it there, and the next one goes on with it. One program at a time.
+class PartFile {
+ public:
+  /// Opens what lies there or makes it. Throws Error when that cannot be, or another program writes it.
+  explicit PartFile(const std::filesystem::path& wanted);
+  ~PartFile();  // leaves it there
+  PartFile(const PartFile&) = delete;
+  PartFile& operator=(const PartFile&) = delete;
+
+  const std::filesystem::path& path() const { return part_; }
+  std::uint64_t size() const { return size_; }
+  void cut(std::uint64_t size);  // what lies behind is gone
+  /// Appends. Throws Error when the disk is full; whatever was written of these bytes is there.
+  void write(std::span<const std::byte> bytes);
+  void commit();   // it gets its name
+  void discard();  // it is gone
+
+ private:
+  [[noreturn]] void fail(const char* what) const;
+
+  std::filesystem::path place_, part_;
+  std::uint64_t size_ = 0;
+  int file_ = -1;
+};
+
 /// Where a path leads: symbolic links are followed, also one to a file that is not there yet. Throws Error for a circle.
 std::filesystem::path followed(const std::filesystem::path& path);
 

@@ -1,7 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/core/parallel.h"
 
-#include <array>
+#include <vector>
 
 #include <tbb/blocked_range.h>
 #include <tbb/global_control.h>
@@ -18,12 +18,11 @@ void parallel_ranges(std::size_t count, std::size_t grain,
 }
 
 void detail::in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
-                      const std::function<void(std::size_t, void*)>& take) {
+                      const std::function<void(std::size_t, void*)>& take, std::size_t ahead) {
   using tbb::filter_mode;
-  constexpr std::size_t ahead = 64;
   // Number i waits in place i % ahead, which i - ahead has left by then. Here, and not with the pipeline, which forgets what is
   // on its way when somebody throws.
-  std::array<std::shared_ptr<void>, ahead> made;
+  std::vector<std::shared_ptr<void>> made(ahead);
   std::size_t next = 0;
   tbb::parallel_pipeline(
       ahead,

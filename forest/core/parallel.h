@@ -27,17 +27,17 @@ void parallel_for(std::size_t count, std::size_t grain, Body&& body) {
 
 namespace detail {
 void in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::size_t)>& make,
-              const std::function<void(std::size_t, void*)>& take);
+              const std::function<void(std::size_t, void*)>& take, std::size_t ahead);
 }
 
 /// What make(i) returns goes to take(i, …), in the order of i and one at a time, while later ones are being made on all
-/// cores; few wait at any time. The first exception thrown by either is rethrown here.
+/// cores; no more than `ahead` wait at any time. The first exception thrown by either is rethrown here.
 template <class Make, class Take>
-void parallel_in_order(std::size_t count, Make&& make, Take&& take) {
+void parallel_in_order(std::size_t count, Make&& make, Take&& take, std::size_t ahead = 64) {
   using T = decltype(make(std::size_t()));
   detail::in_order(
       count, [&](std::size_t i) { return std::make_shared<T>(make(i)); },
-      [&](std::size_t i, void* made) { take(i, std::move(*static_cast<T*>(made))); });
+      [&](std::size_t i, void* made) { take(i, std::move(*static_cast<T*>(made))); }, ahead);
 }
 
 /// Sorted by the first number, then by the second.

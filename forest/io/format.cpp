@@ -10,6 +10,7 @@
 #include "forest/core/file.h"
 #include "forest/io/acc.h"
 #include "forest/io/asc.h"
+#include "forest/io/cells.h"
 #include "forest/io/genesis.h"
 #include "forest/io/h5.h"
 #include "forest/io/neuroml.h"
@@ -23,6 +24,7 @@ namespace {
 
 constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
 constexpr std::array<std::string_view, 2> h5_extensions{".h5", ".hdf5"};
+constexpr std::array<std::string_view, 1> cells_extensions{".cells"};
 constexpr std::array<std::string_view, 2> neuroml_extensions{".nml", ".xml"};
 
 constexpr std::array<std::string_view, 1> hoc_extensions{".hoc"};
@@ -42,6 +44,7 @@ constexpr std::array table{
            .recognises = recognises_swc,
            .read = read_swc,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_swc,
            .keeps = swc_keeps},
     Format{.name = "hoc",
@@ -50,6 +53,7 @@ constexpr std::array table{
            .recognises = nullptr,
            .read = nullptr,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_neuron_hoc,
            .keeps = neuron_keeps},
     Format{.name = "neuron-python",
@@ -58,6 +62,7 @@ constexpr std::array table{
            .recognises = nullptr,
            .read = nullptr,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_neuron_python,
            .keeps = neuron_keeps},
     Format{.name = "genesis",
@@ -66,6 +71,7 @@ constexpr std::array table{
            .recognises = recognises_genesis,
            .read = read_genesis,
            .read_all = read_genesis_cells,
+           .read_each = nullptr,
            .write = write_genesis,
            .keeps = genesis_keeps},
     Format{.name = "acc",
@@ -74,6 +80,7 @@ constexpr std::array table{
            .recognises = nullptr,
            .read = nullptr,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_acc,
            .keeps = acc_keeps},
     Format{.name = "h5",
@@ -82,7 +89,17 @@ constexpr std::array table{
            .recognises = recognises_h5,
            .read = read_h5,
            .read_all = read_all_h5,
+           .read_each = nullptr,
            .write = write_h5,
+           .keeps = {}},
+    Format{.name = "cells",
+           .title = "Brain Forest cells (millions of them)",
+           .extensions = cells_extensions,
+           .recognises = recognises_cells,
+           .read = read_cells,
+           .read_all = read_all_cells,
+           .read_each = read_each_cells,
+           .write = write_cells,
            .keeps = {}},
     Format{.name = "neuroml",
            .title = "NeuroML 2",
@@ -90,6 +107,7 @@ constexpr std::array table{
            .recognises = recognises_neuroml,
            .read = read_neuroml,
            .read_all = read_all_neuroml,
+           .read_each = nullptr,
            .write = write_neuroml,
            .keeps = neuroml_keeps},
     Format{.name = "asc",
@@ -98,6 +116,7 @@ constexpr std::array table{
            .recognises = recognises_asc,
            .read = read_asc,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_asc,
            .keeps = asc_keeps},
     Format{.name = "nts",
@@ -106,6 +125,7 @@ constexpr std::array table{
            .recognises = recognises_nts,
            .read = read_nts,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = write_nts,
            .keeps = nts_keeps},
     Format{.name = "nmf",
@@ -114,6 +134,7 @@ constexpr std::array table{
            .recognises = recognises_nmf,
            .read = read_nmf,
            .read_all = nullptr,
+           .read_each = nullptr,
            .write = nullptr,
            .keeps = {}},
 };
@@ -255,6 +276,13 @@ std::vector<Cell> read_all(const Format& format, std::string_view bytes, const s
     one.push_back({{}, format.read(bytes, name)});
     return one;
   });
+}
+
+CellReader read_each(const Format& format, std::string_view bytes, const std::string& name) {
+  if (format.read_each) return guarded(format, bytes, name, [&] { return format.read_each(bytes, name); });
+  const auto cells = std::make_shared<std::vector<Cell>>(read_all(format, bytes, name));
+  return {cells->size(), [cells](std::size_t i) { return (*cells)[i]; },
+          [cells](std::size_t i) { return (*cells)[i].name; }};
 }
 
 std::vector<Warning> write(const std::filesystem::path& path, const Morphology& m) {

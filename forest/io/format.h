@@ -5,6 +5,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <functional>
 #include <span>
 #include <string>
 #include <string_view>
@@ -42,6 +43,19 @@ struct Cell {
   ReadResult read;
 };
 
+/// The cells of a file, one at a time: those of a format that holds millions are read when they are asked for.
+struct CellReader {
+  std::size_t count = 0;
+  std::function<Cell(std::size_t)> read;         // by any thread; throws InputError
+  std::function<std::string(std::size_t)> name;  // of a cell, without reading the rest; as read
+};
+
+/// A neuron on its way into a file that holds several.
+struct NamedMorphology {
+  std::string name;
+  Morphology morphology;
+};
+
 struct Format {
   std::string_view name;                         // "swc"
   std::string_view title;                        // "SWC (INCF v1 and its dialects)"
@@ -54,6 +68,8 @@ struct Format {
   ReadResult (*read)(std::string_view bytes, const std::string& name);
   /// All cells of a file; null when a file of this format holds one.
   std::vector<Cell> (*read_all)(std::string_view bytes, const std::string& name);
+  /// The same, for files of so many cells that they do not fit into memory; null where all are read at once.
+  CellReader (*read_each)(std::string_view bytes, const std::string& name);
   /// The same neuron gives the same bytes. Null when the format is only read.
   std::string (*write)(const Morphology& morphology);
   Keeps keeps;
@@ -71,6 +87,9 @@ ReadResult read(const std::filesystem::path& path);  // throws InputError
 /// Never empty; the only cell of a file has no name. Throws InputError; where the bytes are those of another kind of file (an
 /// archive, a web page, another format of neurons) its sentence says so.
 std::vector<Cell> read_all(const Format& format, std::string_view bytes, const std::string& name);
+
+/// As read_all. The bytes must outlive it.
+CellReader read_each(const Format& format, std::string_view bytes, const std::string& name);
 
 /// Whole or not at all. Returns what was lost.
 std::vector<Warning> write(const std::filesystem::path& path, const Morphology& m);

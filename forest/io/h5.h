@@ -30,11 +30,7 @@ std::vector<Cell> read_all_h5(std::string_view bytes, const std::string& name);
 /// which other programs skip.
 std::string write_h5(const Morphology& morphology);
 
-struct NamedMorphology {
-  std::string name;  // of its group; a/b is a group in a group
-  Morphology morphology;
-};
-/// A container. Throws Error when a name is empty or stands twice.
+/// A container, each cell in the group of its name; a/b is a group in a group. Throws Error when a name is empty or stands twice.
 std::string write_h5(std::span<const NamedMorphology> cells);
 
 /// Every deviation that is read, in the order of enum H5Oddity (h5.cpp).

@@ -20,16 +20,16 @@ Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t ind
   return list;
 }
 
-Morphology grown(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
+}  // namespace
+
+Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
   return interpret(deriver.derive(seed, index), grammar, source(grammar, seed, index, deriver.site()),
                    deriver.site());
 }
 
-}  // namespace
-
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, const cortex::Site& site) {
   Deriver deriver(grammar, site);
-  return grown(deriver, grammar, seed, index);
+  return grow(deriver, grammar, seed, index);
 }
 
 Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
@@ -46,7 +46,7 @@ std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t coun
   parallel_ranges(count, 1, [&](std::size_t begin, std::size_t end) {
     Deriver deriver(grammar, site);
     for (std::size_t i = begin; i < end; ++i) {
-      neurons[i] = grown(deriver, grammar, seed, first + i);
+      neurons[i] = grow(deriver, grammar, seed, first + i);
       progress.advance();
     }
   });

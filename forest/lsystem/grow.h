@@ -18,8 +18,11 @@ class Deriver;
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
                 const cortex::Site& site = {});
 
+/// The same, where the deriver is; one object a thread keeps memory between neurons (Deriver).
+Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index);
+
 /// The same neuron as it was after some steps of derivation, which are the time of its growth; its annotations say after how
-/// many. One object a thread keeps memory between them (Deriver).
+/// many.
 Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index,
                    int steps);
 

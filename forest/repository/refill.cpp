@@ -6,9 +6,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
+#include "forest/morphology/packing.h"
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
-#include "forest/repository/packing.h"
 
 namespace forest::repository {
 
@@ -32,7 +32,7 @@ void Repository::Impl::refill_shapes() {
       sql << fmt::format("delete from {} where neuron = {}", table, id);
     all.id = id;
     all.rows = rows_of(m);
-    all.packed_points = packed(m.points(), runs_of(all.rows));
+    all.packed_points = pack_points(m.points(), runs_of(all.rows));
     all.run_shape();
   }
   all.finish();

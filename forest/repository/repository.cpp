@@ -10,9 +10,9 @@
 #include <fmt/format.h>
 
 #include "forest/core/hash.h"
+#include "forest/morphology/packing.h"
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
-#include "forest/repository/packing.h"
 #include "forest/repository/schema.h"
 
 namespace forest::repository {
@@ -66,7 +66,7 @@ Repository Repository::open(const std::string& place, Access access) {
 
 Prepared::Prepared(Morphology morphology) {
   Rows rows = rows_of(morphology);
-  std::string points = packed(morphology.points(), runs_of(rows));
+  std::string points = pack_points(morphology.points(), runs_of(rows));
   const std::uint64_t sum = checksum(rows);
   data_ = std::unique_ptr<Data>(new Data{std::move(morphology), std::move(rows), std::move(points), sum});
 }
@@ -244,7 +244,7 @@ Rows Repository::Impl::stored(NeuronId id, const char* points, const std::string
     std::exclusive_scan(s.point_count.begin(), s.point_count.end(), s.first_point.begin(), 0);
   }
   if (const int packing = ask<int>("select packing from points where neuron = :id", neuron).value_or(0)) {
-    const auto whole = unpacked(rows.points, packing < 2 ? Runs() : runs_of(rows));
+    const auto whole = unpack_points(rows.points, packing < 2 ? PointRuns() : runs_of(rows));
     rows.points.assign(reinterpret_cast<const char*>(whole.data()), whole.size() * sizeof(Point));
   }
   if (const std::size_t n = count("spines")) {

@@ -57,7 +57,7 @@ std::optional<SomaKind> soma_kind(std::string_view name) {
   return SomaKind(found - soma_kinds.begin());
 }
 
-Runs runs_of(const Rows& rows) { return {rows.sections.parent, rows.sections.point_count}; }
+PointRuns runs_of(const Rows& rows) { return {rows.sections.parent, rows.sections.point_count}; }
 
 Rows rows_of(const Morphology& m, bool measured) {
   Rows rows;

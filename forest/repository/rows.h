@@ -9,13 +9,13 @@
 #include <vector>
 
 #include "forest/morphology/morphology.h"
-#include "forest/repository/packing.h"
+#include "forest/morphology/packing.h"
 
 namespace forest::repository {
 
 /// Bytes are little-endian, as on every machine this runs on: a blob is the array itself.
 struct Rows {
-  std::string points;  // blob: x, y, z, radius as float32, section after section; see packing.h
+  std::string points;  // blob: x, y, z, radius as float32, section after section; see morphology/packing.h
   std::string soma_points, soma_links;  // blobs
   SomaKind soma_kind = SomaKind::none;
 
@@ -36,8 +36,8 @@ struct Rows {
   Annotations annotations;
 };
 
-/// How `points` are divided into sections (packing.h); stands as long as the rows do.
-Runs runs_of(const Rows& rows);
+/// How `points` are divided into sections (morphology/packing.h); stands as long as the rows do.
+PointRuns runs_of(const Rows& rows);
 
 /// With `measured` the metrics too, which take most of the time.
 Rows rows_of(const Morphology& morphology, bool measured = true);

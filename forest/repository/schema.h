@@ -268,7 +268,7 @@ create view metric as
   from neurons n join populations p on p.id = n.population cross join metrics m
        join neuron_metrics v on v.metric = m.id and v.neuron = n.id;
 )sql"},
-    // Points that are no decimals are packed too (packing.h), which an older program does not read. What is there stays.
+    // Points that are no decimals are packed too (morphology/packing.h), which an older program does not read. What is there stays.
     Migration{6, ""},
     // Measures of sections are whole numbers of picometres and square nanometres, which SQLite keeps in three or four bytes
     // instead of eight, and the views give them in micrometres. Points are packed from the end of the section they grow out

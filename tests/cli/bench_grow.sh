@@ -10,7 +10,11 @@ assert out["neurons_per_second"] > 0 and out["segments_per_second"] > out["neuro
 assert set(out["growing"]) == {"astrocyte", "bes", "microglia", "motoneuron", "purkinje", "pyramidal", "retraction", "tufted"}, out
 for result in out["growing"].values():
     assert result["neurons"] >= 200 and result["segments_each"] > 300, out
+    assert result["neurons_per_second_into_a_file"] > 0 and result["bytes_each_in_the_file"] > 1000, out
 PY
+mkdir place
+"$BRAINFOREST" bench grow --grammar bes --seconds 0.01 --folder place >out.txt
+[ -z "$(ls place)" ]  # the file is removed again
 
 # A grammar that grows nothing, or the same twice, is not timed.
 printf 'axiom: Soma(10) A\ngrow: A -> B\n' >nothing.lsys

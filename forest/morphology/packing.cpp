@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "forest/repository/packing.h"
+#include "forest/morphology/packing.h"
 
 #include <array>
 #include <bit>
@@ -9,7 +9,7 @@
 
 #include "forest/core/error.h"
 
-namespace forest::repository {
+namespace forest {
 namespace {
 
 constexpr std::array<double, 6> scales{1., 10., 100., 1e3, 1e4, 1e5};  // steps a micrometre
@@ -69,7 +69,7 @@ Steps steps_of(const Point& p, bool decimal, double scale) {
 /// Walks over the runs as their points come.
 class Walk {
  public:
-  explicit Walk(const Runs& runs) : runs_(runs), ends_(runs.counts.size()) {}
+  explicit Walk(const PointRuns& runs) : runs_(runs), ends_(runs.counts.size()) {}
 
   /// Of the next point, which is number `at`: from which point it is the difference, or none: from the one before.
   std::optional<std::size_t> from(std::size_t at) {
@@ -85,14 +85,14 @@ class Walk {
   }
 
  private:
-  Runs runs_;
+  PointRuns runs_;
   std::vector<std::size_t> ends_;  // one after the last point of each run
   std::size_t run_ = 0, end_ = 0;
 };
 
 }  // namespace
 
-std::string packed(std::span<const Point> points, const Runs& runs) {
+std::string pack_points(std::span<const Point> points, const PointRuns& runs) {
   if (points.empty()) return {};
   const std::size_t places = decimals(points);
   const bool decimal = places != in_floats;
@@ -120,7 +120,7 @@ std::string packed(std::span<const Point> points, const Runs& runs) {
   return bytes.size() < points.size() * sizeof(Point) ? bytes : std::string();
 }
 
-std::vector<Point> unpacked(const std::string& bytes, const Runs& runs) {
+std::vector<Point> unpack_points(std::string_view bytes, const PointRuns& runs) {
   const auto damaged = [] { return Error("its packed points are damaged"); };
   const std::size_t places = bytes.empty() ? in_floats + 1 : static_cast<unsigned char>(bytes[0]);
   if (places > in_floats) throw damaged();
@@ -155,4 +155,4 @@ std::vector<Point> unpacked(const std::string& bytes, const Runs& runs) {
   return points;
 }
 
-}  // namespace forest::repository
+}  // namespace forest

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-#include "forest/repository/packing.h"
+#include "forest/morphology/packing.h"
 
 #include <array>
 #include <cmath>
@@ -11,7 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/random.h"
 
-namespace forest::repository {
+namespace forest {
 namespace {
 
 /// A walk whose numbers have `places` decimals.
@@ -31,9 +31,9 @@ std::vector<Point> traced(int places, std::size_t count = 500, double far = 300.
 TEST(Packing, GivesBackEveryBitInEightBytesAPoint) {
   for (int places = 0; places <= 3; ++places) {
     const auto points = traced(places);
-    const std::string bytes = packed(points);
+    const std::string bytes = pack_points(points);
     ASSERT_FALSE(bytes.empty()) << places;
-    EXPECT_EQ(unpacked(bytes), points);
+    EXPECT_EQ(unpack_points(bytes), points);
     EXPECT_LE(double(bytes.size()), 8. * double(points.size())) << places;
   }
 }
@@ -41,7 +41,7 @@ TEST(Packing, GivesBackEveryBitInEightBytesAPoint) {
 TEST(Packing, MinusZeroStaysItself) {
   auto points = traced(1);
   points[3].x = points[4].x = points[7].radius = -0.f;
-  const auto back = unpacked(packed(points));
+  const auto back = unpack_points(pack_points(points));
   ASSERT_EQ(back, points);
   EXPECT_TRUE(std::signbit(back[3].x) && std::signbit(back[4].x) && std::signbit(back[7].radius));
   EXPECT_FALSE(std::signbit(back[5].x) != std::signbit(points[5].x));
@@ -65,14 +65,14 @@ bool same_bits(const std::vector<Point>& a, const std::vector<Point>& b) {
 
 TEST(Packing, NumbersThatAreNoDecimalsGoFromFloatToFloat) {
   const auto points = grown();
-  const std::string bytes = packed(points);
+  const std::string bytes = pack_points(points);
   ASSERT_FALSE(bytes.empty());
-  EXPECT_TRUE(same_bits(unpacked(bytes), points));
+  EXPECT_TRUE(same_bits(unpack_points(bytes), points));
   EXPECT_LT(double(bytes.size()), 14. * double(points.size()));
 
   auto nearly = traced(2);
   nearly[77].y = std::nextafter(nearly[77].y, 1e9f);
-  EXPECT_TRUE(same_bits(unpacked(packed(nearly)), nearly));
+  EXPECT_TRUE(same_bits(unpack_points(pack_points(nearly)), nearly));
 }
 
 TEST(Packing, NoFloatIsTooOdd) {
@@ -82,9 +82,9 @@ TEST(Packing, NoFloatIsTooOdd) {
       -1e-45f, 3.4e38f, -3.4e38f};
   for (std::size_t i = 0; i < odd.size(); ++i)
     points[3 * i].x = points[3 * i + 1].radius = points[100 + i].z = odd[i];
-  const std::string bytes = packed(points);
+  const std::string bytes = pack_points(points);
   ASSERT_FALSE(bytes.empty());
-  EXPECT_TRUE(same_bits(unpacked(bytes), points));
+  EXPECT_TRUE(same_bits(unpack_points(bytes), points));
 }
 
 TEST(Packing, WhatWouldNotBeSmallerIsLeft) {
@@ -92,15 +92,15 @@ TEST(Packing, WhatWouldNotBeSmallerIsLeft) {
   std::vector<Point> points(100);
   for (Point& p : points)
     p = {float(random.normal()), float(random.normal()), float(random.normal()), float(random.normal())};
-  EXPECT_TRUE(packed(points).empty());
-  EXPECT_TRUE(packed({}).empty());
+  EXPECT_TRUE(pack_points(points).empty());
+  EXPECT_TRUE(pack_points({}).empty());
 }
 
 /// Sections of some points each, which begin where the one ends that they grow out of.
 struct Branched {
   std::vector<Point> points;
   std::vector<std::int32_t> parents, counts;
-  Runs runs() const { return {parents, counts}; }
+  PointRuns runs() const { return {parents, counts}; }
 };
 Branched branched(std::vector<Point> from) {
   Branched b;
@@ -119,10 +119,10 @@ Branched branched(std::vector<Point> from) {
 
 TEST(Packing, ASectionBeginsWhereTheOneEndsThatItGrowsOutOf) {
   for (const Branched& b : {branched(traced(2)), branched(grown())}) {
-    const std::string bytes = packed(b.points, b.runs());
+    const std::string bytes = pack_points(b.points, b.runs());
     ASSERT_FALSE(bytes.empty());
-    EXPECT_TRUE(same_bits(unpacked(bytes, b.runs()), b.points));
-    const double without = double(packed(b.points).size());
+    EXPECT_TRUE(same_bits(unpack_points(bytes, b.runs()), b.points));
+    const double without = double(pack_points(b.points).size());
     EXPECT_LT(double(bytes.size()), .95 * without) << "a point in five is there already";
   }
 }
@@ -130,34 +130,34 @@ TEST(Packing, ASectionBeginsWhereTheOneEndsThatItGrowsOutOf) {
 TEST(Packing, SectionsMayHaveNoPointsAndBeDamaged) {
   const auto points = grown(6);
   const std::vector<std::int32_t> parents{-1, 0, 1, 1}, counts{0, 2, 0, 4};
-  const std::string bytes = packed(points, {parents, counts});
+  const std::string bytes = pack_points(points, {parents, counts});
   ASSERT_FALSE(bytes.empty());
-  EXPECT_TRUE(same_bits(unpacked(bytes, {parents, counts}), points));
+  EXPECT_TRUE(same_bits(unpack_points(bytes, {parents, counts}), points));
   const std::vector<std::int32_t> later{-1, 3, 1, 1}, negative{0, -2, 0, 4}, long_ones{2000, 2000, 1, 1};
-  EXPECT_THROW(unpacked(bytes, {later, counts}), Error);
-  EXPECT_THROW(unpacked(bytes, {parents, negative}), Error);
-  EXPECT_NO_THROW(unpacked(bytes, {parents, long_ones})) << "its checksum will not be right";
+  EXPECT_THROW(unpack_points(bytes, {later, counts}), Error);
+  EXPECT_THROW(unpack_points(bytes, {parents, negative}), Error);
+  EXPECT_NO_THROW(unpack_points(bytes, {parents, long_ones})) << "its checksum will not be right";
 }
 
 TEST(Packing, CutOrChangedBytesAreAnErrorOrPoints) {
-  for (const std::string& bytes : {packed(traced(2, 20)), packed(grown(20))}) {
+  for (const std::string& bytes : {pack_points(traced(2, 20)), pack_points(grown(20))}) {
     for (std::size_t size = 0; size < bytes.size(); ++size) {
       try {
-        EXPECT_LT(unpacked(bytes.substr(0, size)).size(), 20u);
+        EXPECT_LT(unpack_points(bytes.substr(0, size)).size(), 20u);
       } catch (const Error&) {
       }
       std::string changed = bytes;
       changed[size] = char(changed[size] ^ '\x85');
       try {
-        EXPECT_LE(unpacked(changed).size(), 40u);
+        EXPECT_LE(unpack_points(changed).size(), 40u);
       } catch (const Error&) {
       }
     }
   }
-  EXPECT_THROW(unpacked(std::string(40, '\xff')), Error);
-  EXPECT_THROW(unpacked("\x06\x80\x80\x80\x80\x40\1\1\1"), Error) << "beyond the last float";
-  EXPECT_THROW(unpacked("\x07\1\1\1\1"), Error);
+  EXPECT_THROW(unpack_points(std::string(40, '\xff')), Error);
+  EXPECT_THROW(unpack_points("\x06\x80\x80\x80\x80\x40\1\1\1"), Error) << "beyond the last float";
+  EXPECT_THROW(unpack_points("\x07\1\1\1\1"), Error);
 }
 
 }  // namespace
-}  // namespace forest::repository
+}  // namespace forest

@@ -14,21 +14,22 @@
 #include <cstdint>
 #include <span>
 #include <string>
+#include <string_view>
 
 #include "forest/morphology/morphology.h"
 
-namespace forest::repository {
+namespace forest {
 
 /// The sections whose points follow one another: how many each has, and out of which it grows, -1 for none. Without them
 /// each point is the difference from the one before.
-struct Runs {
+struct PointRuns {
   std::span<const std::int32_t> parents, counts;
 };
 
 /// Empty when packing would not make it smaller.
-std::string packed(std::span<const Point> points, const Runs& runs = {});
+std::string pack_points(std::span<const Point> points, const PointRuns& runs = {});
 
 /// Throws Error when the bytes are damaged, or are not those of such sections.
-std::vector<Point> unpacked(const std::string& bytes, const Runs& runs = {});
+std::vector<Point> unpack_points(std::string_view bytes, const PointRuns& runs = {});
 
-}  // namespace forest::repository
+}  // namespace forest

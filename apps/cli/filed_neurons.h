@@ -1,0 +1,36 @@
+// SPDX-License-Identifier: Apache-2.0
+// Neurons that lie in files, one by one, however many a file holds.
+#pragma once
+
+#include <cstddef>
+#include <filesystem>
+#include <memory>
+#include <optional>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "forest/core/file.h"
+#include "forest/io/format.h"
+
+namespace forest::cli {
+
+/// A file is one neuron, as io::read has it; a file of cells (io/cells.h) as many as it holds, read when they are asked for.
+class FiledNeurons {
+ public:
+  explicit FiledNeurons(std::vector<std::filesystem::path> files);
+
+  std::size_t size() const { return neurons_.size(); }
+  const std::filesystem::path& file(std::size_t i) const { return files_[neurons_[i].first]; }
+  /// The cell's own name in a file of cells; empty in others, and where it cannot be read.
+  std::string cell(std::size_t i) const;
+  Morphology read(std::size_t i) const;  // by any thread; throws InputError
+
+ private:
+  std::vector<std::filesystem::path> files_;
+  std::vector<std::unique_ptr<MappedFile>> mapped_;           // of files of cells
+  std::vector<std::optional<io::CellReader>> cells_;          // the same
+  std::vector<std::pair<std::size_t, std::size_t>> neurons_;  // file and cell
+};
+
+}  // namespace forest::cli
