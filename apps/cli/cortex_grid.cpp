@@ -24,7 +24,8 @@ namespace {
 
 struct Options {
   std::string domain, generator = "best";
-  int steps = 0;  // 0: 20 in the plane, 10 in space
+  int steps = 0;       // 0: 20 in the plane, 10 in space
+  int dimensions = 0;  // of the domains that are compared; 0: all
   std::filesystem::path out;
   cortex::GridPicture picture;
 };
@@ -72,6 +73,8 @@ void compare(const Options& options, Console& console) {
   auto all = nlohmann::ordered_json::array();
   console.progress().begin("filling", cortex::domains().size());
   for (const cortex::Domain& domain : cortex::domains()) {
+    console.progress().advance();
+    if (options.dimensions && options.dimensions != (domain.plane ? 2 : 3)) continue;
     const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain));
     std::vector<std::string> line{domain.name};
     nlohmann::ordered_json told{{"domain", domain.name}, {"dimensions", boundary.dimensions()}};
@@ -91,7 +94,6 @@ void compare(const Options& options, Console& console) {
       chosen.emplace_back(fmt::format("{}: {}", domain.name, best.generator), std::move(best.grid));
     all.push_back(std::move(told));
     table.push_back(std::move(line));
-    console.progress().advance();
   }
   console.progress().end();
   if (!options.out.empty()) {
@@ -150,6 +152,8 @@ std::function<void()> cortex_grid(CLI::App& command, Console& console) {
       .add_option("--steps", options->steps,
                   "Cells along each direction; by default 20 in the plane, 10 in space")
       ->check(CLI::Range(1, 1000));
+  command.add_option("--dimensions", options->dimensions, "Only the blocks of the plane (2) or of space (3)")
+      ->check(CLI::IsMember({2, 3}));
   command.add_option("--up", options->picture.up, "The axis that points up in a picture of a block in space")
       ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}))
       ->capture_default_str();

@@ -148,7 +148,7 @@ std::string to_svg(std::span<const GridPanel> panels, const GridPicture& picture
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
       "height=\"{1:.0f}\" "
       "font-family=\"sans-serif\" font-size=\"12\">\n<rect width=\"100%\" height=\"100%\" fill=\"#fff\"/>\n"
-      "<g stroke=\"#333\" stroke-width=\".4\" stroke-linejoin=\"round\">\n",
+      "<g stroke=\"#333\" stroke-width=\"4\" stroke-linejoin=\"round\" transform=\"scale(.1)\">\n",
       width, height);
   const auto out = std::back_inserter(text);
   std::string captions;
@@ -167,10 +167,17 @@ std::string to_svg(std::span<const GridPanel> panels, const GridPicture& picture
         fmt::format_to(out, "{}<path fill=\"{}\" d=\"", colour.empty() ? "" : "\"/>\n", next);
         colour = next;
       }
+      Eigen::Vector2i from(0, 0);  // tenths of a pixel, one place from the one before
       for (std::size_t q = 0; q < 4; ++q) {
         const Eigen::Vector2d p = scale * (quad.corners[q] - middle);
-        fmt::format_to(out, "{}{:.1f} {:.1f}", q == 0 ? "M" : "L", left + .5 * side + p.x(),
-                       top + .5 * side - p.y());
+        const Eigen::Vector2i at(int(std::lround(10. * (left + .5 * side + p.x()))),
+                                 int(std::lround(10. * (top + .5 * side - p.y()))));
+        fmt::format_to(out, "{}{} {}",
+                       q == 0   ? "M"
+                       : q == 1 ? "l"
+                                : " ",
+                       at.x() - from.x(), at.y() - from.y());
+        from = at;
       }
       text += "z";
     }
