@@ -19,8 +19,6 @@ constexpr double pi = std::numbers::pi;
 double bump(double t) { return 4. * t * (1. - t); }  // 1 in the middle, 0 at both ends
 double dent(double s, double t) { return std::pow(bump(s) * bump(t), 2.); }
 double tent(double t) { return 1. - std::abs(2. * t - 1.); }
-// From 0 to 1 with both slopes 0.
-double ease(double t) { return t * t * (3. - 2. * t); }
 
 // The boundary of a plane block by its four sides.
 template <class Bottom, class Top, class Left, class Right>
@@ -141,7 +139,7 @@ Place screw(double u, double v, double w) {  // the top turned by 110°
 }
 // Cortex over the crown of a gyrus, and around the fundus of a sulcus: w from the pia to the white matter, mm.
 Place crown(double u, double v, double w) {
-  const double r = 2.9 - 2.5 * ease(w), angle = (u - .5) * (1.9 + .5 * v);
+  const double r = 2.9 - 2.5 * w, angle = (u - .5) * (1.9 + .5 * v);
   return {-r * std::sin(angle), v, r * std::cos(angle)};
 }
 Place fundus(double u, double v, double w) {

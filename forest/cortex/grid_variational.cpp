@@ -1,39 +1,25 @@
 // SPDX-License-Identifier: Apache-2.0
 // Generators that minimise Σ φ(J) over the corners of all cells, where the columns of J are the edges of the cell at that corner,
-// by L-BFGS (Liu & Nocedal 1989, "On the limited memory BFGS method for large scale optimization").
+// by L-BFGS.
 //
 //   length               φ = tr G: every edge short (Laplace's equation; folds where the block is not convex)
 //   area-orthogonality   φ = g11 g22 = det J² + g12², even areas and right angles at once; in space the sum of it over
 //                        the three pairs of directions
 //   liao                 φ = ‖G‖² = g11² + 2 g12² + g22², Liao's functional
 //                        (both: Knupp & Steinberg 1993, chapter 8; there as differential equations)
-//   foldover-free        φ = ‖J‖² / (d χ^(2/d)) + λ (1 + det J²) / χ with χ = (det J + √(ε² + det J²)) / 2: for ε → 0 infinite
-//                        where a cell folds; ε begins large and follows the worst cell down, so that folded starts unfold
-//                        (Garanzha, Kaporin, Kudryavtseva, Protais, Ray & Sokolov 2021, "Foldover-free maps in 50 lines of
-//                        code", ACM Trans Graph 40:102). There J is taken relative to the mean cell.
+//   foldover-free        a barrier against folds, see minimise.h; J is taken relative to the mean cell
 #include <algorithm>
 #include <cmath>
-#include <limits>
 #include <utility>
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
 
 #include "forest/cortex/grid_generators.h"
+#include "forest/cortex/minimise.h"
 
 namespace forest::cortex {
 namespace {
-
-template <int d>
-using Matrix = Eigen::Matrix<double, d, d>;
-using Vector = Eigen::VectorXd;
-
-// φ and ∂φ/∂J.
-template <int d>
-struct Density {
-  double value = 0.;
-  Matrix<d> slope;
-};
 
 template <int d>
 Density<d> length_density(const Matrix<d>& j) {
@@ -56,40 +42,6 @@ Density<d> liao_density(const Matrix<d>& j) {
   const Matrix<d> metric = j.transpose() * j;
   return {metric.squaredNorm(), 4. * j * metric};
 }
-
-// The matrix of cofactors, ∂ det J / ∂J.
-template <int d>
-Matrix<d> cofactors(const Matrix<d>& j) {
-  Matrix<d> c;
-  if constexpr (d == 2) {
-    c << j(1, 1), -j(1, 0), -j(0, 1), j(0, 0);
-  } else {
-    c.col(0) = j.col(1).cross(j.col(2));
-    c.col(1) = j.col(2).cross(j.col(0));
-    c.col(2) = j.col(0).cross(j.col(1));
-  }
-  return c;
-}
-
-struct Unfolding {
-  double epsilon = 1.;
-  static constexpr double even = .2;  // λ: even volumes against even shapes
-
-  double chi(double det) const {
-    const double root = std::sqrt(epsilon * epsilon + det * det);
-    return det > 0. ? .5 * (det + root) : .5 * epsilon * epsilon / (root - det);
-  }
-  template <int d>
-  Density<d> operator()(const Matrix<d>& j) const {
-    const double det = j.determinant(), x = chi(det), dx = x / std::sqrt(epsilon * epsilon + det * det);
-    const double power = std::pow(x, 2. / d), shape = j.squaredNorm() / (d * power),
-                 size = .5 * (1. + det * det) / x;
-    Density<d> result{(1. - even) * shape + even * size, Matrix<d>::Zero()};
-    const double by_det = (1. - even) * (-2. / d) * shape * dx / x + even * (det - size * dx) / x;
-    result.slope = (1. - even) * 2. / (d * power) * j + by_det * cofactors<d>(j);
-    return result;
-  }
-};
 
 // The points that may move, as a vector, and the sum of a density over all corners of all cells.
 template <int d>
@@ -192,66 +144,6 @@ class Problem {
   Matrix<d> inverse_ = Matrix<d>::Identity();
 };
 
-// Minimises f from x on; `f(x, gradient)` returns the value, which may be infinite. Returns the value.
-template <class Function>
-double minimise(Vector& x, int iterations, double enough, Function&& f) {
-  constexpr std::size_t memory = 12;
-  Vector gradient, next_gradient;
-  double value = f(x, gradient);
-  std::vector<std::pair<Vector, Vector>> past;  // steps and changes of the gradient
-  for (int iteration = 0; iteration < iterations; ++iteration) {
-    Vector direction = -gradient;
-    std::vector<double> alpha(past.size());
-    for (std::size_t i = past.size(); i-- > 0;) {
-      alpha[i] = past[i].first.dot(direction) / past[i].first.dot(past[i].second);
-      direction -= alpha[i] * past[i].second;
-    }
-    if (!past.empty())
-      direction *= past.back().first.dot(past.back().second) / past.back().second.squaredNorm();
-    for (std::size_t i = 0; i < past.size(); ++i)
-      direction +=
-          (alpha[i] - past[i].second.dot(direction) / past[i].first.dot(past[i].second)) * past[i].first;
-    double along = direction.dot(gradient);
-    if (!(along < 0.)) {
-      if (past.empty()) break;
-      past.clear();
-      continue;
-    }
-    // A step after Lewis & Overton (2013): the value falls enough, the slope flattens; by bisection.
-    double low = 0., high = std::numeric_limits<double>::infinity();
-    double step = past.empty() ? std::min(1., enough * 1e4 / direction.cwiseAbs().maxCoeff()) : 1.;
-    Vector next;
-    double next_value = value;
-    bool found = false;
-    for (int attempt = 0; attempt < 40; ++attempt) {
-      next = x + step * direction;
-      next_value = f(next, next_gradient);
-      if (!(next_value <= value + 1e-4 * step * along))
-        high = step;
-      else if (next_gradient.dot(direction) < .9 * along)
-        low = step, found = true;
-      else {
-        found = true;
-        break;
-      }
-      step = std::isinf(high) ? 2. * step : .5 * (low + high);
-    }
-    if (!found) {
-      if (past.empty()) break;
-      past.clear();
-      continue;
-    }
-    const Vector moved = next - x, changed = next_gradient - gradient;
-    x = next, value = next_value, gradient = next_gradient;
-    if (moved.dot(changed) > 1e-12 * moved.norm() * changed.norm()) {
-      if (past.size() == memory) past.erase(past.begin());
-      past.emplace_back(moved, changed);
-    }
-    if (moved.cwiseAbs().maxCoeff() < enough) break;
-  }
-  return value;
-}
-
 double diagonal(const Grid& grid) {
   Eigen::Vector3d low = grid.points.front(), high = low;
   for (const auto& p : grid.points) low = low.cwiseMin(p), high = high.cwiseMax(p);
@@ -273,29 +165,16 @@ Grid smallest(Grid grid, const GridOptions& options, Phi&& phi) {
 }
 
 template <int d>
-Grid unfold(Grid grid, const GridOptions& options) {
+Grid unfolded(Grid grid, const GridOptions& options) {
   const double enough = options.tolerance * diagonal(grid);
   Problem<d> problem(grid);
-  Vector x = problem.start(), gradient;
+  Vector x = problem.start();
   if (x.size() == 0) return grid;
   problem.scale(problem.mean_cell().inverse());
-  Unfolding phi;
-  const auto least_of = [&](const Vector& at) {
-    double least = std::numeric_limits<double>::infinity();
-    problem(at, gradient, phi, &least);
-    return least;
-  };
-  double least = least_of(x), before = problem(x, gradient, phi);
-  if (least > 0.) phi.epsilon = 1e-9;
-  for (int round = 0; round < 60; ++round) {
-    before = problem(x, gradient, phi);
-    const double value = minimise(x, options.iterations / 10 + 1, enough,
-                                  [&](const Vector& at, Vector& slope) { return problem(at, slope, phi); });
-    least = least_of(x);
-    if (least > 0. && phi.epsilon < 1e-8 && before - value < 1e-4 * before) break;
-    const double progress = std::max(.1, 1. - value / before), aim = (1. - progress) * phi.chi(least);
-    phi.epsilon = least < aim ? 2. * std::sqrt(aim * (aim - least)) : 1e-9;
-  }
+  unfold(x, 60, options.iterations / 10 + 1, enough,
+         [&](const Vector& at, Vector& gradient, const Unfolding& phi, double* least) {
+           return problem(at, gradient, phi, least);
+         });
   problem.take(x);
   return grid;
 }
@@ -315,7 +194,7 @@ Grid liao(Grid grid, const GridOptions& options) {
                       : smallest<3>(std::move(grid), options, liao_density<3>);
 }
 Grid foldover_free(Grid grid, const GridOptions& options) {
-  return grid.plane() ? unfold<2>(std::move(grid), options) : unfold<3>(std::move(grid), options);
+  return grid.plane() ? unfolded<2>(std::move(grid), options) : unfolded<3>(std::move(grid), options);
 }
 
 }  // namespace forest::cortex
