@@ -37,7 +37,7 @@ class Locator {
 
   /// On a face that elements share, one of them. element.at(uvw) is within 1e-5 µm of a place that lies inside.
   Location find(const Eigen::Vector3d& place) const;
-  /// Each of them, on all cores; the same at any number of threads.
+  /// Each of them, on all cores, neighbours after one another; the same at any number of threads.
   std::vector<Location> find(std::span<const Eigen::Vector3d> places) const;
 
  private:
@@ -46,6 +46,9 @@ class Locator {
     Eigen::Vector3d origin;     // (u, v, w) is about inverse · place + origin
     Eigen::Vector3d low, high;  // of the control points in that frame, slack included
   };
+
+  static constexpr std::size_t no_cell = ~std::size_t(0);
+  std::size_t cell_of(const Eigen::Vector3d& place) const;
 
   std::span<const Hexahedron> elements_;
   double slack_;
