@@ -243,6 +243,19 @@ double Hexahedron::volume(double from_w, double to_w) const {
   return sum * (to_w - from_w) / 8.;
 }
 
+double scaled_jacobian(const Hexahedron& hexahedron, int steps) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= steps; ++k)
+    for (int j = 0; j <= steps; ++j)
+      for (int i = 0; i <= steps; ++i) {
+        const Eigen::Matrix3d at =
+            hexahedron.jacobian(double(i) / steps, double(j) / steps, double(k) / steps);
+        const double lengths = at.colwise().norm().prod();
+        least = std::min(least, lengths > 0. ? at.determinant() / lengths : 0.);
+      }
+  return least;
+}
+
 Patch Hexahedron::face(Face face) const {
   const int across = cortex::axis(face), first = across == 0 ? 1 : 0, second = across == 2 ? 1 : 2;
   Patch patch;

@@ -63,6 +63,10 @@ struct Linear {
 };
 Linear linear(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw);
 
+/// The least of det J / (|∂x/∂u| |∂x/∂v| |∂x/∂w|) at (steps + 1)³ places: 1 where the parameters are at right angles everywhere,
+/// at or below 0 where the element is not valid. A measure, no proof: that is certify.
+double scaled_jacobian(const Hexahedron& hexahedron, int steps = 4);
+
 /// The element that goes through the 4×4×4 places at parameters 0, 1/3, 2/3 and 1, in the order of control points. A face's
 /// control points depend on the places of that face alone and on nothing else, bit for bit: neighbours that have the same
 /// places on it, with parameters that run alike, share it exactly.

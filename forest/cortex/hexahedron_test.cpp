@@ -202,6 +202,18 @@ TEST(Hexahedron, VolumesOfItsPartsSumToItsOwn) {
   }
 }
 
+TEST(Hexahedron, ItsScaledJacobianIsThatOfItsAnglesAlone) {
+  Eigen::Matrix3d sheared = Eigen::Vector3d(300., 700., 2400.).asDiagonal();
+  EXPECT_NEAR(
+      scaled_jacobian(of_map([&](double u, double v, double w) { return Place(sheared * Place(u, v, w)); })),
+      1., 1e-9);
+  sheared.col(1) = 700. * Place(.5, std::sqrt(.75), 0.);  // 60°
+  EXPECT_NEAR(
+      scaled_jacobian(of_map([&](double u, double v, double w) { return Place(sheared * Place(u, v, w)); })),
+      std::sqrt(.75), 1e-9);
+  EXPECT_LT(scaled_jacobian(wobbly(600., 1)), 0.);
+}
+
 TEST(Determinant, IsThePolynomialOfItsCoefficientsWithinTheMargin) {
   for (const auto& [name, h] : zoo()) {
     double margin = 0.;
