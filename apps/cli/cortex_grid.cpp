@@ -1,9 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest cortex grid: fills a block by a generator, tells how good its cells are, draws it.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
-#include <optional>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
