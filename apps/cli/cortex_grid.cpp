@@ -21,6 +21,7 @@
 #include "forest/cortex/grid_quality.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/cortex.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
