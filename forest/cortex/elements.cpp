@@ -223,11 +223,15 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     for (const std::uint32_t e : star) {
       const Hexahedron h = elements.hexahedron(e);
       const Coefficients c = determinant(h);
-      least = std::min(least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume));
+      least = std::min(
+          least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume));
     }
     return least;
   };
   for (int round = 0; round < rounds_of_corners && !bad.empty(); ++round) {
+    for (const std::uint32_t e : bad)
+      straighten(e);  // a neighbour's sides became straight, and its own inside is not
+    bad = uncertified(elements, spread(bad));
     std::vector<std::uint32_t> corners;
     for (const std::uint32_t e : bad)
       for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
@@ -260,7 +264,20 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
         Depths next = start;
         if (t < 4 && !rim[c])
           for (std::size_t d = 0; d < 4; ++d) towards(next[d], .25 * double(t + 1), mean[d]);
-        else {
+        else if (t < 7) {  // less bent from depth to depth
+          const Place one = (2. * next[0] + next[3]) / 3., two = (next[0] + 2. * next[3]) / 3.;
+          if (t == 4) calm(next[0], next[1], next[2], next[3]);
+          towards(next[1],
+                  t == 5   ? .5
+                  : t == 6 ? 1.
+                           : 0.,
+                  one),
+              towards(next[2],
+                      t == 5   ? .5
+                      : t == 6 ? 1.
+                               : 0.,
+                      two);
+        } else {
           const Place way(random.normal(), random.normal(), random.normal());
           const Place turn(random.normal(), random.normal(), random.normal());
           // All depths alike and turned, or only some: those near one surface, or a single one.
@@ -284,7 +301,7 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
       }
       for (std::size_t k = 0; k < better.size(); ++k) elements.curves[own[k]] = better[k], moved[own[k]] = 1;
     }
-    bad = uncertified(elements, spread(bad));
+    bad = uncertified(elements, spread(spread(bad)));  // sides of the stars' rims changed, too
     progress.advance();
   }
   // By the wall, where the surfaces meet at an edge, there may be no room for an element: those go to the wall.

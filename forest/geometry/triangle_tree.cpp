@@ -173,7 +173,8 @@ bool TriangleTree::encloses(const Place& place) const {
   if (nodes_.empty()) return false;
   const Place across = nodes_[0].high - nodes_[0].low;
   // In no special direction, so that it meets no edge.
-  const Place far = place + 2. * (across.norm() + (place - nodes_[0].low).norm()) * Place(.5377, .3141, .7823).normalized();
+  const Place far =
+      place + 2. * (across.norm() + (place - nodes_[0].low).norm()) * Place(.5377, .3141, .7823).normalized();
   const double step = 1e-9 * across.norm();
   int inside = 0;
   Place from = place;
