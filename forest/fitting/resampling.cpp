@@ -29,6 +29,7 @@ constexpr std::array<const char*, styles> style_names{"reach",  "wander",   "gir
 using Style = std::array<double, styles>;
 
 constexpr double least_diameter = .05;  // µm: where none was measured
+constexpr double least_length = .05;    // µm: so that none has a logarithm
 
 constexpr std::size_t most_daughters = 3;  // of a fork; those with more are not learned from
 
@@ -50,6 +51,7 @@ struct Fork {
   double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
   double side, height, depth;                 // from the soma: across, above and before it, µm
   Vec3 heading, aim;                          // aim: unit, towards the farthest tip
+  Vec3 last;                                  // where the last segment of the branch heads
   // How far to the right of the way out from the soma it heads, in the plane of the slice.
   double lean() const {
     return (side * double(heading.y()) - height * double(heading.x())) /
@@ -77,6 +79,7 @@ struct Manner {
 struct Cell {
   double soma = 0.;    // diameter, µm
   double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
+  double low = 0., high = 0.;  // of its points, along z from the soma, µm
   std::map<int, Manner> kinds;
   std::vector<Stem> stems;
 };
@@ -88,6 +91,13 @@ std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points) {
   return stops;
 }
 
+// Where its last segment heads that has a length.
+Vec3 last_heading(std::span<const Point> points) {
+  for (std::size_t i = points.size(); i-- > 1;)
+    if (const Vec3 step = points[i].position() - points[i - 1].position(); !step.isZero(0.f))
+      return step.normalized();
+  return Vec3::Zero();
+}
 // Where a branch heads at its end, and at its beginning.
 Vec3 end_heading(std::span<const Point> points) {
   return lsystem::heading_at_end(Vec3::Zero(), stops_of(points));
@@ -130,8 +140,11 @@ struct Traced {
 
     int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
-    // A root of one point, from which others leave: no branch.
-    bool begins(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
+    // A root of one point, from which others leave: of an insect's neuron no branch, else a stem that forks where it leaves.
+    bool begins(std::uint32_t i) const {
+      return all[i].parent < 0 && points(i).size() < 2 && arbors.neuron().soma().kind == SomaKind::none;
+    }
+    bool bud(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2 && learned(i); }
     // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
     // point where a fibre begins.
     std::int32_t above(std::size_t i) const {
@@ -146,6 +159,8 @@ struct Traced {
       return !daughters[i].empty() && daughters[i].size() <= most_daughters &&
              std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); });
     }
+    // From its end to the farthest tip.
+    Vec3 ahead_of(std::uint32_t i) const { return (farthest[i] - points(i).back().position()).normalized(); }
     std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
 
     void learn() {
@@ -170,7 +185,12 @@ struct Traced {
       Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
       if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
       for (std::uint32_t i = 0; i < all.size(); ++i)
-        if (above(i) < 0 && drawn(i)) cell.stems.push_back(stem(i));
+        for (const Point& p : points(i)) {
+          cell.low = std::min(cell.low, double(p.z - soma.z()));
+          cell.high = std::max(cell.high, double(p.z - soma.z()));
+        }
+      for (std::uint32_t i = 0; i < all.size(); ++i)
+        if (above(i) < 0 && (drawn(i) || bud(i))) cell.stems.push_back(stem(i));
       if (cell.stems.empty()) return;
       for (std::uint32_t i = 0; i < all.size(); ++i)
         if (learned(i)) traced.forks.push_back(fork(i));
@@ -186,9 +206,9 @@ struct Traced {
               .length = b.length,
               .end_diameter = diameter_of(points(i).back()),
               .place = points(i).front().position() - soma,
-              .heading = start_heading(points(i)),
+              .heading = bud(i) ? ahead_of(i) : start_heading(points(i)),
               .aim = farthest[i] - soma,
-              .points = copy(i),
+              .points = bud(i) ? std::vector<Point>(2, points(i).front()) : copy(i),
               .next = fork_at[i]};
     }
 
@@ -205,8 +225,9 @@ struct Traced {
                 .side = double(place.x()),
                 .height = double(place.y()),
                 .depth = double(place.z()),
-                .heading = end_heading(points(i)),
-                .aim = (farthest[i] - points(i).back().position()).normalized(),
+                .heading = bud(i) ? ahead_of(i) : end_heading(points(i)),
+                .aim = ahead_of(i),
+                .last = bud(i) ? ahead_of(i) : last_heading(points(i)),
                 .daughters = {}};
       for (const std::uint32_t d : daughters[i])
         fork.daughters.push_back({.tips = tips[d],
@@ -312,73 +333,92 @@ function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
 function along(r, x, y, z) = cosine(x, y, z, nth(forks.main(r), forks.t1x(r), forks.t2x(r), forks.t3x(r)),
   nth(forks.main(r), forks.t1y(r), forks.t2y(r), forks.t3y(r)), nth(forks.main(r), forks.t1z(r), forks.t2z(r), forks.t3z(r)))
+# By which angle about z a fork is turned, of that between the headings where it was traced and here (Trace turns as much).
+function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 + y^2)) *
+  atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
+# The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
+function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
+  min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
 
 module Plan(i), Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az)
-module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz)
-module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz)
+module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
+module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
 axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
-stem: Plan(i) : i < cells.stems(me)
+stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(plans.length(p))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
-    away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(plans.length(p)), x, y, z, log(d)@style),
-    scale = longer(ahead, stems.ahead(r)) }
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
+    away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
+    ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r), ez = away * plans.tz(p) - plans.z(p) - scale * stems.tz(r),
+    part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), q)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), q, 1, 0, part * ex, part * ey, part * ez)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d,
          away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
-       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
+       ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0) ] Plan(i + 1)
+bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
+  { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
+    tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), away = ahead / max(1, plans.ahead(p)),
+    d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
+  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
+       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+       ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
 
 # A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
 # neuron may lie anywhere between the faces of its slice.
 end: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) : tips < 2 ->
-on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz)
+on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z, hx, hy, hz)
   : next >= 0 & run < longest & forks.tips(max(0, next)) == tips
     & along(max(0, next), if(mirror, px - ax, ax - px), ay - py, az - pz) > agreed
-  { q = calibre(kind, next, tips, ahead, d) }
+  { q = calibre(kind, next, tips, ahead, d), phi = spin(if(mirror, -1, 1), next, x, y) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
-          ax, ay, az, px, py, pz) : follow
-fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
+          ax, ay, az, px, py, pz, phi) : follow
+fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z, hx, hy, hz)
   { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
-    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
+    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z, hx * mx, hy, hz,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style),
-    q = calibre(kind, r, tips, ahead, d) }
+    q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
-          ax, ay, az, px, py, pz)
-one: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) : forks.daughters(r) == 1
-  -> Limb(kind, r, q, run, 0, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz)
-two: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) : forks.daughters(r) == 2 & !forks.turned(r)
+          ax, ay, az, px, py, pz, phi)
+one: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 1
+  -> Limb(kind, r, q, run, 0, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
+two: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 2 & !forks.turned(r)
   { n = share(forks.n1(r), forks.tips(r), tips, 1) }
-  -> [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-     [ Limb(kind, r, q, run, 1, tips - n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-turned: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) : forks.daughters(r) == 2 & forks.turned(r)
+  -> [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+     [ Limb(kind, r, q, run, 1, tips - n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+turned: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 2 & forks.turned(r)
   { n = share(forks.n1(r), forks.tips(r), tips, 1) }
-  -> [ Limb(kind, r, q, run, 1, tips - n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-     [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) : forks.daughters(r) == 3
+  -> [ Limb(kind, r, q, run, 1, tips - n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+     [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 3
   { n = share(forks.n1(r), forks.tips(r), tips, 2), m = share(forks.n2(r), forks.tips(r), tips - n, 1) }
-  -> [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-     [ Limb(kind, r, q, run, 1, m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-     [ Limb(kind, r, q, run, 2, tips - n - m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz) ]
-limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz)
+  -> [ Limb(kind, r, q, run, 0, n, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+     [ Limb(kind, r, q, run, 1, m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+     [ Limb(kind, r, q, run, 2, tips - n - m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
+limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
   { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
-    length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)),
+    length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), main = i == forks.main(r),
-    beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
+    tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
+    gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
+    gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
+    wx = if(main, ax, gx), wy = if(main, ay, gy), wz = if(main, az, max(cells.low(me), min(cells.high(me), gz))),
+    part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, thick * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
-  -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin)
+  -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
+       part * (wx - gx), part * (wy - gy), part * (wz - gz), forks.vx(r), forks.vy(r), forks.vz(r))
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
-       if(main, ax, px + scale * m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r))),
-       if(main, ay, py + scale * nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r))),
-       if(main, az, pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)))) ?P(0, 0, 0) ?H(0, 0, 0)
+       wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0)
 )";
 
 /// Writes the grammar, part by part.
@@ -413,10 +453,11 @@ class Writer {
   void cells() {
     put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
         "(else -1), and how "
-        "many stems they have.\nsample cells(-> soma, fibre, stems) =");
+        "many stems they have.\nsample cells(-> soma, fibre, stems, low, high) =");
     for (const Cell& c : traced_.cells) {
       row(&c == traced_.cells.data());
-      put("{} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), c.stems.size());
+      put("{} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), c.stems.size(), rounded(c.low, 10.),
+          rounded(c.high, 10.));
     }
   }
 
@@ -488,7 +529,7 @@ class Writer {
   void stems() {
     put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
         "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, "
-        "d ~ 0.3{}\n  -> donor, next, ahead, length) =",
+        "d ~ 0.3{}\n  -> donor, next, ahead, length, tx, ty, tz) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
     for (const Cell& c : traced_.cells)
@@ -498,7 +539,8 @@ class Writer {
         vector(s.heading, 1e3);
         put(" {}", logarithm(s.end_diameter));
         style(c.kinds.at(s.kind).style);
-        put(" -> {} {} {} {}", s.cell, s.next, rounded(s.ahead, 10.), rounded(s.length, 1e2));
+        put(" -> {} {} {} {} ", s.cell, s.next, rounded(s.ahead, 10.), rounded(s.length, 1e2));
+        vector(s.aim - s.place, 10.);
         trace(s.heading, s.points);
       }
   }
@@ -518,26 +560,29 @@ class Writer {
         "lengths, paths beyond their ends.\n"
         "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
+        "    hx ~ {}, hy ~ {}, hz ~ {}, lx ~ {}, ly ~ {}, lz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
-        "  -> donor, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, "
+        "  -> donor, ux, uy, vx, vy, vz, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, "
         "next3, "
         "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
-        options_.lean, options_.aim, options_.aim, options_.aim, kernels_);
+        options_.last, options_.last, options_.last, options_.lean, options_.aim, options_.aim, options_.aim, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
       put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead),
           rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
+      put(" ");
+      vector(f.last, 1e3);
       put(" {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.side, 10.), rounded(f.height, 10.),
           rounded(f.depth, 10.));
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} {} {} {}", f.cell, f.daughters.size(), int(f.turned), f.main, f.tips,
-          rounded(f.ahead, 10.));
+      put(" -> {} {} {} ", f.cell, rounded(double(f.heading.x()), 1e3), rounded(double(f.heading.y()), 1e3));
+      vector(f.last, 1e3);
+      put(" {} {} {} {} {}", f.daughters.size(), int(f.turned), f.main, f.tips, rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
           put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);
@@ -608,6 +653,8 @@ class Writer {
     put("#define agreed 0.85  # the least cosine between the ways to their farthest tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
+        "#define steer 0.8   # how far branches are drawn to where their farthest tip should be\n"
+        "#define most 0.5    # … in shares of their length, at most\n"
         "#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n");
@@ -651,7 +698,7 @@ class Writer {
     }
   }
   static double rounded(double value, double steps) { return std::round(value * steps) / steps; }
-  static double logarithm(double value) { return rounded(std::log(value), 1e3); }
+  static double logarithm(double value) { return rounded(std::log(std::max(least_length, value)), 1e3); }
 
   const Traced& traced_;
   const Resampling& options_;
