@@ -23,9 +23,9 @@ using statistics::Branch;
 using Out = std::back_insert_iterator<std::string>;
 
 // What sets the branches of one neuron apart from those of another, and the names that the grammar gives it.
-enum { reach, wander, girth, grain, depth, spread, thinning, extent, number, styles };
-constexpr std::array<const char*, styles> style_names{"reach",  "wander",   "girth",  "grain", "depth",
-                                                      "spread", "thinning", "extent", "forks"};
+enum { reach, wander, girth, grain, slope, kink, depth, spread, thinning, extent, number, styles };
+constexpr std::array<const char*, styles> style_names{
+    "reach", "wander", "girth", "grain", "slope", "kink", "depth", "spread", "thinning", "extent", "forks"};
 using Style = std::array<double, styles>;
 
 constexpr double least_diameter = .05;  // µm: where none was measured
@@ -51,7 +51,6 @@ struct Fork {
   double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
   double side, height, depth;                 // from the soma: across, above and before it, µm
   Vec3 heading, aim;                          // aim: unit, towards the farthest tip
-  Vec3 last;                                  // where the last segment of the branch heads
   // How far to the right of the way out from the soma it heads, in the plane of the slice.
   double lean() const {
     return (side * double(heading.y()) - height * double(heading.x())) /
@@ -73,7 +72,6 @@ struct Manner {
   Style style{};
   double thinnest = least_diameter;  // diameter, µm
   double winding = .01;              // mean of the logarithm of path / chord
-  double tip = 0.;                   // mean of the logarithm of the diameters where branches end, µm
 };
 
 struct Cell {
@@ -91,13 +89,6 @@ std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points) {
   return stops;
 }
 
-// Where its last segment heads that has a length.
-Vec3 last_heading(std::span<const Point> points) {
-  for (std::size_t i = points.size(); i-- > 1;)
-    if (const Vec3 step = points[i].position() - points[i - 1].position(); !step.isZero(0.f))
-      return step.normalized();
-  return Vec3::Zero();
-}
 // Where a branch heads at its end, and at its beginning.
 Vec3 end_heading(std::span<const Point> points) {
   return lsystem::heading_at_end(Vec3::Zero(), stops_of(points));
@@ -105,6 +96,27 @@ Vec3 end_heading(std::span<const Point> points) {
 Vec3 start_heading(std::span<const Point> points) {
   const std::vector<Point> back(points.rbegin(), points.rend());
   return -end_heading(back);
+}
+
+// How far along z it goes, forth or back, in shares of its length.
+double slope_of(std::span<const Point> points) {
+  double along = 0., length = 0.;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    along += std::abs(double(points[i].z) - double(points[i - 1].z));
+    length += double((points[i].position() - points[i - 1].position()).norm());
+  }
+  return length > 0. ? along / length : 0.;
+}
+
+// By which angle it turns from one segment to the next, in the mean.
+double kink_of(std::span<const Point> points) {
+  double sum = 0.;
+  for (std::size_t i = 2; i < points.size(); ++i) {
+    const Vec3 before = points[i - 1].position() - points[i - 2].position(),
+               after = points[i].position() - points[i - 1].position();
+    sum += std::atan2(double(before.cross(after).norm()), double(before.dot(after)));
+  }
+  return sum / double(points.size() - 2);
 }
 
 double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
@@ -141,10 +153,11 @@ struct Traced {
     int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
     // A root of one point, from which others leave: of an insect's neuron no branch, else a stem that forks where it leaves.
+    bool single(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
     bool begins(std::uint32_t i) const {
-      return all[i].parent < 0 && points(i).size() < 2 && arbors.neuron().soma().kind == SomaKind::none;
+      return single(i) && arbors.neuron().soma().kind == SomaKind::none;
     }
-    bool bud(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2 && learned(i); }
+    bool bud(std::uint32_t i) const { return single(i) && learned(i); }
     // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
     // point where a fibre begins.
     std::int32_t above(std::size_t i) const {
@@ -227,7 +240,6 @@ struct Traced {
                 .depth = double(place.z()),
                 .heading = bud(i) ? ahead_of(i) : end_heading(points(i)),
                 .aim = ahead_of(i),
-                .last = bud(i) ? ahead_of(i) : last_heading(points(i)),
                 .daughters = {}};
       for (const std::uint32_t d : daughters[i])
         fork.daughters.push_back({.tips = tips[d],
@@ -248,7 +260,6 @@ struct Traced {
     std::map<int, Manner> manners() const {
       struct Sums {
         std::array<std::vector<double>, styles> values;
-        std::vector<double> tips;
         double farthest = 0., sections = 0., thinnest = INFINITY;
       };
       std::map<int, Sums> by_kind;
@@ -258,7 +269,6 @@ struct Traced {
         of.sections += 1.;
         of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
         for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
-        if (daughters[i].empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
         if (drawn(i)) measure(i, of.values);
       }
       std::map<int, Manner> manners;
@@ -267,7 +277,6 @@ struct Traced {
         Manner& manner = manners[kind];
         for (std::size_t s = 0; s < styles; ++s)
           manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
-        manner.tip = statistics::mean(of.tips);
         manner.thinnest = of.thinnest, manner.winding = std::max(.01, manner.style[wander]);
       }
       return manners;
@@ -282,6 +291,8 @@ struct Traced {
       if (b.length > straight && across > 0.) values[wander].push_back(std::log(b.length / across));
       values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
       values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
+      values[slope].push_back(slope_of(points(i)));
+      if (points(i).size() > 2) values[kink].push_back(kink_of(points(i)));
       values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
       if (above(i) < 0) return;
       const auto before = points(std::uint32_t(above(i)));
@@ -355,36 +366,36 @@ stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
     ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
     away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r), ez = away * plans.tz(p) - plans.z(p) - scale * stems.tz(r),
-    part = steer * drawn(length, beyond, ex, ey, ez) }
+    ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r),
+    ez = away * plans.tz(p) - plans.z(p) - scale * stems.tz(r), part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
        Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), q, 1, 0, part * ex, part * ey, part * ez)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d,
          away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
-       ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0) ] Plan(i + 1)
+       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), away = ahead / max(1, plans.ahead(p)),
-    d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
+    away = ahead / max(1, plans.ahead(p)), d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
-       ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0) ] Plan(i + 1)
+       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
 
 # A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
 # neuron may lie anywhere between the faces of its slice.
 end: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) : tips < 2 ->
-on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z, hx, hy, hz)
+on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   : next >= 0 & run < longest & forks.tips(max(0, next)) == tips
     & along(max(0, next), if(mirror, px - ax, ax - px), ay - py, az - pz) > agreed
   { q = calibre(kind, next, tips, ahead, d), phi = spin(if(mirror, -1, 1), next, x, y) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
-fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z, hx, hy, hz)
+fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
-    r = forks(kind, donor, log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z, hx * mx, hy, hz,
+    r = forks(kind, donor, if(chance(familiar), -1, me), log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style),
     q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
@@ -416,9 +427,9 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, thick * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz), forks.vx(r), forks.vy(r), forks.vz(r))
+       part * (wx - gx), part * (wy - gy), part * (wz - gz))
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
-       wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0, 0, 0, 0)
+       wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
 
 /// Writes the grammar, part by part.
@@ -427,7 +438,7 @@ class Writer {
   Writer(const Traced& traced, const std::string& title, const Resampling& options)
       : traced_(traced), options_(options) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
-      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s], (s == grain ? .2 : 1.) * options.style);
+      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s], s == grain ? .2 * options.style : s == slope || s == kink ? options.tracer : options.style);
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
         traced.cells.size(), traced.forks.size(), title);
     cells();
@@ -466,8 +477,8 @@ class Writer {
         "coarsely traced branches are,\n"
         "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and "
         "how often they fork; the\n"
-        "# thinnest diameter (µm), and the mean logarithms of path by chord and of the diameters at tips.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, winding, tip) =",
+        "# thinnest diameter (µm), and the mean logarithm of path by chord.\n"
+        "sample styles(cell =, kind = -> {}, thinnest, winding) =",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -477,7 +488,7 @@ class Writer {
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4), rounded(of.tip, 1e3));
+        put(" {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4));
       }
   }
 
@@ -491,7 +502,7 @@ class Writer {
       for (const auto& [kind, of] : a.kinds) {
         const auto found = b.kinds.find(kind);
         for (std::size_t s = 0; s < styles; ++s)
-          sum += std::pow(of.style[s] - (found == b.kinds.end() ? 0. : found->second.style[s]), 2);
+          if (s != slope && s != kink) sum += std::pow(of.style[s] - (found == b.kinds.end() ? 0. : found->second.style[s]), 2);
       }
       return sum;
     };
@@ -558,31 +569,29 @@ class Writer {
         "diameter are logarithms; heading and\n"
         "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
         "lengths, paths beyond their ends.\n"
-        "sample forks(kind =, cell !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
+        "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, lx ~ {}, ly ~ {}, lz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
+        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
-        "  -> donor, ux, uy, vx, vy, vz, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, "
+        "  -> donor, ux, uy, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, "
         "next3, "
         "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
-        options_.last, options_.last, options_.last, options_.lean, options_.aim, options_.aim, options_.aim, kernels_);
+        options_.lean, options_.aim, options_.aim, options_.aim, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
-      put("{} {} {} {} {} {} {} ", f.kind, f.cell, logarithm(f.tips), logarithm(f.ahead),
+      put("{} {} {} {} {} {} {} {} ", f.kind, f.cell, f.cell, logarithm(f.tips), logarithm(f.ahead),
           rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
-      put(" ");
-      vector(f.last, 1e3);
       put(" {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.side, 10.), rounded(f.height, 10.),
           rounded(f.depth, 10.));
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} ", f.cell, rounded(double(f.heading.x()), 1e3), rounded(double(f.heading.y()), 1e3));
-      vector(f.last, 1e3);
-      put(" {} {} {} {} {}", f.daughters.size(), int(f.turned), f.main, f.tips, rounded(f.ahead, 10.));
+      put(" -> {} {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
+          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.main, f.tips,
+          rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
           put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);
@@ -653,11 +662,13 @@ class Writer {
     put("#define agreed 0.85  # the least cosine between the ways to their farthest tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
-        "#define steer 0.8   # how far branches are drawn to where their farthest tip should be\n"
+        "#define steer 0.5   # how far branches are drawn to where their farthest tip should be\n"
         "#define most 0.5    # … in shares of their length, at most\n"
+        "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
-        "drawn\n");
+        "drawn\n",
+        options_.familiar);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);

@@ -27,9 +27,10 @@ struct Resampling {
          depth = .2;                          // in standard deviations among the forks of a kind
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
   double aim = .15;                           // of the unit vector to the farthest tip: likewise
-  double last = .5;                           // of where its last segment heads, a unit vector
   double lean = .12;                          // of how far aside of the way out it heads
   double style = .45;                         // in standard deviations among the neurons
+  double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
+  double familiar = 1.;                       // how often a fork may come from the neuron whose stems these are
   double smoothing = .3;                      // of a neuron's style: 0 takes that of a traced neuron as it is
   std::size_t kin = 4;                        // neurons alike, by whose differences it is changed
 };

@@ -45,16 +45,13 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace",
-     "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, aside x, y, z, left x, y, z",
+    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
-     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by so many µm; its first 10 µm "
-     "turned with the "
-     "last segment here from what it `left` where it was traced",
-     Action::trace, 3, 16},
+     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by (x, y, z), all of it in proportion",
+     Action::trace, 3, 13},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -71,9 +68,7 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::shun, 1, 2},
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
-    {"?H", "x, y, z, u, v, w",
-     "… and where it heads, a unit vector; then that of the last segment alone, where a traced branch winds",
-     Action::ask_heading, 3, 6},
+    {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
     {"?D", "depth, layer, above, below",
      "… how deep below the pia it is, in which layer, and how far from the upper and lower border of that",
      Action::ask_depth, 1, 4},
@@ -110,7 +105,6 @@ struct State {
   double avoid = -1.;                                  // µm kept free; below 0: it goes through everything
   Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
   Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
-  Eigen::Vector3d last = Eigen::Vector3d::UnitY();     // where the last segment headed
   std::uint32_t node = none;                           // the drawn point the turtle stands on
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
@@ -278,7 +272,7 @@ class Turtle {
       case Action::ask_place:
         return tell(m, Eigen::Vector3d(state_.position - soma_place_));
       case Action::ask_heading:
-        return tell(m, (Eigen::Matrix<double, 6, 1>() << state_.frame.col(0), state_.last).finished());
+        return tell(m, Eigen::Vector3d(state_.frame.col(0)));
       case Action::ask_depth: {
         const auto stratum = environment_.stratum(here());
         return tell(m,
@@ -372,7 +366,6 @@ class Turtle {
   void line_to(const Eigen::Vector3d& place, float start_radius) {
     const Eigen::Vector3d from = std::exchange(state_.position, place);
     if (!place.allFinite()) fail("the turtle has left the world");
-    if (place != from) state_.last = (place - from).stableNormalized();
     if (answers_) return;
     if (state_.node == none) {
       drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind});
@@ -418,34 +411,22 @@ class Turtle {
     const double level = before.head<2>().norm() * heading.head<2>().norm();
     const Eigen::Quaterniond turn(
         Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
-    const Eigen::Vector3d pull(value(10, 0.), value(11, 0.), value(12, 0.));
-    const auto part_at = [&](std::size_t i) { return t.length() > 0.f ? t.lengths[i] / t.length() : 1.f; };
-    // On its way, times `bent` from the chord, and drawn aside.
-    const auto aside_at = [&](std::size_t i) {
-      const Vec3 on_chord = t.end() * part_at(i);
-      return Eigen::Vector3d(place(on_chord + float(bent) * (t.stops[i].at - on_chord)) + part_at(i) * pull);
-    };
-    knee(values.size() > 15 ? Eigen::Vector3d(turn * sides.cwiseProduct(Eigen::Vector3d(value(13, 0.), value(14, 0.), value(15, 0.))))
-                            : Eigen::Vector3d(Eigen::Vector3d::Zero()),
-         t, scale, aside_at);
-    const auto stop_at = [&](std::size_t i) {
-      return Eigen::Vector3d(aside_at(i) + (knees_.empty() ? Eigen::Vector3d(Eigen::Vector3d::Zero()) : knees_[std::min(i, knees_.size() - 1)]));
-    };
     const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
     const bool free = state_.avoid < 0.;
     Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // by what it avoided
     if (answers_ && free) {
-      line_to(stop_at(t.stops.size() - 1), 0.f);
-      if (const std::size_t n = t.stops.size(); n > 1)
-        if (const Eigen::Vector3d last = state_.position - stop_at(n - 2); !last.isZero(0.))
-          state_.last = last.stableNormalized();
+      line_to(place(t.end()) + aside, 0.f);
     } else {
+      const float whole = t.length();
       auto start = float(0.5 * thick(calibre.diameter));
       for (std::size_t i = 0; i < t.stops.size(); ++i) {
         const lsystem::Trace::Stop& stop = t.stops[i];
-        state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part_at(i)));
-        Eigen::Vector3d next = stop_at(i);
+        const float part = whole > 0.f ? t.lengths[i] / whole : 1.f;
+        state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
+        const Vec3 on_chord = t.end() * part;
+        Eigen::Vector3d next = place(on_chord + float(bent) * (stop.at - on_chord)) + double(part) * aside;
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
@@ -458,28 +439,8 @@ class Turtle {
       }
     }
     state_.diameter = thick(calibre.stops.back().diameter);
-    if (!t.ahead.isZero(0.f)) {
-      const double length = scale * double(t.length());
-      head((turn * mirrored(t.ahead) + (length > 0. ? Eigen::Vector3d(pull / length) : pull)).stableNormalized());
-    }
-  }
-
-  // Where a branch was traced, it left a segment of this direction: so that it leaves the one that is drawn here by the same
-  // angles, its first segments are turned with that, less and less. knees_: by how much that moves each of its places.
-  template <class Place>
-  void knee(const Eigen::Vector3d& left, const lsystem::Trace& t, double scale, Place&& place_at) {
-    constexpr double reach = 10.;  // µm
-    knees_.clear();
-    if (left.isZero(0.) || t.length() <= 0.f) return;
-    const Eigen::AngleAxisd turn(Eigen::Quaterniond::FromTwoVectors(left, state_.last));
-    Eigen::Vector3d before = state_.position, moved = Eigen::Vector3d::Zero();
-    for (std::size_t i = 0; i < t.stops.size(); ++i) {
-      const double share = i ? 1. - scale * double(t.lengths[i - 1]) / reach : 1.;
-      if (share <= 0.) break;
-      const Eigen::Vector3d at = place_at(i), step = at - std::exchange(before, at);
-      moved += Eigen::AngleAxisd(share * turn.angle(), turn.axis()) * step - step;
-      knees_.push_back(moved);
-    }
+    const double length = scale * double(t.length());
+    if (!t.ahead.isZero(0.f) && length > 0.) head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
   }
 
   void head(const Eigen::Vector3d& direction) {
@@ -572,7 +533,6 @@ class Turtle {
   State state_;
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
-  std::vector<Eigen::Vector3d> knees_;  // of the traced branch that is being drawn
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
