@@ -154,9 +154,7 @@ struct Traced {
     std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
     // A root of one point, from which others leave: of an insect's neuron no branch, else a stem that forks where it leaves.
     bool single(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
-    bool begins(std::uint32_t i) const {
-      return single(i) && arbors.neuron().soma().kind == SomaKind::none;
-    }
+    bool begins(std::uint32_t i) const { return single(i) && arbors.neuron().soma().kind == SomaKind::none; }
     bool bud(std::uint32_t i) const { return single(i) && learned(i); }
     // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
     // point where a fibre begins.
@@ -363,7 +361,7 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
     away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r),
@@ -376,7 +374,7 @@ stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
 bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
     away = ahead / max(1, plans.ahead(p)), d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
@@ -438,7 +436,10 @@ class Writer {
   Writer(const Traced& traced, const std::string& title, const Resampling& options)
       : traced_(traced), options_(options) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
-      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s], s == grain ? .2 * options.style : s == slope || s == kink ? options.tracer : options.style);
+      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
+                              s == grain                ? .2 * options.style
+                              : s == slope || s == kink ? options.tracer
+                                                        : options.style);
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
         traced.cells.size(), traced.forks.size(), title);
     cells();
@@ -502,7 +503,8 @@ class Writer {
       for (const auto& [kind, of] : a.kinds) {
         const auto found = b.kinds.find(kind);
         for (std::size_t s = 0; s < styles; ++s)
-          if (s != slope && s != kink) sum += std::pow(of.style[s] - (found == b.kinds.end() ? 0. : found->second.style[s]), 2);
+          if (s != slope && s != kink)
+            sum += std::pow(of.style[s] - (found == b.kinds.end() ? 0. : found->second.style[s]), 2);
       }
       return sum;
     };
@@ -515,7 +517,22 @@ class Writer {
         row(!i && !k);
         put("{} {} -> {}", i, k, others[k].second);
       }
+      for (std::size_t k = 0; k < kin(); ++k)
+        for (std::size_t l = 0; l < kin(); ++l)
+          differ(traced_.cells[others[k].second], traced_.cells[others[l].second]);
     }
+  }
+
+  void differ(const Cell& one, const Cell& other) {
+    for (const auto& [kind, of] : one.kinds)
+      if (const auto found = other.kinds.find(kind); found != other.kinds.end())
+        for (std::size_t s = 0; s < styles; ++s, differences_ += 1.)
+          squares_ += std::pow(of.style[s] - found->second.style[s], 2);
+  }
+  // What keeps styles as different among neurons as they are, when the differences of like ones are added.
+  double kept() const {
+    return differences_ > 0. ? 1. / std::sqrt(1. + std::pow(options_.smoothing, 2) * squares_ / differences_)
+                             : 1.;
   }
 
   void plans() {
@@ -574,11 +591,12 @@ class Writer {
         "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
-        "  -> donor, ux, uy, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, "
+        "  -> donor, ux, uy, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
+        "next2, "
         "next3, "
         "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
-        options_.lean, options_.aim, options_.aim, options_.aim, kernels_);
+        options_.lean, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
       put("{} {} {} {} {} {} {} {} ", f.kind, f.cell, f.cell, logarithm(f.tips), logarithm(f.ahead),
@@ -645,8 +663,9 @@ class Writer {
         "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell thin_as = one\n#define stray {:.4g}\n"
-        "function own(mine, one_s, other_s) = mine + stray * (one_s - other_s)\n",
-        traced_.cells.size(), kin(), options_.smoothing);
+        "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
+        "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
+        traced_.cells.size(), kin(), options_.smoothing, kept());
     for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
@@ -662,10 +681,11 @@ class Writer {
     put("#define agreed 0.85  # the least cosine between the ways to their farthest tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
+        "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
         "#define steer 0.5   # how far branches are drawn to where their farthest tip should be\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
-        "#define jitter 0.1  # of the logarithms of a stem's tips and of the path to its farthest\n"
+        "#define jitter 0.05  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
         options_.familiar);
@@ -713,6 +733,7 @@ class Writer {
 
   const Traced& traced_;
   const Resampling& options_;
+  double squares_ = 0., differences_ = 0.;  // of the styles of neurons that are like the same one
   std::string kernels_, text_;
 };
 

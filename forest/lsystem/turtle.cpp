@@ -50,7 +50,8 @@ constexpr TurtleSymbol symbol_table[] = {
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
-     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by (x, y, z), all of it in proportion",
+     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by (x, y, z), all of it in "
+     "proportion",
      Action::trace, 3, 13},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
@@ -440,7 +441,8 @@ class Turtle {
     }
     state_.diameter = thick(calibre.stops.back().diameter);
     const double length = scale * double(t.length());
-    if (!t.ahead.isZero(0.f) && length > 0.) head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
+    if (!t.ahead.isZero(0.f) && length > 0.)
+      head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
   }
 
   void head(const Eigen::Vector3d& direction) {

@@ -118,7 +118,8 @@ template <auto column>
 double length_along(const Arbors& a, const Branch& b) {
   const std::vector<double>& at = a.columns().*column;
   double along = 0.;
-  for (std::size_t row = b.first_row + 1; row <= b.last_row(); ++row) along += std::abs(at[row] - at[row - 1]);
+  for (std::size_t row = b.first_row + 1; row <= b.last_row(); ++row)
+    along += std::abs(at[row] - at[row - 1]);
   return along;
 }
 
