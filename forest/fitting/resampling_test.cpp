@@ -17,6 +17,8 @@
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
 
+#include "tests/zoo.h"
+
 namespace forest::fitting {
 namespace {
 
