@@ -17,6 +17,8 @@
 #include "forest/statistics/metric.h"
 #include "forest/statistics/summary.h"
 
+#include "tests/zoo.h"
+
 namespace forest::fitting {
 namespace {
 
@@ -115,6 +117,37 @@ TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
       EXPECT_EQ(std::ranges::count_if(std::span(grown).subspan(half, 12),
                                       [&](const Vec3& g) { return (g - place).norm() < .02f; }),
                 1);
+}
+
+// Two arbors that fork in their first point, where they leave the soma, and one that does not.
+TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 6; ++i) {
+    Random random(3, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    for (int stem = 0; stem < 3; ++stem) {
+      const double angle = 2. * stem + .1 * random.normal();
+      const auto at = [&](double way, double turn) {
+        return Point{float(way * std::cos(angle + turn)), float(way * std::sin(angle + turn)),
+                     float(random.normal()), .5f};
+      };
+      const Point first = at(5., 0.), fork = stem ? first : at(25., 0.);
+      const SectionId root = stem ? builder.add_section({}, SectionKind::basal, std::array{first})
+                                  : builder.add_section({}, SectionKind::basal, std::array{first, fork});
+      for (const double side : {-.3, .4})
+        builder.add_section(root, SectionKind::basal, std::array{fork, at(60. + 5. * random.normal(), side)});
+    }
+    models.push_back(builder.build());
+  }
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  for (const Morphology& m : lsystem::grow_population(grammar, 12, 1)) {
+    ASSERT_EQ(m.roots().size(), 3u);
+    std::size_t single = 0;
+    for (const SectionId root : m.roots()) single += m.points(root).size() == 1;
+    EXPECT_EQ(single, 2u);
+    EXPECT_EQ(m.sections().size(), 9u);
+  }
 }
 
 // Arbors that leave one point, and no soma.

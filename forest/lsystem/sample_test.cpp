@@ -167,6 +167,17 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
   EXPECT_FLOAT_EQ(m.points().back().radius, 1.75f);
 }
 
+TEST(Trace, IsDrawnAsideInProportionToTheWay) {
+  const Morphology m = drawn("Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, -16)");
+  expect_near(m.points()[1].position(), {3, 3, -6});  // after 3 of 8 µm
+  expect_near(m.points()[2].position(), {8, 6, -12});
+  // It heads where it has been drawn.
+  const std::string course = "Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, -16)";
+  const Vec3 straight = end_of("Trace(twigs, 0, 0) F(1)") - end_of("Trace(twigs, 0, 0)"),
+             aside = end_of(course + " F(1)") - end_of(course);
+  expect_near(aside, (straight + Vec3(1, 0, -2)).normalized());
+}
+
 TEST(Trace, TellsItsDiameterAnywhere) {
   const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
   const Trace& t = twigs(g).branches(0)[0];  // 1 after 3 µm, 1.5 after 8

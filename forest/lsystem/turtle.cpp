@@ -45,13 +45,14 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest",
+    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
-     "times `thickness`, and no thinner than `thinnest`",
-     Action::trace, 3, 10},
+     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by (x, y, z), all of it in "
+     "proportion",
+     Action::trace, 3, 13},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -411,12 +412,13 @@ class Turtle {
     const double level = before.head<2>().norm() * heading.head<2>().norm();
     const Eigen::Quaterniond turn(
         Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
     const bool free = state_.avoid < 0.;
     Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // by what it avoided
     if (answers_ && free) {
-      line_to(place(t.end()), 0.f);
+      line_to(place(t.end()) + aside, 0.f);
     } else {
       const float whole = t.length();
       auto start = float(0.5 * thick(calibre.diameter));
@@ -425,7 +427,7 @@ class Turtle {
         const float part = whole > 0.f ? t.lengths[i] / whole : 1.f;
         state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
         const Vec3 on_chord = t.end() * part;
-        Eigen::Vector3d next = place(on_chord + float(bent) * (stop.at - on_chord));
+        Eigen::Vector3d next = place(on_chord + float(bent) * (stop.at - on_chord)) + double(part) * aside;
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
@@ -438,7 +440,9 @@ class Turtle {
       }
     }
     state_.diameter = thick(calibre.stops.back().diameter);
-    if (!t.ahead.isZero(0.f)) head(turn * mirrored(t.ahead));
+    const double length = scale * double(t.length());
+    if (!t.ahead.isZero(0.f) && length > 0.)
+      head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
   }
 
   void head(const Eigen::Vector3d& direction) {

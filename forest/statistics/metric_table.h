@@ -113,6 +113,16 @@ inline double is_bifurcation(const Arbors&, const Branch& b) { return b.daughter
 inline double order(const Arbors& a, const Branch& b) { return a.neuron().order(b.id); }
 inline double radius_at_start(const Arbors& a, const Branch& b) { return a.columns().radius[b.first_row]; }
 
+/// Path along one axis, whether forth or back.
+template <auto column>
+double length_along(const Arbors& a, const Branch& b) {
+  const std::vector<double>& at = a.columns().*column;
+  double along = 0.;
+  for (std::size_t row = b.first_row + 1; row <= b.last_row(); ++row)
+    along += std::abs(at[row] - at[row - 1]);
+  return along;
+}
+
 /// The first point of a daughter repeats the branch point, often with the parent's radius: its own begins at the next.
 inline double first_diameter(const Arbors& a, const Branch& b) {
   return 2. * a.columns().radius[b.first_row + (b.parent >= 0 ? 1 : 0)];

@@ -94,6 +94,13 @@ double fraction_above_soma(const Arbors& a) {
   return ratio(above, sum<length>(a));
 }
 
+double length_fraction_along_z(const Arbors& a) {
+  return ratio(sum<length_along<&Columns::z>>(a), sum<length>(a));
+}
+double depth_by_width(const Arbors& a) {
+  return ratio(sum<length_along<&Columns::z>>(a), sum<length_along<&Columns::x>>(a));
+}
+
 // Shape.
 
 double hull_volume(const Arbors& a) { return a.sections().empty() ? nan : a.once<hulls>().volume; }
@@ -237,6 +244,10 @@ constexpr auto table = std::to_array<Metric>({
      "Least extent along z that holds 95 % of the path length.", "Scorcioni et al. 2008", "Depth"},
     {"length_fraction_above_soma", "", neuron, axes_only, per_neuron<fraction_above_soma>,
      "Part of the path length that lies on the pia's side (larger y) of the centre of the soma.", "", ""},
+    {"length_fraction_along_z", "", neuron, axes_only, per_neuron<length_fraction_along_z>,
+     "Way along z, forth or back, over path length: Σ abs(Δz) / Σ l. It sees a wrong depth of a slice, or a wrong step between its pictures.", "", ""},
+    {"length_along_z_by_x", "", neuron, axes_only, per_neuron<depth_by_width>,
+     "Way along z over way along x: Σ abs(Δz) / Σ abs(Δx).", "", ""},
     {"hull_volume", "µm³", neuron, axes_only, per_neuron<hull_volume>,
      "Volume of the convex hull of all points; 0 where they lie in one plane.", "", ""},
     {"volume_density", "", neuron, diameters_too, per_neuron<volume_density>,

@@ -33,6 +33,10 @@ double segment_volume(const Columns& c, std::size_t row) {
 double segment_taper_rate(const Columns& c, std::size_t row) {
   return ratio(2. * std::abs(c.radius[row] - c.radius[row - 1]), c.length[row]);
 }
+double segment_elevation(const Columns& c, std::size_t row) {
+  if (!(c.length[row] > 0.)) return nan;
+  return std::asin(std::min(1., std::abs(c.z[row] - c.z[row - 1]) / c.length[row])) * (180. / pi);
+}
 double diameter(const Columns& c, std::size_t row) { return 2. * c.radius[row]; }
 double diameter_pow(const Columns& c, std::size_t row) {
   const double d = 2. * c.radius[row];
@@ -130,6 +134,8 @@ constexpr auto table = std::to_array<Metric>({
      "Change of diameter along the segment over its length, without its sign.", "", ""},
     {"segment_meander_angles", "°", point, axes_only, meander_angles,
      "Angle at the segment's start between the ways back and on: 180 where the section runs straight; none at a section's first segment.", "", ""},
+    {"segment_elevations", "°", point, axes_only, per_point<segment_elevation>,
+     "Angle of the segment with the x-y plane, without its sign; none where it has no length.", "", ""},
     {"segment_midpoints_x", "µm", point, axes_only, per_point<at_middle<&Columns::x>>,
      "x coordinate of the middle of the segment.", "", ""},
     {"segment_midpoints_y", "µm", point, axes_only, per_point<at_middle<&Columns::y>>,

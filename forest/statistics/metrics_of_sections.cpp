@@ -118,6 +118,10 @@ Values spine_counts(const Arbors& a) {
   return values;
 }
 
+double fraction_along_z(const Arbors& a, const Branch& b) {
+  return ratio(length_along<&Columns::z>(a, b), b.length);
+}
+
 Values spine_densities(const Arbors& a) {
   Values values = spine_counts(a);
   for (std::size_t i = 0; i < values.size(); ++i) values[i] = ratio(values[i], a.section(i).length);
@@ -172,6 +176,8 @@ constexpr auto table = std::to_array<Metric>({
      "The same over 50 µm.", "", ""},
     {"tortuosity_100", "", section, axes_only, per_section<tortuosity_over<100>>,
      "The same over 100 µm.", "", ""},
+    {"section_length_fractions_along_z", "", section, axes_only, per_section<fraction_along_z>,
+     "Way along z, forth or back, over path length.", "", ""},
     {"contraction", "", section, axes_only, per_section<contraction>,
      "Straight distance between the ends over path length.", "Scorcioni et al. 2008", "Contraction"},
     {"fractal_dim", "", section, axes_only, fractal_dimensions,

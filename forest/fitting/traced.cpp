@@ -1,0 +1,246 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/fitting/traced.h"
+
+#include <algorithm>
+#include <cmath>
+#include <cstdint>
+#include <utility>
+
+#include "forest/statistics/summary.h"
+
+namespace forest::fitting {
+
+using statistics::Arbors;
+using statistics::Branch;
+
+std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points) {
+  std::vector<lsystem::Trace::Stop> stops;
+  for (const Point& p : points.subspan(1))
+    stops.push_back({p.position() - points[0].position(), 2.f * p.radius});
+  return stops;
+}
+
+namespace {
+
+// Where a branch heads at its end, and at its beginning.
+Vec3 end_heading(std::span<const Point> points) {
+  return lsystem::heading_at_end(Vec3::Zero(), stops_of(points));
+}
+Vec3 start_heading(std::span<const Point> points) {
+  const std::vector<Point> back(points.rbegin(), points.rend());
+  return -end_heading(back);
+}
+
+// How far along z it goes, forth or back, in shares of its length.
+double slope_of(std::span<const Point> points) {
+  double along = 0., length = 0.;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    along += std::abs(double(points[i].z) - double(points[i - 1].z));
+    length += double((points[i].position() - points[i - 1].position()).norm());
+  }
+  return length > 0. ? along / length : 0.;
+}
+
+// By which angle it turns from one segment to the next, in the mean.
+double kink_of(std::span<const Point> points) {
+  double sum = 0.;
+  for (std::size_t i = 2; i < points.size(); ++i) {
+    const Vec3 before = points[i - 1].position() - points[i - 2].position(),
+               after = points[i].position() - points[i - 1].position();
+    sum += std::atan2(double(before.cross(after).norm()), double(before.dot(after)));
+  }
+  return sum / double(points.size() - 2);
+}
+
+double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
+
+// Of one neuron.
+struct Learner {
+  Traced& traced;
+  const Arbors& arbors;
+  const Vec3 soma = arbors.origin().position();
+  std::span<const Branch> all = arbors.sections();
+  std::vector<double> beyond =
+      std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
+  std::vector<int> fork_at = std::vector<int>(all.size(), none);  // its number among all forks
+  std::vector<Vec3> farthest = std::vector<Vec3>(all.size());     // that tip
+  std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
+  std::vector<std::uint32_t> stems = std::vector<std::uint32_t>(all.size());  // that sections grow from
+  std::vector<double> tips = std::vector<double>(all.size(), 0.);
+
+  Learner(Traced& into, const Arbors& of) : traced(into), arbors(of) {}
+
+  int kind_of(const Branch& b) const { return int(arbors.neuron().section(b.id).kind); }
+  std::span<const Point> points(std::uint32_t i) const { return arbors.points(all[i]); }
+  // A root of one point, from which others leave: of an insect's neuron no branch, else a stem that forks where it leaves.
+  bool single(std::uint32_t i) const { return all[i].parent < 0 && points(i).size() < 2; }
+  bool begins(std::uint32_t i) const { return single(i) && arbors.neuron().soma().kind == SomaKind::none; }
+  bool bud(std::uint32_t i) const { return single(i) && learned(i); }
+  // The section that this one goes on: none (-1) for a stem, which leaves the soma, a section of another kind, or the
+  // point where a fibre begins.
+  std::int32_t above(std::size_t i) const {
+    const std::int32_t parent = all[i].parent;
+    return parent < 0 || begins(std::uint32_t(parent)) || kind_of(all[std::size_t(parent)]) != kind_of(all[i])
+               ? -1
+               : parent;
+  }
+  bool drawn(std::uint32_t i) const { return points(i).size() >= 2 && all[i].length > 0.; }
+  bool learned(std::uint32_t i) const {  // the fork at the end of this section
+    return !daughters[i].empty() && daughters[i].size() <= most_daughters &&
+           std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); });
+  }
+  // From its end to the farthest tip.
+  Vec3 ahead_of(std::uint32_t i) const { return (farthest[i] - points(i).back().position()).normalized(); }
+  std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
+
+  void learn() {
+    for (std::uint32_t i = 0; i < all.size(); ++i) farthest[i] = points(i).back().position();
+    for (std::size_t i = all.size(); i-- > 0;)
+      if (above(i) >= 0) {
+        const auto before = std::size_t(above(i));
+        if (all[i].length + beyond[i] < beyond[before]) continue;
+        beyond[before] = all[i].length + beyond[i];
+        farthest[before] = farthest[i];
+      }
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      if (above(i) >= 0) daughters[std::size_t(above(i))].push_back(i);
+    for (std::uint32_t i = 0, row = std::uint32_t(traced.forks.size()); i < all.size(); ++i)
+      if (learned(i)) fork_at[i] = int(row++);
+    for (std::uint32_t i = 0; i < all.size(); ++i) stems[i] = above(i) < 0 ? i : stems[std::size_t(above(i))];
+    for (std::size_t i = all.size(); i-- > 0;) {
+      if (daughters[i].empty()) tips[i] = 1.;
+      if (above(i) >= 0) tips[std::size_t(above(i))] += tips[i];
+    }
+    Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
+    if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      for (const Point& p : points(i)) {
+        cell.low = std::min(cell.low, double(p.z - soma.z()));
+        cell.high = std::max(cell.high, double(p.z - soma.z()));
+      }
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      if (above(i) < 0 && (drawn(i) || bud(i))) cell.stems.push_back(stem(i));
+    if (cell.stems.empty()) return;
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      if (learned(i)) traced.forks.push_back(fork(i));
+    traced.cells.push_back(std::move(cell));
+  }
+
+  Stem stem(std::uint32_t i) const {
+    const Branch& b = all[i];
+    return {.cell = traced.cells.size(),
+            .kind = kind_of(b),
+            .tips = tips[i],
+            .ahead = b.length + beyond[i],
+            .length = b.length,
+            .end_diameter = diameter_of(points(i).back()),
+            .place = points(i).front().position() - soma,
+            .heading = bud(i) ? ahead_of(i) : start_heading(points(i)),
+            .aim = farthest[i] - soma,
+            .points = bud(i) ? std::vector<Point>(2, points(i).front()) : copy(i),
+            .next = fork_at[i]};
+  }
+
+  Fork fork(std::uint32_t i) const {
+    const Branch& b = all[i];
+    const Vec3 place = points(i).back().position() - soma;
+    Fork fork{.cell = traced.cells.size(),
+              .kind = kind_of(b),
+              .tips = tips[i],
+              .ahead = beyond[i],
+              .path = b.path_distance - (all[stems[i]].path_distance - all[stems[i]].length),
+              .order = double(arbors.neuron().order(b.id) - arbors.neuron().order(all[stems[i]].id)),
+              .diameter = diameter_of(points(i).back()),
+              .side = double(place.x()),
+              .height = double(place.y()),
+              .depth = double(place.z()),
+              .heading = bud(i) ? ahead_of(i) : end_heading(points(i)),
+              .aim = ahead_of(i),
+              .daughters = {}};
+    for (const std::uint32_t d : daughters[i])
+      fork.daughters.push_back({.tips = tips[d],
+                                .ahead = beyond[d],
+                                .length = all[d].length,
+                                .end_diameter = diameter_of(points(d).back()),
+                                .aim = farthest[d] - points(i).back().position(),
+                                .points = copy(d),
+                                .next = fork_at[d]});
+    fork.turned = fork.daughters.front().tips > fork.daughters.back().tips;
+    std::ranges::stable_sort(fork.daughters, {}, &Fork::Daughter::tips);
+    fork.main = std::size_t(
+        std::ranges::max_element(fork.daughters, {}, [](const auto& d) { return d.length + d.ahead; }) -
+        fork.daughters.begin());
+    return fork;
+  }
+
+  std::map<int, Manner> manners() const {
+    struct Sums {
+      std::array<std::vector<double>, styles> values;
+      double farthest = 0., sections = 0., thinnest = INFINITY;
+    };
+    std::map<int, Sums> by_kind;
+    for (std::uint32_t i = 0; i < all.size(); ++i) {
+      if (begins(i)) continue;
+      Sums& of = by_kind[kind_of(all[i])];
+      of.sections += 1.;
+      of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
+      for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
+      if (drawn(i)) measure(i, of.values);
+    }
+    std::map<int, Manner> manners;
+    for (auto& [kind, of] : by_kind) {
+      of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
+      Manner& manner = manners[kind];
+      for (std::size_t s = 0; s < styles; ++s)
+        manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
+      manner.thinnest = of.thinnest, manner.winding = std::max(.01, manner.style[wander]);
+    }
+    return manners;
+  }
+
+  void measure(std::uint32_t i, std::array<std::vector<double>, styles>& values) const {
+    constexpr double straight = 10.;  // µm: shorter ones tell nothing of how they wind
+    const Branch& b = all[i];
+    const Vec3 chord = points(i).back().position() - points(i).front().position();
+    const double across = double(chord.norm());
+    values[reach].push_back(std::log(b.length));
+    if (b.length > straight && across > 0.) values[wander].push_back(std::log(b.length / across));
+    values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
+    values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
+    values[slope].push_back(slope_of(points(i)));
+    if (points(i).size() > 2) values[kink].push_back(kink_of(points(i)));
+    values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
+    if (above(i) < 0) return;
+    const auto before = points(std::uint32_t(above(i)));
+    if (across > 0.)
+      values[spread].push_back(
+          std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
+    values[thinning].push_back(std::log(diameter_of(points(i)[1]) / diameter_of(before.back())));
+  }
+};
+// In standard deviations from the mean of all neurons.
+void standardise(Traced& traced) {
+  std::map<int, std::vector<Style*>> by_kind;
+  for (Cell& c : traced.cells)
+    for (auto& [kind, of] : c.kinds) by_kind[kind].push_back(&of.style);
+  for (const auto& [kind, of] : by_kind)
+    for (std::size_t s = 0; s < styles; ++s) {
+      std::vector<double> values;
+      for (const Style* style : of) values.push_back((*style)[s]);
+      const double mean = statistics::mean(values), sd = statistics::summarize(values).sd;
+      traced.deviations[kind][s] = sd;
+      for (Style* style : of) (*style)[s] = sd > 0. ? ((*style)[s] - mean) / sd : 0.;
+    }
+}
+
+}  // namespace
+
+Traced learn(std::span<const Morphology> neurons, statistics::KindSet kinds) {
+  Traced traced;
+  for (const Morphology& neuron : neurons)
+    if (!neuron.roots().empty()) Learner(traced, Arbors(neuron, kinds)).learn();
+  standardise(traced);
+  return traced;
+}
+
+}  // namespace forest::fitting

@@ -1,0 +1,93 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a grammar is resampled from: stems and forks as they were traced, and what sets one neuron apart from another. Private to
+// this room; resampling.h says what is made of it.
+#pragma once
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+#include <cstddef>
+#include <map>
+#include <span>
+#include <vector>
+
+#include "forest/core/vec.h"
+#include "forest/lsystem/sample.h"
+#include "forest/morphology/morphology.h"
+#include "forest/statistics/arbors.h"
+
+namespace forest::fitting {
+
+// What sets the branches of one neuron apart from those of another, and the names that the grammar gives it.
+enum { reach, wander, girth, grain, slope, kink, depth, spread, thinning, extent, number, styles };
+inline constexpr std::array<const char*, styles> style_names{
+    "reach", "wander", "girth", "grain", "slope", "kink", "depth", "spread", "thinning", "extent", "forks"};
+using Style = std::array<double, styles>;
+
+inline constexpr double least_diameter = .05;  // µm: where none was measured
+inline constexpr double least_length = .05;    // µm: so that none has a logarithm
+
+inline constexpr std::size_t most_daughters = 3;  // of a fork; those with more are not learned from
+
+inline constexpr int none = -1;  // no fork
+
+struct Stem {
+  std::size_t cell;
+  int kind;
+  double tips, ahead, length, end_diameter;  // ahead: path from its beginning to the farthest tip, µm
+  Vec3 place, heading;                       // of its beginning, from the soma's centre
+  Vec3 aim;                                  // its farthest tip, from there
+  std::vector<Point> points;
+  int next = none;  // the fork at its end
+};
+
+struct Fork {
+  std::size_t cell;
+  int kind;
+  double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
+  double side, height, depth;                 // from the soma: across, above and before it, µm
+  Vec3 heading, aim;                          // aim: unit, towards the farthest tip
+  // How far to the right of the way out from the soma it heads, in the plane of the slice.
+  double lean() const {
+    return (side * double(heading.y()) - height * double(heading.x())) /
+           std::max(1., std::hypot(side, height, depth));
+  }
+  struct Daughter {
+    double tips, ahead, length, end_diameter;
+    Vec3 aim;  // its farthest tip, from the fork
+    std::vector<Point> points;
+    int next = none;  // the fork at its end
+  };
+  std::vector<Daughter> daughters;  // fewest tips first
+  std::size_t main = 0;             // the daughter with the farthest tip
+  bool turned = false;              // … though the one with more came first
+};
+
+// What is true of one kind of section of a neuron.
+struct Manner {
+  Style style{};
+  double thinnest = least_diameter;  // diameter, µm
+  double winding = .01;              // mean of the logarithm of path / chord
+};
+
+struct Cell {
+  double soma = 0.;    // diameter, µm
+  double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
+  double low = 0., high = 0.;  // of its points, along z from the soma, µm
+  std::map<int, Manner> kinds;
+  std::vector<Stem> stems;
+};
+
+/// Of all neurons. Styles are in standard deviations from the mean of all neurons.
+struct Traced {
+  std::vector<Cell> cells;  // that have such sections
+  std::vector<Fork> forks;
+  std::map<int, Style> deviations;  // among cells, by kind
+};
+
+Traced learn(std::span<const Morphology> neurons, statistics::KindSet kinds);
+
+/// A branch from its beginning on.
+std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points);
+
+}  // namespace forest::fitting
