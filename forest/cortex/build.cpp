@@ -78,7 +78,7 @@ void check_surfaces(const Mesh& outer, const Mesh& inner) {
   parallel_for(depths.size(), 256, [&](std::size_t i) {
     const Place p = inner.positions[i].cast<double>();
     const auto hit = tree.nearest(p);
-    depths[i] = tree.normal(hit->triangle).dot(p - hit->at) > 0. ? hit->distance : 0.;
+    depths[i] = hit->distance > 100. && !tree.encloses(p) ? hit->distance : 0.;
   });
   for (std::size_t i = 0; i < depths.size(); ++i) {
     if (depths[i] <= 100.) continue;
@@ -134,6 +134,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   progress.end();
   cortex.w_angle = spread_of(angles);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
+  cortex.wall += cortex.mending.left_out_volume;
   return cortex;
 }
 

@@ -222,7 +222,8 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     double least = 1e300;
     for (const std::uint32_t e : star) {
       const Hexahedron h = elements.hexahedron(e);
-      least = std::min(least, certify(h, 6).least / std::max(std::abs(h.volume()), .1 * mean_volume));
+      const Coefficients c = determinant(h);
+      least = std::min(least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume));
     }
     return least;
   };
@@ -254,7 +255,7 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
       const double reach = (mean[1] - start[1]).norm() + .1 * (start[0] - start[3]).norm();
       Random random(1, c, std::uint32_t(round));
       std::vector<Depths> better;
-      constexpr int tries = 24;
+      constexpr int tries = 40;
       for (int t = 0; t < tries; ++t) {
         Depths next = start;
         if (t < 4 && !rim[c])
@@ -262,7 +263,12 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
         else {
           const Place way(random.normal(), random.normal(), random.normal());
           const Place turn(random.normal(), random.normal(), random.normal());
-          for (std::size_t d = 0; d < 4; ++d) next[d] += .15 * reach * (way + (double(d) / 1.5 - 1.) * turn);
+          // All depths alike and turned, or only some: those near one surface, or a single one.
+          const std::size_t first = t % 3 == 0 ? 0 : std::size_t(random.below(4));
+          const std::size_t last = t % 3 == 0 ? 3 : t % 3 == 1 ? first : first < 2 ? 1 : 3;
+          const double size = (t & 1) ? .15 : .04;
+          for (std::size_t d = std::min(first, last); d <= last; ++d)
+            next[d] += size * reach * (way + (double(d) / 1.5 - 1.) * turn);
         }
         keep_on_surface(next);
         bool near = true;
@@ -280,6 +286,25 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     }
     bad = uncertified(elements, spread(bad));
     progress.advance();
+  }
+  // By the wall, where the surfaces meet at an edge, there may be no room for an element: those go to the wall.
+  while (!bad.empty()) {
+    std::vector<std::uint8_t> gone(elements.size(), 0);
+    for (const std::uint32_t e : bad)
+      for (const std::uint32_t c : elements.corners_of(e))
+        if (rim[c]) gone[e] = 1;
+    if (std::count(gone.begin(), gone.end(), 1) == 0) break;
+    std::vector<std::array<std::uint32_t, 16>> kept;
+    for (std::uint32_t e = 0; e < elements.size(); ++e) {
+      if (!gone[e]) {
+        kept.push_back(elements.elements[e]);
+        continue;
+      }
+      ++result.left_out, result.left_out_volume += elements.hexahedron(e).volume();
+      for (const std::uint32_t c : elements.corners_of(e)) rim[c] = 1;
+    }
+    elements.elements = std::move(kept);
+    bad = uncertified(elements);
   }
   progress.end();
   result.after = bad.size();

@@ -49,6 +49,8 @@ struct Mending {
   std::size_t before = 0, after = 0;  // elements not certified
   std::size_t moved = 0;              // curves that were moved
   double farthest = 0.;               // µm, the longest such way
+  std::size_t left_out = 0;           // elements by the wall that nothing could mend
+  double left_out_volume = 0.;        // µm³
 };
 /// Makes elements valid that are not, by straightening their sides first and then moving their corners towards the middle
 /// of those around; what lies on a surface stays on it.

@@ -722,9 +722,11 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
   progress.begin("evening volumes", std::size_t(options.relaxations));
   const double wanted = volume / double(quads.quads.size());
   std::vector<Place> moved(n);
-  constexpr int smooth_rounds = 10;
+  constexpr int smooth_rounds = 10, last_rounds = 15;
   for (int round = 0; round < options.relaxations; ++round) {
-    const double shape = .3 + (.04 - .3) * double(round) / double(options.relaxations);
+    const double shape = .3 + (.06 - .3) * double(round) / double(options.relaxations);
+    // In the end only what is bent is mended.
+    const bool last = round + last_rounds >= options.relaxations;
     for (const auto& [a, b] : rim) along_border[a] = along_border[b] = Place::Zero();
     for (const auto& [a, b] : rim) along_border[a] += quads.middle[b], along_border[b] += quads.middle[a];
     parallel_for(n, 1024, [&](std::size_t v) {
@@ -763,10 +765,11 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
         }
       }
       const double bent = std::clamp((.5 - worst) / .5, 0., 1.);
+      if (last && bent == 0.) return void(moved[v] = quads.middle[v]);
       Place pull = (1. - bent) * (shape * .5 * mean + std::max(shape, held[v]) * aligned) / sides_around +
                    bent * .5 * mean / sides_around;
       pull -= up[v] * up[v].dot(pull);
-      Place step = (1. - .7 * bent) * .8 * sum + pull;
+      Place step = (last ? 1. - bent : 1. - .7 * bent) * .8 * sum + pull;
       const double most = .25 * std::sqrt(wanted / under[v]);
       if (step.norm() > most) step *= most / step.norm();
       moved[v] = quads.middle[v] + step;

@@ -34,7 +34,7 @@ struct Quads {
 struct QuadOptions {
   double volume = 1e9;          // µm³ under each
   double volume_within = .005;  // of it: how near their mean must come
-  int relaxations = 60;
+  int relaxations = 90;
 };
 
 Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvatures, std::span<const Line> lines,

@@ -160,7 +160,8 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
       ribbon.outer[v] = fine.positions[v].cast<double>();
       const WCurve curve = curves.drop(ribbon.outer[v], -normals[v].cast<double>());
       ribbon.middle[v] = curve.at(.5), ribbon.inner[v] = curve.points.back();
-      ribbon.thickness[v] = float(curve.length()), arrived[v] = curve.arrived;
+      ribbon.thickness[v] = float(std::min(curve.length(), curves.straight_way(ribbon.outer[v])));
+      arrived[v] = curve.arrived;
     }
     progress.advance(end - begin);
   });

@@ -27,7 +27,7 @@ Mesh halved(const Mesh& mesh);
 
 struct Ribbon {
   std::vector<Place> outer, middle, inner;  // of every vertex, µm
-  std::vector<float> thickness;             // length of its w-curve, µm
+  std::vector<float> thickness;             // the lesser of its w-curve and the straight way to the inner surface, µm
   std::vector<std::uint8_t> wall;           // 1: the medial wall, where there is no cortex
   std::vector<Triangle> triangles;
 

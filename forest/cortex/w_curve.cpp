@@ -40,6 +40,11 @@ Place WCurve::at_length(double share) const {
   return points.back();
 }
 
+double WCurves::straight_way(const Place& from) const {
+  const auto hit = inner_.nearest(from);
+  return hit ? hit->distance : longest;
+}
+
 WCurve WCurves::drop(const Place& start, const Place& inward) const {
   WCurve curve;
   curve.points.push_back(start);

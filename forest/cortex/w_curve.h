@@ -38,6 +38,8 @@ class WCurves {
   /// @param start   on the outer surface
   /// @param inward  roughly into the tissue
   WCurve drop(const Place& start, const Place& inward) const;
+  /// To the nearest place of the inner surface, µm.
+  double straight_way(const Place& from) const;
 
  private:
   const Laplace& field_;

@@ -169,6 +169,21 @@ std::optional<TriangleTree::Hit> TriangleTree::first(const Place& from, const Pl
   return best;
 }
 
+bool TriangleTree::encloses(const Place& place) const {
+  if (nodes_.empty()) return false;
+  const Place across = nodes_[0].high - nodes_[0].low;
+  // In no special direction, so that it meets no edge.
+  const Place far = place + 2. * (across.norm() + (place - nodes_[0].low).norm()) * Place(.5377, .3141, .7823).normalized();
+  const double step = 1e-9 * across.norm();
+  int inside = 0;
+  Place from = place;
+  while (const auto hit = first(from, far)) {
+    inside += normal(hit->triangle).dot(far - place) > 0. ? 1 : -1;
+    from = hit->at + step * (far - place).normalized();
+  }
+  return inside > 0;
+}
+
 Place TriangleTree::normal(std::uint32_t triangle) const {
   const Triangle& t = triangles_[triangle];
   const Place across = (positions_[t[1]] - positions_[t[0]]).cross(positions_[t[2]] - positions_[t[0]]);

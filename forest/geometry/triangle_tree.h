@@ -28,6 +28,9 @@ class TriangleTree {
   /// Where the piece from `from` to `to` meets the surface first.
   std::optional<Hit> first(const Place& from, const Place& to) const;
 
+  /// Whether a closed surface encloses the place: a ray from there leaves it once more than it enters.
+  bool encloses(const Place& place) const;
+
   /// Unit, of a triangle; zero where it has no area.
   Place normal(std::uint32_t triangle) const;
   std::size_t size() const { return triangles_.size(); }
