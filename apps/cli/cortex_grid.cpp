@@ -19,6 +19,7 @@
 #include "forest/cortex/grid_domains.h"
 #include "forest/cortex/grid_picture.h"
 #include "forest/cortex/grid_quality.h"
+#include "forest/io/elements_file.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/cortex.h"
@@ -29,6 +30,8 @@ namespace {
 
 struct Options {
   std::string domain, generator = "best";
+  std::filesystem::path elements;
+  std::size_t element = 0;
   int steps = 0;       // 0: 20 in the plane, 10 in space
   int dimensions = 0;  // of the domains that are compared; 0: all
   std::filesystem::path out;
@@ -110,14 +113,33 @@ void compare(const Options& options, Console& console) {
   console.table(header, table);
 }
 
+struct Block {
+  std::string name;
+  cortex::Grid boundary;
+};
+Block block(const Options& options) {
+  if (options.elements.empty()) {
+    const cortex::Domain& domain = cortex::domain(options.domain);
+    return {domain.name, cortex::boundary(domain, steps_of(options, domain))};
+  }
+  if (!options.domain.empty())
+    throw Error(fmt::format("the block is to be '{}' and an element; give one of them", options.domain));
+  const cortex::Elements elements = io::read_elements(options.elements).cortex.elements;
+  if (options.element >= elements.size())
+    throw Error(fmt::format("{} has elements 0 to {}, and no {}", options.elements.string(),
+                            elements.size() - 1, options.element));
+  const int n = 1 + (options.steps ? options.steps : 10);
+  return {fmt::format("element {}", options.element),
+          cortex::sample(elements.hexahedron(options.element), {n, n, n})};
+}
+
 void run(const Options& options, Console& console) {
-  if (options.domain.empty()) return compare(options, console);
-  const cortex::Domain& domain = cortex::domain(options.domain);
-  const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain));
+  if (options.domain.empty() && options.elements.empty()) return compare(options, console);
+  const auto [name, boundary] = block(options);
   const Filled filled = fill(options.generator, boundary);
   const cortex::Validity validity = cortex::validity(filled.grid);
   if (!options.out.empty()) {
-    const cortex::GridPanel panel{&filled.grid, fmt::format("{}: {}", domain.name, filled.generator)};
+    const cortex::GridPanel panel{&filled.grid, fmt::format("{}: {}", name, filled.generator)};
     write(options, {&panel, 1});
   }
   nlohmann::ordered_json measures;
@@ -131,12 +153,12 @@ void run(const Options& options, Console& console) {
     line.push_back(row.measure->what);
     rows.push_back(std::move(line));
   }
-  console.print({{"domain", domain.name},
+  console.print({{"block", name},
                  {"generator", filled.generator},
                  {"cells", filled.grid.cells()},
                  {"folded", validity.bad},
                  {"measures", measures}});
-  console.say(fmt::format("{} by {}: {}, {} folded", domain.name, filled.generator,
+  console.say(fmt::format("{} by {}: {}, {} folded", name, filled.generator,
                           counted(filled.grid.cells(), "cell"), validity.bad));
   console.table({"measure", "min", "p1", "median", "mean", "p99", "max", "what it is"}, rows);
 }
@@ -151,6 +173,9 @@ std::function<void()> cortex_grid(CLI::App& command, Console& console) {
   for (const cortex::Generator& row : cortex::generators()) generators += ", " + std::string(row.name);
   command.add_option("domain", options->domain,
                      "The block: " + domains + "; by default all, by every generator");
+  CLI::Option* const elements = command.add_option(
+      "--elements", options->elements, "File of cortex build; then the block is one of its elements");
+  command.add_option("--element", options->element, "Its number")->needs(elements)->capture_default_str();
   command.add_option("--generator", options->generator, "What fills it: " + generators)
       ->capture_default_str();
   command
