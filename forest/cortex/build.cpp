@@ -133,8 +133,10 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   });
   progress.end();
   cortex.w_angle = spread_of(angles);
+  fit_faces(cortex.elements, outer_tree, inner_tree);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
   cortex.wall += cortex.mending.left_out_volume;
+  even_depths(cortex.elements, progress);
   return cortex;
 }
 

@@ -45,6 +45,15 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
 std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of);
 std::vector<std::uint32_t> uncertified(const Elements& elements);
 
+/// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
+/// on a creased surface cut its convex creases off.
+void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
+
+/// Makes w the share of volume in every element, as near as a cubic can: single tubes are so by themselves, their sum over a
+/// curved footprint is not quite. Curves within the elements move along themselves, sides and corners stay; an element that
+/// would no longer be valid stays as it was.
+void even_depths(Elements& elements, Progress& progress);
+
 struct Mending {
   std::size_t before = 0, after = 0;  // elements not certified
   std::size_t moved = 0;              // curves that were moved

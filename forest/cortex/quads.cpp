@@ -673,24 +673,31 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
 
   // Back onto the ribbon, and along it until volumes are even.
   const RibbonLocator locator(ribbon);
-  Mesh valleys;
-  for (const Line& line : lines) {
-    if (line.kind != Line::Kind::valley) continue;
-    for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
-      const auto first = std::uint32_t(valleys.positions.size());
-      valleys.positions.push_back(line.points[i].cast<float>()),
-          valleys.positions.push_back(line.points[i + 1].cast<float>());
-      valleys.triangles.push_back({first, first + 1, first + 1});
+  const auto tree_of = [&](Line::Kind kind) {
+    Mesh pieces;
+    for (const Line& line : lines) {
+      if (line.kind != kind) continue;
+      for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+        const auto first = std::uint32_t(pieces.positions.size());
+        pieces.positions.push_back(line.points[i].cast<float>());
+        pieces.positions.push_back(line.points[i + 1].cast<float>());
+        pieces.triangles.push_back({first, first + 1, first + 1});
+      }
     }
-  }
-  const TriangleTree valley_tree(valleys);
+    return TriangleTree(pieces);
+  };
+  const TriangleTree valley_tree = tree_of(Line::Kind::valley), border_tree = tree_of(Line::Kind::border);
 
   const std::size_t n = quads.middle.size();
   quads.points.resize(n);
   std::vector<double> under(n), held(n);  // held: to the directions of a line
   std::vector<Place> up(n), arm(n);
+  std::vector<std::uint8_t> border(n, 0);  // sides that only one face has, of every vertex
   const auto put_back = [&](std::size_t v) {
-    if (quads.on_valley[v])
+    if (border[v])
+      if (const auto hit = border_tree.nearest(quads.middle[v], 1.5 * std::cbrt(options.volume)))
+        quads.middle[v] = hit->at;
+    if (quads.on_valley[v] && !border[v])
       if (const auto hit = valley_tree.nearest(quads.middle[v])) quads.middle[v] = hit->at;
     const RibbonPoint point = locator.nearest(quads.middle[v]);
     quads.points[v] = point, quads.middle[v] = on(ribbon.middle, ribbon, point);
@@ -713,7 +720,6 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
   for (const Quad& q : quads.quads)
     for (std::size_t e = 0; e < 4; ++e) ++sides[std::minmax(q[e], q[(e + 1) % 4])];
-  std::vector<std::uint8_t> border(n, 0);
   std::vector<Place> along_border(n);  // the sum of both neighbours
   std::vector<std::pair<std::uint32_t, std::uint32_t>> rim;
   for (const auto& [edge, times] : sides)
