@@ -40,6 +40,17 @@ void expect_figures(const std::vector<Morphology>& cells, std::initializer_list<
     EXPECT_NEAR(statistics::mean(values(cells, f.metric)), f.mean, f.apart) << f.metric;
 }
 
+// Their mean within the deviation of the others.
+void expect_like(const std::vector<Morphology>& cells, const std::vector<Morphology>& others,
+                 std::initializer_list<const char*> metrics) {
+  for (const char* metric : metrics) {
+    const auto wanted = values(others, metric);
+    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted),
+                statistics::summarize(wanted).sd)
+        << metric;
+  }
+}
+
 TEST(Glia, MicrogliaHaveThePublishedFigures) {
   const auto cells = grown("microglia", 100);
   expect_figures(cells, {{"number_of_neurites", 3.25, .6},
@@ -112,14 +123,10 @@ TEST(Glia, MicrogliaAreLikeTheTracedOnes) {
   for (const auto& file : files_below(folder, ".swc")) traced.push_back(io::read(file).morphology);
   ASSERT_EQ(traced.size(), 12u);
   const auto cells = grown("microglia", 60);
-  for (const char* metric : {"number_of_neurites", "number_of_leaves", "total_length", "max_radial_distance",
-                             "max_path_distance", "section_term_lengths", "section_bif_lengths",
-                             "contraction", "partition_asymmetry", "sholl_maximum", "hull_volume"}) {
-    const auto wanted = values(traced, metric);
-    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted),
-                statistics::summarize(wanted).sd)
-        << metric;
-  }
+  expect_like(cells, traced,
+              {"number_of_neurites", "number_of_leaves", "total_length", "max_radial_distance",
+               "max_path_distance", "section_term_lengths", "section_bif_lengths", "contraction",
+               "partition_asymmetry", "sholl_maximum", "hull_volume"});
 }
 
 TEST(Glia, AstrocytesAreAsManyTipsAndAsLongAsThoseOfACircuit) {
@@ -128,12 +135,7 @@ TEST(Glia, AstrocytesAreAsManyTipsAndAsLongAsThoseOfACircuit) {
   for (const auto& file : files_below(folder, ".h5")) others.push_back(io::read(file).morphology);
   ASSERT_EQ(others.size(), 5u);
   const auto cells = grown("astrocyte", 20);
-  for (const char* metric : {"number_of_leaves", "total_length", "total_width", "sholl_maximum"}) {
-    const auto wanted = values(others, metric);
-    EXPECT_NEAR(statistics::mean(values(cells, metric)), statistics::mean(wanted),
-                statistics::summarize(wanted).sd)
-        << metric;
-  }
+  expect_like(cells, others, {"number_of_leaves", "total_length", "total_width", "sholl_maximum"});
 }
 
 }  // namespace

@@ -15,6 +15,7 @@ namespace forest::cli {
 std::function<void()> bench_activity(CLI::App&, Console&);
 std::function<void()> bench_column(CLI::App&, Console&);
 std::function<void()> bench_gaze(CLI::App&, Console&);
+std::function<void()> bench_grid(CLI::App&, Console&);
 std::function<void()> bench_grow(CLI::App&, Console&);
 std::function<void()> bench_io(CLI::App&, Console&);
 std::function<void()> bench_measure(CLI::App&, Console&);
@@ -30,6 +31,7 @@ std::span<const Benchmark> benchmarks() {
       {"activity", "How fast a simulation's values are packed, sought and clamped", bench_activity},
       {"column", "How fast the column is drawn with a moving camera, and in how much memory", bench_column},
       {"gaze", "How much less is drawn for an eye that looks at one place, and how fast", bench_gaze},
+      {"grid", "How many curved elements are certified in a second, and places found in them", bench_grid},
       {"grow", "How many neurons a second grow from the built-in grammars, on all cores", bench_grow},
       {"io", "How many megabytes of neuron files are read in a second, on one core", bench_io},
       {"measure", "How many neurons a second have all their metrics measured, on one core", bench_measure},

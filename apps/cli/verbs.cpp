@@ -22,6 +22,7 @@ std::function<void()> compare(CLI::App&, Console&);
 std::function<void()> typical(CLI::App&, Console&);
 std::function<void()> classify(CLI::App&, Console&);
 std::function<void()> judge(CLI::App&, Console&);
+std::function<void()> cortex(CLI::App&, Console&);
 std::function<void()> model(CLI::App&, Console&);
 std::function<void()> fit(CLI::App&, Console&);
 std::function<void()> grow(CLI::App&, Console&);
@@ -91,6 +92,11 @@ std::span<const Verb> verbs() {
        "  brainforest judge --grown grown/ --train fitted/ --held-out others/ --features features.csv\n"
        "  brainforest judge --leave-one-out --train few/",
        judge},
+      {"cortex",
+       "Build the tissue: finite elements between two surfaces, grids within them, and how good they are",
+       "brainforest cortex build lh.pial lh.white -o elements.h5\n"
+       "  brainforest cortex report elements.h5",
+       cortex},
       {"model", "Keep what neurons grow from: list, show, edit, import, export and compare models",
        "brainforest model import pyramidal --repo cells.db\n"
        "  brainforest model edit pyramidal --repo cells.db\n"

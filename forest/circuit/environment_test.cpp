@@ -7,6 +7,8 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
+#include "tests/replaced.h"
+
 namespace forest::circuit {
 namespace {
 
@@ -35,12 +37,7 @@ reach = 40
 at = [1, 2, 3]
 )";
 
-std::string with(const std::string& from, const std::string& to) {
-  std::string text = good;
-  const auto at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
+std::string with(const std::string& from, const std::string& to) { return replaced(good, from, to); }
 
 TEST(EnvironmentFile, IsReadKeyByKey) {
   const cortex::Environment e = parse_environment(good, "good.toml");

@@ -11,6 +11,8 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
+#include "tests/replaced.h"
+
 namespace forest::circuit {
 namespace {
 
@@ -47,12 +49,7 @@ density = 1000
 mix = { tall = 1 }
 )";
 
-std::string with(const std::string& from, const std::string& to) {
-  std::string text = good;
-  const auto at = text.find(from);
-  EXPECT_NE(at, std::string::npos) << from;
-  return text.replace(at, from.size(), to);
-}
+std::string with(const std::string& from, const std::string& to) { return replaced(good, from, to); }
 
 TEST(Recipe, IsReadKeyByKey) {
   const Recipe recipe = parse_recipe(good, "good.toml");

@@ -8,6 +8,7 @@
 #include "forest/core/parallel.h"
 #include "forest/core/progress.h"
 #include "forest/geometry/isosurface.h"
+#include "forest/geometry/self_intersection.h"
 #include "forest/geometry/triangle_tree.h"
 
 #include "tests/refused.h"

@@ -71,7 +71,6 @@ struct Manner {
   Style style{};
   double thinnest = least_diameter;  // diameter, µm
   double winding = .01;              // mean of the logarithm of path / chord
-  double tip = 0.;                   // mean of the logarithm of the diameters where branches end, µm
 };
 
 struct Cell {
@@ -227,7 +226,6 @@ struct Traced {
     std::map<int, Manner> manners() const {
       struct Sums {
         std::array<std::vector<double>, styles> values;
-        std::vector<double> tips;
         double farthest = 0., sections = 0., thinnest = INFINITY;
       };
       std::map<int, Sums> by_kind;
@@ -237,7 +235,6 @@ struct Traced {
         of.sections += 1.;
         of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
         for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
-        if (daughters[i].empty()) of.tips.push_back(std::log(diameter_of(points(i).back())));
         if (drawn(i)) measure(i, of.values);
       }
       std::map<int, Manner> manners;
@@ -246,7 +243,6 @@ struct Traced {
         Manner& manner = manners[kind];
         for (std::size_t s = 0; s < styles; ++s)
           manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
-        manner.tip = statistics::mean(of.tips);
         manner.thinnest = of.thinnest, manner.winding = std::max(.01, manner.style[wander]);
       }
       return manners;
@@ -425,8 +421,8 @@ class Writer {
         "coarsely traced branches are,\n"
         "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and "
         "how often they fork; the\n"
-        "# thinnest diameter (µm), and the mean logarithms of path by chord and of the diameters at tips.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, winding, tip) =",
+        "# thinnest diameter (µm), and the mean logarithm of path by chord.\n"
+        "sample styles(cell =, kind = -> {}, thinnest, winding) =",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -436,7 +432,7 @@ class Writer {
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4), rounded(of.tip, 1e3));
+        put(" {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4));
       }
   }
 

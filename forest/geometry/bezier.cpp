@@ -228,14 +228,14 @@ class Refinement {
       Cubic& before = pieces_[(i + count - 1) % count];
       Cubic& behind = pieces_[i];
       const Place in = before.points[3] - before.points[2], out = behind.points[1] - behind.points[0];
-      const auto turns = [&](const Place& u, const Place& v) {
-        return std::abs(std::atan2(cross(u, v), u.dot(v))) > corner;
+      const auto turns = [&](const Place& u, const Place& v, double by) {
+        return std::abs(std::atan2(cross(u, v), u.dot(v))) > by;
       };
       const Place here = samples.breaks[breaks[i]];
       smooth_[i] = in.norm() > 0. && out.norm() > 0. &&
-                   !(turns(in, out) &&
+                   !(turns(in, out, corner) &&
                      turns(here - samples.breaks[(breaks[i] + n - std::min<std::size_t>(2, n - 1)) % n],
-                           samples.breaks[(breaks[i] + 2) % n] - here));
+                           samples.breaks[(breaks[i] + 2) % n] - here, corner / 3.));
       if (!smooth_[i]) continue;
       // The tangent in between, by the longer handle more.
       const Place direction = (in + out).normalized();

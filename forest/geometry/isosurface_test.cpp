@@ -8,7 +8,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/parallel.h"
-#include "forest/geometry/triangle_tree.h"
+#include "forest/geometry/self_intersection.h"
 
 #include "tests/refused.h"
 

@@ -4,208 +4,176 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <numeric>
-
-#include "forest/core/parallel.h"
+#include <utility>
 
 namespace forest {
 namespace {
 
-using Point = Eigen::Vector3d;
+using Place = TriangleTree::Place;
+constexpr std::uint32_t leaf = 4;
 
-constexpr std::uint32_t leaf_size = 4;
-
-double squared_distance(const Bounds& box, const Point& point) {
-  const Point low = box.low.cast<double>(), high = box.high.cast<double>();
-  return (point - point.cwiseMax(low).cwiseMin(high)).squaredNorm();
+// Ericson (2005), "Real-time collision detection", 5.1.5: by the region of the plane that the place lies over.
+Place nearest_on(const Place& p, const Place& a, const Place& b, const Place& c) {
+  const Place ab = b - a, ac = c - a, ap = p - a;
+  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
+  if (d1 <= 0. && d2 <= 0.) return a;
+  const Place bp = p - b;
+  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
+  if (d3 >= 0. && d4 <= d3) return b;
+  const double vc = d1 * d4 - d3 * d2;
+  if (vc <= 0. && d1 >= 0. && d3 <= 0.) return a + ab * (d1 / (d1 - d3));
+  const Place cp = p - c;
+  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
+  if (d6 >= 0. && d5 <= d6) return c;
+  const double vb = d5 * d2 - d1 * d6;
+  if (vb <= 0. && d2 >= 0. && d6 <= 0.) return a + ac * (d2 / (d2 - d6));
+  const double va = d3 * d6 - d5 * d4;
+  if (va <= 0. && d4 - d3 >= 0. && d5 - d6 >= 0.) return b + (c - b) * ((d4 - d3) / ((d4 - d3) + (d5 - d6)));
+  const double all = va + vb + vc;
+  return all > 0. ? Place(a + ab * (vb / all) + ac * (vc / all)) : a;
 }
 
-bool touch(const Bounds& a, const Bounds& b) {
-  return (a.low.array() <= b.high.array()).all() && (b.low.array() <= a.high.array()).all();
+// Möller & Trumbore (1997), both sides: the share of the way, or above 1.
+double share_to(const Place& from, const Place& way, const Place& a, const Place& b, const Place& c) {
+  constexpr double none = 2.;
+  const Place e1 = b - a, e2 = c - a, h = way.cross(e2);
+  const double det = e1.dot(h);
+  if (det == 0.) return none;
+  const Place s = from - a;
+  const double u = s.dot(h) / det;
+  if (!(u >= 0. && u <= 1.)) return none;
+  const Place q = s.cross(e1);
+  const double v = way.dot(q) / det;
+  if (!(v >= 0. && u + v <= 1.)) return none;
+  const double t = e2.dot(q) / det;
+  return t >= 0. ? t : none;
 }
 
-std::array<Point, 3> corners(const Mesh& mesh, std::uint32_t t) {
-  std::array<Point, 3> result;
-  for (std::size_t k = 0; k < 3; ++k) result[k] = mesh.positions[mesh.triangles[t][k]].cast<double>();
-  return result;
-}
-
-Bounds bounds_of(const Mesh& mesh, std::uint32_t t) {
-  Bounds box;
-  for (const std::uint32_t corner : mesh.triangles[t]) box.add(mesh.positions[corner]);
-  return box;
-}
-
-// Six times the volume of a tetrahedron: on which side of a triangle a point lies.
-double side(const Point& a, const Point& b, const Point& c, const Point& d) {
-  return (b - a).cross(c - a).dot(d - a);
-}
-
-// Where the edge p–q goes through the inner of a triangle.
-std::optional<Point> pierced(const Point& p, const Point& q, const std::array<Point, 3>& t) {
-  const double below = side(t[0], t[1], t[2], p), above = side(t[0], t[1], t[2], q);
-  if (!((below < 0. && above > 0.) || (below > 0. && above < 0.))) return {};
-  const double u = side(p, q, t[0], t[1]), v = side(p, q, t[1], t[2]), w = side(p, q, t[2], t[0]);
-  if (!((u > 0. && v > 0. && w > 0.) || (u < 0. && v < 0. && w < 0.))) return {};
-  return p + below / (below - above) * (q - p);
-}
-
-std::optional<Point> cut(const Mesh& mesh, std::uint32_t a, std::uint32_t b) {
-  for (const std::uint32_t i : mesh.triangles[a])
-    for (const std::uint32_t j : mesh.triangles[b])
-      if (i == j) return {};
-  const auto s = corners(mesh, a), t = corners(mesh, b);
-  for (std::size_t k = 0; k < 3; ++k) {
-    if (const auto point = pierced(s[k], s[(k + 1) % 3], t)) return point;
-    if (const auto point = pierced(t[k], t[(k + 1) % 3], s)) return point;
-  }
-  return {};
+double square_to_box(const Place& p, const Place& low, const Place& high) {
+  return (low - p).cwiseMax(p - high).cwiseMax(0.).squaredNorm();
 }
 
 }  // namespace
 
-Point nearest_on_triangle(const Point& p, const Point& a, const Point& b, const Point& c) {
-  const Point ab = b - a, ac = c - a, ap = p - a;
-  const double d1 = ab.dot(ap), d2 = ac.dot(ap);
-  if (d1 <= 0. && d2 <= 0.) return a;
-  const Point bp = p - b;
-  const double d3 = ab.dot(bp), d4 = ac.dot(bp);
-  if (d3 >= 0. && d4 <= d3) return b;
-  const double vc = d1 * d4 - d3 * d2;
-  if (vc <= 0. && d1 >= 0. && d3 <= 0.) return a + d1 / (d1 - d3) * ab;
-  const Point cp = p - c;
-  const double d5 = ab.dot(cp), d6 = ac.dot(cp);
-  if (d6 >= 0. && d5 <= d6) return c;
-  const double vb = d5 * d2 - d1 * d6;
-  if (vb <= 0. && d2 >= 0. && d6 <= 0.) return a + d2 / (d2 - d6) * ac;
-  const double va = d3 * d6 - d5 * d4;
-  if (va <= 0. && d4 - d3 >= 0. && d5 - d6 >= 0.) return b + (d4 - d3) / ((d4 - d3) + (d5 - d6)) * (c - b);
-  const double sum = va + vb + vc;
-  if (!(sum > 0.)) return a;  // the triangle is a line or a point
-  return a + vb / sum * ab + vc / sum * ac;
-}
-
-TriangleTree::TriangleTree(const Mesh& mesh) : mesh_(mesh) {
-  const auto count = std::uint32_t(mesh.triangles.size());
-  order_.resize(count);
+TriangleTree::TriangleTree(const Mesh& mesh) : triangles_(mesh.triangles), order_(mesh.triangles.size()) {
+  positions_.reserve(mesh.positions.size());
+  for (const Vec3& p : mesh.positions) positions_.push_back(p.cast<double>());
   std::iota(order_.begin(), order_.end(), 0u);
-  std::vector<Bounds> boxes(count);
-  std::vector<Vec3> centres(count);
-  for (std::uint32_t t = 0; t < count; ++t) boxes[t] = bounds_of(mesh, t), centres[t] = boxes[t].centre();
-  nodes_.reserve(2 * (count / 2 + 1));
+  if (order_.empty()) return;
+  std::vector<Place> centres;
+  centres.reserve(triangles_.size());
+  for (const Triangle& t : triangles_)
+    centres.push_back((positions_[t[0]] + positions_[t[1]] + positions_[t[2]]) / 3.);
+  nodes_.reserve(order_.size());
   nodes_.emplace_back();
-  build(0, 0, count, boxes, centres);
+  build(0, 0, std::uint32_t(order_.size()), centres);
 }
 
 void TriangleTree::build(std::uint32_t node, std::uint32_t begin, std::uint32_t end,
-                         std::vector<Bounds>& boxes, std::vector<Vec3>& centres) {
-  Bounds box, middles;
-  for (std::uint32_t i = begin; i < end; ++i) box.add(boxes[order_[i]]), middles.add(centres[order_[i]]);
-  nodes_[node].box = box;
-  if (end - begin <= leaf_size) {
+                         const std::vector<Place>& centres) {
+  Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
+  Place centre_low = low, centre_high = high;
+  for (std::uint32_t i = begin; i < end; ++i) {
+    for (const std::uint32_t corner : triangles_[order_[i]])
+      low = low.cwiseMin(positions_[corner]), high = high.cwiseMax(positions_[corner]);
+    centre_low = centre_low.cwiseMin(centres[order_[i]]),
+    centre_high = centre_high.cwiseMax(centres[order_[i]]);
+  }
+  nodes_[node].low = low, nodes_[node].high = high;
+  if (end - begin <= leaf) {
     nodes_[node].first = begin, nodes_[node].count = end - begin;
     return;
   }
-  Eigen::Index axis = 0;
-  middles.extent().maxCoeff(&axis);
-  const std::uint32_t middle = (begin + end) / 2;
+  int axis = 0;
+  (centre_high - centre_low).maxCoeff(&axis);
+  const std::uint32_t middle = begin + (end - begin) / 2;
   std::nth_element(order_.begin() + begin, order_.begin() + middle, order_.begin() + end,
                    [&](std::uint32_t a, std::uint32_t b) {
                      return std::pair(centres[a][axis], a) < std::pair(centres[b][axis], b);
                    });
   const auto children = std::uint32_t(nodes_.size());
-  nodes_.resize(nodes_.size() + 2);
   nodes_[node].first = children;
-  build(children, begin, middle, boxes, centres);
-  build(children + 1, middle, end, boxes, centres);
+  nodes_.emplace_back(), nodes_.emplace_back();
+  build(children, begin, middle, centres);
+  build(children + 1, middle, end, centres);
 }
 
-std::optional<TriangleTree::Nearest> TriangleTree::nearest(const Point& point, double limit) const {
-  if (order_.empty()) return {};
-  std::optional<Nearest> best;
-  double least = limit * limit;
-  std::array<std::pair<double, std::uint32_t>, 128> stack;
+std::optional<TriangleTree::Hit> TriangleTree::nearest(const Place& to, double within) const {
+  std::optional<Hit> best;
+  if (nodes_.empty()) return best;
+  double square = within * within;
+  std::array<std::pair<double, std::uint32_t>, 96> stack;
   std::size_t depth = 0;
-  stack[depth++] = {squared_distance(nodes_[0].box, point), 0};
+  stack[depth++] = {square_to_box(to, nodes_[0].low, nodes_[0].high), 0};
   while (depth > 0) {
-    const auto [distance, index] = stack[--depth];
-    if (distance > least) continue;
+    const auto [least, index] = stack[--depth];
+    if (least >= square) continue;
     const Node& node = nodes_[index];
-    if (node.count > 0) {
-      for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
-        const auto t = corners(mesh_, order_[i]);
-        const Point on = nearest_on_triangle(point, t[0], t[1], t[2]);
-        const double squared = (on - point).squaredNorm();
-        if (squared < least || (squared == least && (!best || order_[i] < best->triangle)))
-          least = squared, best = Nearest{order_[i], on, 0.};
-      }
+    if (node.count == 0) {
+      std::pair<double, std::uint32_t> near{
+          square_to_box(to, nodes_[node.first].low, nodes_[node.first].high), node.first};
+      std::pair<double, std::uint32_t> far{
+          square_to_box(to, nodes_[node.first + 1].low, nodes_[node.first + 1].high), node.first + 1};
+      if (far.first < near.first) std::swap(near, far);
+      stack[depth++] = far, stack[depth++] = near;
       continue;
     }
-    const double a = squared_distance(nodes_[node.first].box, point),
-                 b = squared_distance(nodes_[node.first + 1].box, point);
-    const bool a_first = a <= b;
-    stack[depth++] = {a_first ? b : a, node.first + (a_first ? 1 : 0)};
-    stack[depth++] = {a_first ? a : b, node.first + (a_first ? 0 : 1)};
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const Triangle& t = triangles_[order_[i]];
+      const Place at = nearest_on(to, positions_[t[0]], positions_[t[1]], positions_[t[2]]);
+      const double d = (at - to).squaredNorm();
+      if (d < square) square = d, best = Hit{order_[i], at, std::sqrt(d)};
+    }
   }
-  if (best) best->distance = std::sqrt(least);
   return best;
 }
 
-std::vector<std::uint32_t> TriangleTree::within(const Bounds& box) const {
-  std::vector<std::uint32_t> found, open;
-  if (!order_.empty()) open.push_back(0);
-  while (!open.empty()) {
-    const Node& node = nodes_[open.back()];
-    open.pop_back();
-    if (!touch(node.box, box)) continue;
+std::optional<TriangleTree::Hit> TriangleTree::first(const Place& from, const Place& to) const {
+  std::optional<Hit> best;
+  if (nodes_.empty()) return best;
+  const Place way = to - from, inverse = way.cwiseInverse();
+  double share = 1.;
+  const auto enters =
+      [&](const Node& node) {  // the share of the way at which it enters the box, or above `share`
+        double in = 0., out = share;
+        for (int k = 0; k < 3; ++k) {
+          if (way[k] == 0.) {
+            if (from[k] < node.low[k] || from[k] > node.high[k]) return 2.;
+            continue;
+          }
+          double a = (node.low[k] - from[k]) * inverse[k], b = (node.high[k] - from[k]) * inverse[k];
+          if (a > b) std::swap(a, b);
+          in = std::max(in, a), out = std::min(out, b);
+        }
+        return in <= out * (1. + 1e-12) ? in : 2.;
+      };
+  std::array<std::uint32_t, 96> stack;
+  std::size_t depth = 0;
+  stack[depth++] = 0;
+  while (depth > 0) {
+    const Node& node = nodes_[stack[--depth]];
+    if (enters(node) > share) continue;
     if (node.count == 0) {
-      open.push_back(node.first), open.push_back(node.first + 1);
+      stack[depth++] = node.first, stack[depth++] = node.first + 1;
       continue;
     }
-    for (std::uint32_t i = node.first; i < node.first + node.count; ++i)
-      if (touch(bounds_of(mesh_, order_[i]), box)) found.push_back(order_[i]);
+    for (std::uint32_t i = node.first; i < node.first + node.count; ++i) {
+      const Triangle& t = triangles_[order_[i]];
+      const double at = share_to(from, way, positions_[t[0]], positions_[t[1]], positions_[t[2]]);
+      if (at < share || (at == share && !best))
+        share = at, best = Hit{order_[i], from + at * way, at * way.norm()};
+    }
   }
-  std::ranges::sort(found);
-  return found;
+  return best;
 }
 
-std::optional<SelfIntersection> self_intersection(const Mesh& mesh) {
-  const TriangleTree tree(mesh);
-  const std::size_t count = mesh.triangles.size();
-  constexpr std::size_t block = 1024;  // looked at in turn, so that the first pair is found soon
-  for (std::size_t begin = 0; begin < count; begin += 64 * block) {
-    const std::size_t blocks = (std::min(count - begin, 64 * block) + block - 1) / block;
-    std::vector<std::optional<SelfIntersection>> found(blocks);
-    parallel_for(blocks, 1, [&](std::size_t b) {
-      const std::size_t from = begin + b * block, to = std::min(count, from + block);
-      for (std::size_t t = from; t < to && !found[b]; ++t) {
-        const auto a = std::uint32_t(t);
-        for (const std::uint32_t other : tree.within(bounds_of(mesh, a)))
-          if (other > a)
-            if (const auto point = cut(mesh, a, other)) {
-              found[b] = SelfIntersection{a, other, *point};
-              break;
-            }
-      }
-    });
-    for (const auto& one : found)
-      if (one) return one;
-  }
-  return {};
-}
-
-std::size_t count_cut_triangles(const Mesh& mesh) {
-  const TriangleTree tree(mesh);
-  std::vector<std::uint8_t> is_cut(mesh.triangles.size(), 0);
-  parallel_for(mesh.triangles.size(), 256, [&](std::size_t t) {
-    const auto a = std::uint32_t(t);
-    for (const std::uint32_t other : tree.within(bounds_of(mesh, a)))
-      if (other != a && cut(mesh, a, other)) {
-        is_cut[t] = 1;
-        break;
-      }
-  });
-  return std::size_t(std::ranges::count(is_cut, 1));
+Place TriangleTree::normal(std::uint32_t triangle) const {
+  const Triangle& t = triangles_[triangle];
+  const Place across = (positions_[t[1]] - positions_[t[0]]).cross(positions_[t[2]] - positions_[t[0]]);
+  const double length = across.norm();
+  return length > 0. ? Place(across / length) : Place::Zero();
 }
 
 }  // namespace forest

@@ -1,60 +1,66 @@
 // SPDX-License-Identifier: Apache-2.0
-// A tree of boxes around the triangles of a mesh: the nearest of them, those within a box, and whether any two cut each other.
+// The triangles of a mesh by place: the nearest point of the surface, and where a straight piece meets it. A binary tree of
+// boxes, split at the median of the centres along the widest side.
 #pragma once
 
 #include <cstdint>
 #include <optional>
-#include <utility>
 #include <vector>
 
-#include "forest/core/bounds.h"
 #include "forest/geometry/mesh.h"
 
 namespace forest {
 
 class TriangleTree {
  public:
-  /// The mesh must outlive the tree and stay as it is.
+  using Place = Eigen::Vector3d;  // µm
+
+  /// Keeps a copy of what it needs of the mesh. Corners must be in range, coordinates finite.
   explicit TriangleTree(const Mesh& mesh);
 
-  struct Nearest {
-    std::uint32_t triangle;
-    Eigen::Vector3d point;  // on it
-    double distance;        // µm
+  struct Hit {
+    std::uint32_t triangle = 0;
+    Place at = Place::Zero();
+    double distance = 0.;  // µm: to the asked place; along the piece from its start
   };
-  /// None when all are farther away than `limit` (µm).
-  std::optional<Nearest> nearest(const Eigen::Vector3d& point, double limit = HUGE_VAL) const;
+  /// The nearest point that is nearer than `within`.
+  std::optional<Hit> nearest(const Place& to, double within = 1e300) const;
+  /// Where the piece from `from` to `to` meets the surface first.
+  std::optional<Hit> first(const Place& from, const Place& to) const;
 
-  /// Triangles whose boxes touch `box`, in ascending order.
-  std::vector<std::uint32_t> within(const Bounds& box) const;
+  /// Unit, of a triangle; zero where it has no area.
+  Place normal(std::uint32_t triangle) const;
+  std::size_t size() const { return triangles_.size(); }
 
-  const Mesh& mesh() const { return mesh_; }
+  /// Calls visit(triangle) for all whose boxes touch the box from `low` to `high`.
+  template <class Visit>
+  void for_overlapping(const Place& low, const Place& high, Visit&& visit) const {
+    if (nodes_.empty()) return;
+    std::vector<std::uint32_t> stack{0};
+    while (!stack.empty()) {
+      const Node& node = nodes_[stack.back()];
+      stack.pop_back();
+      if ((node.low.array() > high.array()).any() || (node.high.array() < low.array()).any()) continue;
+      if (node.count == 0) {
+        stack.push_back(node.first), stack.push_back(node.first + 1);
+        continue;
+      }
+      for (std::uint32_t i = node.first; i < node.first + node.count; ++i) visit(order_[i]);
+    }
+  }
 
  private:
   struct Node {
-    Bounds box;
-    std::uint32_t first = 0, count = 0;  // a leaf: into order_; count 0: children at first and first + 1
+    Place low, high;
+    std::uint32_t first = 0;  // its first triangle in order_, or the first of its two children
+    std::uint32_t count = 0;  // of triangles; 0: it has children
   };
-  void build(std::uint32_t node, std::uint32_t begin, std::uint32_t end, std::vector<Bounds>& boxes,
-             std::vector<Vec3>& centres);
+  void build(std::uint32_t node, std::uint32_t begin, std::uint32_t end, const std::vector<Place>& centres);
 
-  const Mesh& mesh_;
-  std::vector<Node> nodes_;
+  std::vector<Place> positions_;
+  std::vector<Triangle> triangles_;
   std::vector<std::uint32_t> order_;
+  std::vector<Node> nodes_;
 };
-
-/// The point of a triangle that is nearest to another (Ericson 2005, "Real-Time Collision Detection", 5.1.5).
-Eigen::Vector3d nearest_on_triangle(const Eigen::Vector3d& point, const Eigen::Vector3d& a,
-                                    const Eigen::Vector3d& b, const Eigen::Vector3d& c);
-
-/// Two triangles that share no vertex and cut each other, the first pair in their order, and a point of both: an edge of one
-/// goes through the other. Triangles that touch in one plane do not count. On all cores.
-struct SelfIntersection {
-  std::uint32_t first, second;
-  Eigen::Vector3d point;  // µm
-};
-std::optional<SelfIntersection> self_intersection(const Mesh& mesh);
-/// Of all triangles, how many are cut by others.
-std::size_t count_cut_triangles(const Mesh& mesh);
 
 }  // namespace forest

@@ -69,7 +69,7 @@ struct Format {
   /// All cells of a file; null when a file of this format holds one.
   std::vector<Cell> (*read_all)(std::string_view bytes, const std::string& name);
   /// The same, for files of so many cells that they do not fit into memory; null where all are read at once.
-  CellReader (*read_each)(std::string_view bytes, const std::string& name);
+  CellReader (*read_each)(std::string_view bytes, const std::string& name) = nullptr;
   /// The same neuron gives the same bytes. Null when the format is only read.
   std::string (*write)(const Morphology& morphology);
   Keeps keeps;

@@ -1,0 +1,166 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest cortex: the tissue, from surfaces to finite elements. One row each; longer ones have a file of their own.
+#include "apps/cli/cortex.h"
+
+#include <chrono>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/cortex/build.h"
+#include "forest/io/elements_file.h"
+#include "forest/io/surface.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+using Json = nlohmann::ordered_json;
+
+Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).text(), path.string()); }
+
+// What is measured, in one list for people and for machines.
+void tell(const cortex::Cortex& cortex, const cortex::Report& r, double volume, double seconds,
+          Console& console) {
+  console.print(
+      {{"elements", r.elements},
+       {"uncertified", r.uncertified},
+       {"volume_error", r.volume_error},
+       {"volume_mean", r.volume_mean / 1e9},
+       {"volume_within", r.volume_within},
+       {"w_angle", {{"median", cortex.w_angle.median}, {"p99", cortex.w_angle.p99}}},
+       {"w_reached", cortex.w_reached},
+       {"equivolume_error", r.equivolume_error},
+       {"equivolume_p99", r.equivolume_p99},
+       {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
+       {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
+       {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
+       {"seconds", seconds},
+       {"peak_bytes", peak_bytes()}});
+  const auto row = [](const char* what, const std::string& value, const char* how) {
+    return std::vector<std::string>{what, value, how};
+  };
+  console.table(
+      {"measure", "value", "what it is"},
+      {row("elements", std::to_string(r.elements), ""),
+       row("uncertified", std::to_string(r.uncertified), "not proven to have a positive Jacobian everywhere"),
+       row("volume error", fmt::format("{:.5f}", r.volume_error),
+           "of all, as a share of what lies between the surfaces"),
+       row("volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"),
+       row("volume within", fmt::format("{:.4f}", r.volume_within),
+           fmt::format("share of elements of {:.2f}–{:.2f} mm³", .8 * volume / 1e9, 1.25 * volume / 1e9)
+               .c_str()),
+       row("w angle", fmt::format("{:.2f} / {:.2f}", cortex.w_angle.median, cortex.w_angle.p99),
+           "degrees from the normals of both surfaces, median / 99th percentile"),
+       row("w reached", fmt::format("{:.6f}", cortex.w_reached),
+           "share of curves that reach the inner surface"),
+       row("equivolume error", fmt::format("{:.4f} / {:.4f}", r.equivolume_p99, r.equivolume_error),
+           "|V(0 → w) / V − w|, 99th percentile / largest"),
+       row("scaled Jacobian", fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
+           "least / 1st percentile"),
+       row("crest angle", fmt::format("{:.2f}", r.crest_angle.median),
+           "degrees between v-isolines and the right angle to crests, median"),
+       row("faces", fmt::format("{:.3f} / {:.3f}", r.outer_distance_p99 / 1e3, r.inner_distance_p99 / 1e3),
+           "mm from the outer / inner surface, 99th percentile; 0 where no surfaces are given")});
+}
+
+std::function<void()> build(CLI::App& command, Console& console) {
+  struct Options {
+    fs::path outer, inner, out;
+    double volume = 1., spacing = .3, scale = 3.;
+    bool force = false;
+  };
+  const auto o = std::make_shared<Options>();
+  command.add_option("outer", o->outer, "Outer surface (pia): GIFTI or FreeSurfer, in mm")
+      ->required()
+      ->type_name("OUTER");
+  command.add_option("inner", o->inner, "Inner surface (white matter)")->required()->type_name("INNER");
+  command.add_option("-o,--out", o->out, "The file of elements to make")->required()->type_name("FILE.h5");
+  must_be_within(*command.add_option("--volume", o->volume, "Of an element, mm³")->capture_default_str(), .05,
+                 1e3);
+  must_be_within(
+      *command.add_option("--spacing", o->spacing, "Of the nodes of the field between the surfaces, mm")
+           ->capture_default_str(),
+      .05, 2.);
+  must_be_within(*command.add_option("--scale", o->scale, "What is smaller is no crest and no valley, mm")
+                      ->capture_default_str(),
+                 .1, 20.);
+  add_force(command, o->force);
+  return [o, &console] {
+    if (!o->force) refuse_existing({o->out});
+    const auto begin = std::chrono::steady_clock::now();
+    const Mesh outer = read_mesh(o->outer), inner = read_mesh(o->inner);
+    const cortex::Cortex built = cortex::build_cortex(
+        outer, inner, {.volume = o->volume * 1e9, .spacing = o->spacing * 1e3, .line_scale = o->scale * 1e3},
+        console.progress());
+    io::write_elements(o->out, built, o->volume * 1e9);
+    const TriangleTree outer_tree(outer), inner_tree(inner);
+    const cortex::Report r =
+        cortex::report(built, o->volume * 1e9, &outer_tree, &inner_tree, console.progress());
+    tell(built, r, o->volume * 1e9,
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), console);
+  };
+}
+
+std::function<void()> report(CLI::App& command, Console& console) {
+  struct Options {
+    fs::path file, outer, inner;
+  };
+  const auto o = std::make_shared<Options>();
+  command.add_option("file", o->file, "A file of elements")->required()->type_name("FILE.h5");
+  command.add_option("--outer", o->outer, "The outer surface, to measure how far the faces are from it")
+      ->type_name("OUTER");
+  command.add_option("--inner", o->inner, "The inner one")->type_name("INNER");
+  return [o, &console] {
+    const auto begin = std::chrono::steady_clock::now();
+    const io::ElementsFile file = io::read_elements(o->file);
+    std::optional<TriangleTree> outer, inner;
+    if (!o->outer.empty()) outer.emplace(read_mesh(o->outer));
+    if (!o->inner.empty()) inner.emplace(read_mesh(o->inner));
+    const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
+                                            inner ? &*inner : nullptr, console.progress());
+    tell(file.cortex, r, file.volume,
+         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), console);
+  };
+}
+
+constexpr Verb actions[] = {
+    {"contours", "Cut surfaces, volumes or pictures into sections, whose boundaries become curves",
+     "brainforest cortex contours lh.pial lh.white -o lh.contours --axis y --spacing 1", cortex_contours},
+    {"compare", "Lay consecutive contours over one another and tell how far apart they are",
+     "brainforest cortex compare lh.contours --svg overlays", cortex_compare},
+    {"surfaces", "Make the outer and the inner surface of contours",
+     "brainforest cortex surfaces lh.contours -o outer.surf.gii inner.surf.gii", cortex_surfaces},
+    {"build", "Fill the space between two surfaces with certified elements",
+     "brainforest cortex build lh.pial lh.white -o elements.h5", build},
+    {"report", "Measure a file of elements",
+     "brainforest cortex report elements.h5 --outer lh.pial --inner lh.white --json", report},
+    {"grid", "Fill blocks with curvilinear grids, and compare what fills them",
+     "brainforest cortex grid swan --generator winslow -o swan.svg", cortex_grid},
+};
+
+}  // namespace
+
+std::function<void()> cortex(CLI::App& command, Console& console) {
+  command.require_subcommand(1);
+  const auto chosen = std::make_shared<std::function<void()>>();
+  for (const Verb& action : actions) {
+    CLI::App* sub = command.add_subcommand(action.name, action.summary);
+    sub->footer(fmt::format("Example:\n  {}", action.example));
+    add_common(*sub, console);
+    sub->callback([chosen, run = action.setup(*sub, console)] { *chosen = run; });
+  }
+  return [chosen] { (*chosen)(); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,170 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest cortex grid: fills a block by a generator, tells how good its cells are, draws it.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+#include <span>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/cortex/grid.h"
+#include "forest/cortex/grid_domains.h"
+#include "forest/cortex/grid_picture.h"
+#include "forest/cortex/grid_quality.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/cortex.h"
+#include "apps/cli/verb.h"
+
+namespace forest::cli {
+namespace {
+
+struct Options {
+  std::string domain, generator = "best";
+  int steps = 0;       // 0: 20 in the plane, 10 in space
+  int dimensions = 0;  // of the domains that are compared; 0: all
+  std::filesystem::path out;
+  cortex::GridPicture picture;
+};
+
+std::array<int, 3> steps_of(const Options& options, const cortex::Domain& domain) {
+  const int n = options.steps ? options.steps : domain.plane ? 20 : 10;
+  return {n, n, n};
+}
+
+struct Filled {
+  cortex::Grid grid;
+  std::string generator;
+};
+Filled fill(const std::string& name, const cortex::Grid& boundary) {
+  if (name != "best") return {cortex::generate(boundary, name), name};
+  cortex::Best best = cortex::best_grid(boundary);
+  return {std::move(best.grid), std::move(best.generator)};
+}
+
+double least_scaled_jacobian(const cortex::Grid& grid) {
+  double least = INFINITY;
+  for (const double v : cortex::measure(grid, cortex::cell_measure("scaled-jacobian")))
+    least = std::min(least, v);
+  return least;
+}
+
+void write(const Options& options, std::span<const cortex::GridPanel> panels) {
+  const std::string extension = options.out.extension().string();
+  if (extension == ".svg")
+    write_file(options.out, cortex::to_svg(panels, options.picture));
+  else if (extension == ".obj" && panels.size() == 1)
+    write_file(options.out, cortex::to_obj(*panels.front().grid));
+  else
+    throw Error(fmt::format("'{}' has no ending that can be written; give {}", options.out.string(),
+                            panels.size() == 1 ? ".svg or .obj" : ".svg"));
+}
+
+// Every domain by every generator.
+void compare(const Options& options, Console& console) {
+  std::vector<std::string> header{"domain"};
+  for (const cortex::Generator& row : cortex::generators()) header.push_back(row.name);
+  header.push_back("best");
+  std::vector<std::vector<std::string>> table;
+  std::vector<std::pair<std::string, cortex::Grid>> chosen;
+  auto all = nlohmann::ordered_json::array();
+  console.progress().begin("filling", cortex::domains().size());
+  for (const cortex::Domain& domain : cortex::domains()) {
+    console.progress().advance();
+    if (options.dimensions && options.dimensions != (domain.plane ? 2 : 3)) continue;
+    const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain));
+    std::vector<std::string> line{domain.name};
+    nlohmann::ordered_json told{{"domain", domain.name}, {"dimensions", boundary.dimensions()}};
+    for (const cortex::Generator& row : cortex::generators()) {
+      const cortex::Grid grid = cortex::generate(boundary, row.name);
+      const double least = least_scaled_jacobian(grid);
+      const std::size_t bad = cortex::validity(grid).bad;
+      line.push_back(bad ? fmt::format("{} folded", bad) : fmt::format("{:.3f}", least));
+      told[row.name] = {{"scaled_jacobian", least}, {"folded", bad}};
+      if (std::string_view(row.name) == "transfinite")
+        chosen.emplace_back(fmt::format("{}: transfinite", domain.name), grid);
+    }
+    Filled best = fill("best", boundary);
+    line.push_back(best.generator);
+    told["best"] = best.generator;
+    if (best.generator != "transfinite")
+      chosen.emplace_back(fmt::format("{}: {}", domain.name, best.generator), std::move(best.grid));
+    all.push_back(std::move(told));
+    table.push_back(std::move(line));
+  }
+  console.progress().end();
+  if (!options.out.empty()) {
+    std::vector<cortex::GridPanel> panels;
+    for (const auto& [caption, grid] : chosen) panels.push_back({&grid, caption});
+    write(options, panels);
+  }
+  console.print(all);
+  console.table(header, table);
+}
+
+void run(const Options& options, Console& console) {
+  if (options.domain.empty()) return compare(options, console);
+  const cortex::Domain& domain = cortex::domain(options.domain);
+  const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain));
+  const Filled filled = fill(options.generator, boundary);
+  const cortex::Validity validity = cortex::validity(filled.grid);
+  if (!options.out.empty()) {
+    const cortex::GridPanel panel{&filled.grid, fmt::format("{}: {}", domain.name, filled.generator)};
+    write(options, {&panel, 1});
+  }
+  nlohmann::ordered_json measures;
+  std::vector<std::vector<std::string>> rows;
+  for (const cortex::QualityRow& row : cortex::quality(filled.grid)) {
+    measures[row.measure->name] = {{"min", row.least}, {"p1", row.p1},   {"median", row.median},
+                                   {"mean", row.mean}, {"p99", row.p99}, {"max", row.most}};
+    std::vector<std::string> line{row.measure->name};
+    for (const double v : {row.least, row.p1, row.median, row.mean, row.p99, row.most})
+      line.push_back(fmt::format("{:.4g}", v));
+    line.push_back(row.measure->what);
+    rows.push_back(std::move(line));
+  }
+  console.print({{"domain", domain.name},
+                 {"generator", filled.generator},
+                 {"cells", filled.grid.cells()},
+                 {"folded", validity.bad},
+                 {"measures", measures}});
+  console.say(fmt::format("{} by {}: {}, {} folded", domain.name, filled.generator,
+                          counted(filled.grid.cells(), "cell"), validity.bad));
+  console.table({"measure", "min", "p1", "median", "mean", "p99", "max", "what it is"}, rows);
+}
+
+}  // namespace
+
+std::function<void()> cortex_grid(CLI::App& command, Console& console) {
+  const auto options = std::make_shared<Options>();
+  std::string domains, generators = "best";
+  for (const cortex::Domain& row : cortex::domains())
+    domains += (domains.empty() ? "" : ", ") + std::string(row.name);
+  for (const cortex::Generator& row : cortex::generators()) generators += ", " + std::string(row.name);
+  command.add_option("domain", options->domain,
+                     "The block: " + domains + "; by default all, by every generator");
+  command.add_option("--generator", options->generator, "What fills it: " + generators)
+      ->capture_default_str();
+  command
+      .add_option("--steps", options->steps,
+                  "Cells along each direction; by default 20 in the plane, 10 in space")
+      ->check(CLI::Range(1, 1000));
+  command.add_option("--dimensions", options->dimensions, "Only the blocks of the plane (2) or of space (3)")
+      ->check(CLI::IsMember({2, 3}));
+  command.add_option("--up", options->picture.up, "The axis that points up in a picture of a block in space")
+      ->check(CLI::IsMember({"x", "y", "z", "-x", "-y", "-z"}))
+      ->capture_default_str();
+  command.add_flag("!--closed", options->picture.opened, "Do not cut out the corner nearest to the eye");
+  command.add_option("-o,--out", options->out, "A drawing (.svg), or of one block a mesh (.obj)");
+  return [options, &console] { run(*options, console); };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/build.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+
+namespace forest::cortex {
+namespace {
+
+double degrees_between(const Place& a, const Place& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / 3.14159265358979323846;
+}
+
+double share_of(std::vector<double>& values, double share) {
+  if (values.empty()) return 0.;
+  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
+  std::nth_element(values.begin(), at, values.end());
+  return *at;
+}
+
+Spread spread_of(std::vector<double>& values) { return {share_of(values, .5), share_of(values, .99)}; }
+
+std::string place_text(const Place& p) {
+  return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
+}
+
+// The normal of a surface around a place of it, the mean over a disc: what is smaller than that is not its direction.
+Place normal_around(const TriangleTree& tree, const Place& at, const Place& outwards) {
+  constexpr double radius = 300.;  // µm
+  const auto hit = tree.nearest(at);
+  Place sum = tree.normal(hit->triangle);
+  const Place u = outwards.unitOrthogonal(), v = outwards.normalized().cross(u);
+  for (int k = 0; k < 8; ++k) {
+    const double angle = k * 3.14159265358979323846 / 4.;
+    const auto near = tree.nearest(at + radius * (std::cos(angle) * u + std::sin(angle) * v), radius);
+    if (near && tree.normal(near->triangle).dot(outwards) > 0.) sum += tree.normal(near->triangle);
+  }
+  return sum;
+}
+
+}  // namespace
+
+void check_surfaces(const Mesh& outer, const Mesh& inner) {
+  const std::array<std::pair<const Mesh*, const char*>, 2> both{{{&outer, "outer"}, {&inner, "inner"}}};
+  for (const auto& [mesh, name] : both) {
+    if (mesh->triangles.empty()) throw Error(fmt::format("the {} surface has no triangles", name));
+    if (!is_closed(*mesh))
+      throw Error(fmt::format("the {} surface is open or not of one orientation; give a closed one", name));
+    if (count_pieces(*mesh) != 1)
+      throw Error(fmt::format("the {} surface has {} pieces; give one piece", name, count_pieces(*mesh)));
+    const long euler = long(mesh->positions.size()) - long(mesh->triangles.size()) / 2;
+    if (euler != 2)
+      throw Error(fmt::format(
+          "the {} surface has {} handles; give one without, such as FreeSurfer's after its topology is "
+          "corrected",
+          name, (2 - euler) / 2));
+    if (!(volume(*mesh) > 0.))
+      throw Error(fmt::format("the triangles of the {} surface face inwards; turn them", name));
+  }
+  const double cubic_mm = volume(outer) / 1e9;
+  if (cubic_mm < 1. || cubic_mm > 1e7)
+    throw Error(fmt::format(
+        "the outer surface encloses {:.3g} mm³, which is no hemisphere; check that it is in mm", cubic_mm));
+  if (volume(inner) > volume(outer))
+    throw Error("the inner surface encloses more than the outer one; were they swapped?");
+  // Inner vertices outside of the outer surface, and pieces of one that cut the other, are told by the first of them.
+  const TriangleTree tree(outer);
+  std::size_t outside = 0;
+  Place where = Place::Zero();
+  double farthest = 0.;
+  std::vector<double> depths(inner.positions.size());
+  parallel_for(depths.size(), 256, [&](std::size_t i) {
+    const Place p = inner.positions[i].cast<double>();
+    const auto hit = tree.nearest(p);
+    depths[i] = tree.normal(hit->triangle).dot(p - hit->at) > 0. ? hit->distance : 0.;
+  });
+  for (std::size_t i = 0; i < depths.size(); ++i) {
+    if (depths[i] <= 100.) continue;
+    ++outside;
+    if (depths[i] > farthest) farthest = depths[i], where = inner.positions[i].cast<double>();
+  }
+  if (outside * 200 > depths.size())
+    throw Error(fmt::format(
+        "{} of {} vertices of the inner surface lie outside of the outer one, the farthest by {:.2f} mm "
+        "at {}; check that both are of one hemisphere and that they were not swapped",
+        outside, depths.size(), farthest / 1e3, place_text(where)));
+}
+
+Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& options, Progress& progress) {
+  check_surfaces(outer, inner);
+  const Laplace field(outer, inner, {.spacing = options.spacing}, progress);
+  const TriangleTree outer_tree(outer), inner_tree(inner);
+  const WCurves curves(field, inner_tree);
+  // Two triangles to a side of the lattice that elements are laid by, or more.
+  const double side = std::sqrt(options.volume / 2500.);
+  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .65 * side}, progress);
+
+  Cortex cortex;
+  cortex.between = volume(outer) - volume(inner);
+  for (const Triangle& t : ribbon.triangles)
+    if (ribbon.is_wall(t)) cortex.wall += volume_under(ribbon, t);
+  progress.begin("looking for crests and valleys", 0);
+  const auto bent = curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles),
+                               options.line_scale);
+  cortex.lines = crests_and_valleys(ribbon, bent, {.scale = options.line_scale});
+  progress.end();
+  const Quads quads = lay_quads(ribbon, bent, cortex.lines, {.volume = options.volume}, progress);
+  cortex.elements = make_elements(ribbon, quads, bent, curves, progress);
+  cortex.w_reached = 1. - double(cortex.elements.not_arrived) / double(cortex.elements.curves.size());
+
+  progress.begin("measuring w-curves", quads.points.size());
+  std::vector<double> angles(2 * quads.points.size());
+  parallel_ranges(quads.points.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      const Place start = on(ribbon.outer, ribbon, quads.points[v]);
+      const auto hit = outer_tree.nearest(start);
+      const WCurve curve = curves.drop(start, -outer_tree.normal(hit->triangle));
+      const double length = curve.length();
+      constexpr double piece = 150.;  // µm
+      const double share = length > 2. * piece ? piece / length : .5;
+      const Place out = start - curve.at_length(share),
+                  in = curve.at_length(1. - share) - curve.points.back();
+      angles[2 * v] = degrees_between(out, normal_around(outer_tree, start, out));
+      angles[2 * v + 1] = degrees_between(in, normal_around(inner_tree, curve.points.back(), in));
+    }
+    progress.advance(end - begin);
+  });
+  progress.end();
+  cortex.w_angle = spread_of(angles);
+  cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
+  return cortex;
+}
+
+Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, const TriangleTree* inner,
+              Progress& progress) {
+  const Elements& elements = cortex.elements;
+  const std::size_t n = elements.size();
+  Report result;
+  result.elements = n;
+  std::vector<double> volumes(n), equivolume(n), jacobian(n), outer_distance, inner_distance;
+  if (outer) outer_distance.resize(4 * n);
+  if (inner) inner_distance.resize(4 * n);
+  std::vector<std::uint8_t> bad(n);
+  progress.begin("measuring elements", n);
+  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const Hexahedron h = elements.hexahedron(e);
+      bad[e] = !certify(h).positive();
+      volumes[e] = h.volume();
+      for (const double w : {1. / 6., 1. / 3., .5, 2. / 3., 5. / 6.})
+        equivolume[e] = std::max(equivolume[e], std::abs(h.volume(0., w) / volumes[e] - w));
+      double least = 1.;
+      for (int k = 0; k < 5; ++k)
+        for (int j = 0; j < 5; ++j)
+          for (int i = 0; i < 5; ++i) {
+            const Eigen::Matrix3d J = h.jacobian(i / 4., j / 4., k / 4.);
+            const double lengths = J.col(0).norm() * J.col(1).norm() * J.col(2).norm();
+            least = std::min(least, lengths > 0. ? J.determinant() / lengths : 0.);
+          }
+      jacobian[e] = least;
+      constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
+      for (std::size_t k = 0; k < 4; ++k) {
+        if (outer) outer_distance[4 * e + k] = outer->nearest(h.at(at[k][0], at[k][1], 0.))->distance;
+        if (inner) inner_distance[4 * e + k] = inner->nearest(h.at(at[k][0], at[k][1], 1.))->distance;
+      }
+    }
+    progress.advance(end - begin);
+  });
+  progress.end();
+  double total = 0.;
+  for (std::size_t e = 0; e < n; ++e) {
+    total += volumes[e];
+    result.uncertified += bad[e];
+    result.volume_within += volumes[e] >= .8 * wanted && volumes[e] <= 1.25 * wanted;
+  }
+  result.volume_within /= double(n), result.volume_mean = total / double(n);
+  result.volume_error =
+      cortex.between > 0. ? std::abs(total + cortex.wall - cortex.between) / cortex.between : 0.;
+  result.equivolume_error = *std::max_element(equivolume.begin(), equivolume.end());
+  result.equivolume_p99 = share_of(equivolume, .99);
+  result.jacobian_least = *std::min_element(jacobian.begin(), jacobian.end());
+  result.jacobian_p1 = share_of(jacobian, .01);
+  result.outer_distance_p99 = share_of(outer_distance, .99),
+  result.inner_distance_p99 = share_of(inner_distance, .99);
+
+  // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
+  Mesh crests;
+  std::vector<Place> along;
+  for (const Line& line : cortex.lines) {
+    if (line.kind != Line::Kind::crest) continue;
+    for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+      const auto first = std::uint32_t(crests.positions.size());
+      crests.positions.push_back(line.points[i].cast<float>()),
+          crests.positions.push_back(line.points[i + 1].cast<float>());
+      crests.triangles.push_back({first, first + 1, first + 1});
+      along.push_back(line.direction(i));
+    }
+  }
+  if (!crests.triangles.empty()) {
+    const TriangleTree tree(crests);
+    std::vector<double> angles;
+    for (std::size_t e = 0; e < n; ++e) {
+      const Hexahedron h = elements.hexahedron(e);
+      const auto hit = tree.nearest(h.at(.5, .5, .5), .5 * std::cbrt(wanted));
+      if (hit)
+        angles.push_back(
+            std::abs(90. - degrees_between(h.jacobian(.5, .5, .5).col(0), along[hit->triangle])));
+    }
+    result.crest_angle = spread_of(angles);
+  }
+  return result;
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,295 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+#include <numeric>
+#include <utility>
+
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+
+namespace forest::cortex {
+namespace {
+
+using Edge = std::pair<std::uint32_t, std::uint32_t>;
+
+void towards(Place& place, double share, const Place& aim) { place += share * (aim - place); }
+
+std::vector<std::uint32_t> distinct(std::vector<std::uint32_t> list) {
+  std::sort(list.begin(), list.end());
+  list.erase(std::unique(list.begin(), list.end()), list.end());
+  return list;
+}
+
+// A cubic through four places swings widely where they zigzag: what the two inner ones deviate from the straight way in
+// opposite directions comes out four and a half times as large in its control points, three times as much as what they deviate
+// alike. A third of it is kept, which makes no difference on a smooth surface and some µm at a crease.
+void calm(const Place& first, Place& second, Place& third, const Place& last) {
+  const Place one = second - (2. * first + last) / 3., two = third - (first + 2. * last) / 3.;
+  const Place zigzag = (one - two) / 2.;
+  second -= zigzag * (2. / 3.), third += zigzag * (2. / 3.);
+}
+
+constexpr std::size_t slot(int i, int j) { return std::size_t(i + 4 * j); }
+// The slots of the four sides from their first corner to their last, and the corners.
+constexpr std::array<std::array<std::size_t, 4>, 4> sides{{{slot(0, 0), slot(1, 0), slot(2, 0), slot(3, 0)},
+                                                           {slot(0, 3), slot(1, 3), slot(2, 3), slot(3, 3)},
+                                                           {slot(0, 0), slot(0, 1), slot(0, 2), slot(0, 3)},
+                                                           {slot(3, 0), slot(3, 1), slot(3, 2), slot(3, 3)}}};
+
+}  // namespace
+
+Hexahedron Elements::hexahedron(std::size_t element) const {
+  std::array<Eigen::Vector3d, 64> places;
+  for (std::size_t k = 0; k < 4; ++k)
+    for (std::size_t c = 0; c < 16; ++c) places[16 * k + c] = curves[elements[element][c]][k];
+  return through_lattice(places);
+}
+
+Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const Curvature> curvature,
+                       const WCurves& curves, Progress& progress) {
+  Elements result;
+  result.corners = std::uint32_t(quads.middle.size());
+  result.on_valley = quads.on_valley;
+  std::vector<Place> starts = quads.middle;  // of all curves, on the middle
+  std::map<Edge, std::uint32_t> first;       // of the two curves on a side, from the lower corner on
+  for (const Quad& given : quads.quads) {
+    // v along the fold.
+    Quad q = given;
+    const Triangle& t = ribbon.triangles[quads.points[q[0]].triangle];
+    const Place fold = curvature[t[0]].along_least;
+    const Place one = quads.middle[q[1]] - quads.middle[q[0]] + quads.middle[q[2]] - quads.middle[q[3]];
+    const Place other = quads.middle[q[3]] - quads.middle[q[0]] + quads.middle[q[2]] - quads.middle[q[1]];
+    if (std::abs(one.normalized().dot(fold)) < std::abs(other.normalized().dot(fold)))
+      std::rotate(q.begin(), q.begin() + 1, q.end());
+    std::array<std::uint32_t, 16> e{};
+    e[slot(0, 0)] = q[0], e[slot(0, 3)] = q[1], e[slot(3, 3)] = q[2], e[slot(3, 0)] = q[3];
+    for (const auto& side : sides) {
+      const std::uint32_t a = e[side[0]], b = e[side[3]];
+      const auto [at, fresh] = first.insert({std::minmax(a, b), std::uint32_t(starts.size())});
+      if (fresh) {
+        const Place low = starts[std::min(a, b)], high = starts[std::max(a, b)];
+        starts.push_back(low + (high - low) / 3.), starts.push_back(low + (high - low) * (2. / 3.));
+      }
+      e[side[1]] = at->second + (a < b ? 0 : 1), e[side[2]] = at->second + (a < b ? 1 : 0);
+    }
+    for (int j = 1; j < 3; ++j)
+      for (int i = 1; i < 3; ++i) {
+        const double u = i / 3., v = j / 3.;
+        e[slot(i, j)] = std::uint32_t(starts.size());
+        starts.push_back((1. - u) * (1. - v) * starts[e[slot(0, 0)]] + u * (1. - v) * starts[e[slot(3, 0)]] +
+                         (1. - u) * v * starts[e[slot(0, 3)]] + u * v * starts[e[slot(3, 3)]]);
+      }
+    result.elements.push_back(e);
+  }
+
+  const RibbonLocator locator(ribbon);
+  Mesh surface;
+  for (const Place& p : ribbon.outer) surface.positions.push_back(p.cast<float>());
+  surface.triangles = ribbon.triangles;
+  const std::vector<Vec3> normals = vertex_normals(surface);
+  std::vector<std::uint8_t> arrived(starts.size());
+  result.curves.resize(starts.size());
+  progress.begin("dropping the curves of elements", starts.size());
+  parallel_ranges(starts.size(), 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t c = begin; c < end; ++c) {
+      const RibbonPoint point = c < result.corners ? quads.points[c] : locator.nearest(starts[c]);
+      const Triangle& t = ribbon.triangles[point.triangle];
+      Place inward = Place::Zero();
+      for (std::size_t k = 0; k < 3; ++k)
+        inward -= point.weights[Eigen::Index(k)] * normals[t[k]].cast<double>();
+      const WCurve curve = curves.drop(on(ribbon.outer, ribbon, point), inward);
+      for (std::size_t k = 0; k < 4; ++k) result.curves[c][k] = curve.at(double(k) / 3.);
+      arrived[c] = curve.arrived;
+    }
+    progress.advance(end - begin);
+  });
+  progress.end();
+  for (const auto& [side, c] : first)
+    for (std::size_t d = 0; d < 4; ++d)
+      calm(result.curves[side.first][d], result.curves[c][d], result.curves[c + 1][d],
+           result.curves[side.second][d]);
+  parallel_for(result.size(), 256, [&](std::size_t e) {
+    const auto at = [&](int i, int j, std::size_t d) -> Place& {
+      return result.curves[result.elements[e][slot(i, j)]][d];
+    };
+    for (std::size_t d = 0; d < 4; ++d) {
+      for (int j = 1; j < 3; ++j) calm(at(0, j, d), at(1, j, d), at(2, j, d), at(3, j, d));
+      for (int i = 1; i < 3; ++i) calm(at(i, 0, d), at(i, 1, d), at(i, 2, d), at(i, 3, d));
+    }
+  });
+  result.not_arrived = std::size_t(std::count(arrived.begin(), arrived.end(), 0));
+  return result;
+}
+
+std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of) {
+  std::vector<std::uint8_t> bad(of.size(), 0);
+  parallel_for(of.size(), 64,
+               [&](std::size_t i) { bad[i] = !certify(elements.hexahedron(of[i])).positive(); });
+  std::vector<std::uint32_t> result;
+  for (std::size_t i = 0; i < of.size(); ++i)
+    if (bad[i]) result.push_back(of[i]);
+  return result;
+}
+
+std::vector<std::uint32_t> uncertified(const Elements& elements) {
+  std::vector<std::uint32_t> all(elements.size());
+  std::iota(all.begin(), all.end(), 0u);
+  return uncertified(elements, all);
+}
+
+Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress) {
+  constexpr int rounds_of_sides = 6, rounds_of_corners = 40;
+  constexpr double farthest_way = 1e3;  // µm
+  Mending result;
+  std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
+  for (std::uint32_t e = 0; e < elements.size(); ++e)
+    for (const std::uint32_t c : elements.elements[e]) of[c].push_back(e);
+  const std::vector<Depths> before = elements.curves;
+  std::vector<std::uint8_t> moved(elements.curves.size(), 0);
+  progress.begin("untangling", 0);
+  std::vector<std::uint32_t> bad = uncertified(elements);
+  result.before = bad.size();
+
+  // Not to the other bank of a sulcus or a gyrus: near, and facing the same way.
+  const auto keep_on_surface = [&](Depths& curve) {
+    constexpr double reach = 500.;
+    const Place outwards = curve[0] - curve[3];
+    if (const auto hit = outer.nearest(curve[0], reach);
+        hit && outer.normal(hit->triangle).dot(outwards) > 0.)
+      curve[0] = hit->at;
+    if (const auto hit = inner.nearest(curve[3], reach);
+        hit && inner.normal(hit->triangle).dot(outwards) > 0.)
+      curve[3] = hit->at;
+  };
+  // Half way to straight sides, three quarters, … and wholly.
+  std::vector<std::uint8_t> times(elements.size(), 0);
+  const auto straighten = [&](std::uint32_t element) {
+    const double much = ++times[element] < 4 ? .5 : 1.;
+    const auto& e = elements.elements[element];
+    for (const auto& side : sides)
+      for (std::size_t k = 1; k < 3; ++k) {
+        const double share = double(k) / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          towards(elements.curves[e[side[k]]][d], much,
+                  (1. - share) * elements.curves[e[side[0]]][d] + share * elements.curves[e[side[3]]][d]);
+        moved[e[side[k]]] = 1;
+      }
+    for (int j = 1; j < 3; ++j)
+      for (int i = 1; i < 3; ++i) {
+        const double u = i / 3., v = j / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          towards(elements.curves[e[slot(i, j)]][d], much,
+                  (1. - u) * (1. - v) * elements.curves[e[slot(0, 0)]][d] +
+                      u * (1. - v) * elements.curves[e[slot(3, 0)]][d] +
+                      (1. - u) * v * elements.curves[e[slot(0, 3)]][d] +
+                      u * v * elements.curves[e[slot(3, 3)]][d]);
+        moved[e[slot(i, j)]] = 1;
+      }
+  };
+  const auto spread = [&](const std::vector<std::uint32_t>& list) {  // with all that shares a corner
+    std::vector<std::uint32_t> wide;
+    for (const std::uint32_t e : list)
+      for (const std::uint32_t c : elements.corners_of(e))
+        wide.insert(wide.end(), of[c].begin(), of[c].end());
+    return distinct(std::move(wide));
+  };
+  for (int round = 0; round < rounds_of_sides && !bad.empty(); ++round) {
+    for (const std::uint32_t e : bad) straighten(e);
+    bad = uncertified(elements, spread(bad));
+    progress.advance();
+  }
+
+  // What is left is few: corners look for a better place each, as long as the worst element around them gains.
+  std::vector<std::uint8_t> rim(elements.corners, 0);
+  {
+    std::map<Edge, int> met;
+    for (std::uint32_t e = 0; e < elements.size(); ++e)
+      for (const auto& side : sides)
+        ++met[std::minmax(elements.elements[e][side[0]], elements.elements[e][side[3]])];
+    for (const auto& [side, count] : met)
+      if (count == 1) rim[side.first] = rim[side.second] = 1;
+  }
+  const double mean_volume = [&] {
+    double sum = 0.;
+    for (std::uint32_t e = 0; e < elements.size(); e += 1 + std::uint32_t(elements.size() / 1000))
+      sum += elements.hexahedron(e).volume();
+    return sum / std::min<double>(double(elements.size()), 1000.);
+  }();
+  const auto worth = [&](const std::vector<std::uint32_t>& star) {
+    double least = 1e300;
+    for (const std::uint32_t e : star) {
+      const Hexahedron h = elements.hexahedron(e);
+      least = std::min(least, certify(h, 6).least / std::max(std::abs(h.volume()), .1 * mean_volume));
+    }
+    return least;
+  };
+  for (int round = 0; round < rounds_of_corners && !bad.empty(); ++round) {
+    std::vector<std::uint32_t> corners;
+    for (const std::uint32_t e : bad)
+      for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
+    for (const std::uint32_t c : distinct(std::move(corners))) {
+      const std::vector<std::uint32_t>& star = of[c];
+      std::vector<std::uint32_t> own;  // all curves that a move of this corner may change
+      for (const std::uint32_t e : star)
+        own.insert(own.end(), elements.elements[e].begin(), elements.elements[e].end());
+      own = distinct(std::move(own));
+      std::vector<Depths> kept;
+      for (const std::uint32_t k : own) kept.push_back(elements.curves[k]);
+      const Depths start = elements.curves[c];
+      double best = worth(star);
+      Depths mean{Place::Zero(), Place::Zero(), Place::Zero(), Place::Zero()};
+      double count = 0.;
+      for (const std::uint32_t e : star) {
+        const auto at = elements.corners_of(e);
+        const std::size_t k = std::size_t(std::find(at.begin(), at.end(), c) - at.begin());
+        for (const std::size_t other : {k ^ 1u, k ^ 2u}) {
+          for (std::size_t d = 0; d < 4; ++d) mean[d] += elements.curves[at[other]][d];
+          count += 1.;
+        }
+      }
+      for (std::size_t d = 0; d < 4; ++d) mean[d] /= count;
+      const double reach = (mean[1] - start[1]).norm() + .1 * (start[0] - start[3]).norm();
+      Random random(1, c, std::uint32_t(round));
+      std::vector<Depths> better;
+      constexpr int tries = 24;
+      for (int t = 0; t < tries; ++t) {
+        Depths next = start;
+        if (t < 4 && !rim[c])
+          for (std::size_t d = 0; d < 4; ++d) towards(next[d], .25 * double(t + 1), mean[d]);
+        else {
+          const Place way(random.normal(), random.normal(), random.normal());
+          const Place turn(random.normal(), random.normal(), random.normal());
+          for (std::size_t d = 0; d < 4; ++d) next[d] += .15 * reach * (way + (double(d) / 1.5 - 1.) * turn);
+        }
+        keep_on_surface(next);
+        bool near = true;
+        for (std::size_t d = 0; d < 4; ++d) near = near && (next[d] - before[c][d]).norm() < farthest_way;
+        if (!near) continue;
+        elements.curves[c] = next;
+        for (const std::uint32_t e : star) times[e] = 4, straighten(e);
+        if (const double now = worth(star); now > best) {
+          best = now, better.clear();
+          for (const std::uint32_t k : own) better.push_back(elements.curves[k]);
+        }
+        for (std::size_t k = 0; k < own.size(); ++k) elements.curves[own[k]] = kept[k];
+      }
+      for (std::size_t k = 0; k < better.size(); ++k) elements.curves[own[k]] = better[k], moved[own[k]] = 1;
+    }
+    bad = uncertified(elements, spread(bad));
+    progress.advance();
+  }
+  progress.end();
+  result.after = bad.size();
+  for (std::size_t c = 0; c < moved.size(); ++c) {
+    if (!moved[c]) continue;
+    ++result.moved;
+    for (std::size_t d = 0; d < 4; ++d)
+      result.farthest = std::max(result.farthest, (elements.curves[c][d] - before[c][d]).norm());
+  }
+  return result;
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+// The coefficients of det J: the partial derivatives are evaluated at 9×9×9 nodes, their determinant there is the
+// polynomial's value, and the inverse of the Bernstein matrix of degree 8, applied along each parameter, makes coefficients of
+// values. Nodes are those of Chebyshev and Lobatto, as that inverse is least there (its norm is 184; at even steps 560).
+#include "forest/cortex/hexahedron.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <type_traits>
+#include <vector>
+
+#include <Eigen/LU>
+
+#include "forest/core/clones.h"
+
+namespace forest::cortex {
+namespace {
+
+constexpr int nodes = 9;  // a parameter
+
+std::array<double, 4> cubic(double t) {
+  const double s = 1. - t;
+  return {s * s * s, 3. * s * s * t, 3. * s * t * t, t * t * t};
+}
+std::array<double, 4> cubic_derivative(double t) {
+  const double s = 1. - t;
+  return {-3. * s * s, 3. * s * (s - 2. * t), 3. * t * (2. * s - t), 3. * t * t};
+}
+
+// What is multiplied along one parameter, with a column a node, so that loops run over nodes.
+struct Tables {
+  double cubic[4][nodes], quadratic[3][nodes], to_bernstein[nodes][nodes];
+  double norm;  // of the last, largest sum of absolute values
+
+  Tables() {
+    using Exact = long double;
+    Eigen::Matrix<Exact, nodes, nodes> values;
+    for (int n = 0; n < nodes; ++n) {
+      const Exact t = n == nodes - 1 ? 1.L : (1.L - std::cos(std::numbers::pi_v<Exact> * n / 8)) / 2,
+                  s = 1 - t;
+      Exact binomial = 1;
+      for (int i = 0; i < nodes; ++i) {
+        values(n, i) = binomial * std::pow(t, Exact(i)) * std::pow(s, Exact(8 - i));
+        binomial = binomial * (8 - i) / (i + 1);
+      }
+      const Exact three[4] = {s * s * s, 3 * s * s * t, 3 * s * t * t, t * t * t};
+      for (int i = 0; i < 4; ++i) cubic[i][n] = double(three[i]);
+      const Exact two[3] = {s * s, 2 * s * t, t * t};
+      for (int i = 0; i < 3; ++i) quadratic[i][n] = double(two[i]);
+    }
+    const Eigen::Matrix<Exact, nodes, nodes> inverse = values.fullPivLu().inverse();
+    norm = 0.;
+    for (int i = 0; i < nodes; ++i) {
+      double sum = 0.;
+      for (int n = 0; n < nodes; ++n) sum += std::abs(to_bernstein[n][i] = double(inverse(i, n)));
+      norm = std::max(norm, sum);
+    }
+    for (int n = 0; n < nodes; ++n)  // the ends are values themselves
+      to_bernstein[n][0] = n == 0 ? 1. : 0., to_bernstein[n][nodes - 1] = n == nodes - 1 ? 1. : 0.;
+  }
+  static const Tables& get() {
+    static const Tables tables;
+    return tables;
+  }
+};
+
+// out[r][n] = Σ in[r][i] table[i][n], for `rows` rows of `terms`: along the parameter that runs fastest.
+template <int terms>
+[[gnu::always_inline]] inline void along_fast(const double* in, int rows, const double (*table)[nodes],
+                                              double* out) {
+  for (int r = 0; r < rows; ++r, in += terms, out += nodes) {
+    double sum[nodes] = {};
+    for (int i = 0; i < terms; ++i)
+      for (int n = 0; n < nodes; ++n) sum[n] += in[i] * table[i][n];
+    for (int n = 0; n < nodes; ++n) out[n] = sum[n];
+  }
+}
+// out[b][n][x] = Σ in[b][i][x] table[i][n], where x runs over `width`: along another.
+template <int terms, int width>
+[[gnu::always_inline]] inline void along_slow(const double* in, int blocks, const double (*table)[nodes],
+                                              double* out) {
+  for (int b = 0; b < blocks; ++b, in += terms * width, out += nodes * width)
+    for (int n = 0; n < nodes; ++n) {
+      double* const row = out + n * width;
+      for (int x = 0; x < width; ++x) row[x] = in[x] * table[0][n];
+      for (int i = 1; i < terms; ++i)
+        for (int x = 0; x < width; ++x) row[x] += in[i * width + x] * table[i][n];
+    }
+}
+
+// Values at all nodes of three components with a, b, c coefficients along u, v, w.
+template <int a, int b, int c>
+[[gnu::always_inline]] inline void at_nodes(const double* in, const Tables& t, double (*out)[729]) {
+  double first[3 * c * b * nodes], second[3 * c * nodes * nodes];
+  const auto table = [&](auto terms) {
+    if constexpr (terms.value == 4)
+      return t.cubic;
+    else
+      return t.quadratic;
+  };
+  along_fast<a>(in, 3 * c * b, table(std::integral_constant<int, a>()), first);
+  along_slow<b, nodes>(first, 3 * c, table(std::integral_constant<int, b>()), second);
+  along_slow<c, nodes * nodes>(second, 3, table(std::integral_constant<int, c>()), out[0]);
+}
+
+// The control points of ∂x/∂u, ∂x/∂v, ∂x/∂w over 3, as [component][k][j][i], to the coefficients of the determinant.
+FOREST_CLONES
+void coefficients_of(const double* du, const double* dv, const double* dw, const Tables& t, double* out) {
+  double u[3][729], v[3][729], w[3][729], a[729], b[729];
+  at_nodes<3, 4, 4>(du, t, u);
+  at_nodes<4, 3, 4>(dv, t, v);
+  at_nodes<4, 4, 3>(dw, t, w);
+  for (int n = 0; n < 729; ++n)
+    a[n] = 27. * (u[0][n] * (v[1][n] * w[2][n] - v[2][n] * w[1][n]) +
+                  u[1][n] * (v[2][n] * w[0][n] - v[0][n] * w[2][n]) +
+                  u[2][n] * (v[0][n] * w[1][n] - v[1][n] * w[0][n]));
+  along_fast<nodes>(a, 81, t.to_bernstein, b);
+  along_slow<nodes, nodes>(b, 9, t.to_bernstein, a);
+  along_slow<nodes, nodes * nodes>(a, 1, t.to_bernstein, out);
+}
+
+struct Box {
+  Coefficients coefficients;
+  Eigen::Vector3d low = Eigen::Vector3d::Zero();
+  Eigen::Vector3d size = Eigen::Vector3d::Ones();
+  int halvings = 0;
+};
+
+constexpr std::array<int, 3> stride{1, 9, 81};
+
+Eigen::Vector3d place_of(const Box& box, std::size_t coefficient) {
+  const Eigen::Vector3d at(double(coefficient % 9), double(coefficient / 9 % 9), double(coefficient / 81));
+  return box.low + box.size.cwiseProduct(at / 8.);
+}
+
+// The axis along which neighbouring coefficients differ most.
+int steepest(const Coefficients& c) {
+  int best = 0;
+  double most = -1.;
+  for (int axis = 0; axis < 3; ++axis) {
+    double sum = 0.;
+    for (int n = 0; n < 729; ++n)
+      if (n / stride[std::size_t(axis)] % 9 < 8)
+        sum += std::abs(c[std::size_t(n + stride[std::size_t(axis)])] - c[std::size_t(n)]);
+    if (sum > most) most = sum, best = axis;
+  }
+  return best;
+}
+
+// The upper half is returned, the box becomes the lower one: de Casteljau's algorithm at the middle.
+Box halve(Box& box, int axis) {
+  Box upper = box;
+  const std::size_t step = std::size_t(stride[std::size_t(axis)]);
+  for (std::size_t n = 0; n < 729; ++n) {
+    if (n / step % 9 != 0) continue;
+    double row[9];
+    for (std::size_t i = 0; i < 9; ++i) row[i] = box.coefficients[n + i * step];
+    for (std::size_t level = 0; level < 9; ++level) {
+      box.coefficients[n + level * step] = row[0];
+      upper.coefficients[n + (8 - level) * step] = row[8 - level];
+      for (std::size_t i = 0; i + level < 8; ++i) row[i] = .5 * (row[i] + row[i + 1]);
+    }
+  }
+  box.size[axis] *= .5;
+  upper.size[axis] = box.size[axis];
+  upper.low[axis] += box.size[axis];
+  ++box.halvings;
+  upper.halvings = box.halvings;
+  return upper;
+}
+
+// Control points of the cubic through f at 0, 1/3, 2/3 and 1.
+void through_thirds(Eigen::Vector3d* f, std::size_t step) {
+  const Eigen::Vector3d a = f[0], b = f[step], c = f[2 * step], d = f[3 * step];
+  f[step] = (-5. * a + 18. * b - 9. * c + 2. * d) / 6.;
+  f[2 * step] = (2. * a - 9. * b + 18. * c - 5. * d) / 6.;
+}
+
+}  // namespace
+
+Eigen::Vector3d Patch::at(double s, double t) const {
+  const auto bs = cubic(s), bt = cubic(t);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t j = 0; j < 4; ++j)
+    for (std::size_t i = 0; i < 4; ++i) sum += bs[i] * bt[j] * points[i + 4 * j];
+  return sum;
+}
+
+Eigen::Vector3d Hexahedron::at(double u, double v, double w) const {
+  const auto bu = cubic(u), bv = cubic(v), bw = cubic(w);
+  Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+  for (std::size_t k = 0; k < 4; ++k)
+    for (std::size_t j = 0; j < 4; ++j) {
+      const Eigen::Vector3d* const row = &points[4 * (j + 4 * k)];
+      sum += (bv[j] * bw[k]) * (bu[0] * row[0] + bu[1] * row[1] + bu[2] * row[2] + bu[3] * row[3]);
+    }
+  return sum;
+}
+
+Linear linear(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw) {
+  const auto bu = cubic(uvw[0]), bv = cubic(uvw[1]), bw = cubic(uvw[2]);
+  const auto du = cubic_derivative(uvw[0]), dv = cubic_derivative(uvw[1]), dw = cubic_derivative(uvw[2]);
+  Linear result{Eigen::Vector3d::Zero(), Eigen::Matrix3d::Zero()};
+  for (std::size_t k = 0; k < 4; ++k) {
+    Eigen::Vector3d at = Eigen::Vector3d::Zero(), along_u = at, along_v = at;
+    for (std::size_t j = 0; j < 4; ++j) {
+      const Eigen::Vector3d* const row = &hexahedron.points[4 * (j + 4 * k)];
+      const Eigen::Vector3d value = bu[0] * row[0] + bu[1] * row[1] + bu[2] * row[2] + bu[3] * row[3];
+      const Eigen::Vector3d slope = du[0] * row[0] + du[1] * row[1] + du[2] * row[2] + du[3] * row[3];
+      at += bv[j] * value;
+      along_u += bv[j] * slope;
+      along_v += dv[j] * value;
+    }
+    result.at += bw[k] * at;
+    result.jacobian.col(0) += bw[k] * along_u;
+    result.jacobian.col(1) += bw[k] * along_v;
+    result.jacobian.col(2) += dw[k] * at;
+  }
+  return result;
+}
+
+Eigen::Matrix3d Hexahedron::jacobian(double u, double v, double w) const {
+  return linear(*this, {u, v, w}).jacobian;
+}
+
+double Hexahedron::volume(double from_w, double to_w) const {
+  const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
+               outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
+  const std::array<double, 5> at{-outer, -inner, 0., inner, outer};
+  const double near_weight = (322. + 13. * std::sqrt(70.)) / 900.,
+               far_weight = (322. - 13. * std::sqrt(70.)) / 900.;
+  const std::array<double, 5> weight{far_weight, near_weight, 128. / 225., near_weight, far_weight};
+  double sum = 0.;
+  for (std::size_t k = 0; k < 5; ++k)
+    for (std::size_t j = 0; j < 5; ++j)
+      for (std::size_t i = 0; i < 5; ++i) {
+        const double w = .5 * (from_w + to_w) + .5 * (to_w - from_w) * at[k];
+        sum +=
+            weight[i] * weight[j] * weight[k] * jacobian(.5 + .5 * at[i], .5 + .5 * at[j], w).determinant();
+      }
+  return sum * (to_w - from_w) / 8.;
+}
+
+double scaled_jacobian(const Hexahedron& hexahedron, int steps) {
+  double least = std::numeric_limits<double>::infinity();
+  for (int k = 0; k <= steps; ++k)
+    for (int j = 0; j <= steps; ++j)
+      for (int i = 0; i <= steps; ++i) {
+        const Eigen::Matrix3d at =
+            hexahedron.jacobian(double(i) / steps, double(j) / steps, double(k) / steps);
+        const double lengths = at.colwise().norm().prod();
+        least = std::min(least, lengths > 0. ? at.determinant() / lengths : 0.);
+      }
+  return least;
+}
+
+Patch Hexahedron::face(Face face) const {
+  const int across = cortex::axis(face), first = across == 0 ? 1 : 0, second = across == 2 ? 1 : 2;
+  Patch patch;
+  std::array<int, 3> at{};
+  at[std::size_t(across)] = is_far(face) ? 3 : 0;
+  for (int t = 0; t < 4; ++t)
+    for (int s = 0; s < 4; ++s) {
+      at[std::size_t(first)] = s, at[std::size_t(second)] = t;
+      patch.points[std::size_t(s + 4 * t)] = point(at[0], at[1], at[2]);
+    }
+  return patch;
+}
+
+Hexahedron through_lattice(const std::array<Eigen::Vector3d, 64>& places) {
+  Hexahedron h{places};
+  for (std::size_t n = 0; n < 16; ++n) through_thirds(&h.points[4 * n], 1);
+  for (std::size_t n = 0; n < 16; ++n) through_thirds(&h.points[n % 4 + 16 * (n / 4)], 4);
+  for (std::size_t n = 0; n < 16; ++n) through_thirds(&h.points[n], 16);
+  return h;
+}
+
+Patch through_lattice(const std::array<Eigen::Vector3d, 16>& places) {
+  Patch patch{places};
+  for (std::size_t n = 0; n < 4; ++n) through_thirds(&patch.points[4 * n], 1);
+  for (std::size_t n = 0; n < 4; ++n) through_thirds(&patch.points[n], 4);
+  return patch;
+}
+
+Hexahedron from_corners(const std::array<Eigen::Vector3d, 8>& corners) {
+  Hexahedron h;
+  const auto blend = [](const Eigen::Vector3d& a, const Eigen::Vector3d& b, int i) -> Eigen::Vector3d {
+    return i == 0 ? a : i == 3 ? b : Eigen::Vector3d((double(3 - i) * a + double(i) * b) / 3.);
+  };
+  for (int k = 0; k < 4; ++k)
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i)
+        h.point(i, j, k) =
+            blend(blend(blend(corners[0], corners[1], i), blend(corners[2], corners[3], i), j),
+                  blend(blend(corners[4], corners[5], i), blend(corners[6], corners[7], i), j), k);
+  return h;
+}
+
+std::array<Hexahedron, 2> split(const Hexahedron& hexahedron, int axis, double at) {
+  std::array<Hexahedron, 2> halves{hexahedron, hexahedron};
+  const std::size_t step = axis == 0 ? 1 : axis == 1 ? 4 : 16;
+  for (std::size_t n = 0; n < 64; ++n) {
+    if (n / step % 4 != 0) continue;
+    std::array<Eigen::Vector3d, 4> row;
+    for (std::size_t i = 0; i < 4; ++i) row[i] = hexahedron.points[n + i * step];
+    for (std::size_t level = 0; level < 4; ++level) {
+      halves[0].points[n + level * step] = row[0];
+      halves[1].points[n + (3 - level) * step] = row[3 - level];
+      for (std::size_t i = 0; i + level < 3; ++i) row[i] = (1. - at) * row[i] + at * row[i + 1];
+    }
+  }
+  return halves;
+}
+
+Coefficients determinant(const Hexahedron& hexahedron, double* margin) {
+  double du[3 * 48], dv[3 * 48], dw[3 * 48];
+  for (int c = 0; c < 3; ++c)
+    for (int k = 0; k < 4; ++k)
+      for (int j = 0; j < 4; ++j)
+        for (int i = 0; i < 4; ++i) {
+          const double here = hexahedron.point(i, j, k)[c];
+          if (i < 3) du[((c * 4 + k) * 4 + j) * 3 + i] = hexahedron.point(i + 1, j, k)[c] - here;
+          if (j < 3) dv[((c * 4 + k) * 3 + j) * 4 + i] = hexahedron.point(i, j + 1, k)[c] - here;
+          if (k < 3) dw[((c * 3 + k) * 4 + j) * 4 + i] = hexahedron.point(i, j, k + 1)[c] - here;
+        }
+  const Tables& tables = Tables::get();
+  Coefficients result;
+  coefficients_of(du, dv, dw, tables, result.data());
+  if (margin) {
+    const auto largest = [](const double* d) {
+      double most = 0.;
+      for (int n = 0; n < 144; ++n) most = std::max(most, std::abs(d[n]));
+      return 3. * most;
+    };
+    // With ε = 2⁻⁵³ a derivative has an error of at most 25 ε of the largest component of its control points (a difference, three
+    // sums of four products, rounded weights), a determinant of 6 products so 80 ε of 6 such products; each of the three
+    // transformations multiplies by the norm at most and adds 12 ε. Altogether 116 ε norm³; and 64 halvings, of which each adds 8 ε.
+    const double epsilon = .5 * std::numeric_limits<double>::epsilon();
+    const double scale = 6. * largest(du) * largest(dv) * largest(dw);
+    *margin = (128. * std::pow(tables.norm, 3.) + 512.) * epsilon * scale;
+  }
+  return result;
+}
+
+Certificate certify(const Hexahedron& hexahedron, int halvings) {
+  using enum Certificate::Verdict;
+  double margin = 0.;
+  std::vector<Box> open(1);
+  open[0].coefficients = determinant(hexahedron, &margin);
+  Certificate result{positive, std::numeric_limits<double>::infinity(), Eigen::Vector3d::Zero()};
+  while (!open.empty()) {
+    Box& box = open.back();
+    const Coefficients& c = box.coefficients;
+    for (const std::size_t corner : {0, 8, 72, 80, 648, 656, 720, 728})
+      if (!(c[corner] > margin)) return {not_positive, c[corner], place_of(box, corner)};
+    const auto least = std::ranges::min_element(c);
+    const double bound = *least - margin;
+    if (!(bound > 0.) && box.halvings < halvings) {
+      Box upper = halve(box, steepest(c));
+      open.push_back(std::move(upper));
+      continue;
+    }
+    if (!(bound > 0.)) result.verdict = undecided;
+    if (bound < result.least)
+      result.least = bound, result.where = place_of(box, std::size_t(least - c.begin()));
+    open.pop_back();
+  }
+  return result;
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,197 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/ribbon.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <span>
+#include <utility>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+
+namespace forest::cortex {
+namespace {
+
+using Edge = std::pair<std::uint32_t, std::uint32_t>;
+
+Edge edge_of(const Triangle& t, std::size_t e) { return std::minmax(t[e], t[(e + 1) % 3]); }
+
+double area_of(const std::vector<Place>& at, const Triangle& t) {
+  return .5 * (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]).norm();
+}
+
+// Thin places that hang together over an area are a wall.
+std::vector<std::uint8_t> find_wall(const Ribbon& ribbon, const RibbonOptions& options) {
+  const std::size_t n = ribbon.size();
+  std::vector<double> areas(n, 0.);
+  for (const Triangle& t : ribbon.triangles)
+    for (const std::uint32_t v : t) areas[v] += area_of(ribbon.outer, t) / 3.;
+  const Neighbours near = neighbours(n, ribbon.triangles);
+  std::vector<std::uint8_t> wall(n, 0), seen(n, 0);
+  for (std::uint32_t start = 0; start < n; ++start) {
+    if (seen[start] || double(ribbon.thickness[start]) >= options.least_thickness) continue;
+    std::vector<std::uint32_t> piece{start};
+    seen[start] = 1;
+    double area = 0.;
+    for (std::size_t i = 0; i < piece.size(); ++i) {
+      area += areas[piece[i]];
+      for (const std::uint32_t v : near.of(piece[i]))
+        if (!seen[v] && double(ribbon.thickness[v]) < options.least_thickness)
+          seen[v] = 1, piece.push_back(v);
+    }
+    if (area >= options.least_wall)
+      for (const std::uint32_t v : piece) wall[v] = 1;
+  }
+  return wall;
+}
+
+}  // namespace
+
+Neighbours neighbours(std::size_t vertices, std::span<const Triangle> triangles) {
+  Neighbours near;
+  std::vector<std::uint32_t> counts(vertices + 1, 0);
+  for (const Triangle& t : triangles)
+    for (const std::uint32_t v : t) counts[v + 1] += 2;
+  std::partial_sum(counts.begin(), counts.end(), counts.begin());
+  std::vector<std::uint32_t> all(counts.back()), next(counts.begin(), counts.end() - 1);
+  for (const Triangle& t : triangles)
+    for (std::size_t e = 0; e < 3; ++e)
+      all[next[t[e]]++] = t[(e + 1) % 3], all[next[t[e]]++] = t[(e + 2) % 3];
+  near.starts.assign(vertices + 1, 0);
+  near.list.reserve(all.size() / 2);
+  for (std::size_t v = 0; v < vertices; ++v) {
+    const auto begin = all.begin() + counts[v], end = all.begin() + counts[v + 1];
+    std::sort(begin, end);
+    near.list.insert(near.list.end(), begin, std::unique(begin, end));
+    near.starts[v + 1] = std::uint32_t(near.list.size());
+  }
+  return near;
+}
+
+Mesh halved(const Mesh& mesh) {
+  std::vector<Edge> edges;
+  edges.reserve(mesh.triangles.size() * 3);
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t e = 0; e < 3; ++e) edges.push_back(edge_of(t, e));
+  std::sort(edges.begin(), edges.end());
+  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  Mesh fine{mesh.positions, mesh.labels, {}};
+  const auto old = std::uint32_t(mesh.positions.size());
+  for (const auto& [a, b] : edges) fine.positions.push_back(.5f * (mesh.positions[a] + mesh.positions[b]));
+  fine.labels.resize(fine.positions.size(), 0);
+  fine.triangles.reserve(mesh.triangles.size() * 4);
+  for (const Triangle& t : mesh.triangles) {
+    std::array<std::uint32_t, 3> middle{};  // of the edges that begin at each corner
+    for (std::size_t e = 0; e < 3; ++e)
+      middle[e] =
+          old + std::uint32_t(std::lower_bound(edges.begin(), edges.end(), edge_of(t, e)) - edges.begin());
+    for (std::size_t e = 0; e < 3; ++e) fine.triangles.push_back({t[e], middle[e], middle[(e + 2) % 3]});
+    fine.triangles.push_back({middle[0], middle[1], middle[2]});
+  }
+  return fine;
+}
+
+Place on(const std::vector<Place>& level, const Ribbon& ribbon, const RibbonPoint& point) {
+  const Triangle& t = ribbon.triangles[point.triangle];
+  return point.weights[0] * level[t[0]] + point.weights[1] * level[t[1]] + point.weights[2] * level[t[2]];
+}
+
+namespace {
+
+std::vector<std::uint32_t> outside_wall(const Ribbon& ribbon) {
+  std::vector<std::uint32_t> list;
+  for (std::uint32_t t = 0; t < ribbon.triangles.size(); ++t)
+    if (!ribbon.is_wall(ribbon.triangles[t])) list.push_back(t);
+  return list;
+}
+
+Mesh middle_of(const Ribbon& ribbon, std::span<const std::uint32_t> triangles) {
+  Mesh mesh;
+  mesh.positions.reserve(ribbon.size());
+  for (const Place& p : ribbon.middle) mesh.positions.push_back(p.cast<float>());
+  for (const std::uint32_t t : triangles) mesh.triangles.push_back(ribbon.triangles[t]);
+  return mesh;
+}
+
+}  // namespace
+
+RibbonLocator::RibbonLocator(const Ribbon& ribbon)
+    : sheet_(ribbon), original_(outside_wall(ribbon)), tree_(middle_of(ribbon, original_)) {}
+
+RibbonPoint RibbonLocator::nearest(const Place& to) const {
+  const auto hit = tree_.nearest(to);
+  RibbonPoint point{original_[hit->triangle], Place(1., 0., 0.)};
+  const Triangle& t = sheet_.triangles[point.triangle];
+  const Place &a = sheet_.middle[t[0]], &b = sheet_.middle[t[1]], &c = sheet_.middle[t[2]];
+  const Place across = (b - a).cross(c - a);
+  if (const double square = across.squaredNorm(); square > 0.) {
+    Place w((b - hit->at).cross(c - hit->at).dot(across) / square,
+            (c - hit->at).cross(a - hit->at).dot(across) / square, 0.);
+    w = w.cwiseMax(0.), w[2] = std::max(0., 1. - w[0] - w[1]);
+    point.weights = w / w.sum();
+  }
+  return point;
+}
+
+Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions& options,
+                   Progress& progress) {
+  Mesh fine = outer;
+  const auto mean_edge = [](const Mesh& mesh) {
+    double sum = 0.;
+    for (const Triangle& t : mesh.triangles)
+      for (std::size_t e = 0; e < 3; ++e)
+        sum += double((mesh.positions[t[e]] - mesh.positions[t[(e + 1) % 3]]).norm());
+    return sum / (3. * double(mesh.triangles.size()));
+  };
+  while (mean_edge(fine) > options.edge) fine = halved(fine);
+
+  Ribbon ribbon;
+  const std::size_t n = fine.positions.size();
+  ribbon.triangles = fine.triangles;
+  ribbon.outer.resize(n), ribbon.middle.resize(n), ribbon.inner.resize(n), ribbon.thickness.resize(n);
+  const std::vector<Vec3> normals = vertex_normals(fine);
+  std::vector<std::uint8_t> arrived(n);
+  progress.begin("dropping w-curves", n);
+  parallel_ranges(n, 256, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t v = begin; v < end; ++v) {
+      ribbon.outer[v] = fine.positions[v].cast<double>();
+      const WCurve curve = curves.drop(ribbon.outer[v], -normals[v].cast<double>());
+      ribbon.middle[v] = curve.at(.5), ribbon.inner[v] = curve.points.back();
+      ribbon.thickness[v] = float(curve.length()), arrived[v] = curve.arrived;
+    }
+    progress.advance(end - begin);
+  });
+  progress.end();
+  ribbon.wall = find_wall(ribbon, options);
+  std::size_t lost = 0;
+  for (std::size_t v = 0; v < n; ++v) lost += !arrived[v] && !ribbon.wall[v];
+  if (lost * 100 > n)
+    throw Error(
+        fmt::format("{} of {} w-curves do not reach the inner surface; check that both surfaces are of one "
+                    "hemisphere and in the same coordinates",
+                    lost, n));
+  return ribbon;
+}
+
+double volume_under(const Ribbon& ribbon, const Triangle& triangle) {
+  // A prism between two levels as three tetrahedra, cut along diagonals from the corner of the lowest number, as the
+  // neighbours' are.
+  Triangle t = triangle;
+  std::rotate(t.begin(), std::min_element(t.begin(), t.end()), t.end());
+  const auto tetrahedron = [](const Place& a, const Place& b, const Place& c, const Place& d) {
+    return (b - a).cross(c - a).dot(d - a) / 6.;
+  };
+  const auto prism = [&](const std::vector<Place>& top, const std::vector<Place>& bottom) {
+    const Place &a = top[t[0]], &b = top[t[1]], &c = top[t[2]], &A = bottom[t[0]], &B = bottom[t[1]],
+                &C = bottom[t[2]];
+    // The side over (b, c) is cut from the lower of its two corners on top.
+    return tetrahedron(A, B, C, a) + (t[1] < t[2] ? tetrahedron(a, b, c, C) * -1. + tetrahedron(a, B, C, b)
+                                                  : tetrahedron(a, b, c, B) * -1. + tetrahedron(a, B, C, c));
+  };
+  return prism(ribbon.outer, ribbon.middle) + prism(ribbon.middle, ribbon.inner);
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,47 @@
+// SPDX-License-Identifier: Apache-2.0
+// w-curves: the field lines of a cortex, dropped from the outer surface along the axis of its pyramidal cells to the inner
+// one, and how deep a place on one is.
+//
+// Two measures of depth, both 0 on the outer surface and 1 on the inner one: the share of the curve's length (equidistant),
+// and the share of the volume of the thin tube around it (equivolumetric, after Bok 1929: layers keep their share of volume
+// as the cortex folds). The flux of the field through such a tube is the same everywhere, so its cross-section is
+// proportional to 1/|slope|, and its volume to the integral of that along the curve.
+#pragma once
+
+#include <optional>
+#include <vector>
+
+#include "forest/cortex/laplace.h"
+#include "forest/geometry/triangle_tree.h"
+
+namespace forest::cortex {
+
+struct WCurve {
+  std::vector<Place> points;  // from the outer surface to the inner one, at least two
+  std::vector<double>
+      volume;  // µm: the tube's up to each point for a cross-section of 1 where the slope is 1/µm
+  std::uint32_t triangle = 0;  // of the inner surface, on which it ends
+  bool arrived =
+      false;  // without it the last piece is the straight way to the nearest place of the inner surface
+
+  double length() const;  // µm
+  /// By share of volume (or of length), w in [0, 1].
+  Place at(double w) const;
+  Place at_length(double share) const;
+};
+
+/// Drops curves; the field and the tree must outlive it.
+class WCurves {
+ public:
+  WCurves(const Laplace& field, const TriangleTree& inner) : field_(field), inner_(inner) {}
+
+  /// @param start   on the outer surface
+  /// @param inward  roughly into the tissue
+  WCurve drop(const Place& start, const Place& inward) const;
+
+ private:
+  const Laplace& field_;
+  const TriangleTree& inner_;
+};
+
+}  // namespace forest::cortex

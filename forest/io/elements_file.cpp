@@ -1,0 +1,131 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/elements_file.h"
+
+#include <array>
+#include <cmath>
+
+#include "forest/core/file.h"
+#include "forest/io/hdf5.h"
+
+namespace forest::io {
+namespace {
+
+using cortex::Cortex;
+using cortex::Line;
+
+constexpr const char* magic = "brainforest cortex";
+constexpr const char* fact_names =
+    "volume of an element, volume between the surfaces, volume under the wall, w-angle median, w-angle p99, "
+    "w-curves that "
+    "arrive, elements mended";
+
+void append(std::vector<double>& values, const cortex::Place& place) {
+  values.insert(values.end(), {place[0], place[1], place[2]});
+}
+
+}  // namespace
+
+void write_elements(const std::filesystem::path& path, const Cortex& cortex, double volume) {
+  forest::NewFile place(path);
+  hdf5::NewFile file(place.path());
+  file.attribute("/", "magic", std::string(magic));
+  file.attribute("/", "version", 1u);
+  std::vector<double> numbers;
+  numbers.reserve(cortex.elements.curves.size() * 12);
+  for (const cortex::Depths& curve : cortex.elements.curves)
+    for (const cortex::Place& p : curve) append(numbers, p);
+  file.write("/curves/places", std::span<const double>(numbers));
+  std::vector<std::uint32_t> curves;
+  curves.reserve(cortex.elements.size() * 16);
+  for (const auto& e : cortex.elements.elements) curves.insert(curves.end(), e.begin(), e.end());
+  file.write("/elements/curves", std::span<const std::uint32_t>(curves));
+  file.write("/corners/on_valley", std::span<const std::uint8_t>(cortex.elements.on_valley));
+  std::vector<double> points, strength;
+  std::vector<std::uint32_t> starts;
+  std::vector<std::uint8_t> kinds;
+  for (const Line& line : cortex.lines) {
+    starts.push_back(std::uint32_t(points.size() / 3));
+    kinds.push_back(std::uint8_t(line.kind)), strength.push_back(line.strength);
+    for (const cortex::Place& p : line.points) append(points, p);
+  }
+  file.write("/lines/points", std::span<const double>(points));
+  file.write("/lines/starts", std::span<const std::uint32_t>(starts));
+  file.write("/lines/kind", std::span<const std::uint8_t>(kinds));
+  file.write("/lines/strength", std::span<const double>(strength));
+  const std::array facts{volume,
+                         cortex.between,
+                         cortex.wall,
+                         cortex.w_angle.median,
+                         cortex.w_angle.p99,
+                         cortex.w_reached,
+                         double(cortex.mending.before)};
+  file.write("/facts", std::span<const double>(facts));
+  file.attribute("/facts", "names", std::string(fact_names));
+  file.close();
+  place.commit();
+}
+
+ElementsFile read_elements(const std::filesystem::path& path) {
+  const hdf5::File file(path);
+  if (file.text_attribute("/", "magic") != magic)
+    file.refuse("is no file of elements; make one with brainforest cortex build");
+  const auto version = file.attribute("/", "version");
+  if (version != std::vector<std::int64_t>{1})
+    file.refuse("is of another version; build it anew with this program");
+  ElementsFile result;
+  Cortex& cortex = result.cortex;
+  const auto places = file.doubles("/curves/places");
+  if (places.size() % 12) file.refuse("/curves/places has a length that is no multiple of 12");
+  for (const double x : places)
+    if (!std::isfinite(x) || std::abs(x) > 1e7)
+      file.refuse("/curves/places has a number that is no place in a brain");
+  cortex.elements.curves.resize(places.size() / 12);
+  for (std::size_t i = 0; i < places.size(); i += 3)
+    cortex.elements.curves[i / 12][i % 12 / 3] = cortex::Place(places[i], places[i + 1], places[i + 2]);
+  const auto curves = file.integers("/elements/curves");
+  if (curves.empty() || curves.size() % 16)
+    file.refuse("/elements/curves has a length that is no multiple of 16");
+  cortex.elements.elements.resize(curves.size() / 16);
+  for (std::size_t i = 0; i < curves.size(); ++i) {
+    if (curves[i] < 0 || std::size_t(curves[i]) >= cortex.elements.curves.size())
+      file.refuse("/elements/curves names a curve that is not there");
+    cortex.elements.elements[i / 16][i % 16] = std::uint32_t(curves[i]);
+  }
+  for (const std::int64_t on : file.integers("/corners/on_valley"))
+    cortex.elements.on_valley.push_back(on != 0);
+  cortex.elements.corners = std::uint32_t(cortex.elements.on_valley.size());
+  if (cortex.elements.corners > cortex.elements.curves.size())
+    file.refuse("/corners/on_valley has more corners than curves");
+  const auto points = file.doubles("/lines/points"), strength = file.doubles("/lines/strength");
+  const auto starts = file.integers("/lines/starts"), kinds = file.integers("/lines/kind");
+  if (points.size() % 3 || starts.size() != kinds.size() || starts.size() != strength.size())
+    file.refuse("/lines has arrays of different lengths");
+  for (std::size_t i = 0; i < starts.size(); ++i) {
+    const std::int64_t end = i + 1 < starts.size() ? starts[i + 1] : std::int64_t(points.size() / 3);
+    if (starts[i] < 0 || starts[i] + 2 > end || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
+        kinds[i] > 1)
+      file.refuse("/lines has a line that cannot be");
+    Line line{.kind = Line::Kind(kinds[i]),
+              .points = {},
+              .triangles = {},
+              .strength = strength[i],
+              .closed = false};
+    for (std::int64_t p = starts[i]; p < end; ++p) {
+      const auto k = std::size_t(3 * p);
+      line.points.emplace_back(points[k], points[k + 1], points[k + 2]);
+      if (!line.points.back().allFinite()) file.refuse("/lines/points has a number that is no place");
+    }
+    cortex.lines.push_back(std::move(line));
+  }
+  const auto facts = file.doubles("/facts");
+  if (facts.size() != 7) file.refuse("/facts has not 7 numbers");
+  for (const double x : facts)
+    if (!std::isfinite(x)) file.refuse("/facts has a number that is not finite");
+  if (!(facts[0] > 0.)) file.refuse("/facts has a volume that is not positive");
+  result.volume = facts[0], cortex.between = facts[1], cortex.wall = facts[2];
+  cortex.w_angle = {facts[3], facts[4]}, cortex.w_reached = facts[5];
+  cortex.mending.before = std::size_t(facts[6]);
+  return result;
+}
+
+}  // namespace forest::io
