@@ -135,6 +135,12 @@ std::function<void()> report(CLI::App& command, Console& console) {
 }
 
 constexpr Verb actions[] = {
+    {"contours", "Cut surfaces, volumes or pictures into sections, whose boundaries become curves",
+     "brainforest cortex contours lh.pial lh.white -o lh.contours --axis y --spacing 1", cortex_contours},
+    {"compare", "Lay consecutive contours over one another and tell how far apart they are",
+     "brainforest cortex compare lh.contours --svg overlays", cortex_compare},
+    {"surfaces", "Make the outer and the inner surface of contours",
+     "brainforest cortex surfaces lh.contours -o outer.surf.gii inner.surf.gii", cortex_surfaces},
     {"build", "Fill the space between two surfaces with certified elements",
      "brainforest cortex build lh.pial lh.white -o elements.h5", build},
     {"report", "Measure a file of elements",

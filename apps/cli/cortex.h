@@ -12,6 +12,9 @@ namespace forest::cli {
 
 class Console;
 
+std::function<void()> cortex_compare(CLI::App& command, Console& console);
+std::function<void()> cortex_contours(CLI::App& command, Console& console);
 std::function<void()> cortex_grid(CLI::App& command, Console& console);
+std::function<void()> cortex_surfaces(CLI::App& command, Console& console);
 
 }  // namespace forest::cli

@@ -17,9 +17,6 @@
 
 namespace forest {
 
-/// A point on a plane, along its right and up (µm); double, since a branch of .1 µm lies a thousand µm from the origin.
-using Place = Eigen::Vector2d;
-
 class CrossSection {
  public:
   /// None when the plane does not cut it, or only touches it.

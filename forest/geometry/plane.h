@@ -6,6 +6,9 @@
 
 namespace forest {
 
+/// A point on a plane, along its right and up (µm); double, since a branch of .1 µm lies a thousand µm from the origin.
+using Place = Eigen::Vector2d;
+
 /// Seen from where the normal points to: right and up are those of a sheet of paper that lies in the plane.
 struct Plane {
   Vec3 origin = Vec3::Zero();

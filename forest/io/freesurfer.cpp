@@ -91,4 +91,20 @@ std::vector<float> read_freesurfer_values(std::string_view bytes, const std::str
   return values;
 }
 
+std::string write_freesurfer_surface(const Mesh& mesh) {
+  std::string bytes =
+      "\xff\xff\xfe"
+      "created by Brain Forest\n\n";
+  bytes.reserve(bytes.size() + 8 + 12 * (mesh.positions.size() + mesh.triangles.size()));
+  const auto append = [&](std::uint32_t value) {
+    for (const int shift : {24, 16, 8, 0}) bytes += char(value >> shift & 255);
+  };
+  append(std::uint32_t(mesh.positions.size())), append(std::uint32_t(mesh.triangles.size()));
+  for (const Vec3& p : mesh.positions)
+    for (int k = 0; k < 3; ++k) append(std::bit_cast<std::uint32_t>(p[k] / 1000.f));
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t corner : t) append(corner);
+  return bytes;
+}
+
 }  // namespace forest::io

@@ -20,6 +20,7 @@ bool is_freesurfer_values(std::string_view bytes);
 
 /// Throw InputError.
 Mesh read_freesurfer_surface(std::string_view bytes, const std::string& name);  // in µm
+std::string write_freesurfer_surface(const Mesh& mesh);
 std::vector<float> read_freesurfer_values(std::string_view bytes, const std::string& name);
 
 }  // namespace forest::io

@@ -289,4 +289,42 @@ SurfaceValues read_gifti_values(std::string_view text, const std::string& name) 
   return result;
 }
 
+std::string write_gifti_surface(const Mesh& mesh) {
+  const auto coded = [](std::string_view bytes) {
+    constexpr const char* signs = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+    std::string text;
+    text.reserve(bytes.size() / 3 * 4 + 4);
+    for (std::size_t i = 0; i < bytes.size(); i += 3) {
+      std::uint32_t bits = 0;
+      for (std::size_t k = 0; k < 3; ++k)
+        bits = bits << 8 | (i + k < bytes.size() ? static_cast<unsigned char>(bytes[i + k]) : 0u);
+      for (std::size_t k = 0; k < 4; ++k)
+        text += i + k <= bytes.size() ? signs[bits >> (18 - 6 * k) & 63] : '=';
+    }
+    return text;
+  };
+  std::string points, corners;
+  const auto append = [](std::string& bytes, auto value) {
+    std::array<char, sizeof value> raw;
+    std::memcpy(raw.data(), &value, sizeof value);
+    if (std::endian::native == std::endian::big) std::ranges::reverse(raw);
+    bytes.append(raw.data(), raw.size());
+  };
+  for (const Vec3& p : mesh.positions)
+    for (int k = 0; k < 3; ++k) append(points, p[k] / 1000.f);
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t corner : t) append(corners, std::int32_t(corner));
+  const auto array = [&](std::string_view intent, std::string_view type, std::size_t rows,
+                         const std::string& bytes) {
+    return fmt::format(
+        "<DataArray Intent=\"{}\" DataType=\"{}\" ArrayIndexingOrder=\"RowMajorOrder\" Dimensionality=\"2\" "
+        "Dim0=\"{}\" Dim1=\"3\" Encoding=\"Base64Binary\" Endian=\"LittleEndian\" ExternalFileName=\"\" "
+        "ExternalFileOffset=\"\">\n<Data>{}</Data>\n</DataArray>\n",
+        intent, type, rows, coded(bytes));
+  };
+  return "<?xml version=\"1.0\" encoding=\"UTF-8\"?>\n<GIFTI Version=\"1.0\" NumberOfDataArrays=\"2\">\n" +
+         array(points_intent, "NIFTI_TYPE_FLOAT32", mesh.positions.size(), points) +
+         array(triangles_intent, "NIFTI_TYPE_INT32", mesh.triangles.size(), corners) + "</GIFTI>\n";
+}
+
 }  // namespace forest::io

@@ -117,4 +117,8 @@ void check_corners(const Mesh& mesh, const std::string& name) {
                                      std::int32_t(corner), mesh.positions.size()));
 }
 
+std::string write_surface(const Mesh& mesh, std::string_view file_name) {
+  return file_name.ends_with(".gii") ? write_gifti_surface(mesh) : write_freesurfer_surface(mesh);
+}
+
 }  // namespace forest::io

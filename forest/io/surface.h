@@ -40,6 +40,9 @@ Mesh read_surface(std::string_view bytes, const std::string& name);
 /// Throws InputError. Infinite values become none.
 SurfaceValues read_surface_values(std::string_view bytes, const std::string& name);
 
+/// The bytes of a file: GIFTI where the name ends in .gii, else FreeSurfer's. Coordinates are rounded to floats of mm.
+std::string write_surface(const Mesh& mesh, std::string_view file_name);
+
 // What readers of these formats share.
 
 /// A word of a file as an error may quote it: its first 40 characters, none that a terminal obeys.

@@ -133,6 +133,12 @@ std::string values_error(const std::string& bytes) {
   return refused<InputError>([&] { (void)read_surface_values(bytes, "v"); });
 }
 
+TEST(Surface, ComesBackFromWhatIsWritten) {
+  const Mesh mesh = read_surface(freesurfer_surface(), "lh.pial");
+  expect_tetrahedron(read_surface(write_surface(mesh, "rh.pial"), "rh.pial"));
+  expect_tetrahedron(read_surface(write_surface(mesh, "rh.surf.gii"), "rh.surf.gii"));
+}
+
 TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {
   expect_tetrahedron(read_surface(freesurfer_surface(), "lh.pial"));
   expect_tetrahedron(read_surface(freesurfer_surface() + "what FreeSurfer adds", "lh.pial"));

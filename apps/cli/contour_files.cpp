@@ -1,0 +1,49 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/contour_files.h"
+
+#include <algorithm>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/io/contours.h"
+
+#include "apps/cli/console.h"
+
+namespace forest::cli {
+
+namespace fs = std::filesystem;
+
+cortex::Axis axis_of(const std::string& name) {
+  return name == "x" ? cortex::Axis::x : name == "z" ? cortex::Axis::z : cortex::Axis::y;
+}
+
+cortex::ContourStack read_contour_files(const fs::path& path, double unit, Console& console) {
+  const auto read = [&](const fs::path& file) {
+    io::ReadContours result = io::read_contours(MappedFile(file).text(), file.string(), unit);
+    for (const std::string& oddity : result.oddities) console.warn(file.string() + ": " + oddity);
+    return std::move(result.stack);
+  };
+  if (!fs::is_directory(path)) return read(path);
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(path))
+    if (entry.path().extension() == ".svg") files.push_back(entry.path());
+  std::ranges::sort(files);
+  if (files.empty()) throw InputError(path.string(), 0, "has no .svg file; give a folder of drawn sections");
+  std::vector<cortex::ContourStack> drawings;
+  for (const fs::path& file : files) drawings.push_back(read(file));
+  return io::gathered(drawings);
+}
+
+void write_contour_files(const cortex::ContourStack& stack, const fs::path& path, bool overlay) {
+  if (path.extension() == ".contours") return write_file(path, io::write_contours(stack));
+  if (path.has_extension())
+    throw Error(path.string() + ": is neither FILE.contours nor a folder for drawings; give one of them");
+  fs::create_directories(path);
+  for (std::size_t i = 0; i < stack.sections.size(); ++i)
+    write_file(path / fmt::format("section_{:04}.svg", i + 1),
+               io::write_svg(stack, stack.sections[i], overlay && i ? &stack.sections[i - 1] : nullptr));
+}
+
+}  // namespace forest::cli

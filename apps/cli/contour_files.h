@@ -1,0 +1,25 @@
+// SPDX-License-Identifier: Apache-2.0
+// Stacks of contours on the command line: a file, or a folder of drawings.
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "forest/cortex/contours.h"
+
+namespace forest::cli {
+
+class Console;
+
+cortex::Axis axis_of(const std::string& name);  // "x", "y" or "z"
+
+/// What was left out is told. Throws InputError.
+/// @param unit  µm of one unit, where a format does not say it
+cortex::ContourStack read_contour_files(const std::filesystem::path& path, double unit, Console& console);
+
+/// A file where the name ends in .contours, else a folder of drawings, one a section.
+/// @param overlay  each drawn over the one before it
+void write_contour_files(const cortex::ContourStack& stack, const std::filesystem::path& path,
+                         bool overlay = false);
+
+}  // namespace forest::cli

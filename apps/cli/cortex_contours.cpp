@@ -1,0 +1,251 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest cortex contours and cortex compare: sections of surfaces, volumes and pictures as curves, and how successive
+// ones differ.
+#include <algorithm>
+#include <cmath>
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/cortex/compare.h"
+#include "forest/cortex/volume.h"
+#include "forest/io/contours.h"
+#include "forest/io/nifti.h"
+#include "forest/io/png.h"
+#include "forest/io/surface.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/contour_files.h"
+#include "apps/cli/cortex.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
+
+namespace forest::cli {
+namespace {
+
+namespace fs = std::filesystem;
+
+std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (entry.path().extension() == extension) files.push_back(entry.path());
+  std::ranges::sort(files);
+  return files;
+}
+
+struct Options {
+  std::vector<fs::path> inputs;
+  std::vector<std::string> names;
+  fs::path out;
+  std::string axis = "y";
+  double spacing = 1., offset = 0., threshold = NAN, pixel = 0., tolerance = .02, unit = 1.;
+  bool straight = false, force = false;
+};
+
+// Grey values of a folder of pictures, one a section.
+cortex::Volume read_pictures(const fs::path& folder, const Options& options) {
+  const auto files = files_in(folder, ".png");
+  if (files.empty())
+    throw Error(folder.string() + ": has no .png file and no .svg file; give a folder of sections");
+  if (!(options.pixel > 0.))
+    throw Error(folder.string() + ": pictures do not say how large they are; give --pixel, in mm");
+  const cortex::Axis axis = axis_of(options.axis);
+  const int across = int(axis), right = axis == cortex::Axis::x ? 1 : 0, up = axis == cortex::Axis::z ? 1 : 2;
+  cortex::Volume volume;
+  std::array<std::size_t, 3> stride{};
+  for (std::size_t i = 0; i < files.size(); ++i) {
+    const io::Picture picture = io::read_png(files[i]);
+    if (i == 0) {
+      if (double(picture.width) * picture.height * double(files.size()) > 1e9)
+        throw Error(folder.string() + ": the pictures have more than 10⁹ pixels; make them smaller");
+      volume.size[std::size_t(right)] = picture.width, volume.size[std::size_t(up)] = picture.height;
+      volume.size[std::size_t(across)] = files.size();
+      volume.step[right] = volume.step[up] = 1e3 * options.pixel, volume.step[across] = 1e3 * options.spacing;
+      volume.origin[across] = 1e3 * options.offset;
+      volume.values.resize(volume.size[0] * volume.size[1] * volume.size[2]);
+      stride = {1, volume.size[0], volume.size[0] * volume.size[1]};
+    }
+    if (picture.width != volume.size[std::size_t(right)] || picture.height != volume.size[std::size_t(up)])
+      throw InputError(
+          files[i].string(), 0,
+          fmt::format("has {} × {} pixels where the first picture has {} × {}; align them", picture.width,
+                      picture.height, volume.size[std::size_t(right)], volume.size[std::size_t(up)]));
+    for (std::size_t y = 0; y < picture.height; ++y)
+      for (std::size_t x = 0; x < picture.width; ++x) {
+        const std::uint8_t* p = &picture.pixels[4 * ((picture.height - 1 - y) * picture.width + x)];
+        volume.values[x * stride[std::size_t(right)] + y * stride[std::size_t(up)] +
+                      i * stride[std::size_t(across)]] =
+            (.2126f * float(p[0]) + .7152f * float(p[1]) + .0722f * float(p[2])) / 255.f;
+      }
+  }
+  return volume;
+}
+
+cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& path, const std::string& name,
+                               const Options& options, bool pictures) {
+  if (std::isnan(options.threshold))
+    throw Error(path.string() + ": what is inside is a question of grey; give --threshold");
+  const cortex::Axis axis = axis_of(options.axis);
+  const double low = volume.origin[int(axis)],
+               high = low + volume.step[int(axis)] * double(volume.size[std::size_t(axis)] - 1);
+  std::vector<double> planes = cortex::planes_between(low, high, 1e3 * options.spacing, 1e3 * options.offset);
+  if (pictures)  // each as it is
+    for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = low + volume.step[int(axis)] * double(i);
+  return cortex::contours_of(volume, name, axis, planes, options.threshold);
+}
+
+void run(const Options& options, Console& console) {
+  if (!options.force) refuse_existing({options.out});
+  std::vector<cortex::ContourStack> stacks;
+  std::vector<Mesh> surfaces;
+  std::vector<std::string> surface_names;
+  double low = HUGE_VAL, high = -HUGE_VAL;
+  const cortex::Axis axis = axis_of(options.axis);
+  for (std::size_t i = 0; i < options.inputs.size(); ++i) {
+    const fs::path& path = options.inputs[i];
+    const std::string name = i < options.names.size()    ? options.names[i]
+                             : options.inputs.size() > 2 ? path.stem().string()
+                             : i == 0                    ? "outer"
+                                                         : "inner";
+    if (fs::is_directory(path) && files_in(path, ".svg").empty()) {
+      stacks.push_back(of_volume(read_pictures(path, options), path, name, options, true));
+      continue;
+    }
+    if (fs::is_directory(path) || path.extension() == ".contours" || path.extension() == ".svg" ||
+        path.extension() == ".jser" || path.extension() == ".slc") {
+      stacks.push_back(read_contour_files(path, 1e3 * options.unit, console));
+      continue;
+    }
+    const MappedFile file(path);
+    const std::string lower = path.string();
+    if (io::may_be_nifti(file.text()) && (lower.ends_with(".nii") || lower.ends_with(".nii.gz"))) {
+      stacks.push_back(of_volume(io::read_nifti(file.text(), path.string()), path, name, options, false));
+      continue;
+    }
+    surfaces.push_back(io::read_surface(file.text(), path.string()));
+    surface_names.push_back(name);
+    for (const Vec3& p : surfaces.back().positions)
+      low = std::min(low, double(p[int(axis)])), high = std::max(high, double(p[int(axis)]));
+  }
+  // All surfaces by the same planes.
+  const auto planes = surfaces.empty()
+                          ? std::vector<double>{}
+                          : cortex::planes_between(low, high, 1e3 * options.spacing, 1e3 * options.offset);
+  for (std::size_t i = 0; i < surfaces.size(); ++i)
+    stacks.push_back(cortex::cut(surfaces[i], surface_names[i], axis, planes));
+  cortex::ContourStack stack = cortex::together(stacks);
+  const std::string fault = cortex::fault_of(stack);
+  if (!fault.empty()) throw Error(options.inputs.front().string() + ": " + fault);
+  cortex::FitSummary summary;
+  if (!options.straight)
+    stack = cortex::fitted(stack, {.tolerance = 1e3 * options.tolerance}, summary, console.progress());
+  write_contour_files(stack, options.out);
+  std::size_t loops = 0;
+  double along = 0.;
+  for (const cortex::Section& section : stack.sections)
+    for (const cortex::Contour& contour : section.contours) ++loops, along += length(contour.curve);
+  console.print({{"file", options.out.string()},
+                 {"sections", stack.sections.size()},
+                 {"contours", loops},
+                 {"length", along / 1e3},
+                 {"cubics", summary.pieces},
+                 {"corners", summary.corners},
+                 {"rms", summary.rms / 1e3},
+                 {"greatest", summary.greatest / 1e3},
+                 {"length_per_cubic", summary.pieces ? summary.length / 1e3 / double(summary.pieces) : 0.}});
+  console.table(
+      {"file", "sections", "contours", "length mm", "cubics", "mm a cubic", "rms mm", "greatest mm"},
+      {{options.out.string(), std::to_string(stack.sections.size()), std::to_string(loops),
+        fmt::format("{:.1f}", along / 1e3), std::to_string(summary.pieces),
+        summary.pieces ? fmt::format("{:.2f}", summary.length / 1e3 / double(summary.pieces)) : "",
+        fmt::format("{:.4f}", summary.rms / 1e3), fmt::format("{:.3f}", summary.greatest / 1e3)}});
+}
+
+}  // namespace
+
+std::function<void()> cortex_contours(CLI::App& command, Console& console) {
+  const auto o = std::make_shared<Options>();
+  command
+      .add_option(
+          "input", o->inputs,
+          "Surfaces (GIFTI, FreeSurfer), volumes (.nii, .nii.gz), folders of .png sections, or contours of "
+          "other "
+          "programs (.jser, .slc, .svg): of two the first is the outer boundary, the second the inner one")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("-o,--out", o->out, "FILE.contours, or a folder for one .svg a section")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("--name", o->names, "What the boundaries are called, in the order of the files")
+      ->type_name("NAME");
+  command.add_option("--axis", o->axis, "Across the sections: x sagittal, y coronal, z horizontal")
+      ->capture_default_str()
+      ->check(CLI::IsMember({"x", "y", "z"}));
+  must_be_within(*command.add_option("--spacing", o->spacing, "Of the sections, mm")->capture_default_str(),
+                 1e-4, 1e3);
+  must_be_within(
+      *command.add_option("--offset", o->offset, "Where one of them is, mm")->capture_default_str(), -1e4,
+      1e4);
+  command.add_option("--threshold", o->threshold,
+                     "Of a volume or pictures (0–1): what is brighter is inside");
+  must_be_within(*command.add_option("--pixel", o->pixel, "Of pictures, mm"), 1e-6, 1e3);
+  must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
+                 1e3);
+  must_be_within(
+      *command.add_option("--tolerance", o->tolerance, "Of the curves: root mean square of the distance, mm")
+           ->capture_default_str(),
+      1e-4, 10.);
+  command.add_flag("--straight", o->straight, "Keep polygons as they are, and fit no curves");
+  add_force(command, o->force);
+  return [o, &console] { run(*o, console); };
+}
+
+std::function<void()> cortex_compare(CLI::App& command, Console& console) {
+  struct Compare {
+    fs::path file, svg;
+    std::string object;
+    bool force = false;
+  };
+  const auto o = std::make_shared<Compare>();
+  command.add_option("file", o->file, "Contours: .contours, .jser, .slc, or a folder of .svg")
+      ->required()
+      ->type_name("FILE");
+  command.add_option("--object", o->object, "Compare only this boundary")->type_name("NAME");
+  command.add_option("--svg", o->svg, "A folder for drawings, each section over the one before it")
+      ->type_name("FOLDER");
+  add_force(command, o->force);
+  return [o, &console] {
+    if (!o->svg.empty() && !o->force) refuse_existing({o->svg});
+    const cortex::ContourStack stack = read_contour_files(o->file, 1e3, console);
+    if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
+      throw Error(fmt::format("{}: has no object '{}'", o->file.string(), o->object));
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    std::vector<std::vector<std::string>> table;
+    for (const cortex::SectionChange& change : cortex::changes(stack, console.progress())) {
+      const std::string& name = stack.objects[change.object];
+      if (!o->object.empty() && name != o->object) continue;
+      const double from = stack.sections[change.section].at / 1e3,
+                   to = stack.sections[change.section + 1].at / 1e3;
+      rows.push_back({{"from", from},
+                      {"to", to},
+                      {"object", name},
+                      {"mean", change.mean / 1e3},
+                      {"p95", change.p95 / 1e3},
+                      {"hausdorff", change.greatest / 1e3},
+                      {"overlap", change.overlap}});
+      table.push_back({fmt::format("{:.3f}", from), fmt::format("{:.3f}", to), name,
+                       fmt::format("{:.3f}", change.mean / 1e3), fmt::format("{:.3f}", change.p95 / 1e3),
+                       fmt::format("{:.3f}", change.greatest / 1e3), fmt::format("{:.3f}", change.overlap)});
+    }
+    if (!o->svg.empty()) write_contour_files(stack, o->svg, true);
+    console.print({{"pairs", rows}});
+    console.table({"from mm", "to mm", "object", "mean mm", "p95 mm", "Hausdorff mm", "overlap"}, table);
+  };
+}
+
+}  // namespace forest::cli

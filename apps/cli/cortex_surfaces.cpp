@@ -1,0 +1,100 @@
+// SPDX-License-Identifier: Apache-2.0
+// brainforest cortex surfaces: contours of sections become the outer and the inner surface.
+#include <filesystem>
+#include <memory>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <nlohmann/json.hpp>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+#include "forest/cortex/surfaces.h"
+#include "forest/geometry/isosurface.h"
+#include "forest/io/surface.h"
+
+#include "apps/cli/console.h"
+#include "apps/cli/contour_files.h"
+#include "apps/cli/cortex.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
+
+namespace forest::cli {
+
+std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
+  namespace fs = std::filesystem;
+  struct Options {
+    fs::path file;
+    std::vector<fs::path> out;
+    std::string outer = "outer", inner = "inner";
+    double voxel = 0., margin = .02, unit = 1.;
+    std::uint32_t between = 2;
+    bool force = false;
+  };
+  const auto o = std::make_shared<Options>();
+  command.add_option("file", o->file, "Contours: .contours, .jser, .slc, or a folder of .svg")
+      ->required()
+      ->type_name("FILE");
+  command
+      .add_option("-o,--out", o->out, "The outer and the inner surface: GIFTI (.gii) or FreeSurfer's format")
+      ->required()
+      ->expected(2)
+      ->type_name("OUTER INNER");
+  command.add_option("--outer", o->outer, "The object that is the outer boundary")
+      ->capture_default_str()
+      ->type_name("NAME");
+  command.add_option("--inner", o->inner, "The object that is the inner one")
+      ->capture_default_str()
+      ->type_name("NAME");
+  must_be_within(
+      *command.add_option("--voxel", o->voxel, "In the sections, mm; 0: a quarter of their distance")
+           ->capture_default_str(),
+      0., 100.);
+  add_whole(command, "--between", o->between, "Layers of voxels from a section to the next", 1, 16);
+  must_be_within(
+      *command.add_option("--margin", o->margin, "What the outer surface keeps from the inner one, mm")
+           ->capture_default_str(),
+      1e-4, 1.);
+  must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
+                 1e3);
+  add_force(command, o->force);
+  return [o, &console] {
+    if (!o->force) refuse_existing(o->out);
+    const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
+    const cortex::Surfaces made = cortex::surfaces_from(stack,
+                                                        {.voxel = 1e3 * o->voxel,
+                                                         .between = int(o->between),
+                                                         .margin = 1e3 * o->margin,
+                                                         .outer = o->outer,
+                                                         .inner = o->inner},
+                                                        console.progress());
+    // Both or none.
+    NewFile outer(o->out[0]), inner(o->out[1]);
+    const auto put = [](NewFile& file, const std::string& bytes) {
+      file.write(std::as_bytes(std::span(bytes.data(), bytes.size())));
+    };
+    put(outer, io::write_surface(made.outer, o->out[0].string()));
+    put(inner, io::write_surface(made.inner, o->out[1].string()));
+    outer.commit(), inner.commit();
+    nlohmann::ordered_json rows = nlohmann::ordered_json::array();
+    std::vector<std::vector<std::string>> table;
+    const auto tell = [&](const fs::path& path, const Mesh& mesh, std::size_t cut) {
+      rows.push_back({{"file", path.string()},
+                      {"vertices", mesh.positions.size()},
+                      {"triangles", mesh.triangles.size()},
+                      {"euler", euler_number(mesh)},
+                      {"volume", volume(mesh) / 1e9},
+                      {"area", area(mesh) / 1e6},
+                      {"cut_voxels", cut}});
+      table.push_back({path.string(), std::to_string(mesh.positions.size()),
+                       std::to_string(mesh.triangles.size()), std::to_string(1 - euler_number(mesh) / 2),
+                       fmt::format("{:.1f}", volume(mesh) / 1e9), fmt::format("{:.1f}", area(mesh) / 1e6),
+                       std::to_string(cut)});
+    };
+    tell(o->out[0], made.outer, made.outer_cut), tell(o->out[1], made.inner, made.inner_cut);
+    console.print({{"surfaces", rows}, {"pushed_voxels", made.pushed}});
+    console.table({"file", "vertices", "triangles", "genus", "volume mm³", "area mm²", "voxels cut"}, table);
+  };
+}
+
+}  // namespace forest::cli

@@ -1,0 +1,52 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/compare.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/progress.h"
+
+namespace forest::cortex {
+namespace {
+
+std::vector<Place> square(double side, double shift) {
+  return {{shift, 0.}, {side + shift, 0.}, {side + shift, side}, {shift, side}};
+}
+
+ContourStack pair(const std::vector<Place>& a, const std::vector<Place>& b) {
+  ContourStack stack{.axis = Axis::z, .objects = {"other", "outer"}, .sections = {{0., {}}, {1000., {}}}};
+  stack.sections[0].contours.push_back({1, straight_loop(a)});
+  if (!b.empty()) stack.sections[1].contours.push_back({1, straight_loop(b)});
+  return stack;
+}
+
+TEST(Changes, OfTheSameContourAreNone) {
+  const auto all = changes(pair(square(5000., 0.), square(5000., 0.)), Progress::none());
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].object, 1u);
+  EXPECT_NEAR(all[0].greatest, 0., 1e-3);
+  EXPECT_EQ(all[0].overlap, 1.);
+}
+
+TEST(Changes, OfAShiftedSquareAreKnown) {
+  const auto all = changes(pair(square(5000., 0.), square(5000., 400.)), Progress::none());
+  ASSERT_EQ(all.size(), 1u);
+  // Two sides move by 400 µm, along the two others only the ends stick out.
+  EXPECT_NEAR(all[0].greatest, 400., 1.);
+  EXPECT_NEAR(all[0].mean, (2. * 5000. * 400. - 400. * 400. + 400. * 200. * 2.) / 20000., 10.);
+  EXPECT_NEAR(all[0].overlap, 4600. / 5400., .01);
+}
+
+TEST(Changes, SeeWhatOnlyOneSectionHas) {
+  ContourStack stack = pair(square(5000., 0.), square(5000., 0.));
+  stack.sections[1].contours.push_back({1, straight_loop(square(100., 20000.))});
+  const auto more = changes(stack, Progress::none());
+  EXPECT_NEAR(more[0].greatest, 15100., 1.);
+  const auto gone = changes(pair(square(5000., 0.), {}), Progress::none());
+  ASSERT_EQ(gone.size(), 1u);
+  EXPECT_TRUE(std::isnan(gone[0].mean));
+}
+
+}  // namespace
+}  // namespace forest::cortex

@@ -1,0 +1,261 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/contours.h"
+
+#include <algorithm>
+#include <cmath>
+#include <optional>
+#include <tuple>
+#include <unordered_map>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/progress.h"
+
+namespace forest::cortex {
+namespace {
+
+constexpr std::array<std::array<int, 2>, 3> flat_axes{{{1, 2}, {0, 2}, {0, 1}}};
+
+std::string said(const Eigen::Vector3d& point) {
+  return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", point.x() / 1e3, point.y() / 1e3, point.z() / 1e3);
+}
+
+using Edge = std::uint64_t;
+Edge edge_of(std::uint32_t a, std::uint32_t b) {
+  return std::uint64_t(std::min(a, b)) << 32 | std::max(a, b);
+}
+
+// What one plane cuts, of the triangles that it may cut.
+std::vector<Contour> cut_one(const Mesh& surface, Axis axis, double at,
+                             std::span<const std::uint32_t> triangles) {
+  const auto height = [&](std::uint32_t vertex) { return double(surface.positions[vertex][int(axis)]) - at; };
+  // Seen so that the plane's axes are right-handed or, across y, left-handed.
+  const bool mirrored = axis == Axis::y;
+  struct Step {
+    Edge from, to;
+  };
+  std::vector<Step> steps;
+  for (const std::uint32_t t : triangles) {
+    const Triangle& corner = surface.triangles[t];
+    // Walking around the triangle one leaves what is above by one edge and comes back by another.
+    Edge down = 0, up = 0;
+    int crossings = 0;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const std::uint32_t a = corner[k], b = corner[(k + 1) % 3];
+      const bool a_above = height(a) >= 0., b_above = height(b) >= 0.;
+      if (a_above == b_above) continue;
+      (a_above ? down : up) = edge_of(a, b);
+      ++crossings;
+    }
+    if (crossings != 2) continue;
+    steps.push_back(mirrored ? Step{up, down} : Step{down, up});
+  }
+  std::unordered_map<Edge, std::size_t> next;  // the step that begins at an edge
+  next.reserve(steps.size());
+  const auto place_of = [&](Edge edge) {
+    const auto a = std::uint32_t(edge >> 32), b = std::uint32_t(edge);
+    const Eigen::Vector3d p = surface.positions[a].cast<double>(), q = surface.positions[b].cast<double>();
+    const double share = height(a) / (height(a) - height(b));
+    return Eigen::Vector3d(p + share * (q - p));
+  };
+  for (std::size_t i = 0; i < steps.size(); ++i)
+    if (!next.emplace(steps[i].from, i).second)
+      throw Error(
+          fmt::format("the surface is no surface at {}: an edge has more than two triangles or they "
+                      "face opposite ways; repair it",
+                      said(place_of(steps[i].from))));
+  std::vector<Contour> contours;
+  std::vector<bool> walked(steps.size(), false);
+  for (std::size_t first = 0; first < steps.size(); ++first) {
+    if (walked[first]) continue;
+    std::vector<Place> polygon;
+    for (std::size_t i = first; !walked[i];) {
+      walked[i] = true;
+      const Place place = flat(place_of(steps[i].from), axis);
+      if (polygon.empty() || place != polygon.back()) polygon.push_back(place);
+      const auto found = next.find(steps[i].to);
+      if (found == next.end())
+        throw Error(fmt::format("the surface is open at {}: give a closed one", said(place_of(steps[i].to))));
+      i = found->second;
+    }
+    while (polygon.size() > 1 && polygon.back() == polygon.front()) polygon.pop_back();
+    if (polygon.size() >= 3) contours.push_back({.object = 0, .curve = straight_loop(polygon)});
+  }
+  return contours;
+}
+
+// Where two edges of a section's polygons cross that share no end.
+struct Crossing {
+  Place place;
+  std::size_t first, second;  // contours
+};
+std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons) {
+  struct Side {
+    Place a, b;
+    std::size_t polygon, index;
+  };
+  std::vector<Side> sides;
+  for (std::size_t p = 0; p < polygons.size(); ++p)
+    for (std::size_t i = 0; i < polygons[p].size(); ++i)
+      sides.push_back({polygons[p][i], polygons[p][(i + 1) % polygons[p].size()], p, i});
+  // A sweep from left to right: those that end before the next one begins are done with.
+  const auto left = [](const Side& side) { return std::min(side.a.x(), side.b.x()); };
+  std::ranges::sort(sides, {}, [&](const Side& s) { return std::tuple(left(s), s.polygon, s.index); });
+  std::vector<std::size_t> open;
+  const auto cross = [](const Place& u, const Place& v) { return u.x() * v.y() - u.y() * v.x(); };
+  for (std::size_t k = 0; k < sides.size(); ++k) {
+    const Side& one = sides[k];
+    const double begin = left(one);
+    std::erase_if(open, [&](std::size_t o) { return std::max(sides[o].a.x(), sides[o].b.x()) < begin; });
+    for (const std::size_t o : open) {
+      const Side& other = sides[o];
+      if (std::min(one.a.y(), one.b.y()) > std::max(other.a.y(), other.b.y()) ||
+          std::max(one.a.y(), one.b.y()) < std::min(other.a.y(), other.b.y()))
+        continue;
+      const Place u = one.b - one.a, v = other.b - other.a;
+      const double a = cross(u, other.a - one.a), b = cross(u, other.b - one.a);
+      const double c = cross(v, one.a - other.a), d = cross(v, one.b - other.a);
+      if (a * b < 0. && c * d < 0.)
+        return Crossing{one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
+                        std::max(one.polygon, other.polygon)};
+    }
+    open.push_back(k);
+  }
+  return {};
+}
+
+}  // namespace
+
+std::string fault_of(const ContourStack& stack) {
+  for (std::size_t i = 0; i < stack.sections.size(); ++i) {
+    const Section& section = stack.sections[i];
+    if (!std::isfinite(section.at)) return fmt::format("section {} is at no number; say where it is", i + 1);
+    if (i && section.at <= stack.sections[i - 1].at)
+      return fmt::format(
+          "sections {} and {} are both at {:.3f} mm or in the wrong order; sort them by their place", i,
+          i + 1, section.at / 1e3);
+    for (const Contour& contour : section.contours) {
+      const std::string& object = stack.objects.at(contour.object);
+      if (contour.curve.pieces() < 1 || contour.curve.points.size() % 3 != 0)
+        return fmt::format("a contour of '{}' in section {} ({:.3f} mm) has no points; leave it out", object,
+                           i + 1, section.at / 1e3);
+      for (const Place& point : contour.curve.points)
+        if (!point.allFinite())
+          return fmt::format(
+              "a contour of '{}' in section {} ({:.3f} mm) has a coordinate that is no number; trace "
+              "it again",
+              object, i + 1, section.at / 1e3);
+    }
+  }
+  std::vector<std::string> faults(stack.sections.size());
+  parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
+    const Section& section = stack.sections[i];
+    for (std::uint32_t object = 0; object < stack.objects.size() && faults[i].empty(); ++object) {
+      std::vector<std::vector<Place>> polygons;
+      for (const Contour& contour : section.contours)
+        if (contour.object == object) polygons.push_back(flattened(contour.curve, 2.));
+      if (const auto found = crossing_in(polygons))
+        faults[i] = fmt::format(
+            "{} of '{}' cross{} in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; draw them apart",
+            found->first == found->second ? "one contour" : "two contours", stack.objects[object],
+            found->first == found->second ? "es itself" : "", i + 1, section.at / 1e3, found->place.x() / 1e3,
+            found->place.y() / 1e3);
+    }
+  });
+  for (const std::string& fault : faults)
+    if (!fault.empty()) return fault;
+  return {};
+}
+
+Place flat(const Eigen::Vector3d& point, Axis axis) {
+  const auto& axes = flat_axes[std::size_t(axis)];
+  return {point[axes[0]], point[axes[1]]};
+}
+
+Eigen::Vector3d solid(const Place& place, double at, Axis axis) {
+  Eigen::Vector3d point;
+  const auto& axes = flat_axes[std::size_t(axis)];
+  point[int(axis)] = at, point[axes[0]] = place.x(), point[axes[1]] = place.y();
+  return point;
+}
+
+std::vector<double> planes_between(double low, double high, double spacing, double offset) {
+  std::vector<double> planes;
+  for (double k = std::ceil((low - offset) / spacing); k * spacing + offset <= high; k += 1.)
+    planes.push_back(k * spacing + offset);
+  return planes;
+}
+
+ContourStack cut(const Mesh& surface, const std::string& object, Axis axis, std::span<const double> planes) {
+  for (std::size_t i = 0; i < surface.positions.size(); ++i)
+    if (!surface.positions[i].allFinite())
+      throw Error(fmt::format("vertex {} of the surface '{}' has a coordinate that is no number; repair it",
+                              i, object));
+  std::vector<std::vector<std::uint32_t>> touched(planes.size());
+  for (std::uint32_t t = 0; t < surface.triangles.size(); ++t) {
+    float low = HUGE_VALF, high = -HUGE_VALF;
+    for (const std::uint32_t corner : surface.triangles[t]) {
+      low = std::min(low, surface.positions[corner][int(axis)]);
+      high = std::max(high, surface.positions[corner][int(axis)]);
+    }
+    // A plane cuts it when low < plane <= high.
+    auto first = std::ranges::upper_bound(planes, double(low));
+    for (; first != planes.end() && *first <= double(high); ++first)
+      touched[std::size_t(first - planes.begin())].push_back(t);
+  }
+  ContourStack stack{.axis = axis, .objects = {object}, .sections = std::vector<Section>(planes.size())};
+  parallel_for(planes.size(), 1, [&](std::size_t i) {
+    stack.sections[i] = {.at = planes[i], .contours = cut_one(surface, axis, planes[i], touched[i])};
+  });
+  return stack;
+}
+
+ContourStack together(std::span<const ContourStack> stacks) {
+  ContourStack all = stacks.front();
+  for (const ContourStack& stack : stacks.subspan(1)) {
+    if (stack.axis != all.axis || stack.sections.size() != all.sections.size())
+      throw Error("the stacks are cut along different axes or have different sections; cut them alike");
+    const auto before = std::uint32_t(all.objects.size());
+    all.objects.insert(all.objects.end(), stack.objects.begin(), stack.objects.end());
+    for (std::size_t i = 0; i < all.sections.size(); ++i) {
+      if (stack.sections[i].at != all.sections[i].at)
+        throw Error(fmt::format("section {} is at {} mm in one stack and at {} mm in another; cut them alike",
+                                i + 1, all.sections[i].at / 1e3, stack.sections[i].at / 1e3));
+      for (Contour contour : stack.sections[i].contours) {
+        contour.object += before;
+        all.sections[i].contours.push_back(std::move(contour));
+      }
+    }
+  }
+  return all;
+}
+
+ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSummary& summary,
+                    Progress& progress) {
+  ContourStack result = stack;
+  std::vector<Contour*> all;
+  for (Section& section : result.sections)
+    for (Contour& contour : section.contours) all.push_back(&contour);
+  std::vector<FitSummary> each(all.size());
+  progress.begin("fitting curves", all.size());
+  parallel_for(all.size(), 1, [&](std::size_t i) {
+    const Fit fit = fit_loop(flattened(all[i]->curve, options.tolerance / 4.), options);
+    const double along = length(all[i]->curve);
+    each[i] = {1, fit.curve.pieces(), fit.corners, along, fit.rms * fit.rms * along, fit.greatest};
+    all[i]->curve = fit.curve;
+    progress.advance();
+  });
+  progress.end();
+  summary = {};
+  for (const FitSummary& one : each) {
+    summary.contours += one.contours, summary.pieces += one.pieces, summary.corners += one.corners;
+    summary.length += one.length, summary.rms += one.rms;
+    summary.greatest = std::max(summary.greatest, one.greatest);
+  }
+  summary.rms = summary.length > 0. ? std::sqrt(summary.rms / summary.length) : 0.;
+  return result;
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,75 @@
+// SPDX-License-Identifier: Apache-2.0
+// Sections of a cortex: parallel planes, and in each the closed curves that bound the tissue, of one or more surfaces. They
+// come from cutting surfaces, from volumes, or from people who traced them; they go to reconstruction (surfaces.h).
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <string>
+#include <vector>
+
+#include "forest/geometry/bezier.h"
+#include "forest/geometry/mesh.h"
+
+namespace forest {
+class Progress;
+}
+
+namespace forest::cortex {
+
+/// Across the planes. Of a human brain in the usual coordinates: x sagittal, y coronal, z horizontal sections.
+enum class Axis : std::uint8_t { x, y, z };
+
+/// In a plane the two other axes in their order: (y, z), (x, z) or (x, y).
+Place flat(const Eigen::Vector3d& point, Axis axis);
+Eigen::Vector3d solid(const Place& place, double at, Axis axis);
+
+/// One closed curve. Walking along it one has the inside of its surface to the left, as the plane's axes are drawn: around a
+/// hole it runs clockwise.
+struct Contour {
+  std::uint32_t object = 0;  // which surface it is of: ContourStack::objects
+  BezierLoop curve;          // µm
+
+  friend bool operator==(const Contour&, const Contour&) = default;
+};
+
+struct Section {
+  double at = 0.;  // µm, along the axis
+  std::vector<Contour> contours;
+
+  friend bool operator==(const Section&, const Section&) = default;
+};
+
+struct ContourStack {
+  Axis axis = Axis::y;
+  std::vector<std::string> objects;  // "outer", "inner", or what the file says
+  std::vector<Section> sections;     // `at` ascends
+
+  friend bool operator==(const ContourStack&, const ContourStack&) = default;
+};
+
+/// What is wrong with contours, in one sentence that names object, section and place; empty when nothing is. Tested are
+/// that numbers are finite, sections ascend, and no contour of an object crosses itself or another one of it.
+std::string fault_of(const ContourStack& stack);
+
+/// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
+std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);
+
+/// Cuts a closed surface: straight loops, one corner an edge that is cut. A vertex within a plane counts as above it, so
+/// that loops always close. Parts of the surface may hide in others (sections then hold loops within loops).
+/// Throws Error where the surface has a border, with the place.
+ContourStack cut(const Mesh& surface, const std::string& object, Axis axis, std::span<const double> planes);
+
+/// The stacks as one; their sections must be at the same places. Throws Error.
+ContourStack together(std::span<const ContourStack> stacks);
+
+struct FitSummary {
+  std::size_t contours = 0, pieces = 0, corners = 0;
+  double length = 0.;              // µm
+  double rms = 0., greatest = 0.;  // µm, over all contours
+};
+/// Every contour by the fewest cubics that lie along it (fit_loop). On all cores.
+ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSummary& summary,
+                    Progress& progress);
+
+}  // namespace forest::cortex

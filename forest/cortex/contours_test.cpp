@@ -1,0 +1,176 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/contours.h"
+
+#include <cmath>
+#include <numbers>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/parallel.h"
+#include "forest/core/progress.h"
+
+#include "tests/refused.h"
+
+namespace forest::cortex {
+namespace {
+
+constexpr double pi = std::numbers::pi;
+
+const Mesh& ball() {
+  static const Mesh mesh = icosphere({100.f, 200.f, -300.f}, 10000.f, 5, 0);
+  return mesh;
+}
+
+Mesh turned_inside_out(Mesh mesh) {
+  for (Triangle& t : mesh.triangles) std::swap(t[0], t[1]);
+  return mesh;
+}
+
+TEST(Cut, OfABallIsACircleInEveryPlaneOfEveryAxis) {
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    const Eigen::Vector3d centre(100., 200., -300.);
+    const auto planes = planes_between(-9000., 9000., 1000.);
+    ASSERT_EQ(planes.size(), 19u);
+    const ContourStack stack = cut(ball(), "outer", axis, planes);
+    EXPECT_EQ(stack.objects, std::vector<std::string>{"outer"});
+    for (const Section& section : stack.sections) {
+      ASSERT_EQ(section.contours.size(), 1u);
+      const double height = section.at - centre[int(axis)];
+      const double radius = std::sqrt(1e8 - height * height);
+      // The ball is a polyhedron, 0.2 % smaller at most. Its inside is to the left.
+      EXPECT_NEAR(area(section.contours[0].curve) / (pi * radius * radius), 1., 5e-3);
+      for (const Place& p : section.contours[0].curve.points)
+        EXPECT_NEAR((p - flat(centre, axis)).norm(), radius, 40.);
+    }
+  }
+}
+
+TEST(Cut, TimesTheirDistanceSumsToTheVolume) {
+  Mesh two = ball();
+  append(two, icosphere({25000.f, 0.f, 0.f}, 4000.f, 4, 0));
+  append(two, turned_inside_out(icosphere({0.f, 0.f, 0.f}, 3000.f, 4, 0)));  // a cavity
+  const ContourStack stack = cut(two, "outer", Axis::y, planes_between(-11000., 11000., 50.));
+  double sum = 0.;
+  for (const Section& section : stack.sections)
+    for (const Contour& contour : section.contours) sum += 50. * area(contour.curve);
+  EXPECT_NEAR(sum / volume(two), 1., 1e-4);
+}
+
+TEST(Cut, HasALoopForEachPieceAndHoleOfASection) {
+  Mesh two = ball();
+  append(two, icosphere({25000.f, 0.f, 0.f}, 4000.f, 4, 0));
+  append(two, turned_inside_out(icosphere({0.f, 0.f, 0.f}, 3000.f, 4, 0)));
+  const auto loops = [&](double at) {
+    const double plane[] = {at};
+    return cut(two, "outer", Axis::z, plane).sections[0].contours.size();
+  };
+  EXPECT_EQ(loops(0.), 3u);
+  EXPECT_EQ(loops(3500.), 2u);
+  EXPECT_EQ(loops(5000.), 1u);
+  EXPECT_EQ(loops(11000.), 0u);
+}
+
+TEST(Cut, ClosesItsLoopsThroughVerticesAndEdgesToo) {
+  // An octahedron: planes through vertices, along edges, through its four-cornered middle.
+  Mesh mesh;
+  mesh.positions = {{1000.f, 0.f, 0.f},  {-1000.f, 0.f, 0.f}, {0.f, 1000.f, 0.f},
+                    {0.f, -1000.f, 0.f}, {0.f, 0.f, 1000.f},  {0.f, 0.f, -1000.f}};
+  mesh.labels.assign(6, 0);
+  for (const std::uint32_t x : {0u, 1u})
+    for (const std::uint32_t y : {2u, 3u})
+      for (const std::uint32_t z : {4u, 5u})
+        mesh.triangles.push_back((x + y + z) % 2 == 0 ? Triangle{x, y, z} : Triangle{y, x, z});
+  ASSERT_TRUE(is_closed(mesh));
+  ASSERT_GT(volume(mesh), 0.);
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    const double planes[] = {-1000., 0., 500., 1000.};
+    const ContourStack stack = cut(mesh, "outer", axis, planes);
+    EXPECT_EQ(stack.sections[0].contours.size(), 0u);
+    ASSERT_EQ(stack.sections[1].contours.size(), 1u);
+    EXPECT_NEAR(area(stack.sections[1].contours[0].curve), 2e6, 1e-6);
+    ASSERT_EQ(stack.sections[2].contours.size(), 1u);
+    EXPECT_NEAR(area(stack.sections[2].contours[0].curve), .5e6, 1e-6);
+  }
+}
+
+TEST(Cut, NamesThePlaceWhereASurfaceIsOpenOrNoNumber) {
+  Mesh open = ball();
+  // Not the triangle that comes last: none that any plane misses.
+  open.triangles.erase(open.triangles.begin() + 100);
+  const auto planes = planes_between(-10000., 10000., 20.);
+  EXPECT_NE(refused([&] { (void)cut(open, "outer", Axis::y, planes); }).find("is open at ("),
+            std::string::npos);
+  Mesh broken = ball();
+  broken.positions[7].x() = NAN;
+  EXPECT_NE(refused([&] { (void)cut(broken, "outer", Axis::y, planes); }).find("vertex 7"),
+            std::string::npos);
+}
+
+TEST(Cut, IsTheSameAtAnyNumberOfThreads) {
+  const auto planes = planes_between(-10000., 10000., 2000.);
+  const auto made = [&](unsigned threads) {
+    const ThreadLimit limit(threads);
+    FitSummary summary;
+    return fitted(cut(ball(), "outer", Axis::x, planes), {}, summary, Progress::none());
+  };
+  EXPECT_EQ(made(1), made(2));
+}
+
+TEST(Fitted, TellsHowManyCurvesAndHowFarOffTheyAre) {
+  FitSummary summary;
+  const ContourStack cuts = cut(ball(), "outer", Axis::y, planes_between(-9000., 9000., 1000.));
+  const ContourStack curves = fitted(cuts, {.tolerance = 20.}, summary, Progress::none());
+  EXPECT_EQ(summary.contours, 19u);
+  EXPECT_LE(summary.rms, 20.);
+  EXPECT_GT(summary.length / double(summary.pieces), 5000.);
+  double along = 0.;
+  for (const Section& section : cuts.sections) along += length(section.contours[0].curve);
+  EXPECT_NEAR(summary.length, along, 1.);
+  EXPECT_EQ(fault_of(curves), "");
+}
+
+TEST(Contours, OfTwoSurfacesAreOneStackWhenTheirSectionsAreAlike) {
+  const auto planes = planes_between(-9000., 9000., 1000.);
+  const ContourStack outer = cut(ball(), "outer", Axis::y, planes);
+  const ContourStack inner = cut(icosphere({100.f, 200.f, -300.f}, 7000.f, 4, 0), "inner", Axis::y, planes);
+  const ContourStack stacks[] = {outer, inner};
+  const ContourStack both = together(stacks);
+  EXPECT_EQ(both.objects, (std::vector<std::string>{"outer", "inner"}));
+  ASSERT_EQ(both.sections[9].contours.size(), 2u);
+  EXPECT_EQ(both.sections[9].contours[1].object, 1u);
+  const ContourStack other = cut(ball(), "inner", Axis::y, planes_between(-9000., 9000., 1000., 10.));
+  const ContourStack unlike[] = {outer, other};
+  EXPECT_NE(refused([&] { (void)together(unlike); }).find("section"), std::string::npos);
+}
+
+ContourStack drawn(std::vector<std::vector<Place>> polygons) {
+  ContourStack stack{
+      .axis = Axis::y, .objects = {"outer"}, .sections = {Section{.at = 3000., .contours = {}}}};
+  for (const auto& polygon : polygons)
+    stack.sections[0].contours.push_back({.object = 0, .curve = straight_loop(polygon)});
+  return stack;
+}
+
+TEST(FaultOf, NamesThePlaceWhereContoursCross) {
+  const std::vector<Place> square{{0., 0.}, {4000., 0.}, {4000., 4000.}, {0., 4000.}};
+  auto shifted = square;
+  for (Place& p : shifted) p += Place(2000., 1000.);
+  auto within = square;
+  for (Place& p : within) p = Place(1000., 1000.) + .25 * p;
+  EXPECT_EQ(fault_of(drawn({square, within})), "");
+  const std::string crossing = fault_of(drawn({square, shifted}));
+  EXPECT_NE(crossing.find("'outer'"), std::string::npos) << crossing;
+  EXPECT_NE(crossing.find("3.000"), std::string::npos) << crossing;         // the section
+  EXPECT_NE(crossing.find("2.000, 4.000"), std::string::npos) << crossing;  // and where
+  const std::string eight = fault_of(drawn({{{0., 0.}, {4000., 4000.}, {4000., 0.}, {0., 4000.}}}));
+  EXPECT_NE(eight.find("2.000, 2.000"), std::string::npos) << eight;
+  ContourStack twice = drawn({square});
+  twice.sections.push_back(twice.sections[0]);
+  EXPECT_NE(fault_of(twice), "");
+  ContourStack broken = drawn({square});
+  broken.sections[0].contours[0].curve.points[4].x() = NAN;
+  EXPECT_NE(fault_of(broken), "");
+}
+
+}  // namespace
+}  // namespace forest::cortex

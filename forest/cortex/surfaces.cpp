@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/surfaces.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/progress.h"
+#include "forest/geometry/isosurface.h"
+
+namespace forest::cortex {
+namespace {
+
+std::uint32_t object_of(const ContourStack& stack, const std::string& name) {
+  const auto found = std::ranges::find(stack.objects, name);
+  if (found != stack.objects.end()) return std::uint32_t(found - stack.objects.begin());
+  std::string names;
+  for (const std::string& one : stack.objects) names += (names.empty() ? "" : ", ") + one;
+  throw Error(fmt::format("the contours have no object '{}'; name one of {}", name, names));
+}
+
+double distance_of_sections(const ContourStack& stack) {
+  if (stack.sections.size() < 2) throw Error("a surface needs two sections or more; give more of them");
+  const double spacing =
+      (stack.sections.back().at - stack.sections.front().at) / double(stack.sections.size() - 1);
+  for (std::size_t i = 0; i < stack.sections.size(); ++i)
+    if (std::abs(stack.sections[i].at - stack.sections[0].at - double(i) * spacing) > .01 * spacing)
+      throw Error(
+          fmt::format("section {} is at {:.3f} mm where {:.3f} mm is expected: sections must be at equal "
+                      "distances; bring in "
+                      "the missing ones",
+                      i + 1, stack.sections[i].at / 1e3, (stack.sections[0].at + double(i) * spacing) / 1e3));
+  return spacing;
+}
+
+// Where the grid stands: its first two axes are those of the sections, its third one goes across them.
+struct Raster {
+  Place origin;
+  double step, spacing, first;
+  std::size_t width, height, sections;  // with one empty section before and one behind
+  int between;
+};
+
+Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
+  Raster raster{};
+  raster.spacing = distance_of_sections(stack);
+  raster.step = options.voxel > 0. ? options.voxel : raster.spacing / 4.;
+  raster.between = options.between;
+  Place low = Place::Constant(HUGE_VAL), high = -low;
+  for (const Section& section : stack.sections)
+    for (const Contour& contour : section.contours)
+      for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
+  if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
+  const double border = 2.5 * raster.step;
+  raster.origin = low - Place::Constant(border);
+  const auto points = [&](double extent) {
+    const double count = std::ceil((extent + 2. * border) / raster.step) + 1.;
+    if (count > 1e5)
+      throw Error("contours spread over more than 100,000 voxels; give a larger voxel, or look at the unit");
+    return std::size_t(count);
+  };
+  raster.width = points(high.x() - low.x()), raster.height = points(high.y() - low.y());
+  raster.sections = stack.sections.size() + 2;
+  raster.first = stack.sections.front().at - raster.spacing;
+  const double total =
+      double(raster.width) * double(raster.height) * double(raster.sections) * raster.between;
+  if (total > 4e8)
+    throw Error(
+        fmt::format("the grid would have {:.1f} million points and may have 400; give a voxel of {:.3f} mm",
+                    total / 1e6, raster.step * std::sqrt(total / 4e8) / 1e3));
+  return raster;
+}
+
+// Where a surface passes between two sections, a distance cannot change by more than so many of their distances: what lies
+// far outside in the next section says only that the surface ended somewhere before it. Of 1, 1.5, 2, 3 and none this one
+// came nearest to the surfaces of a brain (docs/cortex/surfaces.md).
+constexpr double most_change = 2.;
+
+// The cubic through four values at -1, 0, 1, 2, whose slopes at 0 and 1 are those of its neighbours.
+float between(float a, float b, float c, float d, float t, float most) {
+  if ((b < 0.f) != (c < 0.f)) {
+    const auto limited = [&](float far, float near) {
+      const float left = std::max(most - std::abs(near), std::min(std::abs(near), .025f * most));
+      return std::copysign(std::min(left, std::abs(far)), far);
+    };
+    if (std::abs(c - b) > most) (std::abs(c) > std::abs(b) ? c = limited(c, b) : b = limited(b, c));
+    a = std::clamp(a, b - most, b + most), d = std::clamp(d, c - most, c + most);
+  }
+  return b + .5f * t * (c - a + t * (2.f * a - 5.f * b + 4.f * c - d + t * (3.f * (b - c) + d - a)));
+}
+
+ScalarGrid interpolated(const ContourStack& stack, std::uint32_t object, const Raster& raster,
+                        Progress& progress) {
+  const std::size_t layer = raster.width * raster.height;
+  const double band = 4. * raster.spacing;
+  std::vector<std::vector<float>> known(raster.sections);
+  progress.begin(fmt::format("distances from {}", stack.objects[object]), raster.sections);
+  parallel_for(raster.sections, 1, [&](std::size_t k) {
+    const bool empty = k == 0 || k + 1 == raster.sections;
+    static const Section nothing;
+    known[k] = signed_distances(empty ? nothing : stack.sections[k - 1], object, raster.origin, raster.step,
+                                raster.width, raster.height, band);
+    progress.advance();
+  });
+  progress.end();
+  ScalarGrid grid{
+      .size = {raster.width, raster.height, (raster.sections - 1) * std::size_t(raster.between) + 1},
+      .origin = {raster.origin.x(), raster.origin.y(), raster.first},
+      .step = {raster.step, raster.step, raster.spacing / raster.between},
+      .values = {}};
+  grid.values.resize(grid.count());
+  parallel_for(grid.size[2], 1, [&](std::size_t z) {
+    const std::size_t k = z / std::size_t(raster.between);
+    const float t = float(z % std::size_t(raster.between)) / float(raster.between);
+    const auto at = [&](std::size_t i) { return known[std::min(i, raster.sections - 1)].data(); };
+    const float *a = at(k == 0 ? 0 : k - 1), *b = at(k), *c = at(k + 1), *d = at(k + 2);
+    float* out = &grid.values[z * layer];
+    for (std::size_t i = 0; i < layer; ++i)
+      out[i] = t == 0.f ? b[i] : between(a[i], b[i], c[i], d[i], t, float(most_change * raster.spacing));
+  });
+  return grid;
+}
+
+// The grid's axes are those of a section and the one across them; the mesh's are x, y, z.
+void stand_up(Mesh& mesh, Axis axis) {
+  for (Vec3& p : mesh.positions) p = solid({p.x(), p.y()}, p.z(), axis).cast<float>();
+  if (axis == Axis::y)  // a mirror image, then
+    for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
+}
+
+}  // namespace
+
+std::vector<float> signed_distances(const Section& section, std::uint32_t object, const Place& origin,
+                                    double step, std::size_t width, std::size_t height, double band) {
+  std::vector<float> squared(width * height, float(band * band));
+  std::vector<std::vector<double>> crossings(height);  // of the rows
+  for (const Contour& contour : section.contours) {
+    if (contour.object != object) continue;
+    const auto polygon = flattened(contour.curve, std::min(2., step / 50.));
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Place a = (polygon[i] - origin) / step, b = (polygon[(i + 1) % polygon.size()] - origin) / step;
+      const Place along = b - a, low = a.cwiseMin(b), high = a.cwiseMax(b);
+      const double reach = band / step, scale = along.squaredNorm() > 0. ? 1. / along.squaredNorm() : 0.;
+      const auto from = [&](double x) { return std::size_t(std::max(0., std::ceil(x))); };
+      const auto to = [&](double x, std::size_t end) {
+        return std::size_t(std::clamp(std::floor(x) + 1., 0., double(end)));
+      };
+      for (std::size_t y = from(low.y() - reach); y < to(high.y() + reach, height); ++y)
+        for (std::size_t x = from(low.x() - reach); x < to(high.x() + reach, width); ++x) {
+          const Place off = Place(double(x), double(y)) - a;
+          const double share = std::clamp(off.dot(along) * scale, 0., 1.);
+          float& value = squared[y * width + x];
+          value = std::min(value, float((off - share * along).squaredNorm() * step * step));
+        }
+      for (std::size_t y = from(low.y()); y < height && double(y) < high.y(); ++y)
+        crossings[y].push_back(a.x() + (double(y) - a.y()) / along.y() * along.x());
+    }
+  }
+  for (float& value : squared) value = std::sqrt(value);
+  for (std::size_t y = 0; y < height; ++y) {
+    std::ranges::sort(crossings[y]);
+    for (std::size_t k = 0; k + 1 < crossings[y].size(); k += 2)
+      for (auto x = std::size_t(std::max(0., std::ceil(crossings[y][k])));
+           x < width && double(x) < crossings[y][k + 1]; ++x)
+        squared[y * width + x] = -squared[y * width + x];
+  }
+  return squared;
+}
+
+Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress) {
+  const std::string fault = fault_of(stack);
+  if (!fault.empty()) throw Error(fault);
+  const std::uint32_t outer_object = object_of(stack, options.outer),
+                      inner_object = object_of(stack, options.inner);
+  const Raster raster = raster_of(stack, options);
+  ScalarGrid inner = interpolated(stack, inner_object, raster, progress);
+  ScalarGrid outer = interpolated(stack, outer_object, raster, progress);
+  Surfaces result;
+  const auto margin = float(options.margin), least = float(raster.step / 10.);
+  // Swapped objects, or sections of different brains: most of the inner one outside is no matter of accuracy.
+  std::size_t within = 0, without = 0;
+  for (std::size_t i = 0; i < inner.count(); ++i)
+    if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? within : without);
+  if (without > within / 4)
+    throw Error(fmt::format(
+        "{:.0f} % of what lies within '{}' lies outside '{}'; swap them or give contours of one brain",
+        100. * double(without) / double(within + without), options.inner, options.outer));
+  progress.begin("one ball, inner", 0);
+  std::vector<std::uint8_t> ball;
+  result.inner_cut = grow_ball(inner, ball, least).cut;
+  progress.end();
+  for (std::size_t i = 0; i < inner.count(); ++i)
+    if (ball[i] && outer.values[i] > inner.values[i] - margin) {
+      result.pushed += outer.values[i] >= 0.f;
+      outer.values[i] = inner.values[i] - margin;
+    }
+  progress.begin("one ball, outer", 0);
+  result.outer_cut = grow_ball(outer, ball, least).cut;
+  progress.end();
+  // Within every tetrahedron both are linear: where one is smaller at all points, its surface lies outside.
+  for (std::size_t i = 0; i < inner.count(); ++i) {
+    const float most = inner.values[i] > 2.f * margin ? inner.values[i] - margin : inner.values[i] / 2.f;
+    if (outer.values[i] < 0.f)
+      outer.values[i] = std::min(outer.values[i], inner.values[i] - margin);
+    else
+      outer.values[i] = std::min(outer.values[i], most);
+  }
+  progress.begin("surfaces", 2);
+  result.inner = isosurface(inner);
+  progress.advance();
+  result.outer = isosurface(outer);
+  progress.end();
+  stand_up(result.inner, stack.axis), stand_up(result.outer, stack.axis);
+  return result;
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,147 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/surfaces.h"
+
+#include <cmath>
+
+#include <gtest/gtest.h>
+
+#include "forest/core/parallel.h"
+#include "forest/core/progress.h"
+#include "forest/geometry/isosurface.h"
+#include "forest/geometry/self_intersection.h"
+#include "forest/geometry/triangle_tree.h"
+
+#include "tests/refused.h"
+
+namespace forest::cortex {
+namespace {
+
+// A bent egg with a dent, mm across.
+Mesh folded(float scale) {
+  Mesh mesh = icosphere(Vec3::Zero(), 1.f, 6, 0);
+  for (Vec3& p : mesh.positions) {
+    const float dent = .35f * std::exp(-6.f * (p - Vec3(0.f, .3f, 1.f)).squaredNorm());
+    p = scale * 8000.f * (1.f - dent) * Vec3(p.x(), 1.3f * p.y() + .2f * p.x() * p.x(), .9f * p.z());
+  }
+  return mesh;
+}
+
+ContourStack cuts(const Mesh& outer, const Mesh& inner, Axis axis = Axis::y, double spacing = 1000.) {
+  const auto planes = planes_between(-13000., 15000., spacing);
+  const ContourStack both[] = {cut(outer, "outer", axis, planes), cut(inner, "inner", axis, planes)};
+  return together(both);
+}
+
+Surfaces made(const ContourStack& stack, const SurfaceOptions& options = {}) {
+  return surfaces_from(stack, options, Progress::none());
+}
+
+double mean_distance(const Mesh& from, const Mesh& to) {
+  const TriangleTree tree(to);
+  double sum = 0.;
+  for (const Vec3& p : from.positions) sum += tree.nearest(p.cast<double>())->distance;
+  return sum / double(from.positions.size());
+}
+
+TEST(SurfacesFrom, CutsOfASolidComeBackToIt) {
+  const Mesh outer = folded(1.f), inner = folded(.75f);
+  for (const Axis axis : {Axis::x, Axis::y, Axis::z}) {
+    const Surfaces result = made(cuts(outer, inner, axis));
+    EXPECT_LT(mean_distance(result.outer, outer), 50.);
+    EXPECT_LT(mean_distance(outer, result.outer), 50.);
+    EXPECT_LT(mean_distance(result.inner, inner), 50.);
+    EXPECT_NEAR(volume(result.outer) / volume(outer), 1., .02);
+    EXPECT_EQ(result.pushed, 0u);
+  }
+}
+
+TEST(SurfacesFrom, AreBetterFromMoreSections) {
+  const Mesh outer = folded(1.f), inner = folded(.75f);
+  const double far = mean_distance(made(cuts(outer, inner, Axis::y, 2000.)).outer, outer),
+               near = mean_distance(made(cuts(outer, inner, Axis::y, 500.)).outer, outer);
+  EXPECT_LT(near, .5 * far);
+}
+
+TEST(SurfacesFrom, AreSpheresWithinOneAnotherThatCutNothing) {
+  const Surfaces result = made(cuts(folded(1.f), folded(.75f)));
+  for (const Mesh* mesh : {&result.outer, &result.inner}) {
+    EXPECT_TRUE(is_closed(*mesh));
+    EXPECT_EQ(count_pieces(*mesh), 1u);
+    EXPECT_EQ(euler_number(*mesh), 2);
+    EXPECT_GT(volume(*mesh), 0.);
+  }
+  Mesh both = result.outer;
+  append(both, result.inner);
+  EXPECT_FALSE(self_intersection(both).has_value());
+}
+
+TEST(SurfacesFrom, HaveNoHandleWhereTheirContoursDo) {
+  // A ball with a bridge of tissue over it, as where two banks of a sulcus touch: a torus and a ball in it.
+  Mesh handle = folded(1.f);
+  append(handle, icosphere({0.f, 0.f, 20000.f}, 1500.f, 3, 0));  // and a piece apart
+  const ContourStack stack = cuts(handle, folded(.5f), Axis::z);
+  const Surfaces result = made(stack);
+  EXPECT_EQ(count_pieces(result.outer), 1u);
+  EXPECT_EQ(euler_number(result.outer), 2);
+}
+
+TEST(SurfacesFrom, StayNestedWhereContoursTouch) {
+  const Mesh outer = folded(1.f);
+  Mesh inner = folded(.75f);
+  for (Vec3& p : inner.positions) p.z() += 1900.f;  // through the outer one at the top
+  const Surfaces result = made(cuts(outer, inner));
+  EXPECT_GT(result.pushed, 0u);
+  Mesh both = result.outer;
+  append(both, result.inner);
+  EXPECT_FALSE(self_intersection(both).has_value());
+}
+
+TEST(SurfacesFrom, AreTheSameAtAnyNumberOfThreads) {
+  const ContourStack stack = cuts(folded(1.f), folded(.75f));
+  const auto with = [&](unsigned threads) {
+    const ThreadLimit limit(threads);
+    return made(stack).outer;
+  };
+  const Mesh one = with(1), two = with(2);
+  EXPECT_EQ(one.positions, two.positions);
+  EXPECT_EQ(one.triangles, two.triangles);
+}
+
+TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
+  const ContourStack good = cuts(folded(1.f), folded(.75f));
+  const auto sentence = [](const ContourStack& stack, const SurfaceOptions& options = {}) {
+    return refused([&] { (void)made(stack, options); });
+  };
+  EXPECT_EQ(sentence(good), "");
+  EXPECT_NE(sentence(good, {.outer = "inner", .inner = "outer"}).find("outside"), std::string::npos);
+  EXPECT_NE(sentence(good, {.outer = "pia"}).find("'pia'"), std::string::npos);
+  EXPECT_NE(sentence(good, {.voxel = 1.}).find("million points"), std::string::npos);
+  ContourStack missing = good;
+  missing.sections.erase(missing.sections.begin() + 12);
+  EXPECT_NE(sentence(missing).find("equal distances"), std::string::npos);
+  ContourStack one = good;
+  one.sections.resize(1);
+  EXPECT_NE(sentence(one).find("two sections"), std::string::npos);
+  ContourStack empty = good;
+  for (Section& section : empty.sections) section.contours.clear();
+  EXPECT_NE(sentence(empty).find("no contours"), std::string::npos);
+}
+
+TEST(SignedDistances, AreThoseOfACircle) {
+  std::vector<Place> circle;
+  for (int i = 0; i < 2000; ++i)
+    circle.push_back(1000. * Place(std::cos(i * M_PI / 1000.), std::sin(i * M_PI / 1000.)));
+  Section section;
+  section.contours.push_back({.object = 3, .curve = straight_loop(circle)});
+  const auto distances = signed_distances(section, 3, {-2000., -2000.}, 100., 41, 41, 800.);
+  for (std::size_t y = 0; y < 41; ++y)
+    for (std::size_t x = 0; x < 41; ++x) {
+      const double wanted = std::hypot(100. * double(x) - 2000., 100. * double(y) - 2000.) - 1000.;
+      EXPECT_NEAR(distances[y * 41 + x], std::clamp(wanted, -800., 800.), .01);
+    }
+  for (const float value : signed_distances(section, 2, {-2000., -2000.}, 100., 41, 41, 800.))
+    EXPECT_EQ(value, 800.f);  // of another object nothing is known
+}
+
+}  // namespace
+}  // namespace forest::cortex
