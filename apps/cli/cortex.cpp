@@ -145,6 +145,10 @@ constexpr Verb actions[] = {
      "brainforest cortex build lh.pial lh.white -o elements.h5", build},
     {"report", "Measure a file of elements",
      "brainforest cortex report elements.h5 --outer lh.pial --inner lh.white --json", report},
+    {"faces", "Write the elements at a depth as a surface, and what is measured of each as its colours",
+     "brainforest cortex faces elements.h5 -o middle.gii --measure jacobian --values jacobian.txt\n"
+     "  brainforest render middle.gii --overlay jacobian.txt -o elements.png",
+     cortex_faces},
     {"grid", "Fill blocks with curvilinear grids, and compare what fills them",
      "brainforest cortex grid swan --generator winslow -o swan.svg", cortex_grid},
 };

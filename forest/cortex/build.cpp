@@ -99,7 +99,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const WCurves curves(field, inner_tree);
   // Two triangles to a side of the lattice that elements are laid by, or more.
   const double side = std::sqrt(options.volume / 2500.);
-  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .65 * side}, progress);
+  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .7 * side}, progress);
 
   Cortex cortex;
   cortex.between = volume(outer) - volume(inner);
@@ -158,15 +158,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
       volumes[e] = h.volume();
       for (const double w : {1. / 6., 1. / 3., .5, 2. / 3., 5. / 6.})
         equivolume[e] = std::max(equivolume[e], std::abs(h.volume(0., w) / volumes[e] - w));
-      double least = 1.;
-      for (int k = 0; k < 5; ++k)
-        for (int j = 0; j < 5; ++j)
-          for (int i = 0; i < 5; ++i) {
-            const Eigen::Matrix3d J = h.jacobian(i / 4., j / 4., k / 4.);
-            const double lengths = J.col(0).norm() * J.col(1).norm() * J.col(2).norm();
-            least = std::min(least, lengths > 0. ? J.determinant() / lengths : 0.);
-          }
-      jacobian[e] = least;
+      jacobian[e] = scaled_jacobian(h);
       constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
       for (std::size_t k = 0; k < 4; ++k) {
         if (outer) outer_distance[4 * e + k] = outer->nearest(h.at(at[k][0], at[k][1], 0.))->distance;

@@ -146,9 +146,9 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
     if (bend(a) <= std::abs(other(a)) || bend(b) <= std::abs(other(b))) return std::nullopt;
     const Place ta = across(a);
     const double ea = growth[a], eb = across(b).dot(ta) < 0. ? -growth[b] : growth[b];
-    if (ea * eb >= 0.) return std::nullopt;
+    if ((ea < 0.) == (eb < 0.)) return std::nullopt;
     // A greatest bend, not a least one: it grows from each end towards the middle of the edge.
-    if (ea * (at[b] - at[a]).dot(ta) <= 0.) return std::nullopt;
+    if ((ea - eb) * (at[b] - at[a]).dot(ta) <= 0.) return std::nullopt;
     const double share = ea / (ea - eb);
     return Crossing{at[a] + share * (at[b] - at[a]), bend(a) + share * (bend(b) - bend(a))};
   };

@@ -644,8 +644,8 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
 
   Quads quads;
   const double count = std::round(volume / options.volume);
-  double factor = 1.;
-  for (int attempt = 0; attempt < 5; ++attempt) {
+  double factor = 1., nearest = 1e300;
+  for (int attempt = 0; attempt < 6; ++attempt) {
     progress.begin("laying the lattice of elements", 0);
     finest.sites.clear();
     for (const std::uint32_t v : vertices) {
@@ -663,11 +663,13 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     progress.begin("collapsing triangles to the lattice", 0);
     Faces coarse = extract(finest, triangles);
     drop_doublets(coarse);
-    quads = {};
-    halve(coarse, quads);
+    Quads laid;
+    halve(coarse, laid);
     progress.end();
-    const double off = double(quads.quads.size()) / count;
-    if (std::abs(off - 1.) < options.volume_within) break;
+    const double off = double(laid.quads.size()) / count;
+    if (quads.quads.empty() || std::abs(off - 1.) < nearest)
+      nearest = std::abs(off - 1.), quads = std::move(laid);
+    if (nearest < options.volume_within) break;
     factor *= off;
   }
 

@@ -1,0 +1,195 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/build.h"
+
+#include <algorithm>
+#include <cmath>
+#include <map>
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+
+namespace forest::cortex {
+namespace {
+
+using ::testing::HasSubstr;
+
+// A ball whose radius (µm) depends on the direction.
+template <class Radius>
+Mesh star(int halvings, Radius&& radius) {
+  Mesh mesh = icosphere(Vec3::Zero(), 1.f, halvings, 0);
+  for (Vec3& p : mesh.positions) p = p.normalized() * float(radius(p.normalized()));
+  return mesh;
+}
+Mesh ball(double radius, int halvings = 5) {
+  return star(halvings, [&](const Vec3&) { return radius; });
+}
+
+std::string refusal(const Mesh& outer, const Mesh& inner) {
+  try {
+    check_surfaces(outer, inner);
+  } catch (const Error& error) {
+    return error.what();
+  }
+  return "";
+}
+
+// Between balls everything is known: the field falls as 1/r.
+struct Shell : ::testing::Test {
+  static constexpr double inside = 8000., outside = 10000.;
+  Mesh outer = ball(outside), inner = ball(inside);
+  Laplace field{outer, inner, {.spacing = 250.}};
+  TriangleTree tree{inner};
+  WCurves curves{field, tree};
+};
+
+TEST_F(Shell, TheSlopeIsThatOfOneOverR) {
+  for (const Place& way : {Place(1., 2., 3.), Place(-1., .1, 0.), Place(.3, -.7, .2)})
+    for (const double r : {8200., 8900., 9700.}) {
+      const auto slope = field.gradient(r * way.normalized(), way);
+      ASSERT_TRUE(slope);
+      const double known = 1. / (r * r) / (1. / inside - 1. / outside);
+      EXPECT_NEAR(slope->norm(), known, .01 * known);
+      EXPECT_GT(slope->normalized().dot(way.normalized()), std::cos(.01));
+    }
+  EXPECT_FALSE(field.gradient(Place(100., 0., 0.), Place(1., 0., 0.)));
+}
+
+TEST_F(Shell, WCurvesAreRadiiAndTheirDepthsShareTheVolume) {
+  const Place way = Place(.2, -.5, .8).normalized();
+  const auto start = TriangleTree(outer).first(Place::Zero(), 2. * outside * way)->at;
+  const WCurve curve = curves.drop(start, -way);
+  EXPECT_TRUE(curve.arrived);
+  EXPECT_NEAR(curve.length(), outside - inside, 15.);
+  for (const double w : {.25, .5, .75}) {
+    const double r = std::cbrt(std::pow(outside, 3) * (1. - w) + std::pow(inside, 3) * w);
+    EXPECT_NEAR(curve.at(w).norm(), r, 12.);
+    EXPECT_NEAR(curve.at_length(w).norm(), outside - w * (outside - inside), 12.);
+    EXPECT_GT(curve.at(w).normalized().dot(way), std::cos(.005));
+  }
+}
+
+TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {
+  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = 500.}, Progress::none());
+  double sum = 0.;
+  for (const Triangle& t : ribbon.triangles) {
+    EXPECT_GT(volume_under(ribbon, t), 0.);
+    sum += volume_under(ribbon, t);
+  }
+  const double between = volume(outer) - volume(inner);
+  EXPECT_NEAR(sum, between, .002 * between);
+  EXPECT_EQ(std::count(ribbon.wall.begin(), ribbon.wall.end(), 1), 0);
+}
+
+TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
+  const Cortex cortex = build_cortex(outer, inner, {.volume = 1e9, .spacing = 300.}, Progress::none());
+  const TriangleTree outer_tree(outer);
+  const Report r = report(cortex, 1e9, &outer_tree, &tree, Progress::none());
+  EXPECT_EQ(r.uncertified, 0u);
+  EXPECT_LT(r.volume_error, .002);
+  EXPECT_NEAR(r.volume_mean, 1e9, 1e7);
+  EXPECT_GT(r.volume_within, .95);
+  EXPECT_EQ(cortex.w_reached, 1.);
+  EXPECT_LT(cortex.w_angle.p99, 3.);
+  EXPECT_LT(r.equivolume_error, .005);
+  EXPECT_LT(r.outer_distance_p99, 30.);
+  EXPECT_LT(r.inner_distance_p99, 30.);
+
+  // Every side between two elements, and Euler's number that of a ball: nothing is left open or lies double.
+  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
+  std::vector<std::uint8_t> used(cortex.elements.corners, 0);
+  for (std::size_t e = 0; e < cortex.elements.size(); ++e) {
+    const auto c = cortex.elements.corners_of(e);
+    for (const auto& [a, b] : {std::pair{c[0], c[1]}, {c[1], c[3]}, {c[3], c[2]}, {c[2], c[0]}})
+      ++sides[std::minmax(a, b)], used[a] = 1;
+  }
+  for (const auto& [side, times] : sides) EXPECT_EQ(times, 2);
+  EXPECT_EQ(std::count(used.begin(), used.end(), 1) - long(sides.size()) + long(cortex.elements.size()), 2);
+
+  const ThreadLimit one(1);
+  const Cortex again = build_cortex(outer, inner, {.volume = 1e9, .spacing = 300.}, Progress::none());
+  EXPECT_EQ(again.elements.elements, cortex.elements.elements);
+  EXPECT_EQ(again.elements.curves, cortex.elements.curves);
+}
+
+TEST_F(Shell, NoiseAndShuffledFootprintsAreReported) {
+  Cortex cortex = build_cortex(outer, inner, {.volume = 2e9, .spacing = 300.}, Progress::none());
+  Cortex noisy = cortex;
+  Random random(7);
+  for (Depths& curve : noisy.elements.curves)
+    for (Place& p : curve) p += 300. * Place(random.normal(), random.normal(), random.normal());
+  const Report of_noise = report(noisy, 2e9, nullptr, nullptr, Progress::none());
+  EXPECT_GT(of_noise.uncertified, noisy.elements.size() / 2);
+
+  Cortex shuffled = cortex;  // u and v against one another in every element
+  for (auto& e : shuffled.elements.elements)
+    for (std::size_t i = 0; i < 4; ++i)
+      for (std::size_t j = 0; j < i; ++j) std::swap(e[4 * i + j], e[4 * j + i]);
+  EXPECT_EQ(report(shuffled, 2e9, nullptr, nullptr, Progress::none()).uncertified, shuffled.elements.size());
+
+  Cortex equidistant = cortex;  // thirds of the length, where thirds of the volume are claimed
+  for (Depths& curve : equidistant.elements.curves) {
+    const Place first = curve[0], last = curve[3];
+    curve[1] = (2. * first + last) / 3., curve[2] = (first + 2. * last) / 3.;
+  }
+  EXPECT_GT(report(equidistant, 2e9, nullptr, nullptr, Progress::none()).equivolume_error, .02);
+}
+
+TEST(CheckSurfaces, NamesWhatIsWrong) {
+  const Mesh outer = ball(10e3, 3), inner = ball(8e3, 3);
+  EXPECT_EQ(refusal(outer, inner), "");
+  EXPECT_THAT(refusal(inner, outer), HasSubstr("swapped"));
+  Mesh open = outer;
+  open.triangles.pop_back();
+  EXPECT_THAT(refusal(open, inner), HasSubstr("outer surface is open"));
+  Mesh turned = inner;
+  for (Triangle& t : turned.triangles) std::swap(t[0], t[1]);
+  EXPECT_THAT(refusal(outer, turned), HasSubstr("inner surface face inwards"));
+  Mesh two = inner;
+  append(two, ball(1e3, 1));
+  EXPECT_THAT(refusal(outer, two), HasSubstr("2 pieces"));
+  Mesh beside = inner;
+  for (Vec3& p : beside.positions) p += Vec3(5e3f, 0, 0);
+  EXPECT_THAT(refusal(outer, beside), HasSubstr("lie outside of the outer one"));
+  EXPECT_THAT(refusal(ball(10., 3), ball(8., 3)), HasSubstr("check that it is in mm"));
+}
+
+TEST(Lines, ACrestRunsAroundALensAndAValleyAroundAWaist) {
+  const auto lines_on = [](const Mesh& mesh) {
+    Ribbon ribbon;
+    for (const Vec3& p : mesh.positions) ribbon.middle.push_back(p.cast<double>());
+    ribbon.triangles = mesh.triangles;
+    ribbon.wall.assign(ribbon.size(), 0);
+    const auto bent =
+        curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles), 500.);
+    return crests_and_valleys(ribbon, bent, {.least_strength = .5});
+  };
+  // All lines of a kind lie by the equator, and make up the most of it.
+  const auto expect_around = [](const std::vector<Line>& lines, Line::Kind kind, double radius) {
+    double length = 0.;
+    for (const Line& line : lines) {
+      if (line.kind != kind) continue;
+      for (const Place& p : line.points) EXPECT_LT(std::abs(p.z()), 250.);
+      for (std::size_t i = 0; i + 1 < line.points.size(); i += 7)
+        EXPECT_LT(std::abs(line.direction(i).z()), .1);
+      for (std::size_t i = 1; i < line.points.size(); ++i)
+        length += (line.points[i] - line.points[i - 1]).norm();
+    }
+    EXPECT_GT(length, .9 * 2. * double(pi) * radius);
+    EXPECT_LT(length, 1.1 * 2. * double(pi) * radius);
+  };
+  expect_around(lines_on(star(6,
+                              [](const Vec3& d) {
+                                return 1. / std::sqrt(double(d.x() * d.x() + d.y() * d.y()) / 1e8 +
+                                                      double(d.z() * d.z()) / 1.6e7);
+                              })),
+                Line::Kind::crest, 1e4);
+  expect_around(lines_on(star(6, [](const Vec3& d) { return 6e3 + 9e3 * double(d.z() * d.z()); })),
+                Line::Kind::valley, 6e3);
+}
+
+}  // namespace
+}  // namespace forest::cortex

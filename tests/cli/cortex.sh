@@ -1,0 +1,83 @@
+# SPDX-License-Identifier: Apache-2.0
+# brainforest cortex: surfaces → elements → report; sections of surfaces and back; what is refused.
+trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
+
+source "$FOREST_SOURCE_DIR/tests/words.sh"
+
+# Two nested, slightly dented balls as FreeSurfer writes surfaces, and some that cannot be.
+python3 - <<'PY'
+import math, struct
+def ball(radius, halvings=4, dent=0.0):
+    t = (1 + 5 ** .5) / 2
+    p = [(-1, t, 0), (1, t, 0), (-1, -t, 0), (1, -t, 0), (0, -1, t), (0, 1, t), (0, -1, -t), (0, 1, -t),
+         (t, 0, -1), (t, 0, 1), (-t, 0, -1), (-t, 0, 1)]
+    f = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
+         (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]
+    for _ in range(halvings):
+        middle, g = {}, []
+        def half(a, b):
+            key = (min(a, b), max(a, b))
+            if key not in middle:
+                middle[key] = len(p)
+                p.append(tuple((x + y) / 2 for x, y in zip(p[a], p[b])))
+            return middle[key]
+        for a, b, c in f:
+            x, y, z = half(a, b), half(b, c), half(c, a)
+            g += [(a, x, z), (b, y, x), (c, z, y), (x, y, z)]
+        f = g
+    out = []
+    for x, y, z in p:
+        n = math.sqrt(x * x + y * y + z * z)
+        r = (radius - dent * math.exp(-((x / n) ** 2) / .02)) / n
+        out.append((x * r, y * r, z * r))
+    return out, f
+def write(name, mesh):
+    p, f = mesh
+    with open(name, "wb") as o:
+        o.write(b"\xff\xff\xfe" + b"made for a test\n\n" + struct.pack(">ii", len(p), len(f)))
+        for q in p: o.write(struct.pack(">fff", *q))
+        for q in f: o.write(struct.pack(">iii", *q))
+write("outer", ball(9, dent=1.2))
+write("inner", ball(7, dent=1.2))
+p, f = ball(9)
+write("open", (p, f[:-1]))
+write("small", ([tuple(x / 1000 for x in q) for q in p], f))
+PY
+
+$BRAINFOREST cortex build outer inner -o e.h5 --json >built.json
+$BRAINFOREST cortex report e.h5 --outer outer --inner inner --json >report.json
+python3 - <<'PY'
+import json
+built, report = json.load(open("built.json")), json.load(open("report.json"))
+for key in ("elements", "uncertified", "volume_error", "volume_mean", "volume_within", "w_angle", "w_reached",
+            "equivolume_error", "scaled_jacobian"):
+    assert built[key] == report[key], (key, built[key], report[key])
+assert built["elements"] > 1000 and built["uncertified"] == 0, built
+assert built["volume_error"] < .005 and abs(built["volume_mean"] - 1) < .03 and built["volume_within"] > .95, built
+assert built["w_reached"] == 1 and built["w_angle"]["median"] < 3, built
+PY
+$BRAINFOREST cortex build outer inner -o again.h5 --threads 1 >/dev/null
+cmp e.h5 again.h5
+
+# Nothing is written where something is wrong.
+refuses 'swapped' $BRAINFOREST cortex build inner outer -o no.h5
+refuses 'outer surface is open' $BRAINFOREST cortex build open inner -o no.h5
+refuses 'check that it is in mm' $BRAINFOREST cortex build small small -o no.h5
+head -c 5000 outer >cut
+refuses 'cut' $BRAINFOREST cortex build cut inner -o no.h5
+[ ! -e no.h5 ]
+refuses 'already' $BRAINFOREST cortex build outer inner -o e.h5
+head -c 9000 e.h5 >cut.h5
+refuses 'cut.h5' $BRAINFOREST cortex report cut.h5
+refuses 'outer' $BRAINFOREST cortex report outer
+
+# Sections of a surface, what lies between them, and a surface again.
+$BRAINFOREST cortex contours outer inner -o s.contours --axis y --spacing 1 >/dev/null
+$BRAINFOREST cortex compare s.contours >compared.txt
+$BRAINFOREST cortex surfaces s.contours -o outer.gii inner.gii --json >surfaces.json
+$BRAINFOREST cortex build outer.gii inner.gii -o from_sections.h5 --json >from_sections.json
+python3 - <<'PY'
+import json
+built = json.load(open("from_sections.json"))
+assert built["uncertified"] == 0 and built["elements"] > 1000, built
+PY
