@@ -7,7 +7,7 @@ source "$FOREST_SOURCE_DIR/tests/words.sh"
 fails_with 2 "no verb 'frob'; there are: demo, import, fetch, list" $program frob
 fails_with 2 'say which verb, one of: demo' $program
 fails_with 2 "no benchmark 'nosuch'; there are: activity, column" $program bench nosuch
-fails_with 2 'one of: activity, column, gaze, grow' $program bench
+fails_with 2 'one of: activity, column, gaze, grid, grow' $program bench
 fails_with 2 'say which action, one of: list, show' $program model
 fails_with 2 "no action 'nosuch'; there are: list, show, edit" $program model nosuch
 fails_with 2 'files or --repo' $program check
