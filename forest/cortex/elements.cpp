@@ -226,8 +226,8 @@ std::vector<std::uint32_t> uncertified(const Elements& elements) {
 }
 
 Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress) {
-  constexpr int rounds_of_sides = 6, rounds_of_corners = 40;
-  constexpr double farthest_way = 1e3;  // µm
+  constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
+  constexpr double farthest_way = 1e3, no_tissue = 100.;  // µm
   Mending result;
   std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
   for (std::uint32_t e = 0; e < elements.size(); ++e)
@@ -389,7 +389,10 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     bad = uncertified(elements, spread(spread(bad)));  // sides of the stars' rims changed, too
     progress.advance();
   }
-  // By the wall, where the surfaces meet at an edge, there may be no room for an element: those go to the wall.
+  // By the wall, where the surfaces meet at an edge, there may be no room for an element: those go to the wall. So do
+  // those where the surfaces touch.
+  for (std::uint32_t c = 0; c < elements.corners; ++c)
+    if ((elements.curves[c][0] - elements.curves[c][3]).norm() < no_tissue) rim[c] = 1;
   while (!bad.empty()) {
     std::vector<std::uint8_t> gone(elements.size(), 0);
     for (const std::uint32_t e : bad)
