@@ -2,7 +2,6 @@
 // brainforest activity: a simulation's report becomes an activity file.
 #include "forest/reports/activity.h"
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -14,6 +13,7 @@
 #include "forest/io/sonata.h"
 #include "forest/io/sonata_report.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
 
@@ -27,7 +27,7 @@ struct Options {
 };
 
 void run(const Options& options, Console& console) {
-  const auto begin = std::chrono::steady_clock::now();
+  const auto begin = Clock::now();
   std::error_code none;
   for (const auto& input : {options.report, options.spikes})
     if (std::filesystem::equivalent(input, options.out, none))
@@ -59,23 +59,22 @@ void run(const Options& options, Console& console) {
                     facts.clamped, values * facts.steps, facts.range.low, facts.range.high, facts.units));
   if (facts.spikes_left_out)
     console.warn(fmt::format("{} spikes of neurons without a shape were left out", facts.spikes_left_out));
-  console.print(
-      {{"file", options.out.string()},
-       {"neurons", packed.rows().size()},
-       {"neurons_of_circuit", facts.instances},
-       {"compartments", values},
-       {"start", facts.start},
-       {"step", facts.step},
-       {"steps", facts.steps},
-       {"units", facts.units},
-       {"range", {facts.range.low, facts.range.high}},
-       {"error", facts.range.error()},
-       {"clamped", facts.clamped},
-       {"not_numbers", facts.not_numbers},
-       {"spikes", packed.spikes().size()},
-       {"spikes_left_out", facts.spikes_left_out},
-       {"bytes", packed.bytes()},
-       {"seconds", std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count()}});
+  console.print({{"file", options.out.string()},
+                 {"neurons", packed.rows().size()},
+                 {"neurons_of_circuit", facts.instances},
+                 {"compartments", values},
+                 {"start", facts.start},
+                 {"step", facts.step},
+                 {"steps", facts.steps},
+                 {"units", facts.units},
+                 {"range", {facts.range.low, facts.range.high}},
+                 {"error", facts.range.error()},
+                 {"clamped", facts.clamped},
+                 {"not_numbers", facts.not_numbers},
+                 {"spikes", packed.spikes().size()},
+                 {"spikes_left_out", facts.spikes_left_out},
+                 {"bytes", packed.bytes()},
+                 {"seconds", seconds_since(begin)}});
   console.table({"file", "neurons", "compartments", "steps", "of ms", "spikes", "bytes"},
                 {{options.out.string(), std::to_string(packed.rows().size()), std::to_string(values),
                   std::to_string(facts.steps), fmt::format("{:g}", facts.step),

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/cli/artist.h"
 
-#include <chrono>
 #include <cmath>
 #include <cstdio>
 
@@ -13,16 +12,10 @@
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
 
+#include "apps/cli/clock.h"
+
 namespace forest::cli {
-namespace {
-
-using Clock = std::chrono::steady_clock;
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
-
-}  // namespace
+namespace {}  // namespace
 
 Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
     : forest_(std::move(forest)),

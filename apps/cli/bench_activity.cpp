@@ -26,6 +26,7 @@
 #include "forest/reports/synthetic.h"
 
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/options.h"
@@ -37,8 +38,6 @@ namespace fs = std::filesystem;
 using reports::Activity;
 using reports::Code;
 using reports::Level;
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   std::uint32_t neurons = 10000, compartments = 1500, steps = 128, seeks = 20, shapes = 10;
   std::uint64_t seed = 1;
@@ -208,7 +207,7 @@ void run(const Options& options, Console& console) {
   std::uint64_t played = 0;
   const auto begin = Clock::now();
   double playing = 0.;
-  for (; playing < 2.; playing = std::chrono::duration<double>(Clock::now() - begin).count())
+  for (; playing < 2.; playing = seconds_since(begin))
     activity.values(Level::compartment, played++ % options.steps, 0, codes);
   const double raster = milliseconds([&] { activity.raster_picture(0, options.steps, 1200, 800); });
   const double error = worst_error(activity, report, options.seed, 4);

@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench column: the whole column drawn with a moving camera. How fast, in how much memory?
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -17,14 +16,13 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
 
 namespace forest::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct Options {
   std::uint32_t neurons = 10000, frames = 60;
@@ -74,7 +72,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
       touched = playback->activity().touched();
     }
     const Drawn drawn = artist.draw(view, width, height);
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const double seconds = seconds_since(start);
     if (drawn.image.covered < .02)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was measured", i,
                               100. * drawn.image.covered));
@@ -147,7 +145,7 @@ void run(const Options& options, Console& console) {
   scene::View first = around(forest, 0.f);
   first.samples = 1;
   artist.draw(first, width, height);
-  const double first_picture = std::chrono::duration<double>(Clock::now() - start).count();
+  const double first_picture = seconds_since(start);
 
   double changes = 0.;
   if (options.activity) {

@@ -2,7 +2,6 @@
 // brainforest bench gaze: pictures for an eye that looks at one place, with a moving camera, a moving gaze or both. How many
 // primitives fewer than without a gaze, is the fovea's part of the picture the same, and how fast? docs/scene/gaze.md.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
@@ -18,6 +17,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
@@ -26,7 +26,6 @@
 namespace forest::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
 using Json = nlohmann::ordered_json;
 
 struct Options {
@@ -107,7 +106,7 @@ class Bench {
       const scene::View view = gazed(i);
       const auto start = Clock::now();
       const frame::Image& image = foveated_.draw(view, size_.first, size_.second, colouring);
-      const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+      const double seconds = seconds_since(start);
       if (i > 0) {  // the first has nothing to go by
         const Foveated::Figures& f = foveated_.figures();
         part.frames += 1, part.seconds += seconds, part.took.push_back(1000. * seconds);
@@ -141,7 +140,7 @@ class Bench {
       view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
       const auto start = Clock::now();
       foveated_.draw(view, size_.first, size_.second, colouring);
-      const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+      const double seconds = seconds_since(start);
       if (i >= settling)
         part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames;
       budget.took(1000. * seconds);

@@ -2,7 +2,6 @@
 // brainforest bench grid: elements of a made-up folded sheet of cortex. How many are certified in a second, how many places
 // find their (element, u, v, w), and how near to it does one come back?
 #include <algorithm>
-#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -17,21 +16,16 @@
 #include "forest/cortex/locate.h"
 
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 
 namespace forest::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   std::size_t elements = 160000, places = 1000000;
   std::uint64_t seed = 1;
 };
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void run(const Options& options, Console& console) {
   const std::size_t along = 100, across = std::max<std::size_t>(1, options.elements / along);

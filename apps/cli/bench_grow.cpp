@@ -2,7 +2,6 @@
 // brainforest bench grow: how fast neurons grow, from grammar to Morphology in memory and into a file of cells, on all cores.
 // What is in the file is compared with what is grown again.
 #include <algorithm>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <unistd.h>
@@ -17,6 +16,7 @@
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/measure.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/grow_cells.h"
@@ -51,13 +51,12 @@ void check(const std::vector<Morphology>& neurons, const lsystem::Grammar& gramm
 }
 
 Result measure(const lsystem::Grammar& grammar, double seconds, Progress& progress) {
-  using Clock = std::chrono::steady_clock;
   Result result{.name = grammar.name};
   lsystem::grow_population(grammar, batch / 4, 0);  // the machine warms up
   while (result.seconds < seconds) {
     const auto begin = Clock::now();
     const auto neurons = lsystem::grow_population(grammar, batch, 1, progress, result.neurons);
-    result.seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+    result.seconds += seconds_since(begin);
     check(neurons, grammar);
     result.neurons += neurons.size();
     for (const Morphology& m : neurons) result.segments += m.segment_count();
@@ -82,13 +81,12 @@ void check_file(const std::filesystem::path& path, const lsystem::Grammar& gramm
 
 void measure_file(const lsystem::Grammar& grammar, double seconds, const std::filesystem::path& folder,
                   Result& result, Console& console) {
-  using Clock = std::chrono::steady_clock;
   const auto path = folder / fmt::format("brainforest-grow-{}.cells", ::getpid());
   result.written = std::max(batch, std::size_t(seconds * double(result.neurons) / result.seconds));
   const auto begin = Clock::now();
   const CellsGrown grown =
       grow_cells([&] { return grammar; }, {path, result.written, 1, false}, *join_ranks(), console);
-  result.writing_seconds = std::chrono::duration<double>(Clock::now() - begin).count();
+  result.writing_seconds = seconds_since(begin);
   result.bytes = grown.bytes;
   check_file(path, grammar, result);
   std::filesystem::remove(path);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench io: how fast neuron files are read, bytes in memory to Morphology, on one core.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <filesystem>
 #include <map>
@@ -18,6 +17,7 @@
 #include "forest/core/random.h"
 #include "forest/io/format.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
 
@@ -116,7 +116,6 @@ struct Result {
 };
 
 Result measure(const io::Format& format, Work& work, Progress& progress) {
-  using Clock = std::chrono::steady_clock;
   Result result{.files = work.files.size()};
   for (const std::string& bytes : work.files) result.megabytes += double(bytes.size()) * 1e-6;
   const bool known = !work.points.empty();
@@ -129,7 +128,7 @@ Result measure(const io::Format& format, Work& work, Progress& progress) {
     for (std::size_t i = 0; i < work.files.size(); ++i) {
       const auto begin = Clock::now();
       const Morphology neuron = format.read(work.files[i], work.names[i]).morphology;
-      seconds += std::chrono::duration<double>(Clock::now() - begin).count();
+      seconds += seconds_since(begin);
       const std::size_t points = neuron.points().size();
       result.points += points;
       if (!known && rates.empty()) work.points[i] = points;

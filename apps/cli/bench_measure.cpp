@@ -2,7 +2,6 @@
 // brainforest bench measure: how many neurons a second have all their metrics measured, on one core, how long Sholl's analysis
 // takes and how many barcodes a second are made. Lengths, crossings and bars are compared with those that plain loops find.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <functional>
 #include <memory>
@@ -22,6 +21,7 @@
 #include "forest/statistics/sholl.h"
 #include "forest/statistics/summary.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/verb.h"
@@ -30,7 +30,6 @@ namespace forest::cli {
 namespace {
 
 using namespace statistics;
-using Clock = std::chrono::steady_clock;
 constexpr double seconds_per_figure = 3.;
 
 /// A binary tree from each stem whose sections are random walks of steps of about a micrometre.
@@ -67,7 +66,7 @@ double seconds(Progress& progress, std::string_view stage, const std::function<v
   for (double total = 0.; total < seconds_per_figure || times.size() < 3;) {
     const auto begin = Clock::now();
     body();
-    times.push_back(std::chrono::duration<double>(Clock::now() - begin).count());
+    times.push_back(seconds_since(begin));
     total += times.back();
     progress.advance();
   }
@@ -211,7 +210,7 @@ void run(const std::vector<std::string>& places, bool details, Console& console)
         const Arbors fresh(cell);
         const auto begin = Clock::now();
         sum += mean(metric.values(fresh));
-        time += std::chrono::duration<double>(Clock::now() - begin).count();
+        time += seconds_since(begin);
       }
       each[std::string(metric.name)] = 1e6 * time / count;
       rows.push_back({std::string(metric.name), fmt::format("{:.1f}", 1e6 * time / count)});

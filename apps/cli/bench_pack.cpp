@@ -2,7 +2,6 @@
 // brainforest bench pack: neurons, each a shape of its own, are packed into a file as they come. How many segments a
 // second, and in how much memory? The file is opened and compared with the neurons.
 #include <atomic>
-#include <chrono>
 #include <filesystem>
 #include <memory>
 #include <unistd.h>
@@ -19,6 +18,7 @@
 #include "forest/scene/forest.h"
 
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/options.h"
@@ -27,17 +27,11 @@ namespace forest::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   std::uint32_t neurons = 10000;
   std::uint64_t seed = 1;
   fs::path folder = fs::temp_directory_path();
 };
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 /// As many distinct neurons as are asked for, made in an instant: a hundred grown ones, each time otherwise stretched and
 /// sheared.

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cerrno>
-#include <chrono>
 #include <cmath>
 #include <cstring>
 #include <ctime>
@@ -31,6 +30,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
@@ -41,7 +41,6 @@ namespace forest::cli {
 namespace {
 
 using Json = nlohmann::ordered_json;
-using Clock = std::chrono::steady_clock;
 namespace fs = std::filesystem;
 
 constexpr std::uint32_t dolly_pictures = 250;  // ten seconds
@@ -240,10 +239,10 @@ void draw_ours(const Options& options) {
     scene::View view = view_at(dolly, picture, options.quick_samples.value_or(budget.samples()));
     view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
     const Drawn drawn = artist.draw(view, width, height);
-    const double seconds = std::chrono::duration<double>(Clock::now() - start).count();
+    const double seconds = seconds_since(start);
     const double core_seconds = double(std::clock() - core) / CLOCKS_PER_SEC;
     budget.took(1000. * seconds);
-    if (picture == 0) first = std::chrono::duration<double>(Clock::now() - begin).count();
+    if (picture == 0) first = seconds_since(begin);
     for (std::size_t i = 0; i < measured.size(); ++i) {
       if (measured[i] != picture) continue;
       frames.push_back(seconds), cores.push_back(core_seconds);

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench pick: random pixels of pictures from outside the column to within it. Is what lies under each what a
 // plain loop over all segments finds, and how many picks are made in a second? What "under" means: forest/scene/pick.h.
-#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -15,6 +14,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
@@ -22,17 +22,11 @@
 namespace forest::cli {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   std::uint32_t neurons = 1000, pixels = 10000;
   std::uint64_t seed = 1;
   std::string size = "1280x720";
 };
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 void run(const Options& options, Console& console) {
   const auto [width, height] = parse_size(options.size);

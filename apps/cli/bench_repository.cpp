@@ -20,6 +20,7 @@
 #include "forest/repository/stored_metrics.h"
 #include "forest/statistics/metric.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
@@ -28,8 +29,6 @@ namespace forest::cli {
 namespace {
 
 using namespace repository;
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   std::uint32_t neurons = 4000, sections = 300, points = 6;
   std::filesystem::path folder = std::filesystem::temp_directory_path();
@@ -60,7 +59,7 @@ template <class Body>
 double seconds(Body&& body) {
   const auto begin = Clock::now();
   body();
-  return std::chrono::duration<double>(Clock::now() - begin).count();
+  return seconds_since(begin);
 }
 
 /// Reads neuron after neuron for as long as it lives, as another program would while this one stores.

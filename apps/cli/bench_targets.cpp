@@ -1,6 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest bench targets: how long does it take to show thousands of neurons otherwise?
-#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -12,14 +11,13 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
 
 namespace forest::cli {
 namespace {
-
-using Clock = std::chrono::steady_clock;
 
 struct Options {
   std::uint32_t neurons = 10000, repeats = 20;
@@ -45,10 +43,6 @@ constexpr Change changes[] = {
     {"inhibitory alone, in their own colour",
      R"([{"name":"all","visible":false},{"name":"inhibitory","visible":true,"colour":"#56b4e9"}])"},
 };
-
-double milliseconds_since(Clock::time_point start) {
-  return std::chrono::duration<double, std::milli>(Clock::now() - start).count();
-}
 
 void run(const Options& options, Console& console) {
   const auto [width, height] = parse_size(options.size);

@@ -2,7 +2,6 @@
 // brainforest cortex: the tissue, from surfaces to finite elements. One row each; longer ones have a file of their own.
 #include "apps/cli/cortex.h"
 
-#include <chrono>
 #include <filesystem>
 #include <memory>
 
@@ -16,6 +15,7 @@
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
@@ -98,7 +98,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
   add_force(command, o->force);
   return [o, &console] {
     if (!o->force) refuse_existing({o->out});
-    const auto begin = std::chrono::steady_clock::now();
+    const auto begin = Clock::now();
     const Mesh outer = read_mesh(o->outer), inner = read_mesh(o->inner);
     const cortex::Cortex built = cortex::build_cortex(
         outer, inner, {.volume = o->volume * 1e9, .spacing = o->spacing * 1e3, .line_scale = o->scale * 1e3},
@@ -107,8 +107,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
     const TriangleTree outer_tree(outer), inner_tree(inner);
     const cortex::Report r =
         cortex::report(built, o->volume * 1e9, &outer_tree, &inner_tree, console.progress());
-    tell(built, r, o->volume * 1e9,
-         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), console);
+    tell(built, r, o->volume * 1e9, seconds_since(begin), console);
   };
 }
 
@@ -122,15 +121,14 @@ std::function<void()> report(CLI::App& command, Console& console) {
       ->type_name("OUTER");
   command.add_option("--inner", o->inner, "The inner one")->type_name("INNER");
   return [o, &console] {
-    const auto begin = std::chrono::steady_clock::now();
+    const auto begin = Clock::now();
     const io::ElementsFile file = io::read_elements(o->file);
     std::optional<TriangleTree> outer, inner;
     if (!o->outer.empty()) outer.emplace(read_mesh(o->outer));
     if (!o->inner.empty()) inner.emplace(read_mesh(o->inner));
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
-    tell(file.cortex, r, file.volume,
-         std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count(), console);
+    tell(file.cortex, r, file.volume, seconds_since(begin), console);
   };
 }
 

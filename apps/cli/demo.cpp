@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest demo: the main job, from nothing to a walk in the forest.
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 #include <memory>
 
@@ -22,6 +21,7 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/artist.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
@@ -34,8 +34,6 @@ namespace forest::cli {
 namespace {
 
 namespace fs = std::filesystem;
-using Clock = std::chrono::steady_clock;
-
 struct Options {
   fs::path out, traced;
   std::uint64_t seed = 1;
@@ -49,10 +47,6 @@ struct Share {
 };
 constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
 constexpr double traced_fraction = .25;  // of every layer
-
-double seconds_since(Clock::time_point start) {
-  return std::chrono::duration<double>(Clock::now() - start).count();
-}
 
 struct Figures {
   std::size_t grown = 0, grown_segments = 0, traced = 0, unread = 0;

@@ -2,7 +2,6 @@
 // brainforest pack: a circuit becomes a forest file. Its morphologies are read when their turn comes, so that they need not
 // fit into memory.
 #include <atomic>
-#include <chrono>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -17,6 +16,7 @@
 #include "forest/scene/forest.h"
 #include "forest/scene/synapses.h"
 
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/verb.h"
 
@@ -77,7 +77,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
   command.add_flag("--no-synapses", options->no_synapses,
                    "Leave out the synapses, which are packed beside the forest: column.synapses");
   return [options, &console] {
-    const auto begin = std::chrono::steady_clock::now();
+    const auto begin = Clock::now();
     io::SonataOutline outline = io::outline_sonata(options->circuit);
     std::vector<std::vector<io::Warning>> oddities(outline.files.size());  // of their files
     std::atomic<std::size_t> count = 0;
@@ -91,7 +91,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     names.sets = sets_of(outline.node_sets, console);
     const scene::PackFigures figures =
         scene::pack(outline.circuit, read, options->out, console.progress(), names);
-    const double seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - begin).count();
+    const double seconds = seconds_since(begin);
     const std::size_t synapses = options->no_synapses ? 0
                                                       : pack_synapses(options->circuit, outline, options->out,
                                                                       outline.warnings, console.progress());

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 #include <fmt/format.h>
 
@@ -14,7 +15,7 @@ namespace forest::cortex {
 namespace {
 
 double degrees_between(const Place& a, const Place& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / 3.14159265358979323846;
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / std::numbers::pi;
 }
 
 double share_of(std::vector<double>& values, double share) {
@@ -37,7 +38,7 @@ Place normal_around(const TriangleTree& tree, const Place& at, const Place& outw
   Place sum = tree.normal(hit->triangle);
   const Place u = outwards.unitOrthogonal(), v = outwards.normalized().cross(u);
   for (int k = 0; k < 8; ++k) {
-    const double angle = k * 3.14159265358979323846 / 4.;
+    const double angle = k * std::numbers::pi / 4.;
     const auto near = tree.nearest(at + radius * (std::cos(angle) * u + std::sin(angle) * v), radius);
     if (near && tree.normal(near->triangle).dot(outwards) > 0.) sum += tree.normal(near->triangle);
   }
@@ -185,18 +186,11 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   result.inner_distance_p99 = share_of(inner_distance, .99);
 
   // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
-  Mesh crests;
+  const Mesh crests = pieces(cortex.lines, Line::Kind::crest);
   std::vector<Place> along;
-  for (const Line& line : cortex.lines) {
-    if (line.kind != Line::Kind::crest) continue;
-    for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
-      const auto first = std::uint32_t(crests.positions.size());
-      crests.positions.push_back(line.points[i].cast<float>()),
-          crests.positions.push_back(line.points[i + 1].cast<float>());
-      crests.triangles.push_back({first, first + 1, first + 1});
+  for (const Line& line : cortex.lines)
+    for (std::size_t i = 0; line.kind == Line::Kind::crest && i + 1 < line.points.size(); ++i)
       along.push_back(line.direction(i));
-    }
-  }
   if (!crests.triangles.empty()) {
     const TriangleTree tree(crests);
     std::vector<double> angles;

@@ -10,6 +10,7 @@
 #include "forest/core/error.h"
 #include "forest/cortex/grid_generators.h"
 #include "forest/cortex/grid_quality.h"
+#include "forest/cortex/named_row.h"
 
 namespace forest::cortex {
 
@@ -73,12 +74,7 @@ std::span<const Generator> generators() {
 }
 
 const Generator& generator(std::string_view name) {
-  std::string names;
-  for (const Generator& row : generators()) {
-    if (row.name == name) return row;
-    names += (names.empty() ? "" : ", ") + std::string(row.name);
-  }
-  throw Error(fmt::format("there is no generator of grids \"{}\"; there are {}", name, names));
+  return named_row(generators(), name, "generator of grids");
 }
 
 Grid generate(const Grid& boundary, std::string_view name, const GridOptions& options) {

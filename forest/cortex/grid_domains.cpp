@@ -6,9 +6,7 @@
 #include <numbers>
 #include <string>
 
-#include <fmt/format.h>
-
-#include "forest/core/error.h"
+#include "forest/cortex/named_row.h"
 
 namespace forest::cortex {
 namespace {
@@ -176,14 +174,7 @@ std::span<const Domain> domains() {
   return table;
 }
 
-const Domain& domain(std::string_view name) {
-  std::string names;
-  for (const Domain& row : domains()) {
-    if (row.name == name) return row;
-    names += (names.empty() ? "" : ", ") + std::string(row.name);
-  }
-  throw Error(fmt::format("there is no domain \"{}\"; there are {}", name, names));
-}
+const Domain& domain(std::string_view name) { return named_row(domains(), name, "domain"); }
 
 Grid boundary(const Domain& domain, const std::array<int, 3>& steps) {
   Grid grid{{steps[0] + 1, steps[1] + 1, domain.plane ? 1 : steps[2] + 1}, {}};

@@ -9,9 +9,8 @@
 
 #include <Eigen/Geometry>
 #include <Eigen/LU>
-#include <fmt/format.h>
 
-#include "forest/core/error.h"
+#include "forest/cortex/named_row.h"
 
 namespace forest::cortex {
 namespace {
@@ -210,12 +209,7 @@ std::span<const CellMeasure> cell_measures() {
 }
 
 const CellMeasure& cell_measure(std::string_view name) {
-  std::string names;
-  for (const CellMeasure& row : cell_measures()) {
-    if (row.name == name) return row;
-    names += (names.empty() ? "" : ", ") + std::string(row.name);
-  }
-  throw Error(fmt::format("there is no measure of cells \"{}\"; there are {}", name, names));
+  return named_row(cell_measures(), name, "measure of cells");
 }
 
 double volume(const Grid& grid) {

@@ -286,4 +286,18 @@ std::vector<Line> crests_and_valleys(const Ribbon& ribbon, std::span<const Curva
   return lines;
 }
 
+Mesh pieces(std::span<const Line> lines, Line::Kind kind) {
+  Mesh mesh;
+  for (const Line& line : lines) {
+    if (line.kind != kind) continue;
+    for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
+      const auto first = std::uint32_t(mesh.positions.size());
+      mesh.positions.push_back(line.points[i].cast<float>());
+      mesh.positions.push_back(line.points[i + 1].cast<float>());
+      mesh.triangles.push_back({first, first + 1, first + 1});
+    }
+  }
+  return mesh;
+}
+
 }  // namespace forest::cortex

@@ -53,4 +53,7 @@ std::vector<Line> borders(const Ribbon& ribbon);
 std::vector<Line> crests_and_valleys(const Ribbon& ribbon, std::span<const Curvature> curvatures,
                                      const LineOptions& options);
 
+/// The pieces of all lines of a kind, one after the other, as triangles without area, for a TriangleTree to find them.
+Mesh pieces(std::span<const Line> lines, Line::Kind kind);
+
 }  // namespace forest::cortex

@@ -675,20 +675,8 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
 
   // Back onto the ribbon, and along it until volumes are even.
   const RibbonLocator locator(ribbon);
-  const auto tree_of = [&](Line::Kind kind) {
-    Mesh pieces;
-    for (const Line& line : lines) {
-      if (line.kind != kind) continue;
-      for (std::size_t i = 0; i + 1 < line.points.size(); ++i) {
-        const auto first = std::uint32_t(pieces.positions.size());
-        pieces.positions.push_back(line.points[i].cast<float>());
-        pieces.positions.push_back(line.points[i + 1].cast<float>());
-        pieces.triangles.push_back({first, first + 1, first + 1});
-      }
-    }
-    return TriangleTree(pieces);
-  };
-  const TriangleTree valley_tree = tree_of(Line::Kind::valley), border_tree = tree_of(Line::Kind::border);
+  const TriangleTree valley_tree(pieces(lines, Line::Kind::valley)),
+      border_tree(pieces(lines, Line::Kind::border));
 
   const std::size_t n = quads.middle.size();
   quads.points.resize(n);
