@@ -2,8 +2,12 @@
 // brainforest cortex: the tissue, from surfaces to finite elements. One row each; longer ones have a file of their own.
 #include "apps/cli/cortex.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -11,7 +15,10 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/cortex/bok.h"
 #include "forest/cortex/build.h"
+#include "forest/cortex/symmetry.h"
+#include "forest/io/border_file.h"
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
 
@@ -29,49 +36,122 @@ using Json = nlohmann::ordered_json;
 
 Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).text(), path.string()); }
 
+// What is measured only when a file is looked at again.
+struct Deeper {
+  struct Border {
+    std::string name;
+    std::size_t points = 0, within = 0;
+
+    double share() const { return double(within) / double(points); }
+  };
+  std::vector<Border> borders;  // the last one: all of them
+  cortex::Symmetry symmetry;
+  cortex::Bok bok;
+};
+
+// How much of the borders lies within 2 mm of a valley. They are drawn on the two surfaces' vertices, and taken half way
+// between them, where the lines are.
+std::vector<Deeper::Border> measure_borders(const std::vector<fs::path>& files, const Mesh& outer,
+                                            const Mesh& inner, const cortex::Cortex& cortex) {
+  constexpr double near = 2000.;  // µm
+  const Mesh valleys = cortex::pieces(cortex.lines, cortex::Line::Kind::valley);
+  const TriangleTree tree(valleys);
+  std::vector<Deeper::Border> result;
+  Deeper::Border all{"all", 0, 0};
+  for (const fs::path& path : files) {
+    const io::Borders read = io::read_borders(MappedFile(path).text(), path.string());
+    for (const Mesh* mesh : {&outer, &inner})
+      if (mesh->positions.size() != read.surface_vertices)
+        throw InputError(
+            path.string(), 0,
+            fmt::format("is drawn on {} vertices and a surface has {}; give the two surfaces of which it is",
+                        read.surface_vertices, mesh->positions.size()));
+    for (const io::Border& border : read.borders) {
+      auto row =
+          std::find_if(result.begin(), result.end(), [&](const auto& r) { return r.name == border.name; });
+      if (row == result.end()) row = result.insert(result.end(), {border.name, 0, 0});
+      for (const io::BorderPoint& point : border.points) {
+        cortex::Place place = cortex::Place::Zero();
+        for (std::size_t k = 0; k < 3; ++k)
+          place += .5 * point.weights[k] *
+                   (outer.positions[point.vertices[k]] + inner.positions[point.vertices[k]]).cast<double>();
+        const bool within = !valleys.triangles.empty() && tree.nearest(place, near).has_value();
+        ++row->points, ++all.points, row->within += within, all.within += within;
+      }
+    }
+  }
+  result.push_back(all);
+  return result;
+}
+
 // What is measured, in one list for people and for machines.
 void tell(const cortex::Cortex& cortex, const cortex::Report& r, double volume, double seconds,
-          Console& console) {
-  console.print(
-      {{"elements", r.elements},
-       {"uncertified", r.uncertified},
-       {"volume_error", r.volume_error},
-       {"volume_mean", r.volume_mean / 1e9},
-       {"volume_within", r.volume_within},
-       {"w_angle", {{"median", cortex.w_angle.median}, {"p99", cortex.w_angle.p99}}},
-       {"w_reached", cortex.w_reached},
-       {"equivolume_error", r.equivolume_error},
-       {"equivolume_p99", r.equivolume_p99},
-       {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
-       {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
-       {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
-       {"seconds", seconds},
-       {"peak_bytes", peak_bytes()}});
+          Console& console, const std::optional<Deeper>& deeper = std::nullopt) {
+  Json json{
+      {"elements", r.elements},
+      {"uncertified", r.uncertified},
+      {"volume_error", r.volume_error},
+      {"volume_mean", r.volume_mean / 1e9},
+      {"volume_within", r.volume_within},
+      {"w_angle", {{"median", cortex.w_angle.median}, {"p99", cortex.w_angle.p99}}},
+      {"w_reached", cortex.w_reached},
+      {"equivolume_error", r.equivolume_error},
+      {"equivolume_p99", r.equivolume_p99},
+      {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
+      {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
+      {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
+      {"seconds", seconds},
+      {"peak_bytes", peak_bytes()}};
+  if (deeper) {
+    const cortex::Symmetry& s = deeper->symmetry;
+    json["symmetry"] = {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}};
+    json["bok"] = {{"l1", deeper->bok.l1}, {"l6", deeper->bok.l6}};
+    if (!deeper->borders.empty()) {
+      json["border_within_2mm"] = deeper->borders.back().share();
+      for (const auto& b : deeper->borders) json["borders"][b.name] = b.share();
+      json["borders"].erase("all");
+    }
+  }
+  console.print(json);
   const auto row = [](const char* what, const std::string& value, const char* how) {
     return std::vector<std::string>{what, value, how};
   };
-  console.table(
-      {"measure", "value", "what it is"},
-      {row("elements", std::to_string(r.elements), ""),
-       row("uncertified", std::to_string(r.uncertified), "not proven to have a positive Jacobian everywhere"),
-       row("volume error", fmt::format("{:.5f}", r.volume_error),
-           "of all, as a share of what lies between the surfaces"),
-       row("volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"),
-       row("volume within", fmt::format("{:.4f}", r.volume_within),
-           fmt::format("share of elements of {:.2f}–{:.2f} mm³", .8 * volume / 1e9, 1.25 * volume / 1e9)
-               .c_str()),
-       row("w angle", fmt::format("{:.2f} / {:.2f}", cortex.w_angle.median, cortex.w_angle.p99),
-           "degrees from the normals of both surfaces, median / 99th percentile"),
-       row("w reached", fmt::format("{:.6f}", cortex.w_reached),
-           "share of curves that reach the inner surface"),
-       row("equivolume error", fmt::format("{:.4f} / {:.4f}", r.equivolume_p99, r.equivolume_error),
-           "|V(0 → w) / V − w|, 99th percentile / largest"),
-       row("scaled Jacobian", fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
-           "least / 1st percentile"),
-       row("crest angle", fmt::format("{:.2f}", r.crest_angle.median),
-           "degrees between v-isolines and the right angle to crests, median"),
-       row("faces", fmt::format("{:.3f} / {:.3f}", r.outer_distance_p99 / 1e3, r.inner_distance_p99 / 1e3),
-           "mm from the outer / inner surface, 99th percentile; 0 where no surfaces are given")});
+  std::vector<std::vector<std::string>> rows{
+      row("elements", std::to_string(r.elements), ""),
+      row("uncertified", std::to_string(r.uncertified), "not proven to have a positive Jacobian everywhere"),
+      row("volume error", fmt::format("{:.5f}", r.volume_error),
+          "of all, as a share of what lies between the surfaces"),
+      row("volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"),
+      row("volume within", fmt::format("{:.4f}", r.volume_within),
+          fmt::format("share of elements of {:.2f}–{:.2f} mm³", .8 * volume / 1e9, 1.25 * volume / 1e9)
+              .c_str()),
+      row("w angle", fmt::format("{:.2f} / {:.2f}", cortex.w_angle.median, cortex.w_angle.p99),
+          "degrees from the normals of both surfaces, median / 99th percentile"),
+      row("w reached", fmt::format("{:.6f}", cortex.w_reached),
+          "share of curves that reach the inner surface"),
+      row("equivolume error", fmt::format("{:.4f} / {:.4f}", r.equivolume_p99, r.equivolume_error),
+          "|V(0 → w) / V − w|, 99th percentile / largest"),
+      row("scaled Jacobian", fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
+          "least / 1st percentile"),
+      row("crest angle", fmt::format("{:.2f}", r.crest_angle.median),
+          "degrees between v-isolines and the right angle to crests, median"),
+      row("faces", fmt::format("{:.3f} / {:.3f}", r.outer_distance_p99 / 1e3, r.inner_distance_p99 / 1e3),
+          "mm from the outer / inner surface, 99th percentile; 0 where no surfaces are given")};
+  if (deeper) {
+    const cortex::Symmetry& s = deeper->symmetry;
+    rows.push_back(
+        row("symmetry", fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
+            fmt::format("difference of successive v-sections / of the best planar ones, over {} stretches",
+                        s.stretches)
+                .c_str()));
+    rows.push_back(row("Bok", fmt::format("{:.2f} / {:.2f}", deeper->bok.l1, deeper->bok.l6),
+                       "share of thickness on crowns over that in fundi, layer 1 / layer 6"));
+    for (const auto& b : deeper->borders)
+      rows.push_back(
+          row("border", fmt::format("{:.2f}", b.share()),
+              fmt::format("share of the {} points of {} within 2 mm of a valley", b.points, b.name).c_str()));
+  }
+  console.table({"measure", "value", "what it is"}, rows);
 }
 
 std::function<void()> build(CLI::App& command, Console& console) {
@@ -114,21 +194,34 @@ std::function<void()> build(CLI::App& command, Console& console) {
 std::function<void()> report(CLI::App& command, Console& console) {
   struct Options {
     fs::path file, outer, inner;
+    std::vector<fs::path> borders;
   };
   const auto o = std::make_shared<Options>();
   command.add_option("file", o->file, "A file of elements")->required()->type_name("FILE.h5");
   command.add_option("--outer", o->outer, "The outer surface, to measure how far the faces are from it")
       ->type_name("OUTER");
-  command.add_option("--inner", o->inner, "The inner one")->type_name("INNER");
+  CLI::Option* inner_option = command.add_option("--inner", o->inner, "The inner one")->type_name("INNER");
+  command
+      .add_option("--borders", o->borders,
+                  "Sulci drawn on both surfaces (Connectome Workbench): how much of them lies by a valley")
+      ->type_name("FILE.border...")
+      ->needs("--outer")
+      ->needs(inner_option);
   return [o, &console] {
     const auto begin = Clock::now();
     const io::ElementsFile file = io::read_elements(o->file);
     std::optional<TriangleTree> outer, inner;
-    if (!o->outer.empty()) outer.emplace(read_mesh(o->outer));
-    if (!o->inner.empty()) inner.emplace(read_mesh(o->inner));
+    Mesh outer_mesh, inner_mesh;
+    if (!o->outer.empty()) outer_mesh = read_mesh(o->outer), outer.emplace(outer_mesh);
+    if (!o->inner.empty()) inner_mesh = read_mesh(o->inner), inner.emplace(inner_mesh);
+    Deeper deeper;
+    if (!o->borders.empty())
+      deeper.borders = measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
-    tell(file.cortex, r, file.volume, seconds_since(begin), console);
+    deeper.symmetry = cortex::symmetry(file.cortex.elements, file.cortex.lines);
+    deeper.bok = cortex::bok(file.cortex.elements);
+    tell(file.cortex, r, file.volume, seconds_since(begin), console, deeper);
   };
 }
 

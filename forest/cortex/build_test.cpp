@@ -40,10 +40,26 @@ std::string refusal(const Mesh& outer, const Mesh& inner) {
 // Between balls everything is known: the field falls as 1/r.
 struct Shell : ::testing::Test {
   static constexpr double inside = 8000., outside = 10000.;
-  Mesh outer = ball(outside), inner = ball(inside);
-  Laplace field{outer, inner, {.spacing = 250.}};
-  TriangleTree tree{inner};
-  WCurves curves{field, tree};
+  struct Made {
+    Mesh outer = ball(outside), inner = ball(inside);
+    Laplace field{outer, inner, {.spacing = 250.}};
+    TriangleTree tree{inner};
+    WCurves curves{field, tree};
+    Cortex cortex = build();
+
+    Cortex build() const {
+      return build_cortex(outer, inner, {.volume = wanted, .spacing = 400.}, Progress::none());
+    }
+  };
+  static constexpr double wanted = 2e9;  // µm³ of an element
+  static const Made& made() {
+    static const Made once;  // for all tests
+    return once;
+  }
+  const Mesh &outer = made().outer, &inner = made().inner;
+  const Laplace& field = made().field;
+  const TriangleTree& tree = made().tree;
+  const WCurves& curves = made().curves;
 };
 
 TEST_F(Shell, TheSlopeIsThatOfOneOverR) {
@@ -85,12 +101,12 @@ TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {
 }
 
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
-  const Cortex cortex = build_cortex(outer, inner, {.volume = 1e9, .spacing = 300.}, Progress::none());
+  const Cortex& cortex = made().cortex;
   const TriangleTree outer_tree(outer);
-  const Report r = report(cortex, 1e9, &outer_tree, &tree, Progress::none());
+  const Report r = report(cortex, wanted, &outer_tree, &tree, Progress::none());
   EXPECT_EQ(r.uncertified, 0u);
   EXPECT_LT(r.volume_error, .002);
-  EXPECT_NEAR(r.volume_mean, 1e9, 1e7);
+  EXPECT_NEAR(r.volume_mean, wanted, .01 * wanted);
   EXPECT_GT(r.volume_within, .95);
   EXPECT_EQ(cortex.w_reached, 1.);
   EXPECT_LT(cortex.w_angle.p99, 3.);
@@ -110,32 +126,37 @@ TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(std::count(used.begin(), used.end(), 1) - long(sides.size()) + long(cortex.elements.size()), 2);
 
   const ThreadLimit one(1);
-  const Cortex again = build_cortex(outer, inner, {.volume = 1e9, .spacing = 300.}, Progress::none());
+  const Cortex again = made().build();
   EXPECT_EQ(again.elements.elements, cortex.elements.elements);
   EXPECT_EQ(again.elements.curves, cortex.elements.curves);
 }
 
-TEST_F(Shell, NoiseAndShuffledFootprintsAreReported) {
-  Cortex cortex = build_cortex(outer, inner, {.volume = 2e9, .spacing = 300.}, Progress::none());
+TEST_F(Shell, NoiseShuffledFootprintsSwappedSurfacesAndDepthByLengthAreReported) {
+  const Cortex& cortex = made().cortex;
   Cortex noisy = cortex;
   Random random(7);
   for (Depths& curve : noisy.elements.curves)
     for (Place& p : curve) p += 300. * Place(random.normal(), random.normal(), random.normal());
-  const Report of_noise = report(noisy, 2e9, nullptr, nullptr, Progress::none());
+  const Report of_noise = report(noisy, wanted, nullptr, nullptr, Progress::none());
   EXPECT_GT(of_noise.uncertified, noisy.elements.size() / 2);
 
   Cortex shuffled = cortex;  // u and v against one another in every element
   for (auto& e : shuffled.elements.elements)
     for (std::size_t i = 0; i < 4; ++i)
       for (std::size_t j = 0; j < i; ++j) std::swap(e[4 * i + j], e[4 * j + i]);
-  EXPECT_EQ(report(shuffled, 2e9, nullptr, nullptr, Progress::none()).uncertified, shuffled.elements.size());
+  EXPECT_EQ(report(shuffled, wanted, nullptr, nullptr, Progress::none()).uncertified,
+            shuffled.elements.size());
+
+  Cortex swapped = cortex;  // the inner surface outside
+  for (Depths& curve : swapped.elements.curves) std::swap(curve[0], curve[3]), std::swap(curve[1], curve[2]);
+  EXPECT_EQ(report(swapped, wanted, nullptr, nullptr, Progress::none()).uncertified, swapped.elements.size());
 
   Cortex equidistant = cortex;  // thirds of the length, where thirds of the volume are claimed
   for (Depths& curve : equidistant.elements.curves) {
     const Place first = curve[0], last = curve[3];
     curve[1] = (2. * first + last) / 3., curve[2] = (first + 2. * last) / 3.;
   }
-  EXPECT_GT(report(equidistant, 2e9, nullptr, nullptr, Progress::none()).equivolume_error, .02);
+  EXPECT_GT(report(equidistant, wanted, nullptr, nullptr, Progress::none()).equivolume_error, .02);
 }
 
 TEST(CheckSurfaces, NamesWhatIsWrong) {

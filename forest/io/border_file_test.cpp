@@ -1,0 +1,73 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/io/border_file.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "forest/core/error.h"
+#include "forest/core/file.h"
+
+#include "tests/real_data.h"
+#include "tests/refused.h"
+
+namespace forest::io {
+namespace {
+
+using ::testing::HasSubstr;
+
+std::string file(const std::string& vertices, const std::string& weights) {
+  return R"(<?xml version="1.0"?><BorderFile Version="3" SurfaceNumberOfVertices="9"><Class Name="???"><Border Name="CS">)"
+         R"(<BorderPart Closed="False"><Vertices>)" +
+         vertices + "</Vertices><Weights>" + weights +
+         "</Weights></BorderPart></Border></Class></BorderFile>";
+}
+
+TEST(BorderFile, ItsWeightsAreMadeToAddUpToOne) {
+  const Borders read = read_borders(file("1 2 3\n4 5 8", "2 1 1\n0 .5 0"), "cs.border");
+  EXPECT_EQ(read.surface_vertices, 9u);
+  ASSERT_EQ(read.borders.size(), 1u);
+  EXPECT_EQ(read.borders[0].name, "CS");
+  ASSERT_EQ(read.borders[0].points.size(), 2u);
+  EXPECT_THAT(read.borders[0].points[0].vertices, ::testing::ElementsAre(1, 2, 3));
+  EXPECT_THAT(read.borders[0].points[0].weights, ::testing::ElementsAre(.5, .25, .25));
+  EXPECT_THAT(read.borders[0].points[1].weights, ::testing::ElementsAre(0., 1., 0.));
+}
+
+TEST(BorderFile, RefusesWhatCannotBe) {
+  const auto refusal = [](const std::string& text) {
+    return refused<InputError>([&] { (void)read_borders(text, "cs.border"); });
+  };
+  EXPECT_EQ(refusal(file("1 2 3", "1 1 1")), "");
+  EXPECT_THAT(refusal(file("1 2 9", "1 1 1")), HasSubstr("names vertex 9, but its surface has 9"));
+  EXPECT_THAT(refusal(file("1 2", "1 1")), HasSubstr("three each"));
+  EXPECT_THAT(refusal(file("1 2 3", "1 1")), HasSubstr("three each"));
+  EXPECT_THAT(refusal(file("1 2 3", "0 0 0")), HasSubstr("all 0"));
+  EXPECT_THAT(refusal(file("1 2 3", "1 -1 3")), HasSubstr("not 0 or more"));
+  EXPECT_THAT(refusal(file("1 2 3", "1 nan 3")), HasSubstr("not 0 or more"));
+  EXPECT_THAT(refusal(file("1 x 3", "1 1 3")), HasSubstr("'x'"));
+  EXPECT_THAT(refusal("<BorderFile SurfaceNumberOfVertices=\"9\"/>"), HasSubstr("has no borders"));
+  EXPECT_THAT(refusal("<BorderFile/>"), HasSubstr("how many vertices"));
+  EXPECT_THAT(refusal("<GIFTI/>"), HasSubstr("<BorderFile>"));
+}
+
+TEST(BorderFile, CutOffAnywhereIsRefused) {
+  const std::string whole = file("1 2 3", "1 1 1");
+  for (std::size_t size = 0; size < whole.size(); ++size)
+    EXPECT_NE(refused<InputError>([&] { (void)read_borders(whole.substr(0, size), "cs.border"); }), "")
+        << size;
+}
+
+TEST(BorderFile, DrawnSulciAreRead) {
+  FOREST_REAL_DATA(folder, "cortex/fs_LR_left");
+  std::size_t points = 0;
+  for (const auto& path : files_below(folder, ".border")) {
+    const Borders read = read_borders(MappedFile(path).text(), path.string());
+    EXPECT_EQ(read.surface_vertices, 32492u);
+    ASSERT_EQ(read.borders.size(), 1u);
+    points += read.borders[0].points.size();
+  }
+  EXPECT_EQ(points, 67u);
+}
+
+}  // namespace
+}  // namespace forest::io

@@ -1,0 +1,56 @@
+// SPDX-License-Identifier: Apache-2.0
+// The cortex against measured layers.
+#include <array>
+#include <numeric>
+
+#include <fmt/format.h>
+#include <gtest/gtest.h>
+
+#include "forest/core/file.h"
+#include "forest/cortex/bok.h"
+#include "forest/io/surface.h"
+
+#include "tests/real_data.h"
+
+namespace forest::cortex {
+namespace {
+
+TEST(BigBrain, ItsLayersKeepTheirVolumeAsItFolds) {
+  FOREST_REAL_DATA(folder, "cortex/bigbrain_left");
+  const auto path = [&](const std::string& what) { return folder / ("tpl-bigbrain_hemi-L_desc-" + what); };
+  const auto surface = [&](const std::string& what) {
+    return io::read_surface(MappedFile(path(what)).text(), what);
+  };
+  const Mesh pial = surface("pial.surf.gii.gz"), white = surface("white.surf.gii.gz");
+  ASSERT_EQ(pial.triangles, white.triangles);
+  std::vector<Place> outer, inner;
+  for (const Vec3& p : pial.positions) outer.push_back(p.cast<double>());
+  for (const Vec3& p : white.positions) inner.push_back(p.cast<double>());
+  std::array<std::vector<float>, 6> layers;
+  for (std::size_t k = 0; k < 6; ++k) {
+    const std::string name = fmt::format("layer{}_thickness.txt.gz", k + 1);
+    layers[k] = io::read_surface_values(MappedFile(path(name)).text(), name).values;
+    ASSERT_EQ(layers[k].size(), outer.size());
+  }
+
+  const std::vector<double> all = folds(outer, inner, pial.triangles);
+  std::vector<double> fold, l1, l6;
+  for (std::size_t v = 0; v < all.size(); ++v) {
+    double sum = 0.;
+    for (const auto& layer : layers) sum += double(layer[v]);
+    if (!(sum > .5)) continue;  // mm; the wall
+    fold.push_back(all[v]), l1.push_back(double(layers[0][v]) / sum),
+        l6.push_back(double(layers[5][v]) / sum);
+  }
+  const Bok measured{crown_over_fundus(fold, l1), crown_over_fundus(fold, l6)};
+  const Bok by_volume = bok(fold), by_length = bok(fold, Depth::by_length);
+  EXPECT_NEAR(by_volume.l1 / measured.l1, 1., .15);
+  EXPECT_NEAR(by_volume.l6 / measured.l6, 1., .15);
+  EXPECT_DOUBLE_EQ(by_length.l1, 1.);
+  EXPECT_DOUBLE_EQ(by_length.l6, 1.);
+  EXPECT_GT(by_length.l1 / measured.l1, 1.15);
+  EXPECT_LT(by_length.l6 / measured.l6, .85);
+}
+
+}  // namespace
+}  // namespace forest::cortex
