@@ -43,7 +43,7 @@ TEST(BigBrain, ItsLayersKeepTheirVolumeAsItFolds) {
         l6.push_back(double(layers[5][v]) / sum);
   }
   const Bok measured{crown_over_fundus(fold, l1), crown_over_fundus(fold, l6)};
-  const Bok by_volume = bok(fold), by_length = bok(fold, Depth::by_length);
+  const Bok by_volume = bok(fold), by_length = bok(fold, Shares::of_length);
   EXPECT_NEAR(by_volume.l1 / measured.l1, 1., .15);
   EXPECT_NEAR(by_volume.l6 / measured.l6, 1., .15);
   EXPECT_DOUBLE_EQ(by_length.l1, 1.);

@@ -7,7 +7,7 @@
 #include <numeric>
 
 #include "forest/core/parallel.h"
-#include "forest/cortex/layers.h"
+#include "forest/cortex/human_layers.h"
 
 namespace forest::cortex {
 namespace {
@@ -73,14 +73,14 @@ double crown_over_fundus(std::span<const double> folds, std::span<const double> 
   return fundus > 0. ? crown / fundus : 0.;
 }
 
-Bok bok(std::span<const double> folds, Depth depth) {
+Bok bok(std::span<const double> folds, Shares shares) {
   std::vector<double> l1(folds.size(), l1_end), l6(folds.size(), 1. - l6_begin);
-  for (std::size_t i = 0; depth == Depth::by_volume && i < folds.size(); ++i)
+  for (std::size_t i = 0; shares == Shares::of_volume && i < folds.size(); ++i)
     l1[i] = way_of_volume(folds[i], l1_end), l6[i] = 1. - way_of_volume(folds[i], l6_begin);
   return {crown_over_fundus(folds, l1), crown_over_fundus(folds, l6)};
 }
 
-Bok bok(const Elements& elements, Depth depth) {
+Bok bok(const Elements& elements, Shares shares) {
   std::vector<Place> outer, inner;
   std::vector<Triangle> triangles;
   for (std::uint32_t c = 0; c < elements.corners; ++c)
@@ -106,7 +106,7 @@ Bok bok(const Elements& elements, Depth depth) {
     };
     const double first = length(0., l1_end), middle = length(l1_end, l6_begin), last = length(l6_begin, 1.);
     const double all = first + middle + last;
-    const bool by_volume = depth == Depth::by_volume && all > 0.;
+    const bool by_volume = shares == Shares::of_volume && all > 0.;
     l1[e] = by_volume ? first / all : l1_end, l6[e] = by_volume ? last / all : 1. - l6_begin;
   });
   return {crown_over_fundus(fold, l1), crown_over_fundus(fold, l6)};

@@ -7,11 +7,12 @@
 //              ╲───────╱                              ╱─────╲
 //               ╲_____╱    L6 thick                  ╱_______╲  L6 thin
 //
-// BigBrain's layers do so where the fold is that of some millimetres, and much less where it is that of single creases: at 6 mm its
-// layers have L1 .65 and L6 1.43 times the share of thickness on crowns that they have in fundi, and constant volumes give .64 and
-// 1.48; at 1.4 mm .72 and 1.28 stand against .37 and 2.2. Depth by length gives 1 and 1.
+// BigBrain's layers do so where the fold is that of some millimetres, and much less where it is that of single creases: seen at
+// 6 mm, L1 has .66 and L6 1.42 times the share of thickness on crowns that it has in fundi, and constant volumes give .65 and 1.47;
+// at 1.5 mm .72 and 1.28 stand against .37 and 2.21. Depth by length gives 1 and 1.
 #pragma once
 
+#include <cstdint>
 #include <span>
 #include <vector>
 
@@ -34,18 +35,16 @@ double way_of_volume(double fold, double volume_share);
 /// ten places.
 double crown_over_fundus(std::span<const double> folds, std::span<const double> values);
 
-enum class Depth : std::uint8_t {
-  by_volume,
-  by_length
-};  // by which layers have constant shares (human_layers)
+/// Of what layers have constant shares (human_layers): of volume as Bok says, or of length.
+enum class Shares : std::uint8_t { of_volume, of_length };
 
 /// How many times the share of thickness that it has in fundi a layer has on crowns.
 struct Bok {
   double l1 = 0., l6 = 0.;
 };
 /// Along the w-curves of an element's middle, as the elements are.
-Bok bok(const Elements& elements, Depth depth = Depth::by_volume);
+Bok bok(const Elements& elements, Shares shares = Shares::of_volume);
 /// By way_of_volume at each vertex.
-Bok bok(std::span<const double> folds, Depth depth = Depth::by_volume);
+Bok bok(std::span<const double> folds, Shares shares = Shares::of_volume);
 
 }  // namespace forest::cortex

@@ -6,7 +6,7 @@
 
 #include <gtest/gtest.h>
 
-#include "forest/cortex/layers.h"
+#include "forest/cortex/human_layers.h"
 
 #include "tests/folded_lattice.h"
 
@@ -38,7 +38,7 @@ TEST(HumanLayers, AreAWhole) {
 }
 
 // Sheets of a sine, with a quarter turn of crown beside one of fundus; every depth by volume, or by length.
-Elements wave(Depth depth) {
+Elements wave(Shares shares) {
   constexpr int across = 48, along = 12;
   constexpr double bend = 5000., thick = 2000.;  // µm: radius of the middle
   return folded_lattice(across, along, [&](double s, double t, double w) {
@@ -46,7 +46,7 @@ Elements wave(Depth depth) {
     const bool crown = angle < std::numbers::pi / 2.;
     const double outer = crown ? bend + thick / 2. : bend - thick / 2.,
                  inner = crown ? bend - thick / 2. : bend + thick / 2.;
-    const double r = depth == Depth::by_volume
+    const double r = shares == Shares::of_volume
                          ? std::sqrt(outer * outer + w * (inner * inner - outer * outer))
                          : outer + w * (inner - outer);
     const Place crown_centre(0., 0., 0.), fundus_centre(2. * bend, 0., 0.);
@@ -59,7 +59,7 @@ Elements wave(Depth depth) {
 }
 
 TEST(Bok, OverCrownsUpperLayersAreThinAndDeepOnesThick) {
-  const Bok found = bok(wave(Depth::by_volume));
+  const Bok found = bok(wave(Shares::of_volume));
   // A ring of the radii 6 and 4 mm, both ways.
   const auto radius = [](double outer, double inner, double w) {
     return std::sqrt(outer * outer + w * (inner * inner - outer * outer));
@@ -73,10 +73,10 @@ TEST(Bok, OverCrownsUpperLayersAreThinAndDeepOnesThick) {
 }
 
 TEST(Bok, DepthByLengthIsReportedAsFailing) {
-  const Bok found = bok(wave(Depth::by_length));
+  const Bok found = bok(wave(Shares::of_length));
   EXPECT_NEAR(found.l1, 1., .005);
   EXPECT_NEAR(found.l6, 1., .005);
-  EXPECT_EQ(bok(wave(Depth::by_volume), Depth::by_length).l1, 1.);
+  EXPECT_EQ(bok(wave(Shares::of_volume), Shares::of_length).l1, 1.);
 }
 
 TEST(Folds, OfNestedBallsAreTheRatioOfTheirAreas) {

@@ -12,7 +12,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "forest/core/parallel.h"
-#include "forest/cortex/layers.h"
+#include "forest/cortex/human_layers.h"
 
 namespace forest::cortex {
 namespace {
