@@ -26,7 +26,7 @@ namespace forest::cortex {
 
 struct SymmetryOptions {
   int across = 6, along = 12;  // elements of a stretch
-  std::size_t stretches = 40;  // at most, spread over all crests
+  std::size_t stretches = 24;  // at most, spread over all crests
   double pixel = 50.;          // µm
 };
 

@@ -41,6 +41,14 @@ write("outer", ball(9, dent=1.2))
 write("inner", ball(7, dent=1.2))
 p, f = ball(9)
 write("open", (p, f[:-1]))
+def border(name, vertices, count):
+    open(name, "w").write(f"""<?xml version="1.0"?><BorderFile Version="3" SurfaceNumberOfVertices="{count}"><Class Name="all">
+<Border Name="{name.split('.')[0]}"><BorderPart Closed="False"><Vertices>{" ".join(f"{v} {v} {v}" for v in vertices)}</Vertices>
+<Weights>{" ".join("2 1 1" for v in vertices)}</Weights></BorderPart></Border></Class></BorderFile>""")
+order = sorted(range(len(p)), key=lambda v: abs(p[v][0]))
+border("dent.border", order[:30], len(p))   # along the dent
+border("pole.border", order[-30:], len(p))  # where there is none
+border("other.border", [0], 7)
 write("small", ([tuple(x / 1000 for x in q) for q in p], f))
 PY
 
@@ -55,7 +63,19 @@ for key in ("elements", "uncertified", "volume_error", "volume_mean", "volume_wi
 assert built["elements"] > 1000 and built["uncertified"] == 0, built
 assert built["volume_error"] < .005 and abs(built["volume_mean"] - 1) < .03 and built["volume_within"] > .95, built
 assert built["w_reached"] == 1 and built["w_angle"]["median"] < 3, built
+assert report["bok"]["l1"] < 1 < report["bok"]["l6"], report  # the dent is a fundus
+assert set(report["symmetry"]) == {"elements", "best_planar", "stretches"} and "border_within_2mm" not in report, report
 PY
+$BRAINFOREST cortex build outer inner -o fine.h5 --scale 1 >/dev/null
+$BRAINFOREST cortex report fine.h5 --outer outer --inner inner --borders dent.border pole.border --json >borders.json
+python3 - <<'PY'
+import json
+report = json.load(open("borders.json"))
+dent, pole = report["borders"]["dent"], report["borders"]["pole"]
+assert dent > .8 and pole == 0 and abs(report["border_within_2mm"] - dent / 2) < 1e-9, report
+PY
+refuses '7 vertices' $BRAINFOREST cortex report e.h5 --outer outer --inner inner --borders other.border
+refuses 'inner' $BRAINFOREST cortex report e.h5 --outer outer --borders dent.border
 $BRAINFOREST cortex build outer inner -o again.h5 --threads 1 >/dev/null
 cmp e.h5 again.h5
 
