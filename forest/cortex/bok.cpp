@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include "forest/core/parallel.h"
+#include "forest/cortex/depth.h"
 #include "forest/cortex/human_layers.h"
 
 namespace forest::cortex {
@@ -104,7 +105,9 @@ Bok bok(const Elements& elements, Shares shares) {
       }
       return sum;
     };
-    const double first = length(0., l1_end), middle = length(l1_end, l6_begin), last = length(l6_begin, 1.);
+    const Layers layers(elements, e);
+    const double top = layers.w(.5, .5, l1_end), bottom = layers.w(.5, .5, l6_begin);
+    const double first = length(0., top), middle = length(top, bottom), last = length(bottom, 1.);
     const double all = first + middle + last;
     const bool by_volume = shares == Shares::of_volume && all > 0.;
     l1[e] = by_volume ? first / all : l1_end, l6[e] = by_volume ? last / all : 1. - l6_begin;

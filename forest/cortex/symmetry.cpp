@@ -12,6 +12,7 @@
 #include <Eigen/Eigenvalues>
 
 #include "forest/core/parallel.h"
+#include "forest/cortex/depth.h"
 #include "forest/cortex/human_layers.h"
 
 namespace forest::cortex {
@@ -27,15 +28,28 @@ double depth(int k) {
   return k % 2 ? .5 * (layer_top(layer) + layer_top(layer + 1)) : layer_top(layer);
 }
 
-// An element as it is seen in a stretch: its curves, turned so that u runs along s and v along t.
-using Cell = std::array<std::uint32_t, 16>;
 constexpr std::size_t slot(int i, int j) { return std::size_t(i + 4 * j); }
 
+// An element as it is seen in a stretch: its curves, turned so that s runs where u did, and t where v did, after some quarters.
+struct Cell {
+  std::array<std::uint32_t, 16> curves;
+  std::uint32_t element = 0;
+  int quarters = 0;
+
+  std::uint32_t operator[](std::size_t k) const { return curves[k]; }
+};
+
 Cell turned(const Cell& cell) {
-  Cell next{};
+  Cell next{{}, cell.element, cell.quarters + 1};
   for (int j = 0; j < 4; ++j)
-    for (int i = 0; i < 4; ++i) next[slot(i, j)] = cell[slot(3 - j, i)];
+    for (int i = 0; i < 4; ++i) next.curves[slot(i, j)] = cell[slot(3 - j, i)];
   return next;
+}
+
+// (u, v) of the element.
+std::pair<double, double> of_element(const Cell& cell, double s, double t) {
+  for (int q = 0; q < cell.quarters % 4; ++q) s = std::exchange(t, s), s = 1. - s;
+  return {s, t};
 }
 
 class Lattice {
@@ -66,10 +80,8 @@ class Lattice {
   std::optional<Cell> across(const Cell& from, std::uint32_t a, std::uint32_t b, std::size_t to_a,
                              std::size_t to_b) const {
     for (const std::uint32_t e : sides_.at(std::minmax(a, b))) {
-      Cell cell = elements_.elements[e];
-      if (cell[slot(1, 1)] == from[slot(1, 1)] || cell[slot(1, 1)] == from[slot(2, 2)] ||
-          cell[slot(1, 1)] == from[slot(2, 1)] || cell[slot(1, 1)] == from[slot(1, 2)])
-        continue;  // itself
+      if (e == from.element) continue;
+      Cell cell{elements_.elements[e], e, 0};
       for (int quarter = 0; quarter < 4; ++quarter, cell = turned(cell))
         if (cell[to_a] == a && cell[to_b] == b) return cell;
     }
@@ -129,15 +141,18 @@ std::vector<Section> sampled(const Elements& elements, const std::vector<std::ve
   std::vector<Section> sections(std::size_t(high), {wide, std::vector<Place>(std::size_t(wide * depths))});
   for (std::size_t j = 0; j < rows.size(); ++j)
     for (std::size_t i = 0; i < rows[j].size(); ++i) {
-      std::array<Eigen::Vector3d, 64> places;
-      for (std::size_t k = 0; k < 4; ++k)
-        for (std::size_t c = 0; c < 16; ++c) places[16 * k + c] = elements.curves[rows[j][i][c]][k];
-      const Hexahedron h = through_lattice(places);
+      const Cell& cell = rows[j][i];
+      const Hexahedron h = elements.hexahedron(cell.element);
+      const Layers element_layers(elements, cell.element);
+      const auto place = [&](double s, double t, double d) {
+        const auto [u, v] = of_element(cell, s, t);
+        return h.at(u, v, element_layers.w(u, v, d));
+      };
       for (int t = 0; t <= fine; ++t)
         for (int s = 0; s <= fine; ++s)
           for (int k = 0; k < depths; ++k)
             sections[j * fine + std::size_t(t)].places[std::size_t(k * wide + int(i) * fine + s)] =
-                h.at(double(s) / fine, double(t) / fine, depth(k));
+                place(double(s) / fine, double(t) / fine, depth(k));
     }
   return sections;
 }
@@ -338,11 +353,11 @@ Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const S
 
   // Stretches that share no element, tried in an order that spreads them.
   std::vector<std::vector<std::vector<Cell>>> stretches;
-  std::vector<std::uint8_t> taken(elements.curves.size(), 0);  // by a curve within the element
+  std::vector<std::uint8_t> taken(elements.size(), 0);
   const std::size_t n = elements.size();
   const auto stride = std::size_t(double(n) * .6180339887) | 1;
   for (std::size_t k = 0, e = 0; k < n && stretches.size() < options.stretches; ++k, e = (e + stride) % n) {
-    Cell cell = elements.elements[e];
+    Cell cell{elements.elements[e], std::uint32_t(e), 0};
     const auto corner = [&](std::size_t c) -> Place {  // half way down
       return .5 * (elements.curves[cell[c]][1] + elements.curves[cell[c]][2]);
     };
@@ -361,11 +376,10 @@ Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const S
     if (!rows) continue;
     bool free = true;
     for (const auto& row : *rows)
-      for (const Cell& c : row) free = free && !taken[std::min(c[slot(1, 1)], c[slot(2, 2)])];
+      for (const Cell& c : row) free = free && !taken[c.element];
     if (!free) continue;
     for (const auto& row : *rows)
-      for (const Cell& c : row)
-        taken[c[slot(1, 1)]] = taken[c[slot(2, 2)]] = taken[c[slot(1, 2)]] = taken[c[slot(2, 1)]] = 1;
+      for (const Cell& c : row) taken[c.element] = 1;
     stretches.push_back(*rows);
   }
   std::vector<std::optional<std::pair<double, double>>> results(stretches.size());
