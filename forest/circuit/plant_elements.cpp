@@ -1,0 +1,185 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/circuit/plant_elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+#include "forest/cortex/warp.h"
+
+namespace forest::circuit {
+namespace {
+
+// Streams of the packings, of which each layer has its own, and of the places in them.
+constexpr std::uint32_t packing_stream = 0x70650000, lot_stream = 0x70651000, cell_stream = 0x70652000;
+
+constexpr double rounding = .02;  // µm that places may be off, as single precision is in a head
+constexpr double evenness = .8;  // at least this times their mean distance keep the places of a packing apart
+
+/// Neurons/mm³ of each layer. Counts hold in the recipe's column.
+std::vector<double> densities_of(const Recipe& recipe) {
+  const bool counted =
+      recipe.neurons || std::ranges::any_of(recipe.layers, [](const auto& l) { return l.count.has_value(); });
+  std::vector<double> densities;
+  if (!counted) {
+    for (const Recipe::Layer& layer : recipe.layers) densities.push_back(layer.density);
+    return densities;
+  }
+  const auto wanted = counts(recipe);
+  const cortex::Column tissue = column(recipe);
+  for (std::size_t l = 0; l < wanted.size(); ++l)
+    densities.push_back(std::accumulate(wanted[l].begin(), wanted[l].end(), 0.) / (tissue.volume(l) * 1e-9));
+  return densities;
+}
+
+}  // namespace
+
+ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates,
+                               std::uint64_t seed, const ElementPlanting& options)
+    : recipe_(recipe), candidates_(candidates), seed_(seed) {
+  check(recipe);
+  if (!(options.scale > 0. && std::isfinite(options.scale)))
+    throw Error(fmt::format("densities cannot be scaled by {}; give a positive number", options.scale));
+  const std::size_t layers = recipe.layers.size();
+  const double height = double(column(recipe).height());
+  double depth = 0.;
+  for (const Recipe::Layer& layer : recipe.layers)
+    depths_.push_back(depth += double(layer.thickness) / height);
+  depths_.back() = 1.;
+  densities_ = densities_of(recipe);
+  for (double& density : densities_) density *= options.scale;
+
+  choices_ = candidates_of(recipe, candidates, [&](std::size_t type) {
+    for (std::size_t l = 0; l < layers; ++l)
+      if (densities_[l] > 0. && recipe.layers[l].mix[type] > 0.) return true;
+    return false;
+  });
+  radii_.assign(layers, 0.);
+  for (std::size_t t = 0; t < choices_.size(); ++t) {
+    std::ranges::stable_sort(choices_[t], {}, [&](std::uint32_t c) { return candidates[c].height; });
+    for (std::size_t l = 0; l < layers; ++l)
+      if (densities_[l] > 0. && recipe.layers[l].mix[t] > 0.)
+        for (const std::uint32_t c : choices_[t])
+          radii_[l] = std::max(radii_[l], double(candidates[c].soma_radius));
+  }
+
+  // A fifth more places than are wanted, and some standard deviations where they are few; fewer where they hardly fit.
+  double spacing = evenness;
+  std::vector<double> supply(layers);  // places/µm³
+  for (std::size_t l = 0; l < layers; ++l) {
+    if (!(densities_[l] > 0.)) continue;
+    const double volume = (depths_[l] - (l ? depths_[l - 1] : 0.)) * options.element,
+                 density = densities_[l] * 1e-9, usual = density * volume;
+    const double contact = 2. * radii_[l] + double(recipe.soma_gap) + rounding;
+    const double most = std::pow(cortex::PackedCube::most_spacing / contact, 3.);
+    supply[l] = std::min((1.2 * usual + 4. * std::sqrt(usual) + 10.) / volume, most);
+    if (supply[l] < 1.01 * density)
+      throw Error(
+          fmt::format("{:.0f} somata/mm³ of a radius of up to {:.3g} µm do not fit into layer {} without "
+                      "overlap, {:.0f} are the most; lower "
+                      "its density or the gap, or plant neurons with smaller somata",
+                      densities_[l], radii_[l], recipe.layers[l].name, most * 1e9 / 1.01));
+    spacing = std::max(spacing, std::min(contact * std::cbrt(supply[l]), cortex::PackedCube::most_spacing));
+  }
+  const auto cube = std::make_shared<const cortex::PackedCube>(cortex::pack_cube(spacing, seed));
+  packings_.resize(layers), sparser_.resize(layers);
+  for (std::size_t l = 0; l < layers; ++l) {
+    if (!(supply[l] > 0.)) continue;
+    packings_[l].emplace(cube, supply[l], seed, packing_stream + std::uint32_t(l));
+    for (std::size_t other = 0; other < layers; ++other)
+      if (supply[other] > 0. && std::pair(supply[other], other) < std::pair(supply[l], l))
+        sparser_[l].push_back(std::uint32_t(other));
+  }
+}
+
+std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hexahedron& element) const {
+  std::vector<double> wanted(depths_.size());
+  for (std::size_t l = 0; l < depths_.size(); ++l)
+    if (densities_[l] > 0.)
+      wanted[l] = std::max(0., densities_[l] * 1e-9 * element.volume(l ? depths_[l - 1] : 0., depths_[l]));
+  const double sum = std::accumulate(wanted.begin(), wanted.end(), 0.);
+  if (!(sum < 4e9))
+    throw Error(fmt::format("an element of {:.3g} neurons is too large; lower the densities", sum));
+  const auto by_layer = apportion(std::uint32_t(std::lround(sum)), wanted);
+  std::vector<std::vector<std::uint32_t>> result;
+  for (std::size_t l = 0; l < by_layer.size(); ++l)
+    result.push_back(apportion(by_layer[l], recipe_.layers[l].mix));
+  return result;
+}
+
+// Whether a place in a layer is too near to what may stand in a sparser one.
+bool ElementPlanter::yields(std::size_t layer, double w, const cortex::Linear& here) const {
+  if (sparser_[layer].empty()) return false;
+  const double steepness =  // of w, a µm
+      here.jacobian.col(0).cross(here.jacobian.col(1)).norm() / here.jacobian.determinant();
+  for (const std::uint32_t other : sparser_[layer]) {
+    const double begin = other ? depths_[other - 1] : 0., end = depths_[other],
+                 contact = radii_[layer] + radii_[other] + double(recipe_.soma_gap) + rounding;
+    // The border is at most this far if the element were straight; it may be a little nearer.
+    if (std::max(begin - w, w - end) < 1.5 * contact * steepness &&
+        packings_[other]->any_within(here.at, contact))
+      return true;
+  }
+  return false;
+}
+
+std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number) const {
+  const auto wanted = counts(element);
+  std::vector<Rooted> rooted;
+  for (std::size_t l = 0; l < wanted.size(); ++l) {
+    const std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
+    if (!count) continue;
+    const auto places = cortex::places_in(*packings_[l], element, l ? depths_[l - 1] : 0., depths_[l]);
+    // Places by lot; what is too near to the pia or to another layer is not in it.
+    constexpr std::uint64_t blank = ~std::uint64_t(0);
+    std::vector<Keyed> lots(places.size());
+    parallel_for(places.size(), 1024, [&](std::size_t i) {
+      const cortex::Linear here = linear(element, places[i].uvw);
+      const double w = places[i].uvw[2];
+      Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
+      const std::uint64_t high = random();
+      lots[i] = {w * here.jacobian.col(2).norm() < radii_[l] || yields(l, w, here)
+                     ? blank
+                     : (high << 31 | random() >> 1),
+                 i};
+    });
+    parallel_sort(lots);
+    const auto free = std::size_t(std::ranges::find(lots, blank, &Keyed::first) - lots.begin());
+    if (free < count)
+      throw Error(
+          fmt::format("layer {} of element {} has room for {} somata of a radius of up to {:.3g} µm, and {} "
+                      "are to stand there; lower its "
+                      "density or the gap, or plant neurons with smaller somata",
+                      recipe_.layers[l].name, number, free, radii_[l], count));
+    const std::size_t begin = rooted.size();
+    for (std::uint32_t type = 0; type < wanted[l].size(); ++type)
+      rooted.resize(
+          rooted.size() + wanted[l][type],
+          Rooted{.uvw = {}, .position = {}, .orientation = {}, .type = type, .layer = std::uint32_t(l)});
+    parallel_for(count, 1024, [&](std::size_t i) {
+      const cortex::Packed& place = places[lots[i].second];
+      Rooted& neuron = rooted[begin + i];
+      const cortex::Linear here = linear(element, place.uvw);
+      Random random(seed_, place.item, cell_stream + std::uint32_t(l));
+      neuron.uvw = place.uvw;
+      neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
+      neuron.position = here.at.cast<float>();
+      neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
+      const auto& choice = choices_[neuron.type];
+      const double room = place.uvw[2] * here.jacobian.col(2).norm();
+      const auto fit = std::ranges::upper_bound(
+          choice, room, {}, [&](std::uint32_t c) { return double(candidates_[c].height); });
+      neuron.candidate = choice[random.below(std::max(1u, std::uint32_t(fit - choice.begin())))];
+    });
+  }
+  return rooted;
+}
+
+}  // namespace forest::circuit
