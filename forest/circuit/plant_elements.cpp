@@ -41,6 +41,13 @@ std::vector<double> densities_of(const Recipe& recipe) {
 
 }  // namespace
 
+double mean_density(const Recipe& recipe) {
+  const auto densities = densities_of(recipe);
+  double sum = 0.;
+  for (std::size_t l = 0; l < densities.size(); ++l) sum += densities[l] * double(recipe.layers[l].thickness);
+  return sum / double(column(recipe).height());
+}
+
 ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates,
                                std::uint64_t seed, const ElementPlanting& options)
     : recipe_(recipe), candidates_(candidates), seed_(seed) {

@@ -39,6 +39,9 @@ struct Rooted {
   std::uint32_t candidate = 0, type = 0, layer = 0;
 };
 
+/// Neurons/mm³ over all layers of a recipe, by their thickness.
+double mean_density(const Recipe& recipe);
+
 class ElementPlanter {
  public:
   /// The candidates must outlive it. Somata are taken as wide as the widest of their layer.

@@ -319,10 +319,11 @@ std::string to_json(const View& v) {
 View overview(const Forest& forest) {
   View view;
   Bounds bounds = forest.soma_bounds();
-  for (const auto& layer : forest.circuit().layers) {
-    bounds.add({0.f, layer.bottom, 0.f});
-    bounds.add({0.f, layer.top, 0.f});
-  }
+  if (forest.circuit().radius > 0.f)  // a column stands at the origin
+    for (const auto& layer : forest.circuit().layers) {
+      bounds.add({0.f, layer.bottom, 0.f});
+      bounds.add({0.f, layer.top, 0.f});
+    }
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, .5f * bounds.extent().norm() * .5f);
   const float height = std::max(bounds.extent().y(), radius) + 120.f;
