@@ -37,21 +37,24 @@ void run(const Options& options, Console& console) {
   for (const std::size_t neurons : options.neurons) {
     circuit::Recipe recipe;
     recipe.radius = 100.f, recipe.types = {{"cell", "cell"}};
-    for (const char* name : {"L1", "L2", "L3"}) recipe.layers.push_back({name, 1.f, double(neurons), {}, {1.}});
+    for (const char* name : {"L1", "L2", "L3"})
+      recipe.layers.push_back({name, 1.f, double(neurons), {}, {1.}});
     const auto start = Clock::now();
     const circuit::ElementPlanter planter(recipe, candidates, options.seed);
     const double packing = seconds_since(start);
     const auto rooted = planter.plant(element, 0);
     const double seconds = seconds_since(start);
-    const double filled = double(rooted.size()) * 4. / 3. * std::numbers::pi * std::pow(options.radius, 3.) / element.volume();
+    const double filled =
+        double(rooted.size()) * 4. / 3. * std::numbers::pi * std::pow(options.radius, 3.) / element.volume();
     all.push_back({{"neurons", rooted.size()},
                    {"radius", options.radius},
                    {"filled", filled},
                    {"packing_seconds", packing},
                    {"seconds", seconds},
                    {"peak_bytes", peak_bytes()}});
-    lines.push_back({fmt::format("{}", rooted.size()), fmt::format("{:.2g}", options.radius), fmt::format("{:.1f}", 100. * filled),
-                     fmt::format("{:.2f}", packing), fmt::format("{:.2f}", seconds)});
+    lines.push_back({fmt::format("{}", rooted.size()), fmt::format("{:.2g}", options.radius),
+                     fmt::format("{:.1f}", 100. * filled), fmt::format("{:.2f}", packing),
+                     fmt::format("{:.2f}", seconds)});
   }
   console.print(all);
   console.table({"somata in 1 mm³", "radius, µm", "filled, %", "packing, s", "in all, s"}, lines);
@@ -62,7 +65,9 @@ void run(const Options& options, Console& console) {
 std::function<void()> bench_planting(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("--neurons", options->neurons, "How many, one run each")->capture_default_str();
-  command.add_option("--radius", options->radius, "Of their somata, µm")->check(CLI::Range(.1, 20.))->capture_default_str();
+  command.add_option("--radius", options->radius, "Of their somata, µm")
+      ->check(CLI::Range(.1, 20.))
+      ->capture_default_str();
   command.add_option("--seed", options->seed, "Seed of their places")->capture_default_str();
   return [options, &console] { run(*options, console); };
 }

@@ -72,6 +72,7 @@ void run(const Options& options, Console& console) {
     all = plant_in_elements(options.elements, recipe, options.repo, options.seed, console.progress());
   else
     all.planted = plant_from_repository(recipe, options.repo, options.seed, console.progress());
+  for (const std::string& sentence : all.left_out) console.warn(sentence);
   const Planted& planted = all.planted;
   const circuit::Circuit& circuit = planted.circuit;
   std::vector<circuit::Projection> projections;
@@ -118,7 +119,8 @@ std::function<void()> plant(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
       .add_option("--recipe", options->recipe,
-                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000")
+                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000, human-frontal, "
+                  "human-visual, rat-barrel-column, rodent-types")
       ->required()
       ->type_name("FILE|NAME");
   command

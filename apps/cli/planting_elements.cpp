@@ -20,6 +20,7 @@
 #include "forest/repository/names.h"
 
 #include "apps/cli/clock.h"
+#include "apps/cli/console.h"
 #include "apps/cli/options.h"
 
 namespace forest::cli {
@@ -28,7 +29,8 @@ namespace {
 using Place = Eigen::Vector3d;
 
 // "7,12,20-29" or "all".
-std::vector<std::uint32_t> parse_elements(const std::string& text, const ElementOptions& options, std::size_t count) {
+std::vector<std::uint32_t> parse_elements(const std::string& text, const ElementOptions& options,
+                                          std::size_t count) {
   std::vector<std::uint32_t> all(count);
   std::iota(all.begin(), all.end(), 0u);
   if (text == "all") return all;
@@ -50,7 +52,8 @@ std::vector<std::uint32_t> parse_elements(const std::string& text, const Element
     if (at != end && *at == '-') ++at, last = number();
     for (std::uint32_t e = first; e <= last; ++e) chosen.push_back(e);
     if (at == end) break;
-    if (*at++ != ',') throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
+    if (*at++ != ',')
+      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
   }
   std::set<std::uint32_t> seen;
   std::erase_if(chosen, [&](std::uint32_t e) { return !seen.insert(e).second; });
@@ -58,7 +61,8 @@ std::vector<std::uint32_t> parse_elements(const std::string& text, const Element
 }
 
 // As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends.
-std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle, std::uint32_t count) {
+std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle,
+                                       std::uint32_t count) {
   std::vector<std::uint32_t> row{middle};
   const auto walk = [&](std::uint32_t element, cortex::Face out, std::size_t length) {
     std::vector<std::uint32_t> way;
@@ -78,7 +82,8 @@ std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t
   return row;
 }
 
-std::vector<std::uint32_t> choose(const ElementOptions& options, std::span<const cortex::Hexahedron> elements) {
+std::vector<std::uint32_t> choose(const ElementOptions& options,
+                                  std::span<const cortex::Hexahedron> elements) {
   if (!options.elements.empty()) return parse_elements(options.elements, options, elements.size());
   std::vector<std::uint32_t> chosen;
   std::vector<Place> middles(elements.size());
@@ -86,7 +91,8 @@ std::vector<std::uint32_t> choose(const ElementOptions& options, std::span<const
   if (!options.near.empty()) {
     const Place near(options.near[0], options.near[1], options.near[2]);
     std::vector<std::pair<double, std::uint32_t>> order;
-    for (std::uint32_t e = 0; e < middles.size(); ++e) order.emplace_back((middles[e] - near).squaredNorm(), e);
+    for (std::uint32_t e = 0; e < middles.size(); ++e)
+      order.emplace_back((middles[e] - near).squaredNorm(), e);
     const auto count = std::min<std::size_t>(options.count, order.size());
     std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(count), order.end());
     for (std::size_t i = 0; i < count; ++i) chosen.push_back(order[i].second);
@@ -105,17 +111,20 @@ std::vector<std::uint32_t> choose(const ElementOptions& options, std::span<const
     if (within(middles[e])) chosen.push_back(e);
   }
   if (chosen.empty())
-    throw Error(fmt::format("no element of {} has its middle in that {}; their middles are at ({:.0f}, {:.0f}, {:.0f}) to "
-                            "({:.0f}, {:.0f}, {:.0f}) µm",
-                            options.file.string(), options.box.empty() ? "sphere" : "box", low.x(), low.y(), low.z(), high.x(),
-                            high.y(), high.z()));
+    throw Error(fmt::format(
+        "no element of {} has its middle in that {}; their middles are at ({:.0f}, {:.0f}, {:.0f}) to "
+        "({:.0f}, {:.0f}, {:.0f}) µm",
+        options.file.string(), options.box.empty() ? "sphere" : "box", low.x(), low.y(), low.z(), high.x(),
+        high.y(), high.z()));
   return chosen;
 }
 
 Spread spread(std::vector<double> values) {
   if (values.empty()) return {};
   std::ranges::sort(values);
-  const auto at = [&](double share) { return values[std::size_t(std::lround(share * double(values.size() - 1)))]; };
+  const auto at = [&](double share) {
+    return values[std::size_t(std::lround(share * double(values.size() - 1)))];
+  };
   return {at(0.), at(.01), at(.5), at(.99), at(1.)};
 }
 
@@ -127,7 +136,9 @@ struct Tree {
   explicit Tree(const Morphology& m) {
     for (const Section& s : m.sections()) {
       const std::int32_t above =
-          s.parent.valid() ? std::int32_t(m.section(s.parent).first_point + m.section(s.parent).point_count) - 1 : -1;
+          s.parent.valid()
+              ? std::int32_t(m.section(s.parent).first_point + m.section(s.parent).point_count) - 1
+              : -1;
       for (std::uint32_t i = 0; i < s.point_count; ++i) {
         points.push_back(m.points()[s.first_point + i].position().cast<double>());
         parents.push_back(i > 1 || (i == 1 && above < 0) ? std::int32_t(points.size()) - 2 : above);
@@ -137,14 +148,16 @@ struct Tree {
 };
 
 // Each neuron becomes a shape of its own, in the tissue's axes.
-Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, const cortex::Sheet& sheet, Progress& progress) {
+Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, const cortex::Sheet& sheet,
+             Progress& progress) {
   circuit::Circuit& circuit = all.planted.circuit;
   const std::size_t count = circuit.instances.size();
   std::vector<Tree> trees;
   for (const Morphology& m : all.planted.morphologies) trees.emplace_back(m);
   std::vector<std::size_t> group(count);  // the element of each, in all.elements
   for (std::size_t e = 0; e < all.elements.size(); ++e)
-    std::fill(group.begin() + std::ptrdiff_t(all.first[e]), group.begin() + std::ptrdiff_t(all.first[e + 1]), e);
+    std::fill(group.begin() + std::ptrdiff_t(all.first[e]), group.begin() + std::ptrdiff_t(all.first[e + 1]),
+              e);
   std::vector<Morphology> bent(count);
   std::vector<std::string> names(count);
   std::vector<cortex::Distortion> distortions(count);
@@ -166,8 +179,8 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
     points.reserve(warped.points.size());
     for (const Place& p : warped.points) points.push_back((p - soma).cast<float>());
     bent[i] = reshaped(all.planted.morphologies[instance.morphology], points, instance.orientation);
-    names[i] = repository::file_name(
-        fmt::format("e{}-{:05}-{}", seat.element, i - all.first[group[i]], circuit.morphologies[instance.morphology]));
+    names[i] = repository::file_name(fmt::format("e{}-{:05}-{}", seat.element, i - all.first[group[i]],
+                                                 circuit.morphologies[instance.morphology]));
     progress.advance();
   });
   progress.end();
@@ -183,23 +196,28 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
   for (std::size_t i = 0; i < count; ++i) {
     const cortex::Distortion& d = distortions[i];
     b.length += d.straight_length, after += d.length;
-    b.beyond_pia += d.beyond_pia, b.pressed += pressed[i], b.beyond_white += d.beyond_white, b.beside += d.beside;
+    b.beyond_pia += d.beyond_pia, b.pressed += pressed[i], b.beyond_white += d.beyond_white,
+        b.beside += d.beside;
     if (d.straight_length > 0.) ratios.push_back(d.length / d.straight_length), turns.push_back(d.mean_turn);
   }
-  if (after > 0.) b.length_ratio = after / b.length, b.beyond_pia /= after, b.beyond_white /= after, b.beside /= after, b.pressed /= b.length;
+  if (after > 0.)
+    b.length_ratio = after / b.length, b.beyond_pia /= after, b.beyond_white /= after, b.beside /= after,
+    b.pressed /= b.length;
   b.ratio = spread(std::move(ratios)), b.turn = spread(std::move(turns));
   return b;
 }
 
 }  // namespace
 
-PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe, const std::string& repo,
-                                  std::uint64_t seed, Progress& progress) {
+PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
+                                  const std::string& repo, std::uint64_t seed, Progress& progress) {
   for (std::size_t t = 0; t < recipe.grammars.size(); ++t)
     if (!recipe.grammars[t].empty())
-      throw Error(fmt::format("neurons of type {} would grow by grammar {} where they stand, which is not so in elements; grow some "
-                              "into a repository (brainforest grow), and name their population instead",
-                              recipe.types[t].name, recipe.grammars[t]));
+      throw Error(
+          fmt::format("neurons of type {} would grow by grammar {} where they stand, which is not so in "
+                      "elements; grow some "
+                      "into a repository (brainforest grow), and name their population instead",
+                      recipe.types[t].name, recipe.grammars[t]));
   if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty())
     throw Error("say which elements are planted: --element, --near, --sphere or --box");
   const io::ElementsFile file = io::read_elements(options.file);
@@ -213,7 +231,8 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   const cortex::Sheet sheet{elements, junctions};
   if (options.row > 1) {
     if (all.elements.size() != 1)
-      throw Error(fmt::format("a row goes through one element, and {} are chosen; choose one", all.elements.size()));
+      throw Error(
+          fmt::format("a row goes through one element, and {} are chosen; choose one", all.elements.size()));
     all.elements = row_through(sheet, all.elements.front(), options.row);
   }
 
@@ -225,19 +244,30 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
     if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
     scale = options.density / mean;
   }
-  const circuit::ElementPlanter planter(recipe, stock.candidates, seed, {.scale = scale, .element = file.volume});
+  const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
+                                        {.scale = scale, .element = file.volume});
+  for (std::size_t l = 0; l < recipe.layers.size(); ++l)
+    if (planter.left_out(l))
+      all.left_out.push_back(
+          fmt::format("{} with somata too wide for the density of layer {} are not planted there; those that "
+                      "are have radii of up to {:.3g} µm",
+                      counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
   double wanted = 0.;
   all.layer_volumes.resize(recipe.layers.size());
   for (const std::uint32_t e : all.elements) {
-    for (const auto& layer : planter.counts(elements[e])) wanted += std::accumulate(layer.begin(), layer.end(), 0.);
+    for (const auto& layer : planter.counts(elements[e]))
+      wanted += std::accumulate(layer.begin(), layer.end(), 0.);
     for (std::size_t l = 0; l < recipe.layers.size(); ++l)
       all.layer_volumes[l] += elements[e].volume(l ? planter.depths()[l - 1] : 0., planter.depths()[l]);
   }
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
   constexpr double most = 50e6, most_bent = 200'000;
   if (wanted > (bent ? most_bent : most))
-    throw Error(fmt::format("{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements or lower --scale",
-                            all.elements.size(), wanted, bent ? most_bent : most, bent ? " of distinct shapes (--bend grid)" : ""));
+    throw Error(
+        fmt::format("{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
+                    "or lower --scale",
+                    all.elements.size(), wanted, bent ? most_bent : most,
+                    bent ? " of distinct shapes (--bend grid)" : ""));
 
   std::vector<circuit::Rooted> rooted;
   progress.begin("planting", all.elements.size());
@@ -268,8 +298,10 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
     auto& [low, high] = reach[r.layer];
     low = std::min(low, r.position.y()), high = std::max(high, r.position.y());
   }
-  for (std::size_t l = 0; l < reach.size(); ++l)  // layers are curved; a circuit says how far their somata reach
-    if (reach[l].first <= reach[l].second) circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
+  for (std::size_t l = 0; l < reach.size();
+       ++l)  // layers are curved; a circuit says how far their somata reach
+    if (reach[l].first <= reach[l].second)
+      circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
   if (bent) all.bending = bend(all, rooted, sheet, progress);
   mark_glia(all.planted);
   return all;
@@ -277,33 +309,47 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
 
 CLI::Option* add_elements(CLI::App& command, ElementOptions& o) {
   CLI::Option* const elements =
-      command.add_option("--elements", o.file, "Plant in curved elements of this file (cortex build) instead of a column")
+      command
+          .add_option("--elements", o.file,
+                      "Plant in curved elements of this file (cortex build) instead of a column")
           ->type_name("FILE.h5");
   const auto one_of_them = [&](CLI::Option* option) { return option->needs(elements); };
   CLI::Option* const element = one_of_them(
-      command.add_option("--element", o.elements, "Which: their numbers in the file, 7,12,20-29, or all")->type_name("LIST"));
-  CLI::Option* const near = one_of_them(
-      command.add_option("--near", o.near, "… those nearest to a place, µm: X Y Z")->expected(3)->type_name("X Y Z"));
-  CLI::Option* const count = command.add_option("--count", o.count, "… so many of them")->needs(near)->capture_default_str();
+      command.add_option("--element", o.elements, "Which: their numbers in the file, 7,12,20-29, or all")
+          ->type_name("LIST"));
+  CLI::Option* const near =
+      one_of_them(command.add_option("--near", o.near, "… those nearest to a place, µm: X Y Z")
+                      ->expected(3)
+                      ->type_name("X Y Z"));
+  CLI::Option* const count =
+      command.add_option("--count", o.count, "… so many of them")->needs(near)->capture_default_str();
   must_be_whole(*count, 1, 1'000'000);
-  CLI::Option* const sphere = one_of_them(
-      command.add_option("--sphere", o.sphere, "… those with their middle in a sphere, µm")->expected(4)->type_name("X Y Z R"));
+  CLI::Option* const sphere =
+      one_of_them(command.add_option("--sphere", o.sphere, "… those with their middle in a sphere, µm")
+                      ->expected(4)
+                      ->type_name("X Y Z R"));
   CLI::Option* const box =
-      one_of_them(command.add_option("--box", o.box, "… or in a box, µm: its two corners")->expected(6)->type_name("X Y Z X Y Z"));
+      one_of_them(command.add_option("--box", o.box, "… or in a box, µm: its two corners")
+                      ->expected(6)
+                      ->type_name("X Y Z X Y Z"));
   for (CLI::Option* a : {element, near, sphere, box})
     for (CLI::Option* b : {element, near, sphere, box})
       if (a != b) a->excludes(b);
-  CLI::Option* const row = command.add_option("--row", o.row, "So many elements in a row across the fold, through the one chosen");
+  CLI::Option* const row =
+      command.add_option("--row", o.row, "So many elements in a row across the fold, through the one chosen");
   must_be_whole(*row->needs(elements), 1, 10'000);
-  CLI::Option* const scale = command.add_option("--scale", o.scale, "Times the recipe's densities")->capture_default_str();
+  CLI::Option* const scale =
+      command.add_option("--scale", o.scale, "Times the recipe's densities")->capture_default_str();
   must_be_within(*scale->needs(elements), 1e-6, 1e6);
-  must_be_within(*command.add_option("--density", o.density, "Or so many neurons/mm³ in the mean over the layers")
-                      ->needs(elements)
-                      ->excludes(scale),
-                 1e-3, 1e8);
+  must_be_within(
+      *command.add_option("--density", o.density, "Or so many neurons/mm³ in the mean over the layers")
+           ->needs(elements)
+           ->excludes(scale),
+      1e-3, 1e8);
   command
       .add_option("--bend", o.bend,
-                  "grid: neurons are bent as their element is, each a shape of its own; rigid: they are only turned upright")
+                  "grid: neurons are bent as their element is, each a shape of its own; rigid: they are only "
+                  "turned upright")
       ->needs(elements)
       ->check(CLI::IsMember({"rigid", "grid"}))
       ->capture_default_str();

@@ -24,8 +24,9 @@ struct ElementOptions {
   std::string elements;                   // "7,12,20-29" or "all"
   std::vector<double> near, sphere, box;  // µm
   std::uint32_t count = 1, row = 1;
-  double scale = 1., density = 0.;  // density: neurons/mm³ in the mean, instead of scale; 0: as the recipe says
-  std::string bend = "rigid";       // or "grid"
+  double scale = 1.,
+         density = 0.;         // density: neurons/mm³ in the mean, instead of scale; 0: as the recipe says
+  std::string bend = "rigid";  // or "grid"
 };
 
 /// --elements and those that need it.
@@ -43,22 +44,26 @@ struct Bending {
   double length_ratio = 1.;  // after over before, of all branches together
   Spread ratio;              // … of single neurons
   Spread turn;               // degrees by which angles between segments changed, mean of each neuron
-  double beyond_pia = 0., pressed = 0., beyond_white = 0.,
-         beside = 0.;  // shares of length: above the pia; at the pia, where it would have passed; in the white matter; off the rim
+  double
+      beyond_pia = 0.,
+      pressed = 0., beyond_white = 0.,
+      beside =
+          0.;  // shares of length: above the pia; at the pia, where it would have passed; in the white matter; off the rim
 };
 
 struct PlantedElements {
   Planted planted;
   std::vector<std::uint32_t> elements;
-  std::vector<std::size_t> first;  // instance of each element, and how many there are in all
-  double volume = 0.;              // µm³ of all elements
+  std::vector<std::size_t> first;     // instance of each element, and how many there are in all
+  double volume = 0.;                 // µm³ of all elements
   std::vector<double> layer_volumes;  // of it
-  double seconds = 0.;             // for places and orientations
+  double seconds = 0.;                // for places and orientations
   std::optional<Bending> bending;
+  std::vector<std::string> left_out;  // sentences on neurons that were not planted in a layer
 };
 
 /// Throws Error for elements that are not there, for a region without any, and for what the planter refuses.
-PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe, const std::string& repo,
-                                  std::uint64_t seed, Progress& progress);
+PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
+                                  const std::string& repo, std::uint64_t seed, Progress& progress);
 
 }  // namespace forest::cli

@@ -21,6 +21,8 @@ namespace {
 constexpr std::uint32_t packing_stream = 0x70650000, lot_stream = 0x70651000, cell_stream = 0x70652000;
 
 constexpr double rounding = .02;  // µm that places may be off, as single precision is in a head
+constexpr double at_ease =
+    .95;  // so many mean distances wide are the widest somata that are taken where narrower ones are at hand
 constexpr double evenness = .8;  // at least this times their mean distance keep the places of a packing apart
 
 /// Neurons/mm³ of each layer. Counts hold in the recipe's column.
@@ -62,38 +64,50 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
   depths_.back() = 1.;
   densities_ = densities_of(recipe);
   for (double& density : densities_) density *= options.scale;
+  const auto grows = [&](std::size_t layer, std::size_t type) {
+    return densities_[layer] > 0. && recipe.layers[layer].mix[type] > 0.;
+  };
 
-  choices_ = candidates_of(recipe, candidates, [&](std::size_t type) {
+  const auto of_type = candidates_of(recipe, candidates, [&](std::size_t type) {
     for (std::size_t l = 0; l < layers; ++l)
-      if (densities_[l] > 0. && recipe.layers[l].mix[type] > 0.) return true;
+      if (grows(l, type)) return true;
     return false;
   });
-  radii_.assign(layers, 0.);
-  for (std::size_t t = 0; t < choices_.size(); ++t) {
-    std::ranges::stable_sort(choices_[t], {}, [&](std::uint32_t c) { return candidates[c].height; });
-    for (std::size_t l = 0; l < layers; ++l)
-      if (densities_[l] > 0. && recipe.layers[l].mix[t] > 0.)
-        for (const std::uint32_t c : choices_[t])
-          radii_[l] = std::max(radii_[l], double(candidates[c].soma_radius));
-  }
+  const auto radius = [&](std::uint32_t c) { return double(candidates[c].soma_radius); };
 
-  // A fifth more places than are wanted, and some standard deviations where they are few; fewer where they hardly fit.
+  // A fifth more places than are wanted, and some standard deviations where they are few; fewer where somata hardly fit.
   double spacing = evenness;
   std::vector<double> supply(layers);  // places/µm³
+  radii_.assign(layers, 0.), left_out_.assign(layers, 0);
+  choices_.assign(layers, std::vector<std::vector<std::uint32_t>>(recipe.types.size()));
   for (std::size_t l = 0; l < layers; ++l) {
     if (!(densities_[l] > 0.)) continue;
     const double volume = (depths_[l] - (l ? depths_[l - 1] : 0.)) * options.element,
                  density = densities_[l] * 1e-9, usual = density * volume;
-    const double contact = 2. * radii_[l] + double(recipe.soma_gap) + rounding;
-    const double most = std::pow(cortex::PackedCube::most_spacing / contact, 3.);
+    const double gap = double(recipe.soma_gap) + rounding;
+    double needed = 0.;  // the widest of the types' narrowest somata
+    for (std::size_t t = 0; t < of_type.size(); ++t)
+      if (grows(l, t)) needed = std::max(needed, radius(*std::ranges::min_element(of_type[t], {}, radius)));
+    const double most = std::pow(cortex::PackedCube::most_spacing / (2. * needed + gap), 3.);
     supply[l] = std::min((1.2 * usual + 4. * std::sqrt(usual) + 10.) / volume, most);
     if (supply[l] < 1.01 * density)
       throw Error(
-          fmt::format("{:.0f} somata/mm³ of a radius of up to {:.3g} µm do not fit into layer {} without "
-                      "overlap, {:.0f} are the most; lower "
-                      "its density or the gap, or plant neurons with smaller somata",
-                      densities_[l], radii_[l], recipe.layers[l].name, most * 1e9 / 1.01));
-    spacing = std::max(spacing, std::min(contact * std::cbrt(supply[l]), cortex::PackedCube::most_spacing));
+          fmt::format("{:.0f} somata/mm³ of a radius of {:.3g} µm or more do not fit into layer {} without "
+                      "overlap, {:.0f} are the "
+                      "most; lower its density or the gap, or plant neurons with smaller somata",
+                      densities_[l], needed, recipe.layers[l].name, most * 1e9 / 1.01));
+    const double widest = std::max(needed, .5 * (at_ease / std::cbrt(supply[l]) - gap));
+    for (std::size_t t = 0; t < of_type.size(); ++t)
+      if (grows(l, t))
+        for (const std::uint32_t c : of_type[t])
+          if (radius(c) <= widest)
+            choices_[l][t].push_back(c), radii_[l] = std::max(radii_[l], radius(c));
+          else
+            ++left_out_[l];
+    for (auto& choice : choices_[l])
+      std::ranges::stable_sort(choice, {}, [&](std::uint32_t c) { return candidates[c].height; });
+    spacing = std::max(
+        spacing, std::min((2. * radii_[l] + gap) * std::cbrt(supply[l]), cortex::PackedCube::most_spacing));
   }
   const auto cube = std::make_shared<const cortex::PackedCube>(cortex::pack_cube(spacing, seed));
   packings_.resize(layers), sparser_.resize(layers);
@@ -179,7 +193,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
       neuron.position = here.at.cast<float>();
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
-      const auto& choice = choices_[neuron.type];
+      const auto& choice = choices_[l][neuron.type];
       const double room = place.uvw[2] * here.jacobian.col(2).norm();
       const auto fit = std::ranges::upper_bound(
           choice, room, {}, [&](std::uint32_t c) { return double(candidates_[c].height); });

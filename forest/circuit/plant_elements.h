@@ -44,13 +44,18 @@ double mean_density(const Recipe& recipe);
 
 class ElementPlanter {
  public:
-  /// The candidates must outlive it. Somata are taken as wide as the widest of their layer.
+  /// The candidates must outlive it. Somata are taken as wide as the widest of their layer; candidates whose somata are too wide for
+  /// a layer's density are left out there, as long as others of their type are not.
   /// Throws Error when a population has no candidate, and when somata of a layer do not fit at its density.
   ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
                  const ElementPlanting& options = {});
 
   /// w where the layers end; the first begins at 0 and the last ends at 1.
   std::span<const double> depths() const { return depths_; }
+  std::size_t left_out(std::size_t layer) const {
+    return left_out_[layer];
+  }                                                                      // candidates with somata too wide
+  double widest(std::size_t layer) const { return radii_[layer]; }       // soma, radius in µm
   double density(std::size_t layer) const { return densities_[layer]; }  // neurons/mm³, scaled
 
   /// How many neurons an element has, [layer][type]: all of them are the nearest whole number, shared out by largest remainders
@@ -67,8 +72,10 @@ class ElementPlanter {
   Recipe recipe_;
   std::span<const Candidate> candidates_;
   std::uint64_t seed_;
-  std::vector<double> depths_, densities_, radii_;        // of layers; radii of their widest somata, µm
-  std::vector<std::vector<std::uint32_t>> choices_;       // of types: their candidates, the lowest first
+  std::vector<double> depths_, densities_, radii_;  // of layers; radii of their widest somata, µm
+  std::vector<std::vector<std::vector<std::uint32_t>>>
+      choices_;  // of layers and types: candidates, the lowest first
+  std::vector<std::size_t> left_out_;
   std::vector<std::optional<cortex::Packing>> packings_;  // of layers; none where nothing grows
   std::vector<std::vector<std::uint32_t>> sparser_;       // of layers: those that they leave room for
 };
