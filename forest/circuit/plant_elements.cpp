@@ -78,7 +78,7 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
   // A fifth more places than are wanted, and some standard deviations where they are few; fewer where somata hardly fit.
   double spacing = evenness;
   std::vector<double> supply(layers);  // places/µm³
-  radii_.assign(layers, 0.), left_out_.assign(layers, 0);
+  radii_.assign(layers, 0.), narrow_.assign(layers, 0.), left_out_.assign(layers, 0);
   choices_.assign(layers, std::vector<std::vector<std::uint32_t>>(recipe.types.size()));
   for (std::size_t l = 0; l < layers; ++l) {
     if (!(densities_[l] > 0.)) continue;
@@ -88,6 +88,7 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
     double needed = 0.;  // the widest of the types' narrowest somata
     for (std::size_t t = 0; t < of_type.size(); ++t)
       if (grows(l, t)) needed = std::max(needed, radius(*std::ranges::min_element(of_type[t], {}, radius)));
+    narrow_[l] = needed;
     const double most = std::pow(cortex::PackedCube::most_spacing / (2. * needed + gap), 3.);
     supply[l] = std::min((1.2 * usual + 4. * std::sqrt(usual) + 10.) / volume, most);
     if (supply[l] < 1.01 * density)
@@ -97,13 +98,15 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
                       "most; lower its density or the gap, or plant neurons with smaller somata",
                       densities_[l], needed, recipe.layers[l].name, most * 1e9 / 1.01));
     const double widest = std::max(needed, .5 * (at_ease / std::cbrt(supply[l]) - gap));
-    for (std::size_t t = 0; t < of_type.size(); ++t)
-      if (grows(l, t))
-        for (const std::uint32_t c : of_type[t])
-          if (radius(c) <= widest)
-            choices_[l][t].push_back(c), radii_[l] = std::max(radii_[l], radius(c));
-          else
-            ++left_out_[l];
+    for (std::size_t t = 0; t < of_type.size(); ++t) {
+      if (!grows(l, t)) continue;
+      for (const std::uint32_t c : of_type[t]) {
+        if (radius(c) <= widest)
+          choices_[l][t].push_back(c), radii_[l] = std::max(radii_[l], radius(c));
+        else
+          ++left_out_[l];
+      }
+    }
     for (auto& choice : choices_[l])
       std::ranges::stable_sort(choice, {}, [&](std::uint32_t c) { return candidates[c].height; });
     spacing = std::max(
@@ -135,20 +138,38 @@ std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hex
   return result;
 }
 
-// Whether a place in a layer is too near to what may stand in a sparser one.
-bool ElementPlanter::yields(std::size_t layer, double w, const cortex::Linear& here) const {
-  if (sparser_[layer].empty()) return false;
+// How wide a soma may be at a place: below 0 where none may stand. By the borders of layers somata are narrow and keep clear of
+// the narrow ones beyond; wide ones stay away from a border by as much as those may reach across it.
+double ElementPlanter::room_for_soma(std::size_t layer, double w, const cortex::Linear& here) const {
   const double steepness =  // of w, a µm
       here.jacobian.col(0).cross(here.jacobian.col(1)).norm() / here.jacobian.determinant();
+  const double begin = layer ? depths_[layer - 1] : 0., end = depths_[layer], narrow = narrow_[layer];
+  const double below_pia = w * here.jacobian.col(2).norm();
+  if (below_pia < narrow) return -1.;
+  double room = std::min(radii_[layer], below_pia);
+  constexpr double straight =
+      .8;  // a border may be nearer than it would be in a straight element, by a little
+  const double reach = *std::ranges::max_element(narrow_) + double(recipe_.soma_gap) + rounding;
+  if (layer > 0) room = std::min(room, straight * (w - begin) / steepness - reach);
+  if (layer + 1 < depths_.size()) room = std::min(room, straight * (end - w) / steepness - reach);
   for (const std::uint32_t other : sparser_[layer]) {
-    const double begin = other ? depths_[other - 1] : 0., end = depths_[other],
-                 contact = radii_[layer] + radii_[other] + double(recipe_.soma_gap) + rounding;
-    // The border is at most this far if the element were straight; it may be a little nearer.
-    if (std::max(begin - w, w - end) < 1.5 * contact * steepness &&
-        packings_[other]->any_within(here.at, contact))
-      return true;
+    const double contact = narrow + narrow_[other] + double(recipe_.soma_gap) + rounding;
+    const double beyond = std::max((other ? depths_[other - 1] : 0.) - w, w - depths_[other]);
+    if (straight * beyond < contact * steepness && packings_[other]->any_within(here.at, contact)) return -1.;
   }
-  return false;
+  return std::max(room, narrow);
+}
+
+// Of a type's candidates with a soma that fits one that ends under the pia, or the lowest one.
+std::uint32_t ElementPlanter::choose(std::span<const std::uint32_t> choice, double height, double radius,
+                                     Random& random) const {
+  const auto fits = [&](std::uint32_t c) { return double(candidates_[c].soma_radius) <= radius; };
+  const auto end = std::ranges::upper_bound(choice, height, {},
+                                            [&](std::uint32_t c) { return double(candidates_[c].height); });
+  const auto low = choice.first(std::size_t(end - choice.begin()));
+  for (int trial = 0; trial < 16 && !low.empty(); ++trial)
+    if (const std::uint32_t c = low[random.below(std::uint32_t(low.size()))]; fits(c)) return c;
+  return *std::ranges::find_if(choice, fits);  // the narrowest one fits everywhere
 }
 
 std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number) const {
@@ -163,13 +184,10 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
     std::vector<Keyed> lots(places.size());
     parallel_for(places.size(), 1024, [&](std::size_t i) {
       const cortex::Linear here = linear(element, places[i].uvw);
-      const double w = places[i].uvw[2];
       Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
       const std::uint64_t high = random();
-      lots[i] = {w * here.jacobian.col(2).norm() < radii_[l] || yields(l, w, here)
-                     ? blank
-                     : (high << 31 | random() >> 1),
-                 i};
+      const bool free = room_for_soma(l, places[i].uvw[2], here) >= 0.;
+      lots[i] = {free ? high << 31 | random() >> 1 : blank, i};
     });
     parallel_sort(lots);
     const auto free = std::size_t(std::ranges::find(lots, blank, &Keyed::first) - lots.begin());
@@ -193,11 +211,9 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
       neuron.position = here.at.cast<float>();
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
-      const auto& choice = choices_[l][neuron.type];
-      const double room = place.uvw[2] * here.jacobian.col(2).norm();
-      const auto fit = std::ranges::upper_bound(
-          choice, room, {}, [&](std::uint32_t c) { return double(candidates_[c].height); });
-      neuron.candidate = choice[random.below(std::max(1u, std::uint32_t(fit - choice.begin())))];
+      const double height = place.uvw[2] * here.jacobian.col(2).norm();
+      neuron.candidate =
+          choose(choices_[l][neuron.type], height, room_for_soma(l, place.uvw[2], here), random);
     });
   }
   return rooted;

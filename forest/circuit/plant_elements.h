@@ -8,8 +8,9 @@
 // Places come from packings (cortex/packing.h), one for each layer, that fill all space whether there is tissue or not: an element
 // has those that lie in it, a few more than it needs, and takes as many as are wanted by lot. So somata do not overlap in an
 // element nor across the faces of neighbours, and no face shows as a sheet without somata (a margin of a radius on both sides of
-// every face would be simpler, and could be seen). Where two layers meet, the denser one leaves out what would touch any place
-// of the sparser one's packing, also one not taken: this rarefies it by a few percent, within a soma's width of the border.
+// every face would be simpler, and could be seen). Where two layers meet only cells with narrow somata stand, and the denser layer
+// leaves out what would touch any place of the sparser one's packing, also one not taken: this rarefies it, by some percent, within
+// a soma's width of the border.
 #pragma once
 
 #include <cstdint>
@@ -20,6 +21,7 @@
 
 #include "forest/circuit/plant.h"
 #include "forest/circuit/recipe.h"
+#include "forest/core/random.h"
 #include "forest/cortex/hexahedron.h"
 #include "forest/cortex/packing.h"
 
@@ -67,12 +69,16 @@ class ElementPlanter {
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number) const;
 
  private:
-  bool yields(std::size_t layer, double w, const cortex::Linear& here) const;
+  double room_for_soma(std::size_t layer, double w, const cortex::Linear& here) const;
+  std::uint32_t choose(std::span<const std::uint32_t> choice, double height, double radius,
+                       Random& random) const;
 
   Recipe recipe_;
   std::span<const Candidate> candidates_;
   std::uint64_t seed_;
-  std::vector<double> depths_, densities_, radii_;  // of layers; radii of their widest somata, µm
+  std::vector<double> depths_, densities_;  // of layers
+  std::vector<double> radii_,
+      narrow_;  // of their widest somata, and of those that stand by their borders, µm
   std::vector<std::vector<std::vector<std::uint32_t>>>
       choices_;  // of layers and types: candidates, the lowest first
   std::vector<std::size_t> left_out_;
