@@ -28,38 +28,6 @@ namespace {
 
 using Place = Eigen::Vector3d;
 
-// "7,12,20-29" or "all".
-std::vector<std::uint32_t> parse_elements(const std::string& text, const ElementOptions& options,
-                                          std::size_t count) {
-  std::vector<std::uint32_t> all(count);
-  std::iota(all.begin(), all.end(), 0u);
-  if (text == "all") return all;
-  std::vector<std::uint32_t> chosen;
-  const char *at = text.data(), *const end = at + text.size();
-  const auto number = [&] {
-    std::uint64_t value = 0;
-    const auto [next, error] = std::from_chars(at, end, value);
-    if (error != std::errc())
-      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
-    if (value >= count)
-      throw Error(fmt::format("{} has elements 0 to {}, and no {}", options.file.string(), count - 1, value));
-    at = next;
-    return std::uint32_t(value);
-  };
-  for (;;) {
-    const std::uint32_t first = number();
-    std::uint32_t last = first;
-    if (at != end && *at == '-') ++at, last = number();
-    for (std::uint32_t e = first; e <= last; ++e) chosen.push_back(e);
-    if (at == end) break;
-    if (*at++ != ',')
-      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
-  }
-  std::set<std::uint32_t> seen;
-  std::erase_if(chosen, [&](std::uint32_t e) { return !seen.insert(e).second; });
-  return chosen;
-}
-
 // As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends.
 std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle,
                                        std::uint32_t count) {
@@ -84,7 +52,7 @@ std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t
 
 std::vector<std::uint32_t> choose(const ElementOptions& options,
                                   std::span<const cortex::Hexahedron> elements) {
-  if (!options.elements.empty()) return parse_elements(options.elements, options, elements.size());
+  if (!options.elements.empty()) return parse_elements(options.elements, options.file, elements.size());
   std::vector<std::uint32_t> chosen;
   std::vector<Place> middles(elements.size());
   parallel_for(elements.size(), 256, [&](std::size_t e) { middles[e] = elements[e].at(.5, .5, .5); });
@@ -208,6 +176,37 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
 }
 
 }  // namespace
+
+std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
+                                          std::size_t count) {
+  std::vector<std::uint32_t> all(count);
+  std::iota(all.begin(), all.end(), 0u);
+  if (text == "all") return all;
+  std::vector<std::uint32_t> chosen;
+  const char *at = text.data(), *const end = at + text.size();
+  const auto number = [&] {
+    std::uint64_t value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc())
+      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
+    if (value >= count)
+      throw Error(fmt::format("{} has elements 0 to {}, and no {}", file.string(), count - 1, value));
+    at = next;
+    return std::uint32_t(value);
+  };
+  for (;;) {
+    const std::uint32_t first = number();
+    std::uint32_t last = first;
+    if (at != end && *at == '-') ++at, last = number();
+    for (std::uint32_t e = first; e <= last; ++e) chosen.push_back(e);
+    if (at == end) break;
+    if (*at++ != ',')
+      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
+  }
+  std::set<std::uint32_t> seen;
+  std::erase_if(chosen, [&](std::uint32_t e) { return !seen.insert(e).second; });
+  return chosen;
+}
 
 PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
                                   const std::string& repo, std::uint64_t seed, Progress& progress) {

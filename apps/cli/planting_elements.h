@@ -62,6 +62,10 @@ struct PlantedElements {
   std::vector<std::string> left_out;  // sentences on neurons that were not planted in a layer
 };
 
+/// Elements of a file that has so many: "7,12,20-29", or "all". Throws Error for what is no such list, and for numbers it has not.
+std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
+                                          std::size_t count);
+
 /// Throws Error for elements that are not there, for a region without any, and for what the planter refuses.
 PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
                                   const std::string& repo, std::uint64_t seed, Progress& progress);

@@ -199,9 +199,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
                       recipe_.layers[l].name, number, free, radii_[l], count));
     const std::size_t begin = rooted.size();
     for (std::uint32_t type = 0; type < wanted[l].size(); ++type)
-      rooted.resize(
-          rooted.size() + wanted[l][type],
-          Rooted{.uvw = {}, .position = {}, .orientation = {}, .type = type, .layer = std::uint32_t(l)});
+      rooted.resize(rooted.size() + wanted[l][type], Rooted{.type = type, .layer = std::uint32_t(l)});
     parallel_for(count, 1024, [&](std::size_t i) {
       const cortex::Packed& place = places[lots[i].second];
       Rooted& neuron = rooted[begin + i];

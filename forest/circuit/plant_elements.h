@@ -34,10 +34,10 @@ struct ElementPlanting {
 
 /// A neuron in an element. `turn` is its angle about its own axis, as in cortex::Seat.
 struct Rooted {
-  Eigen::Vector3d uvw;
+  Eigen::Vector3d uvw = Eigen::Vector3d::Zero();
   double turn = 0.;
-  Vec3 position;  // of the soma, µm
-  Quat orientation;
+  Vec3 position = Vec3::Zero();  // of the soma, µm
+  Quat orientation = Quat::Identity();
   std::uint32_t candidate = 0, type = 0, layer = 0;
 };
 
