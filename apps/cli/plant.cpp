@@ -45,6 +45,7 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
                        {"neuron_length_ratio", json_of(b.ratio)},
                        {"mean_turn", json_of(b.turn)},
                        {"beyond_pia", b.beyond_pia},
+                       {"shortened", b.shortened},
                        {"pressed_to_pia", b.pressed},
                        {"beyond_white", b.beyond_white},
                        {"beside", b.beside}};
@@ -53,14 +54,17 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
 }
 
 std::string sentence_of(const Bending& b) {
+  const auto change = [](double ratio) { return fmt::format("{:+.1f}", 100. * (ratio - 1.)); };
   return fmt::format(
-      "bent, {:.3g} m of branches became {:+.2f} % longer; single neurons {:+.1f} to {:+.1f} % (99 of 100: "
-      "{:+.1f} to {:+.1f} %), "
-      "their angles changed by {:.2g}° in the median; {:.3g} % of the length lies beyond the pia, {:.2g} % "
-      "would have and is pressed "
-      "to it, {:.2g} % lies in the white matter, {:.2g} % left the elements at their rim",
-      b.length * 1e-6, 100. * (b.length_ratio - 1.), 100. * (b.ratio.least - 1.), 100. * (b.ratio.most - 1.),
-      100. * (b.ratio.p1 - 1.), 100. * (b.ratio.p99 - 1.), b.turn.median, 100. * b.beyond_pia,
+      "bent; {} were taller than the tissue above them and made shorter; {:.3g} m of branches became {} % "
+      "longer, "
+      "single neurons {} to {} % (98 of 100: {} to {} %), and the angles between segments changed by {:.2g}° "
+      "in the median; "
+      "{:.2g} % of the length lies beyond the pia, {:.2g} % would have and lies on it, {:.2g} % lies in the "
+      "white matter, "
+      "{:.2g} % left the elements at their rim",
+      counted(b.shortened, "neuron"), b.length * 1e-6, change(b.length_ratio), change(b.ratio.least),
+      change(b.ratio.most), change(b.ratio.p1), change(b.ratio.p99), b.turn.median, 100. * b.beyond_pia,
       100. * b.pressed, 100. * b.beyond_white, 100. * b.beside);
 }
 

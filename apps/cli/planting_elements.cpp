@@ -100,6 +100,7 @@ Spread spread(std::vector<double> values) {
 struct Tree {
   std::vector<Place> points;
   std::vector<std::int32_t> parents;
+  double height = 0., length = 0.;  // µm above the soma, of all branches
 
   explicit Tree(const Morphology& m) {
     for (const Section& s : m.sections()) {
@@ -110,6 +111,8 @@ struct Tree {
       for (std::uint32_t i = 0; i < s.point_count; ++i) {
         points.push_back(m.points()[s.first_point + i].position().cast<double>());
         parents.push_back(i > 1 || (i == 1 && above < 0) ? std::int32_t(points.size()) - 2 : above);
+        height = std::max(height, points.back().y());
+        if (parents.back() >= 0) length += (points.back() - points[std::size_t(parents.back())]).norm();
       }
     }
   }
@@ -130,17 +133,28 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
   std::vector<std::string> names(count);
   std::vector<cortex::Distortion> distortions(count);
   std::vector<double> pressed(count);
+  std::vector<char> shortened(count);
   progress.begin("bending", count);
   parallel_for(count, 16, [&](std::size_t i) {
     circuit::Instance& instance = circuit.instances[i];
     const Tree& tree = trees[instance.morphology];
     const cortex::Seat seat{all.elements[group[i]], rooted[i].uvw, rooted[i].turn};
-    cortex::Warped warped = cortex::warp(sheet, seat, tree.points, tree.parents);
-    if (warped.distortion.beyond_pia > 0.) {
-      const double above = warped.distortion.beyond_pia / warped.distortion.length;
-      warped = cortex::warp(sheet, seat, tree.points, tree.parents, {.below_pia = true});
-      pressed[i] = above * warped.distortion.straight_length;
+    // What is taller than the tissue above the soma gets shorter in its upper part, by a half at most; what passes the pia all the
+    // same lies on it.
+    const Place down = sheet.elements[seat.element].jacobian(seat.uvw).col(2);
+    std::vector<Place> straight = tree.points;
+    if (const double room = seat.uvw[2] * down.norm(); tree.height > room) {
+      const double share = std::max(.5, room / tree.height);
+      shortened[i] = 1;
+      for (Place& p : straight)
+        if (p.y() > 0.) p.y() *= share;
     }
+    cortex::Warped warped = cortex::warp(sheet, seat, straight, tree.parents);
+    if (warped.distortion.beyond_pia > 0.) {
+      pressed[i] = warped.distortion.beyond_pia;
+      warped = cortex::warp(sheet, seat, straight, tree.parents, {.below_pia = true});
+    }
+    warped.distortion.straight_length = tree.length;
     distortions[i] = warped.distortion;
     const Place soma = sheet.elements[seat.element].at(seat.uvw);
     std::vector<Vec3> points;
@@ -170,7 +184,8 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
   }
   if (after > 0.)
     b.length_ratio = after / b.length, b.beyond_pia /= after, b.beyond_white /= after, b.beside /= after,
-    b.pressed /= b.length;
+    b.pressed /= after;
+  b.shortened = std::size_t(std::ranges::count(shortened, 1));
   b.ratio = spread(std::move(ratios)), b.turn = spread(std::move(turns));
   return b;
 }

@@ -40,10 +40,11 @@ struct Spread {
 
 /// What bending did to all neurons together.
 struct Bending {
-  double length = 0.;        // µm of branches, before
-  double length_ratio = 1.;  // after over before, of all branches together
-  Spread ratio;              // … of single neurons
-  Spread turn;               // degrees by which angles between segments changed, mean of each neuron
+  double length = 0.;         // µm of branches, before
+  double length_ratio = 1.;   // after over before, of all branches together
+  Spread ratio;               // … of single neurons
+  std::size_t shortened = 0;  // neurons that were taller than the tissue above their soma
+  Spread turn;                // degrees by which angles between segments changed, mean of each neuron
   double
       beyond_pia = 0.,
       pressed = 0., beyond_white = 0.,

@@ -29,22 +29,29 @@ Recipe layered() {
   Recipe recipe;
   recipe.radius = 200.f;
   recipe.types = {{"small", "s"}, {"large", "l", false}};
-  recipe.layers = {{"L1", 200.f, 6000., {}, {1., 0.}}, {"L2", 500.f, 60000., {}, {.8, .2}}, {"L3", 900.f, 25000., {}, {.5, .5}}};
+  recipe.layers = {{"L1", 200.f, 6000., {}, {1., 0.}},
+                   {"L2", 500.f, 60000., {}, {.8, .2}},
+                   {"L3", 900.f, 25000., {}, {.5, .5}}};
   recipe.soma_gap = .5f;
   return recipe;
 }
-const std::vector<Candidate> candidates{{"s1", "s", 4.f, 150.f}, {"s2", "s", 6.f, 600.f}, {"l1", "l", 7.f, 300.f},
-                                        {"l2", "l", 11.f, 900.f}, {"l3", "l", 60.f, 900.f}};
+const std::vector<Candidate> candidates{{"s1", "s", 4.f, 150.f},
+                                        {"s2", "s", 6.f, 600.f},
+                                        {"l1", "l", 7.f, 300.f},
+                                        {"l2", "l", 11.f, 900.f},
+                                        {"l3", "l", 60.f, 900.f}};
 
 bool same(const Rooted& a, const Rooted& b) {
-  return a.position == b.position && a.orientation == b.orientation && a.uvw == b.uvw && a.candidate == b.candidate &&
-         a.type == b.type && a.layer == b.layer && a.turn == b.turn;
+  return a.position == b.position && a.orientation == b.orientation && a.uvw == b.uvw &&
+         a.candidate == b.candidate && a.type == b.type && a.layer == b.layer && a.turn == b.turn;
 }
 
 // How far the surfaces of the two nearest somata are apart, by a grid.
 double least_gap(std::span<const Rooted> all) {
   constexpr double cell = 24.;  // wider than two of the widest
-  const auto at = [](const Vec3& p, int axis) { return std::int64_t(std::floor(double(p[axis]) / cell)) + 100'000; };
+  const auto at = [](const Vec3& p, int axis) {
+    return std::int64_t(std::floor(double(p[axis]) / cell)) + 100'000;
+  };
   std::map<std::array<std::int64_t, 3>, std::vector<std::size_t>> grid;
   for (std::size_t i = 0; i < all.size(); ++i)
     grid[{at(all[i].position, 0), at(all[i].position, 1), at(all[i].position, 2)}].push_back(i);
@@ -67,7 +74,8 @@ double least_gap(std::span<const Rooted> all) {
 
 double p_of(std::span<const double> seen, std::span<const double> expected) {
   double sum = 0.;
-  for (std::size_t i = 0; i < seen.size(); ++i) sum += (seen[i] - expected[i]) * (seen[i] - expected[i]) / expected[i];
+  for (std::size_t i = 0; i < seen.size(); ++i)
+    sum += (seen[i] - expected[i]) * (seen[i] - expected[i]) / expected[i];
   return boost::math::cdf(boost::math::complement(boost::math::chi_squared(double(seen.size() - 1)), sum));
 }
 
@@ -80,7 +88,8 @@ TEST(PlantElements, CountsAreThoseOfTheDensitiesToTheLastNeuron) {
     EXPECT_EQ(planted, wanted);
     double before = 0.;
     for (std::size_t l = 0; l < 3; ++l) {
-      const double expected = layered().layers[l].density * 1e-9 * element.volume(before, planter.depths()[l]);
+      const double expected =
+          layered().layers[l].density * 1e-9 * element.volume(before, planter.depths()[l]);
       EXPECT_NEAR(wanted[l][0] + wanted[l][1], expected, 1.);
       before = planter.depths()[l];
     }
@@ -89,7 +98,8 @@ TEST(PlantElements, CountsAreThoseOfTheDensitiesToTheLastNeuron) {
 
 TEST(PlantElements, AnElementIsTheSameWhateverElseIsPlantedAndOnAnyNumberOfThreads) {
   const auto sheet = cortex::folded_sheet(2, 2);
-  const ElementPlanter first(layered(), candidates, 5), second(layered(), candidates, 5), other(layered(), candidates, 6);
+  const ElementPlanter first(layered(), candidates, 5), second(layered(), candidates, 5),
+      other(layered(), candidates, 6);
   std::vector<std::vector<Rooted>> forwards, backwards(4);
   for (std::size_t e = 0; e < 4; ++e) forwards.push_back(first.plant(sheet[e], e));
   const ThreadLimit one(1);
@@ -108,7 +118,8 @@ TEST(PlantElements, SomataKeepTheirGapInElementsAndAcrossTheirFaces) {
     for (std::size_t e = 0; e < sheet.size(); ++e)
       for (const Rooted& r : planter.plant(sheet[e], e)) {
         all.push_back(r);
-        by_faces += r.uvw[0] < .004 || r.uvw[0] > .996;  // within 2.6 µm of a face, nearer than any soma's radius
+        by_faces +=
+            r.uvw[0] < .004 || r.uvw[0] > .996;  // within 2.6 µm of a face, nearer than any soma's radius
       }
     EXPECT_GE(least_gap(all), double(recipe.soma_gap)) << scale;
     EXPECT_NEAR(double(by_faces) / double(all.size()), .008, .002);  // no face is bare
@@ -137,7 +148,8 @@ TEST(PlantElements, PlacesAreEvenInVolumeWithinALayerAndStayInIt) {
     EXPECT_GE(r.uvw[2], r.layer ? planter.depths()[r.layer - 1] : 0.);
     EXPECT_LT(r.uvw[2], planter.depths()[r.layer]);
     if (r.layer != 2) continue;
-    across[std::size_t(r.uvw[0] * n)] += 1., deep[std::size_t((r.uvw[2] - top) / (1. - top) * n)] += 1., count += 1.;
+    across[std::size_t(r.uvw[0] * n)] += 1., deep[std::size_t((r.uvw[2] - top) / (1. - top) * n)] += 1.,
+        count += 1.;
   }
   const double all = element.volume(top, 1.);
   Hexahedron rest = element;
@@ -145,7 +157,8 @@ TEST(PlantElements, PlacesAreEvenInVolumeWithinALayerAndStayInIt) {
     const auto halves = cortex::split(rest, 0, 1. / (n - i));
     across_volume[std::size_t(i)] = (i + 1 < n ? halves[0] : rest).volume(top, 1.) / all * count;
     rest = halves[1];
-    deep_volume[std::size_t(i)] = element.volume(top + (1. - top) * i / n, top + (1. - top) * (i + 1) / n) / all * count;
+    deep_volume[std::size_t(i)] =
+        element.volume(top + (1. - top) * i / n, top + (1. - top) * (i + 1) / n) / all * count;
   }
   EXPECT_GT(p_of(across, across_volume), 1e-3);
   EXPECT_GT(p_of(deep, deep_volume), 1e-3);
@@ -196,8 +209,10 @@ TEST(PlantElements, CountsOfARecipeAreThoseOfItsColumn) {
 TEST(PlantElements, RefuseWhatCannotBePlanted) {
   const std::vector<Candidate> none{{"s1", "s", 4.f, 150.f}};
   EXPECT_THAT(refused([&] { ElementPlanter(layered(), none, 1); }), HasSubstr("population l is empty"));
-  EXPECT_THAT(refused([&] { ElementPlanter(layered(), candidates, 1, {.scale = 0.}); }), HasSubstr("positive"));
-  EXPECT_THAT(refused([&] { ElementPlanter(layered(), candidates, 1, {.scale = 100.}); }), HasSubstr("do not fit into layer L2"));
+  EXPECT_THAT(refused([&] { ElementPlanter(layered(), candidates, 1, {.scale = 0.}); }),
+              HasSubstr("positive"));
+  EXPECT_THAT(refused([&] { ElementPlanter(layered(), candidates, 1, {.scale = 100.}); }),
+              HasSubstr("do not fit into layer L2"));
 }
 
 }  // namespace

@@ -55,7 +55,8 @@ TEST(Packing, HasItsDensityAndItsSpacingEverywhere) {
   EXPECT_NEAR(packing.spacing(), .9 / std::cbrt(5e-5), 1e-9);
   for (const Place& middle : {Place(0., 0., 0.), Place(-70'000., 51'000., 12'345.)}) {
     std::size_t count = 0;
-    packing.for_near(middle, 500., [&](std::uint64_t, const Place& p) { count += (p - middle).norm() < 500.; });
+    packing.for_near(middle, 500.,
+                     [&](std::uint64_t, const Place& p) { count += (p - middle).norm() < 500.; });
     EXPECT_NEAR(double(count), 5e-5 * 4. / 3. * std::numbers::pi * 1.25e8, 300.);
   }
 }
