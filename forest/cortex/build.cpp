@@ -101,7 +101,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const WCurves curves(field, inner_tree);
   // Two triangles to a side of the lattice that elements are laid by, or more.
   const double side = std::sqrt(options.volume / 2500.);
-  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .7 * side}, progress);
+  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
 
   Cortex cortex;
   cortex.between = volume(outer) - volume(inner);

@@ -21,9 +21,9 @@ struct Shaping {
   double even = 4.;
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
-  double off = 25.;      // µm, likewise from a surface
-  int rounds = 3;        // of looking for what is badly shaped, and where the surfaces are
-  int iterations = 100;  // in each
+  double off = 25.;     // µm, likewise from a surface
+  int rounds = 3;       // of looking for what is badly shaped, and where the surfaces are
+  int iterations = 60;  // in each
 };
 
 void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
