@@ -30,6 +30,7 @@ struct Cortex {
   Spread w_angle;         // degrees between the curves of corners and the surfaces' normals, over both ends
   double w_reached = 0.;  // share of all curves that reach the inner surface
   Mending mending;
+  LeftOut left_out;
 };
 
 /// Surfaces closed, whole and in µm, triangles outwards, the inner one within the outer.

@@ -29,7 +29,7 @@ struct Quads {
 
 struct QuadOptions {
   double volume = 1e9;          // µm³ under each
-  double volume_within = .005;  // of it: how near their mean must come
+  double volume_within = .007;  // of it: how near their mean must come
   int relaxations = 90;
 };
 

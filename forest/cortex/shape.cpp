@@ -230,6 +230,8 @@ struct Anchor {
 
 using List = std::vector<std::uint32_t>;
 
+constexpr double very_bad = .6;  // so much of a good enough scaled Jacobian
+
 // What is shaped at once: badly shaped elements that touch one another, all whose curves may move, and all that see these.
 struct Patch {
   List curves, seen;
@@ -294,11 +296,16 @@ class Shaper {
 
   void operator()(const Patch& patch) const {
     const std::size_t n = patch.curves.size();
+    // A surface may be creased more sharply than an element can be: the worst may leave it farther.
+    const bool worst = std::ranges::any_of(patch.seen, [&](std::uint32_t e) {
+      return least(places_of(elements_, e)) < very_bad * shaping_.enough;
+    });
+    const double give = worst ? 4. * shaping_.off : shaping_.off;
     std::vector<std::array<Anchor, 4>> anchors(n);
     Vector x(Eigen::Index(12 * n));
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t d = 0; d < 4; ++d) {
-        anchors[i][d] = anchor(elements_.curves[patch.curves[i]], d);
+        anchors[i][d] = anchor(elements_.curves[patch.curves[i]], d, give);
         x.segment<3>(Eigen::Index(12 * i + 3 * d)) = elements_.curves[patch.curves[i]][d];
       }
     const Vector before = x;
@@ -378,10 +385,9 @@ class Shaper {
   }
 
  private:
-  Anchor anchor(const Depths& curve, std::size_t d) const {
+  Anchor anchor(const Depths& curve, std::size_t d, double give) const {
     constexpr double reach = 500.;  // µm
-    const double small = .01 / (shaping_.along * shaping_.along),
-                 strong = .01 / (shaping_.off * shaping_.off);
+    const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
     Anchor result{curve[d], small * Matrix<3>::Identity()};
     if (d == 1 || d == 2) return result;
     const TriangleTree& surface = d == 0 ? outer_ : inner_;
@@ -414,7 +420,7 @@ void improve_shapes(Elements& elements, const TriangleTree& outer, const Triangl
       bad[e] = scaled < shaping.enough || !certify(elements.hexahedron(e)).positive() ||
                volume < (shaping.least - .05) * shaping.volume ||
                volume > (shaping.most + .05) * shaping.volume;
-      worse[e] = scaled < .6 * shaping.enough;
+      worse[e] = scaled < very_bad * shaping.enough;
     });
     for (std::uint32_t e = 0; e < elements.size();
          ++e)  // the worst need more room: what is around moves, too

@@ -14,7 +14,7 @@
 namespace forest::cortex {
 
 struct Shaping {
-  double enough = .5;              // scaled Jacobian: elements that have it everywhere are left alone
+  double enough = .53;             // scaled Jacobian: elements that have it everywhere are left alone
   double wanted = .65;             // of others
   double volume = 1e9;             // µm³
   double least = .85, most = 1.2;  // of it
