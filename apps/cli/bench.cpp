@@ -22,6 +22,7 @@ std::function<void()> bench_measure(CLI::App&, Console&);
 std::function<void()> bench_pack(CLI::App&, Console&);
 std::function<void()> bench_peers(CLI::App&, Console&);
 std::function<void()> bench_pick(CLI::App&, Console&);
+std::function<void()> bench_planting(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
 std::function<void()> bench_seam(CLI::App&, Console&);
 std::function<void()> bench_targets(CLI::App&, Console&);
@@ -41,6 +42,8 @@ std::span<const Benchmark> benchmarks() {
        bench_peers},
       {"pick", "How many picks a second, and whether each is what a plain loop over all segments finds",
        bench_pick},
+      {"planting", "How many seconds a million somata take to find places in a curved element of 1 mm³",
+       bench_planting},
       {"repository", "How many neurons are stored in a repository in a second, and read back",
        bench_repository},
       {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer",

@@ -4,6 +4,10 @@
 #include <cmath>
 #include <filesystem>
 #include <memory>
+#include <numbers>
+#include <span>
+#include <string>
+#include <vector>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -18,6 +22,7 @@
 #include "apps/cli/cortex.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
+#include "apps/cli/planting_elements.h"
 
 namespace forest::cli {
 namespace {
@@ -51,12 +56,52 @@ struct Options {
   fs::path file, out, values;
   std::string measure = "volume";
   double w = .5;
+  std::string edges;   // of which elements
+  double radius = 4.;  // of edges, µm
   bool force = false;
 };
+
+// The twelve edges of elements as tubes: a cage, through which one sees what is within.
+Mesh edges_of(const cortex::Elements& elements, std::span<const std::uint32_t> of, double radius) {
+  constexpr std::uint32_t steps = 24, sides = 6;
+  Mesh mesh;
+  for (const std::uint32_t e : of) {
+    const cortex::Hexahedron h = elements.hexahedron(e);
+    for (int axis = 0; axis < 3; ++axis)
+      for (int corner = 0; corner < 4; ++corner) {
+        Eigen::Vector3d at = Eigen::Vector3d::Zero();
+        at[(axis + 1) % 3] = corner & 1, at[(axis + 2) % 3] = corner >> 1;
+        const auto first = std::uint32_t(mesh.positions.size());
+        for (std::uint32_t i = 0; i <= steps; ++i) {
+          at[axis] = double(i) / steps;
+          const cortex::Linear here = cortex::linear(h, at);
+          const Eigen::Vector3d along = here.jacobian.col(axis).normalized(),
+                                other = here.jacobian.col((axis + 1) % 3);
+          const Eigen::Vector3d x = along.cross(other).normalized(), y = along.cross(x);
+          for (std::uint32_t k = 0; k < sides; ++k) {
+            const double turn = 2. * std::numbers::pi * k / sides;
+            mesh.positions.push_back(
+                (here.at + radius * (std::cos(turn) * x + std::sin(turn) * y)).cast<float>());
+            if (i == steps) continue;
+            const std::uint32_t a = first + i * sides + k, b = first + i * sides + (k + 1) % sides;
+            mesh.triangles.push_back({a, b, b + sides}), mesh.triangles.push_back({a, b + sides, a + sides});
+          }
+        }
+      }
+  }
+  mesh.labels.assign(mesh.positions.size(), 0);
+  return mesh;
+}
 
 void run(const Options& o, Console& console) {
   const io::ElementsFile file = io::read_elements(o.file);
   const cortex::Elements& elements = file.cortex.elements;
+  if (!o.edges.empty()) {
+    const auto of = parse_elements(o.edges, o.file, elements.size());
+    write_unless_there(o.out, io::write_surface(edges_of(elements, of, o.radius), o.out.string()), o.force);
+    console.say(fmt::format("the edges of {} in {}", counted(of.size(), "element"), o.out.string()));
+    return console.print({{"elements", of.size()}});
+  }
   const auto measure = std::ranges::find(measures, o.measure, &Measure::name);
   // Every element has four corners and a middle of its own, so that its number colours it alone.
   Mesh mesh;
@@ -108,6 +153,14 @@ std::function<void()> cortex_faces(CLI::App& command, Console& console) {
       *command.add_option("--w", o->w, "Depth: 0 the outer surface, 1 the inner one")->capture_default_str(),
       0., 1.);
   command.add_option("--measure", o->measure, help)->check(CLI::IsMember(names))->capture_default_str();
+  CLI::Option* const edges =
+      command
+          .add_option("--edges", o->edges,
+                      "Instead of a level the edges of these elements, as tubes: 7,12,20-29 or all")
+          ->type_name("LIST");
+  must_be_within(
+      *command.add_option("--radius", o->radius, "Of the tubes, µm")->needs(edges)->capture_default_str(), .1,
+      1000.);
   add_force(command, o->force);
   return [o, &console] { run(*o, console); };
 }

@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// brainforest plant: neurons of a repository into a column, as a SONATA circuit.
+// brainforest plant: neurons of a repository into a column, or into curved elements of a cortex, as a SONATA circuit.
 #include <filesystem>
 #include <memory>
 
@@ -12,6 +12,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
 #include "apps/cli/planting.h"
+#include "apps/cli/planting_elements.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -22,11 +23,61 @@ struct Options {
   std::filesystem::path out;
   std::uint64_t seed = 0;
   std::uint32_t synapses = 0;
+  ElementOptions elements;
 };
 
+nlohmann::ordered_json json_of(const Spread& s) {
+  return {{"min", s.least}, {"p1", s.p1}, {"median", s.median}, {"p99", s.p99}, {"max", s.most}};
+}
+
+nlohmann::ordered_json json_of(const PlantedElements& all) {
+  nlohmann::ordered_json elements = nlohmann::ordered_json::array();
+  for (std::size_t e = 0; e < all.elements.size(); ++e)
+    elements.push_back({{"element", all.elements[e]},
+                        {"first", all.first[e]},
+                        {"neurons", all.first[e + 1] - all.first[e]}});
+  nlohmann::ordered_json json{
+      {"elements", elements}, {"volume", all.volume * 1e-9}, {"seconds", all.seconds}, {"bending", nullptr}};
+  if (all.bending) {
+    const Bending& b = *all.bending;
+    json["bending"] = {{"length", b.length},
+                       {"length_ratio", b.length_ratio},
+                       {"neuron_length_ratio", json_of(b.ratio)},
+                       {"mean_turn", json_of(b.turn)},
+                       {"beyond_pia", b.beyond_pia},
+                       {"shortened", b.shortened},
+                       {"pressed_to_pia", b.pressed},
+                       {"beyond_white", b.beyond_white},
+                       {"beside", b.beside}};
+  }
+  return json;
+}
+
+std::string sentence_of(const Bending& b) {
+  const auto change = [](double ratio) { return fmt::format("{:+.1f}", 100. * (ratio - 1.)); };
+  return fmt::format(
+      "bent; {} were taller than the tissue above them and made shorter; {:.3g} m of branches became {} % "
+      "longer, "
+      "single neurons {} to {} % (98 of 100: {} to {} %), and the angles between segments changed by {:.2g}° "
+      "in the median; "
+      "{:.2g} % of the length lies beyond the pia, {:.2g} % would have and lies on it, {:.2g} % lies in the "
+      "white matter, "
+      "{:.2g} % left the elements at their rim",
+      counted(b.shortened, "neuron"), b.length * 1e-6, change(b.length_ratio), change(b.ratio.least),
+      change(b.ratio.most), change(b.ratio.p1), change(b.ratio.p99), b.turn.median, 100. * b.beyond_pia,
+      100. * b.pressed, 100. * b.beyond_white, 100. * b.beside);
+}
+
 void run(const Options& options, Console& console) {
-  const Planted planted =
-      plant_from_repository(find_recipe(options.recipe), options.repo, options.seed, console.progress());
+  const circuit::Recipe recipe = find_recipe(options.recipe);
+  const bool curved = !options.elements.file.empty();
+  PlantedElements all;
+  if (curved)
+    all = plant_in_elements(options.elements, recipe, options.repo, options.seed, console.progress());
+  else
+    all.planted = plant_from_repository(recipe, options.repo, options.seed, console.progress());
+  for (const std::string& sentence : all.left_out) console.warn(sentence);
+  const Planted& planted = all.planted;
   const circuit::Circuit& circuit = planted.circuit;
   std::vector<circuit::Projection> projections;
   if (options.synapses)
@@ -40,20 +91,27 @@ void run(const Options& options, Console& console) {
   std::vector<std::vector<std::string>> lines;
   for (const circuit::Tally& row : circuit::tally(circuit)) {
     const std::string &layer = circuit.layers[row.layer].name, &type = circuit.types[row.type].name;
-    list.push_back({{"layer", layer}, {"type", type}, {"count", row.count}, {"density", row.density}});
-    lines.push_back({layer, type, std::to_string(row.count), fmt::format("{:.0f}", row.density)});
+    const double density = curved ? double(row.count) / (all.layer_volumes[row.layer] * 1e-9) : row.density;
+    list.push_back({{"layer", layer}, {"type", type}, {"count", row.count}, {"density", density}});
+    lines.push_back({layer, type, std::to_string(row.count), fmt::format("{:.0f}", density)});
   }
-  console.print({{"circuit", options.out.string()},
-                 {"name", circuit.name},
-                 {"seed", options.seed},
-                 {"radius", circuit.radius},
-                 {"neurons", circuit.instances.size()},
-                 {"morphologies", circuit.morphologies.size()},
-                 {"made_up_synapses", synapses},
-                 {"planted", list}});
+  nlohmann::ordered_json json{{"circuit", options.out.string()},
+                              {"name", circuit.name},
+                              {"seed", options.seed},
+                              {"radius", circuit.radius},
+                              {"neurons", circuit.instances.size()},
+                              {"morphologies", circuit.morphologies.size()},
+                              {"made_up_synapses", synapses},
+                              {"planted", list}};
+  if (curved) json["tissue"] = json_of(all);
+  console.print(json);
   console.table({"layer", "type", "neurons", "neurons/mm³"}, lines);
   console.say(fmt::format("\n{} neurons of {} shapes are planted in {}", circuit.instances.size(),
                           circuit.morphologies.size(), options.out.string()));
+  if (curved)
+    console.say(fmt::format("{} of {:.3f} mm³; places in {:.2f} s", counted(all.elements.size(), "element"),
+                            all.volume * 1e-9, all.seconds));
+  if (all.bending) console.say(sentence_of(*all.bending));
   if (synapses)
     console.say(fmt::format("{} synapses are made up: nobody measured them, they are there to be looked at",
                             synapses));
@@ -65,7 +123,8 @@ std::function<void()> plant(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command
       .add_option("--recipe", options->recipe,
-                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000")
+                  "A recipe (TOML), or the name of one that ships: column-1000, column-10000, human-frontal, "
+                  "human-visual, rat-barrel-column, rodent-types")
       ->required()
       ->type_name("FILE|NAME");
   command
@@ -78,6 +137,7 @@ std::function<void()> plant(CLI::App& command, Console& console) {
                   "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")
       ->required()
       ->type_name("DIR");
+  add_elements(command, options->elements);
   add_whole(command, "--synapses", options->synapses,
             "Make up so many synapses on each neuron, from others drawn by lot (docs/scene/synapses.md)", 0,
             100'000);

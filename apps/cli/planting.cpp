@@ -159,21 +159,6 @@ std::vector<std::string> names_of(const std::vector<NeuronRow>& rows) {
   return names;
 }
 
-/// A type all of whose cells have no other processes than those of glia is glia, also when the recipe does not say so.
-void mark_glia(Planted& planted) {
-  std::vector<char> glial(planted.morphologies.size());
-  for (std::size_t i = 0; i < glial.size(); ++i) {
-    const auto sections = planted.morphologies[i].sections();
-    glial[i] = !sections.empty() &&
-               std::ranges::all_of(sections, [](const Section& s) { return s.kind == SectionKind::glia; });
-  }
-  std::vector<std::size_t> cells(planted.circuit.types.size()), of_glia(cells);
-  for (const circuit::Instance& i : planted.circuit.instances)
-    ++cells[i.type], of_glia[i.type] += glial[i.morphology] != 0;
-  for (std::size_t t = 0; t < cells.size(); ++t)
-    if (cells[t] && cells[t] == of_glia[t]) planted.circuit.types[t].glia = true;
-}
-
 }  // namespace
 
 circuit::Recipe find_recipe(const std::string& name_or_path) {
@@ -190,39 +175,57 @@ circuit::Recipe find_recipe(const std::string& name_or_path) {
                                fmt::join(names, ", ")));
 }
 
-Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
-                              Progress& progress) {
-  const auto seedlings = seedlings_of(recipe, seed);
+Stock stock_of(const circuit::Recipe& recipe, const std::string& repo, Progress& progress) {
   const auto rows = rows_for(recipe, repo);
-  auto names = names_of(rows);
-  std::vector<Morphology> neurons(rows.size());
-  std::vector<circuit::Candidate> candidates(rows.size());
+  const auto names = names_of(rows);
+  Stock stock{std::vector<circuit::Candidate>(rows.size()), std::vector<Morphology>(rows.size())};
   progress.begin("loading", rows.size());
   parallel_ranges(rows.size(), 64, [&](std::size_t begin, std::size_t end) {
     const Repository repository = Repository::open(repo, Access::read);  // an object belongs to one thread
     for (std::size_t i = begin; i < end; ++i) {
-      neurons[i] = centred(repository.morphology(rows[i].id));
-      candidates[i] = {names[i], rows[i].population, neurons[i].soma().sphere().radius,
-                       neurons[i].bounds().empty() ? 0.f : neurons[i].bounds().high.y()};
+      const Morphology& neuron = stock.neurons[i] = centred(repository.morphology(rows[i].id));
+      stock.candidates[i] = {names[i], rows[i].population, neuron.soma().sphere().radius,
+                             neuron.bounds().empty() ? 0.f : neuron.bounds().high.y()};
       progress.advance();
     }
   });
   progress.end();
+  return stock;
+}
+
+void mark_glia(Planted& planted) {
+  std::vector<char> glial(planted.morphologies.size());
+  for (std::size_t i = 0; i < glial.size(); ++i) {
+    const auto sections = planted.morphologies[i].sections();
+    glial[i] = !sections.empty() &&
+               std::ranges::all_of(sections, [](const Section& s) { return s.kind == SectionKind::glia; });
+  }
+  std::vector<std::size_t> cells(planted.circuit.types.size()), of_glia(cells);
+  for (const circuit::Instance& i : planted.circuit.instances)
+    ++cells[i.type], of_glia[i.type] += glial[i.morphology] != 0;
+  for (std::size_t t = 0; t < cells.size(); ++t)
+    if (cells[t] && cells[t] == of_glia[t]) planted.circuit.types[t].glia = true;
+}
+
+Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
+                              Progress& progress) {
+  const auto seedlings = seedlings_of(recipe, seed);
+  auto [candidates, neurons] = stock_of(recipe, repo, progress);
 
   // A candidate for all seedlings of a type; its population is one that no repository has.
   circuit::Recipe planted_by = recipe;
   for (std::size_t type = 0; type < seedlings.size(); ++type)
     if (seedlings[type] && !seedlings[type]->radii.empty()) {
       planted_by.types[type].population = "\n" + recipe.types[type].name;
-      names.push_back(planted_by.types[type].population);
       neurons.emplace_back();
-      candidates.push_back({names.back(), names.back(), std::ranges::max(seedlings[type]->radii), 0.f});
+      candidates.push_back({planted_by.types[type].population, planted_by.types[type].population,
+                            std::ranges::max(seedlings[type]->radii), 0.f});
     }
   Planted planted{circuit::plant(planted_by, candidates, seed, progress), {}};
   planted.circuit.types = recipe.types;
-  for (std::size_t i = 0; i < names.size(); ++i)  // the circuit keeps the order of the candidates
+  for (std::size_t i = 0; i < candidates.size(); ++i)  // the circuit keeps their order
     if (planted.morphologies.size() < planted.circuit.morphologies.size() &&
-        planted.circuit.morphologies[planted.morphologies.size()] == names[i])
+        planted.circuit.morphologies[planted.morphologies.size()] == candidates[i].name)
       planted.morphologies.push_back(neurons[i]);
   if (std::ranges::any_of(seedlings, [](const auto& s) { return s.has_value(); }))
     grow_in_place(planted, seedlings, seed, progress);

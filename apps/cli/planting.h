@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "forest/circuit/plant.h"
 #include "forest/circuit/recipe.h"
 #include "forest/core/progress.h"
 #include "forest/morphology/morphology.h"
@@ -15,10 +16,22 @@ namespace forest::cli {
 /// The recipe at a path, or the one that ships under a name ("column-1000"). Throws InputError that lists the names.
 circuit::Recipe find_recipe(const std::string& name_or_path);
 
+/// The neurons of a repository that a recipe plants from, centre at the origin; names are safe as those of files.
+struct Stock {
+  std::vector<circuit::Candidate> candidates;
+  std::vector<Morphology> neurons;  // one for each
+};
+/// Throws Error when a population that the recipe plants from is empty, with the commands that fill it.
+/// @param repo  may be empty when all types have a grammar
+Stock stock_of(const circuit::Recipe& recipe, const std::string& repo, Progress& progress);
+
 struct Planted {
   circuit::Circuit circuit;
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
 };
+
+/// A type all of whose cells have no other processes than those of glia is glia, also when the recipe does not say so.
+void mark_glia(Planted& planted);
 
 /// Plants the neurons of a repository, and grows those of types with a grammar where they stand: below the pia, in the layers,
 /// among the somata of all others. A morphology is called as its neuron, made safe as a file name.

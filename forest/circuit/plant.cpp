@@ -185,9 +185,22 @@ void place(const Recipe& recipe, const cortex::Column& column, std::span<const f
   progress.end();
 }
 
-/// The candidates of each type, by index. A type of which none is planted may go without.
-std::vector<std::vector<std::uint32_t>> choices(const Recipe& recipe, std::span<const Candidate> candidates,
-                                                const std::vector<std::vector<std::uint32_t>>& wanted) {
+/// Leaves out the candidates that were not planted.
+void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates) {
+  std::vector<std::uint32_t> number(candidates.size(), 0);
+  for (const Instance& instance : circuit.instances) number[instance.morphology] = 1;
+  for (std::size_t i = 0; i < candidates.size(); ++i)
+    if (number[i])
+      number[i] = std::uint32_t(circuit.morphologies.size()),
+      circuit.morphologies.push_back(candidates[i].name);
+  for (Instance& instance : circuit.instances) instance.morphology = number[instance.morphology];
+}
+
+}  // namespace
+
+std::vector<std::vector<std::uint32_t>> candidates_of(
+    const Recipe& recipe, std::span<const Candidate> candidates,
+    const std::function<bool(std::size_t type)>& is_planted) {
   std::unordered_set<std::string_view> names;
   for (const Candidate& candidate : candidates) {
     if (!names.insert(candidate.name).second)
@@ -202,35 +215,22 @@ std::vector<std::vector<std::uint32_t>> choices(const Recipe& recipe, std::span<
   for (std::size_t type = 0; type < recipe.types.size(); ++type) {
     for (std::size_t i = 0; i < candidates.size(); ++i)
       if (candidates[i].population == recipe.types[type].population) result[type].push_back(std::uint32_t(i));
-    std::size_t count = 0;
-    for (const auto& layer : wanted) count += layer[type];
-    if (count && result[type].empty())
+    if (result[type].empty() && is_planted(type))
       throw Error(
-          fmt::format("{} neurons of type {} are to be planted, but population {} is empty; grow or import "
+          fmt::format("neurons of type {} are to be planted, but population {} is empty; grow or import "
                       "neurons into it first",
-                      count, recipe.types[type].name, recipe.types[type].population));
+                      recipe.types[type].name, recipe.types[type].population));
   }
   return result;
 }
-
-/// Leaves out the candidates that were not planted.
-void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates) {
-  std::vector<std::uint32_t> number(candidates.size(), 0);
-  for (const Instance& instance : circuit.instances) number[instance.morphology] = 1;
-  for (std::size_t i = 0; i < candidates.size(); ++i)
-    if (number[i])
-      number[i] = std::uint32_t(circuit.morphologies.size()),
-      circuit.morphologies.push_back(candidates[i].name);
-  for (Instance& instance : circuit.instances) instance.morphology = number[instance.morphology];
-}
-
-}  // namespace
 
 Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
               Progress& progress) {
   check(recipe);
   const auto wanted = counts(recipe);
-  const auto choice = choices(recipe, candidates, wanted);
+  const auto choice = candidates_of(recipe, candidates, [&](std::size_t type) {
+    return std::ranges::any_of(wanted, [&](const auto& layer) { return layer[type] > 0; });
+  });
   const cortex::Column tissue = column(recipe);
 
   Circuit circuit{.name = recipe.name,

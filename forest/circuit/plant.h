@@ -10,8 +10,10 @@
 #pragma once
 
 #include <cstdint>
+#include <functional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "forest/circuit/circuit.h"
 #include "forest/circuit/recipe.h"
@@ -28,6 +30,12 @@ struct Candidate {
 };
 
 inline constexpr float pia_slack = 30.f;  // µm that a neuron may reach above the pia
+
+/// The candidates of each type, by index. Throws Error for two of the same name, for a soma or height that is no number, and for a
+/// type that is planted and has none.
+std::vector<std::vector<std::uint32_t>> candidates_of(
+    const Recipe& recipe, std::span<const Candidate> candidates,
+    const std::function<bool(std::size_t type)>& is_planted);
 
 /// Circuit::morphologies holds the candidates that were planted, in their order; instances are in the order
 /// of layers, then types. Each instance has a candidate of its type's population and stands where that does not reach

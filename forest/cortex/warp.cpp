@@ -144,11 +144,14 @@ std::vector<Junctions> junctions(std::span<const Hexahedron> elements) {
 }
 
 Eigen::Matrix3d axes(const Sheet& sheet, const Seat& seat) {
-  const Eigen::Matrix3d j = sheet.elements[seat.element].jacobian(seat.uvw);
+  return axes(sheet.elements[seat.element].jacobian(seat.uvw), seat.turn);
+}
+
+Eigen::Matrix3d axes(const Eigen::Matrix3d& j, double turn) {
   const Place up = -j.col(2).normalized(), along = j.col(0) - j.col(0).dot(up) * up;
   Eigen::Matrix3d r;
   r.col(1) = up;
-  r.col(0) = Eigen::AngleAxisd(seat.turn, up) * along.normalized();
+  r.col(0) = Eigen::AngleAxisd(turn, up) * along.normalized();
   r.col(2) = r.col(0).cross(up);
   return r;
 }

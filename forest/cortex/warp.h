@@ -53,6 +53,7 @@ struct Seat {
 
 /// R: the columns are the neuron's x, y, z axes in the tissue; y points along −∂x/∂w, towards the pia.
 Eigen::Matrix3d axes(const Sheet& sheet, const Seat& seat);
+Eigen::Matrix3d axes(const Eigen::Matrix3d& jacobian, double turn);  // of the element, at the soma
 
 struct WarpOptions {
   bool rigid = false;

@@ -3,6 +3,9 @@
 
 #include <numbers>
 
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
 #include "forest/core/random.h"
 
 namespace forest {
@@ -64,6 +67,19 @@ Morphology stretched(const Morphology& m, const Vec3& factors) {
         return at(origin + (p.position() - origin).cwiseProduct(factors), p.radius);
       },
       [](const Vec3& head, SectionId) { return head; });
+}
+
+Morphology reshaped(const Morphology& m, std::span<const Vec3> places, const Quat& turn) {
+  if (places.size() != m.points().size())
+    throw Error(
+        fmt::format("a neuron of {} points is given places for {}", m.points().size(), places.size()));
+  auto next = places.begin();  // points are asked for in their order
+  return rebuilt(
+      m,
+      [&](const Point& p, SectionId s) {
+        return at(s.valid() ? *next++ : Vec3(turn * p.position()), p.radius);
+      },
+      [&](const Vec3& head, SectionId) { return Vec3(turn * head); });
 }
 
 Morphology jittered(const Morphology& m, float degrees, std::uint64_t seed, std::uint64_t item) {

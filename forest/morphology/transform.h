@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 
 #include "forest/morphology/morphology.h"
 
@@ -22,6 +23,10 @@ Morphology centred(const Morphology& m);
 /// The same neuron stretched along the axes, from its centre on: what a slice that swelled or shrank, or a wrong step of
 /// the microscope's stage, makes of it. Radii stay.
 Morphology stretched(const Morphology& m, const Vec3& factors);
+
+/// The same neuron, its sections' points at other places, one for each of m.points(); soma and heads of spines are turned about the
+/// origin. Radii stay.
+Morphology reshaped(const Morphology& m, std::span<const Vec3> points, const Quat& turn);
 
 /// The same neuron with every daughter at a bifurcation turned about the branch point, with all beyond it, by a random
 /// angle of this standard deviation about a random axis across its direction: lengths, diameters and topology stay, angles

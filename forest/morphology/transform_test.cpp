@@ -3,9 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
+#include <vector>
 
 #include <gtest/gtest.h>
 
+#include "forest/core/error.h"
 #include "forest/morphology/measure.h"
 
 namespace forest {
@@ -70,6 +72,22 @@ TEST(Stretched, ScalesOneAxisFromTheSoma) {
   }
   EXPECT_EQ(after.soma(), before.soma());
   EXPECT_EQ(after.annotations(), before.annotations());
+}
+
+TEST(Reshaped, PutsEveryPointWhereItIsToldAndKeepsTheTree) {
+  const Morphology before = centred(tree(true));
+  std::vector<Vec3> places;
+  for (const Point& p : before.points()) places.push_back(2.f * p.position() + Vec3(0.f, 1.f, 0.f));
+  const Morphology after = reshaped(before, places, Quat::Identity());
+  ASSERT_EQ(after.points().size(), places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    EXPECT_EQ(after.points()[i].position(), places[i]);
+    EXPECT_EQ(after.points()[i].radius, before.points()[i].radius);
+  }
+  EXPECT_EQ(after.sections().size(), before.sections().size());
+  EXPECT_EQ(after.soma(), before.soma());
+  places.pop_back();
+  EXPECT_THROW(reshaped(before, places, Quat::Identity()), Error);
 }
 
 TEST(Jittered, TurnsDaughtersAndKeepsLengths) {

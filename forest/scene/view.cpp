@@ -319,9 +319,11 @@ std::string to_json(const View& v) {
 View overview(const Forest& forest) {
   View view;
   Bounds bounds = forest.soma_bounds();
+  const bool column = forest.circuit().radius > 0.f || bounds.empty();  // it stands at the origin
+  const Vec3 middle = column ? Vec3(Vec3::Zero()) : bounds.centre();
   for (const auto& layer : forest.circuit().layers) {
-    bounds.add({0.f, layer.bottom, 0.f});
-    bounds.add({0.f, layer.top, 0.f});
+    bounds.add({middle.x(), layer.bottom, middle.z()});
+    bounds.add({middle.x(), layer.top, middle.z()});
   }
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, .5f * bounds.extent().norm() * .5f);

@@ -1,0 +1,373 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "apps/cli/planting_elements.h"
+
+#include <algorithm>
+#include <charconv>
+#include <cmath>
+#include <numeric>
+#include <set>
+
+#include <CLI/CLI.hpp>
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "forest/circuit/plant_elements.h"
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/cortex/warp.h"
+#include "forest/io/elements_file.h"
+#include "forest/morphology/transform.h"
+#include "forest/repository/names.h"
+
+#include "apps/cli/clock.h"
+#include "apps/cli/console.h"
+#include "apps/cli/options.h"
+
+namespace forest::cli {
+namespace {
+
+using Place = Eigen::Vector3d;
+
+// As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends.
+std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle,
+                                       std::uint32_t count) {
+  std::vector<std::uint32_t> row{middle};
+  const auto walk = [&](std::uint32_t element, cortex::Face out, std::size_t length) {
+    std::vector<std::uint32_t> way;
+    while (way.size() < length) {
+      const cortex::Junction next = sheet.junctions[element][std::size_t(out)];
+      if (next.element == cortex::Junction::nothing || next.element == middle) break;
+      way.push_back(element = next.element);
+      out = cortex::Face(int(next.face) ^ 1);  // out by the opposite face
+    }
+    return way;
+  };
+  auto before = walk(middle, cortex::Face::u0, (count - 1) / 2);
+  const auto after = walk(middle, cortex::Face::u1, count - 1 - before.size());
+  std::ranges::reverse(before);
+  row.insert(row.begin(), before.begin(), before.end());
+  row.insert(row.end(), after.begin(), after.end());
+  return row;
+}
+
+std::vector<std::uint32_t> choose(const ElementOptions& options,
+                                  std::span<const cortex::Hexahedron> elements) {
+  if (!options.elements.empty()) return parse_elements(options.elements, options.file, elements.size());
+  std::vector<std::uint32_t> chosen;
+  std::vector<Place> middles(elements.size());
+  parallel_for(elements.size(), 256, [&](std::size_t e) { middles[e] = elements[e].at(.5, .5, .5); });
+  if (!options.near.empty()) {
+    const Place near(options.near[0], options.near[1], options.near[2]);
+    std::vector<std::pair<double, std::uint32_t>> order;
+    for (std::uint32_t e = 0; e < middles.size(); ++e)
+      order.emplace_back((middles[e] - near).squaredNorm(), e);
+    const auto count = std::min<std::size_t>(options.count, order.size());
+    std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(count), order.end());
+    for (std::size_t i = 0; i < count; ++i) chosen.push_back(order[i].second);
+    return chosen;
+  }
+  const auto within = [&](const Place& p) {
+    if (!options.sphere.empty())
+      return (p - Place(options.sphere[0], options.sphere[1], options.sphere[2])).norm() <= options.sphere[3];
+    for (Eigen::Index a = 0; a < 3; ++a)
+      if (!(p[a] >= options.box[std::size_t(a)] && p[a] <= options.box[std::size_t(a) + 3])) return false;
+    return true;
+  };
+  Place low = Place::Constant(INFINITY), high = -low;
+  for (std::uint32_t e = 0; e < middles.size(); ++e) {
+    low = low.cwiseMin(middles[e]), high = high.cwiseMax(middles[e]);
+    if (within(middles[e])) chosen.push_back(e);
+  }
+  if (chosen.empty())
+    throw Error(fmt::format(
+        "no element of {} has its middle in that {}; their middles are at ({:.0f}, {:.0f}, {:.0f}) to "
+        "({:.0f}, {:.0f}, {:.0f}) µm",
+        options.file.string(), options.box.empty() ? "sphere" : "box", low.x(), low.y(), low.z(), high.x(),
+        high.y(), high.z()));
+  return chosen;
+}
+
+Spread spread(std::vector<double> values) {
+  if (values.empty()) return {};
+  std::ranges::sort(values);
+  const auto at = [&](double share) {
+    return values[std::size_t(std::lround(share * double(values.size() - 1)))];
+  };
+  return {at(0.), at(.01), at(.5), at(.99), at(1.)};
+}
+
+// A neuron as warp wants it. The first point of a section repeats its parent's last; what follows is joined to that.
+struct Tree {
+  std::vector<Place> points;
+  std::vector<std::int32_t> parents;
+  double height = 0., length = 0.;  // µm above the soma, of all branches
+
+  explicit Tree(const Morphology& m) {
+    for (const Section& s : m.sections()) {
+      const std::int32_t above =
+          s.parent.valid()
+              ? std::int32_t(m.section(s.parent).first_point + m.section(s.parent).point_count) - 1
+              : -1;
+      for (std::uint32_t i = 0; i < s.point_count; ++i) {
+        points.push_back(m.points()[s.first_point + i].position().cast<double>());
+        parents.push_back(i > 1 || (i == 1 && above < 0) ? std::int32_t(points.size()) - 2 : above);
+        height = std::max(height, points.back().y());
+        if (parents.back() >= 0) length += (points.back() - points[std::size_t(parents.back())]).norm();
+      }
+    }
+  }
+};
+
+// Each neuron becomes a shape of its own, in the tissue's axes.
+Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, const cortex::Sheet& sheet,
+             Progress& progress) {
+  circuit::Circuit& circuit = all.planted.circuit;
+  const std::size_t count = circuit.instances.size();
+  std::vector<Tree> trees;
+  for (const Morphology& m : all.planted.morphologies) trees.emplace_back(m);
+  std::vector<std::size_t> group(count);  // the element of each, in all.elements
+  for (std::size_t e = 0; e < all.elements.size(); ++e)
+    std::fill(group.begin() + std::ptrdiff_t(all.first[e]), group.begin() + std::ptrdiff_t(all.first[e + 1]),
+              e);
+  std::vector<Morphology> bent(count);
+  std::vector<std::string> names(count);
+  std::vector<cortex::Distortion> distortions(count);
+  std::vector<double> pressed(count);
+  std::vector<char> shortened(count);
+  progress.begin("bending", count);
+  parallel_for(count, 16, [&](std::size_t i) {
+    circuit::Instance& instance = circuit.instances[i];
+    const Tree& tree = trees[instance.morphology];
+    const cortex::Seat seat{all.elements[group[i]], rooted[i].uvw, rooted[i].turn};
+    // What is taller than the tissue above the soma gets shorter in its upper part, by a half at most; what passes the pia all the
+    // same lies on it.
+    const Place down = sheet.elements[seat.element].jacobian(seat.uvw).col(2);
+    std::vector<Place> straight = tree.points;
+    if (const double room = seat.uvw[2] * down.norm(); tree.height > room) {
+      const double share = std::max(.5, room / tree.height);
+      shortened[i] = 1;
+      for (Place& p : straight)
+        if (p.y() > 0.) p.y() *= share;
+    }
+    cortex::Warped warped = cortex::warp(sheet, seat, straight, tree.parents);
+    if (warped.distortion.beyond_pia > 0.) {
+      pressed[i] = warped.distortion.beyond_pia;
+      warped = cortex::warp(sheet, seat, straight, tree.parents, {.below_pia = true});
+    }
+    warped.distortion.straight_length = tree.length;
+    distortions[i] = warped.distortion;
+    const Place soma = sheet.elements[seat.element].at(seat.uvw);
+    std::vector<Vec3> points;
+    points.reserve(warped.points.size());
+    for (const Place& p : warped.points) points.push_back((p - soma).cast<float>());
+    bent[i] = reshaped(all.planted.morphologies[instance.morphology], points, instance.orientation);
+    names[i] = repository::file_name(fmt::format("e{}-{:05}-{}", seat.element, i - all.first[group[i]],
+                                                 circuit.morphologies[instance.morphology]));
+    progress.advance();
+  });
+  progress.end();
+  for (std::size_t i = 0; i < count; ++i) {
+    circuit.instances[i].morphology = std::uint32_t(i);
+    circuit.instances[i].orientation = Quat::Identity();
+  }
+  circuit.morphologies = std::move(names), all.planted.morphologies = std::move(bent);
+
+  Bending b;
+  double after = 0.;
+  std::vector<double> ratios, turns;
+  for (std::size_t i = 0; i < count; ++i) {
+    const cortex::Distortion& d = distortions[i];
+    b.length += d.straight_length, after += d.length;
+    b.beyond_pia += d.beyond_pia, b.pressed += pressed[i], b.beyond_white += d.beyond_white,
+        b.beside += d.beside;
+    if (d.straight_length > 0.) ratios.push_back(d.length / d.straight_length), turns.push_back(d.mean_turn);
+  }
+  if (after > 0.)
+    b.length_ratio = after / b.length, b.beyond_pia /= after, b.beyond_white /= after, b.beside /= after,
+    b.pressed /= after;
+  b.shortened = std::size_t(std::ranges::count(shortened, 1));
+  b.ratio = spread(std::move(ratios)), b.turn = spread(std::move(turns));
+  return b;
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
+                                          std::size_t count) {
+  std::vector<std::uint32_t> all(count);
+  std::iota(all.begin(), all.end(), 0u);
+  if (text == "all") return all;
+  std::vector<std::uint32_t> chosen;
+  const char *at = text.data(), *const end = at + text.size();
+  const auto number = [&] {
+    std::uint64_t value = 0;
+    const auto [next, error] = std::from_chars(at, end, value);
+    if (error != std::errc())
+      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
+    if (value >= count)
+      throw Error(fmt::format("{} has elements 0 to {}, and no {}", file.string(), count - 1, value));
+    at = next;
+    return std::uint32_t(value);
+  };
+  for (;;) {
+    const std::uint32_t first = number();
+    std::uint32_t last = first;
+    if (at != end && *at == '-') ++at, last = number();
+    for (std::uint32_t e = first; e <= last; ++e) chosen.push_back(e);
+    if (at == end) break;
+    if (*at++ != ',')
+      throw Error(fmt::format("'{}' is no list of elements; give numbers, 7,12,20-29, or all", text));
+  }
+  std::set<std::uint32_t> seen;
+  std::erase_if(chosen, [&](std::uint32_t e) { return !seen.insert(e).second; });
+  return chosen;
+}
+
+PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
+                                  const std::string& repo, std::uint64_t seed, Progress& progress) {
+  for (std::size_t t = 0; t < recipe.grammars.size(); ++t)
+    if (!recipe.grammars[t].empty())
+      throw Error(
+          fmt::format("neurons of type {} would grow by grammar {} where they stand, which is not so in "
+                      "elements; grow some "
+                      "into a repository (brainforest grow), and name their population instead",
+                      recipe.types[t].name, recipe.grammars[t]));
+  if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty())
+    throw Error("say which elements are planted: --element, --near, --sphere or --box");
+  const io::ElementsFile file = io::read_elements(options.file);
+  std::vector<cortex::Hexahedron> elements(file.cortex.elements.size());
+  parallel_for(elements.size(), 64, [&](std::size_t e) { elements[e] = file.cortex.elements.hexahedron(e); });
+  PlantedElements all;
+  all.elements = choose(options, elements);
+  const bool bent = options.bend == "grid";
+  std::vector<cortex::Junctions> junctions;
+  if (bent || options.row > 1) junctions = cortex::junctions(elements);
+  const cortex::Sheet sheet{elements, junctions};
+  if (options.row > 1) {
+    if (all.elements.size() != 1)
+      throw Error(
+          fmt::format("a row goes through one element, and {} are chosen; choose one", all.elements.size()));
+    all.elements = row_through(sheet, all.elements.front(), options.row);
+  }
+
+  Stock stock = stock_of(recipe, repo, progress);
+  const auto start = Clock::now();
+  double scale = options.scale;
+  if (options.density > 0.) {
+    const double mean = circuit::mean_density(recipe);
+    if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
+    scale = options.density / mean;
+  }
+  const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
+                                        {.scale = scale, .element = file.volume});
+  for (std::size_t l = 0; l < recipe.layers.size(); ++l)
+    if (planter.left_out(l))
+      all.left_out.push_back(
+          fmt::format("{} with somata too wide for the density of layer {} are not planted there; those that "
+                      "are have radii of up to {:.3g} µm",
+                      counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
+  double wanted = 0.;
+  all.layer_volumes.resize(recipe.layers.size());
+  for (const std::uint32_t e : all.elements) {
+    for (const auto& layer : planter.counts(elements[e]))
+      wanted += std::accumulate(layer.begin(), layer.end(), 0.);
+    for (std::size_t l = 0; l < recipe.layers.size(); ++l)
+      all.layer_volumes[l] += elements[e].volume(l ? planter.depths()[l - 1] : 0., planter.depths()[l]);
+  }
+  all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
+  constexpr double most = 50e6, most_bent = 200'000;
+  if (wanted > (bent ? most_bent : most))
+    throw Error(
+        fmt::format("{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
+                    "or lower --scale",
+                    all.elements.size(), wanted, bent ? most_bent : most,
+                    bent ? " of distinct shapes (--bend grid)" : ""));
+
+  std::vector<circuit::Rooted> rooted;
+  progress.begin("planting", all.elements.size());
+  for (const std::uint32_t e : all.elements) {
+    all.first.push_back(rooted.size());
+    const auto here = planter.plant(elements[e], e);
+    rooted.insert(rooted.end(), here.begin(), here.end());
+    progress.advance();
+  }
+  progress.end();
+  all.first.push_back(rooted.size());
+  all.seconds = seconds_since(start);
+
+  circuit::Circuit& circuit = all.planted.circuit;
+  circuit.name = recipe.name, circuit.types = recipe.types;
+  for (const auto& layer : recipe.layers) circuit.layers.push_back({layer.name, 0.f, 0.f});
+  std::vector<std::uint32_t> number(stock.candidates.size());
+  for (const circuit::Rooted& r : rooted) number[r.candidate] = 1;
+  for (std::size_t c = 0; c < number.size(); ++c)
+    if (number[c]) {
+      number[c] = std::uint32_t(circuit.morphologies.size());
+      circuit.morphologies.push_back(stock.candidates[c].name);
+      all.planted.morphologies.push_back(stock.neurons[c]);
+    }
+  std::vector<std::pair<float, float>> reach(circuit.layers.size(), {INFINITY, -INFINITY});
+  for (const circuit::Rooted& r : rooted) {
+    circuit.instances.push_back({r.position, r.orientation, number[r.candidate], r.type, r.layer});
+    auto& [low, high] = reach[r.layer];
+    low = std::min(low, r.position.y()), high = std::max(high, r.position.y());
+  }
+  for (std::size_t l = 0; l < reach.size();
+       ++l)  // layers are curved; a circuit says how far their somata reach
+    if (reach[l].first <= reach[l].second)
+      circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
+  if (bent) all.bending = bend(all, rooted, sheet, progress);
+  mark_glia(all.planted);
+  return all;
+}
+
+CLI::Option* add_elements(CLI::App& command, ElementOptions& o) {
+  CLI::Option* const elements =
+      command
+          .add_option("--elements", o.file,
+                      "Plant in curved elements of this file (cortex build) instead of a column")
+          ->type_name("FILE.h5");
+  const auto one_of_them = [&](CLI::Option* option) { return option->needs(elements); };
+  CLI::Option* const element = one_of_them(
+      command.add_option("--element", o.elements, "Which: their numbers in the file, 7,12,20-29, or all")
+          ->type_name("LIST"));
+  CLI::Option* const near =
+      one_of_them(command.add_option("--near", o.near, "… those nearest to a place, µm: X Y Z")
+                      ->expected(3)
+                      ->type_name("X Y Z"));
+  CLI::Option* const count =
+      command.add_option("--count", o.count, "… so many of them")->needs(near)->capture_default_str();
+  must_be_whole(*count, 1, 1'000'000);
+  CLI::Option* const sphere =
+      one_of_them(command.add_option("--sphere", o.sphere, "… those with their middle in a sphere, µm")
+                      ->expected(4)
+                      ->type_name("X Y Z R"));
+  CLI::Option* const box =
+      one_of_them(command.add_option("--box", o.box, "… or in a box, µm: its two corners")
+                      ->expected(6)
+                      ->type_name("X Y Z X Y Z"));
+  for (CLI::Option* a : {element, near, sphere, box})
+    for (CLI::Option* b : {element, near, sphere, box})
+      if (a != b) a->excludes(b);
+  CLI::Option* const row =
+      command.add_option("--row", o.row, "So many elements in a row across the fold, through the one chosen");
+  must_be_whole(*row->needs(elements), 1, 10'000);
+  CLI::Option* const scale =
+      command.add_option("--scale", o.scale, "Times the recipe's densities")->capture_default_str();
+  must_be_within(*scale->needs(elements), 1e-6, 1e6);
+  must_be_within(
+      *command.add_option("--density", o.density, "Or so many neurons/mm³ in the mean over the layers")
+           ->needs(elements)
+           ->excludes(scale),
+      1e-3, 1e8);
+  command
+      .add_option("--bend", o.bend,
+                  "grid: neurons are bent as their element is, each a shape of its own; rigid: they are only "
+                  "turned upright")
+      ->needs(elements)
+      ->check(CLI::IsMember({"rigid", "grid"}))
+      ->capture_default_str();
+  return elements;
+}
+
+}  // namespace forest::cli

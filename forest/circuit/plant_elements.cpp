@@ -1,0 +1,220 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/circuit/plant_elements.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+#include <numeric>
+
+#include <Eigen/LU>
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+#include "forest/cortex/warp.h"
+
+namespace forest::circuit {
+namespace {
+
+// Streams of the packings, of which each layer has its own, and of the places in them.
+constexpr std::uint32_t packing_stream = 0x70650000, lot_stream = 0x70651000, cell_stream = 0x70652000;
+
+constexpr double rounding = .02;  // µm that places may be off, as single precision is in a head
+constexpr double at_ease =
+    .95;  // so many mean distances wide are the widest somata that are taken where narrower ones are at hand
+constexpr double evenness = .8;  // at least this times their mean distance keep the places of a packing apart
+
+/// Neurons/mm³ of each layer. Counts hold in the recipe's column.
+std::vector<double> densities_of(const Recipe& recipe) {
+  const bool counted =
+      recipe.neurons || std::ranges::any_of(recipe.layers, [](const auto& l) { return l.count.has_value(); });
+  std::vector<double> densities;
+  if (!counted) {
+    for (const Recipe::Layer& layer : recipe.layers) densities.push_back(layer.density);
+    return densities;
+  }
+  const auto wanted = counts(recipe);
+  const cortex::Column tissue = column(recipe);
+  for (std::size_t l = 0; l < wanted.size(); ++l)
+    densities.push_back(std::accumulate(wanted[l].begin(), wanted[l].end(), 0.) / (tissue.volume(l) * 1e-9));
+  return densities;
+}
+
+}  // namespace
+
+double mean_density(const Recipe& recipe) {
+  const auto densities = densities_of(recipe);
+  double sum = 0.;
+  for (std::size_t l = 0; l < densities.size(); ++l) sum += densities[l] * double(recipe.layers[l].thickness);
+  return sum / double(column(recipe).height());
+}
+
+ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates,
+                               std::uint64_t seed, const ElementPlanting& options)
+    : recipe_(recipe), candidates_(candidates), seed_(seed) {
+  check(recipe);
+  if (!(options.scale > 0. && std::isfinite(options.scale)))
+    throw Error(fmt::format("densities cannot be scaled by {}; give a positive number", options.scale));
+  const std::size_t layers = recipe.layers.size();
+  const double height = double(column(recipe).height());
+  double depth = 0.;
+  for (const Recipe::Layer& layer : recipe.layers)
+    depths_.push_back(depth += double(layer.thickness) / height);
+  depths_.back() = 1.;
+  densities_ = densities_of(recipe);
+  for (double& density : densities_) density *= options.scale;
+  const auto grows = [&](std::size_t layer, std::size_t type) {
+    return densities_[layer] > 0. && recipe.layers[layer].mix[type] > 0.;
+  };
+
+  const auto of_type = candidates_of(recipe, candidates, [&](std::size_t type) {
+    for (std::size_t l = 0; l < layers; ++l)
+      if (grows(l, type)) return true;
+    return false;
+  });
+  const auto radius = [&](std::uint32_t c) { return double(candidates[c].soma_radius); };
+
+  // A fifth more places than are wanted, and some standard deviations where they are few; fewer where somata hardly fit.
+  double spacing = evenness;
+  std::vector<double> supply(layers);  // places/µm³
+  radii_.assign(layers, 0.), narrow_.assign(layers, 0.), left_out_.assign(layers, 0);
+  choices_.assign(layers, std::vector<std::vector<std::uint32_t>>(recipe.types.size()));
+  for (std::size_t l = 0; l < layers; ++l) {
+    if (!(densities_[l] > 0.)) continue;
+    const double volume = (depths_[l] - (l ? depths_[l - 1] : 0.)) * options.element,
+                 density = densities_[l] * 1e-9, usual = density * volume;
+    const double gap = double(recipe.soma_gap) + rounding;
+    double needed = 0.;  // the widest of the types' narrowest somata
+    for (std::size_t t = 0; t < of_type.size(); ++t)
+      if (grows(l, t)) needed = std::max(needed, radius(*std::ranges::min_element(of_type[t], {}, radius)));
+    narrow_[l] = needed;
+    const double most = std::pow(cortex::PackedCube::most_spacing / (2. * needed + gap), 3.);
+    supply[l] = std::min((1.2 * usual + 4. * std::sqrt(usual) + 10.) / volume, most);
+    if (supply[l] < 1.01 * density)
+      throw Error(
+          fmt::format("{:.0f} somata/mm³ of a radius of {:.3g} µm or more do not fit into layer {} without "
+                      "overlap, {:.0f} are the "
+                      "most; lower its density or the gap, or plant neurons with smaller somata",
+                      densities_[l], needed, recipe.layers[l].name, most * 1e9 / 1.01));
+    const double widest = std::max(needed, .5 * (at_ease / std::cbrt(supply[l]) - gap));
+    for (std::size_t t = 0; t < of_type.size(); ++t) {
+      if (!grows(l, t)) continue;
+      for (const std::uint32_t c : of_type[t]) {
+        if (radius(c) <= widest)
+          choices_[l][t].push_back(c), radii_[l] = std::max(radii_[l], radius(c));
+        else
+          ++left_out_[l];
+      }
+    }
+    for (auto& choice : choices_[l])
+      std::ranges::stable_sort(choice, {}, [&](std::uint32_t c) { return candidates[c].height; });
+    spacing = std::max(
+        spacing, std::min((2. * radii_[l] + gap) * std::cbrt(supply[l]), cortex::PackedCube::most_spacing));
+  }
+  const auto cube = std::make_shared<const cortex::PackedCube>(cortex::pack_cube(spacing, seed));
+  packings_.resize(layers), sparser_.resize(layers);
+  for (std::size_t l = 0; l < layers; ++l) {
+    if (!(supply[l] > 0.)) continue;
+    packings_[l].emplace(cube, supply[l], seed, packing_stream + std::uint32_t(l));
+    for (std::size_t other = 0; other < layers; ++other)
+      if (supply[other] > 0. && std::pair(supply[other], other) < std::pair(supply[l], l))
+        sparser_[l].push_back(std::uint32_t(other));
+  }
+}
+
+std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hexahedron& element) const {
+  std::vector<double> wanted(depths_.size());
+  for (std::size_t l = 0; l < depths_.size(); ++l)
+    if (densities_[l] > 0.)
+      wanted[l] = std::max(0., densities_[l] * 1e-9 * element.volume(l ? depths_[l - 1] : 0., depths_[l]));
+  const double sum = std::accumulate(wanted.begin(), wanted.end(), 0.);
+  if (!(sum < 4e9))
+    throw Error(fmt::format("an element of {:.3g} neurons is too large; lower the densities", sum));
+  const auto by_layer = apportion(std::uint32_t(std::lround(sum)), wanted);
+  std::vector<std::vector<std::uint32_t>> result;
+  for (std::size_t l = 0; l < by_layer.size(); ++l)
+    result.push_back(apportion(by_layer[l], recipe_.layers[l].mix));
+  return result;
+}
+
+// How wide a soma may be at a place: below 0 where none may stand. By the borders of layers somata are narrow and keep clear of
+// the narrow ones beyond; wide ones stay away from a border by as much as those may reach across it.
+double ElementPlanter::room_for_soma(std::size_t layer, double w, const cortex::Linear& here) const {
+  const double steepness =  // of w, a µm
+      here.jacobian.col(0).cross(here.jacobian.col(1)).norm() / here.jacobian.determinant();
+  const double begin = layer ? depths_[layer - 1] : 0., end = depths_[layer], narrow = narrow_[layer];
+  const double below_pia = w * here.jacobian.col(2).norm();
+  if (below_pia < narrow) return -1.;
+  double room = std::min(radii_[layer], below_pia);
+  constexpr double straight =
+      .8;  // a border may be nearer than it would be in a straight element, by a little
+  const double reach = *std::ranges::max_element(narrow_) + double(recipe_.soma_gap) + rounding;
+  if (layer > 0) room = std::min(room, straight * (w - begin) / steepness - reach);
+  if (layer + 1 < depths_.size()) room = std::min(room, straight * (end - w) / steepness - reach);
+  for (const std::uint32_t other : sparser_[layer]) {
+    const double contact = narrow + narrow_[other] + double(recipe_.soma_gap) + rounding;
+    const double beyond = std::max((other ? depths_[other - 1] : 0.) - w, w - depths_[other]);
+    if (straight * beyond < contact * steepness && packings_[other]->any_within(here.at, contact)) return -1.;
+  }
+  return std::max(room, narrow);
+}
+
+// Of a type's candidates with a soma that fits one that ends under the pia, or the lowest one.
+std::uint32_t ElementPlanter::choose(std::span<const std::uint32_t> choice, double height, double radius,
+                                     Random& random) const {
+  const auto fits = [&](std::uint32_t c) { return double(candidates_[c].soma_radius) <= radius; };
+  const auto end = std::ranges::upper_bound(choice, height, {},
+                                            [&](std::uint32_t c) { return double(candidates_[c].height); });
+  const auto low = choice.first(std::size_t(end - choice.begin()));
+  for (int trial = 0; trial < 16 && !low.empty(); ++trial)
+    if (const std::uint32_t c = low[random.below(std::uint32_t(low.size()))]; fits(c)) return c;
+  return *std::ranges::find_if(choice, fits);  // the narrowest one fits everywhere
+}
+
+std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number) const {
+  const auto wanted = counts(element);
+  std::vector<Rooted> rooted;
+  for (std::size_t l = 0; l < wanted.size(); ++l) {
+    const std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
+    if (!count) continue;
+    const auto places = cortex::places_in(*packings_[l], element, l ? depths_[l - 1] : 0., depths_[l]);
+    // Places by lot; what is too near to the pia or to another layer is not in it.
+    constexpr std::uint64_t blank = ~std::uint64_t(0);
+    std::vector<Keyed> lots(places.size());
+    parallel_for(places.size(), 1024, [&](std::size_t i) {
+      const cortex::Linear here = linear(element, places[i].uvw);
+      Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
+      const std::uint64_t high = random();
+      const bool free = room_for_soma(l, places[i].uvw[2], here) >= 0.;
+      lots[i] = {free ? high << 31 | random() >> 1 : blank, i};
+    });
+    parallel_sort(lots);
+    const auto free = std::size_t(std::ranges::find(lots, blank, &Keyed::first) - lots.begin());
+    if (free < count)
+      throw Error(
+          fmt::format("layer {} of element {} has room for {} somata of a radius of up to {:.3g} µm, and {} "
+                      "are to stand there; lower its "
+                      "density or the gap, or plant neurons with smaller somata",
+                      recipe_.layers[l].name, number, free, radii_[l], count));
+    const std::size_t begin = rooted.size();
+    for (std::uint32_t type = 0; type < wanted[l].size(); ++type)
+      rooted.resize(rooted.size() + wanted[l][type], Rooted{.type = type, .layer = std::uint32_t(l)});
+    parallel_for(count, 1024, [&](std::size_t i) {
+      const cortex::Packed& place = places[lots[i].second];
+      Rooted& neuron = rooted[begin + i];
+      const cortex::Linear here = linear(element, place.uvw);
+      Random random(seed_, place.item, cell_stream + std::uint32_t(l));
+      neuron.uvw = place.uvw;
+      neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
+      neuron.position = here.at.cast<float>();
+      neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
+      const double height = place.uvw[2] * here.jacobian.col(2).norm();
+      neuron.candidate =
+          choose(choices_[l][neuron.type], height, room_for_soma(l, place.uvw[2], here), random);
+    });
+  }
+  return rooted;
+}
+
+}  // namespace forest::circuit
