@@ -4,6 +4,8 @@
 #include <array>
 #include <cmath>
 
+#include <fmt/format.h>
+
 #include "forest/core/file.h"
 #include "forest/io/hdf5.h"
 
@@ -96,14 +98,18 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   cortex.elements.corners = std::uint32_t(cortex.elements.on_valley.size());
   if (cortex.elements.corners > cortex.elements.curves.size())
     file.refuse("/corners/on_valley has more corners than curves");
+  for (std::size_t e = 0; e < cortex.elements.size(); ++e)
+    for (const std::uint32_t corner : cortex.elements.corners_of(e))
+      if (corner >= cortex.elements.corners)
+        file.refuse(fmt::format("/elements/curves has a curve as a corner of element {} that is none", e));
   const auto points = file.doubles("/lines/points"), strength = file.doubles("/lines/strength");
   const auto starts = file.integers("/lines/starts"), kinds = file.integers("/lines/kind");
   if (points.size() % 3 || starts.size() != kinds.size() || starts.size() != strength.size())
     file.refuse("/lines has arrays of different lengths");
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const std::int64_t end = i + 1 < starts.size() ? starts[i + 1] : std::int64_t(points.size() / 3);
-    if (starts[i] < 0 || starts[i] + 2 > end || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
-        kinds[i] > 1)
+    if (starts[i] < 0 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
+        kinds[i] > 1 || !std::isfinite(strength[i]))
       file.refuse("/lines has a line that cannot be");
     Line line{.kind = Line::Kind(kinds[i]),
               .points = {},
@@ -121,6 +127,7 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   if (facts.size() != 7) file.refuse("/facts has not 7 numbers");
   for (const double x : facts)
     if (!std::isfinite(x)) file.refuse("/facts has a number that is not finite");
+  if (!(facts[6] >= 0. && facts[6] <= 4294967295.)) file.refuse("/facts has a count that is none");
   if (!(facts[0] > 0.)) file.refuse("/facts has a volume that is not positive");
   result.volume = facts[0], cortex.between = facts[1], cortex.wall = facts[2];
   cortex.w_angle = {facts[3], facts[4]}, cortex.w_reached = facts[5];
