@@ -10,6 +10,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/shape.h"
 #include "forest/geometry/isosurface.h"
 #include "forest/geometry/self_intersection.h"
 
@@ -175,9 +176,12 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   progress.end();
   cortex.w_angle = spread_of(angles);
   fit_faces(cortex.elements, outer_tree, inner_tree);
+  const Shaping shaping{.volume = options.volume};
+  improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
   cortex.wall += cortex.mending.left_out_volume;
-  even_depths(cortex.elements, progress);
+  improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
+  cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }
 
@@ -197,8 +201,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
       const Hexahedron h = elements.hexahedron(e);
       bad[e] = !certify(h).positive();
       volumes[e] = h.volume();
-      for (const double w : {1. / 6., 1. / 3., .5, 2. / 3., 5. / 6.})
-        equivolume[e] = std::max(equivolume[e], std::abs(h.volume(0., w) / volumes[e] - w));
+      equivolume[e] = depth_error(elements, e);
       jacobian[e] = scaled_jacobian(h);
       constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
       for (std::size_t k = 0; k < 4; ++k) {

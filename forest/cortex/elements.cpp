@@ -159,56 +159,6 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
   }
 }
 
-void even_depths(Elements& elements, Progress& progress) {
-  constexpr std::array<std::size_t, 4> inside{slot(1, 1), slot(2, 1), slot(1, 2), slot(2, 2)};
-  progress.begin("evening depths", elements.size());
-  parallel_ranges(elements.size(), 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e) {
-      const auto& curves = elements.elements[e];
-      // The two inner depths of the four inner curves, moved by shares of their way from one depth to the next.
-      std::array<Depths, 4> start;
-      for (std::size_t i = 0; i < 4; ++i) start[i] = elements.curves[curves[inside[i]]];
-      const auto put = [&](const Eigen::Vector2d& shift) {
-        for (std::size_t i = 0; i < 4; ++i)
-          for (std::size_t d = 1; d < 3; ++d) {
-            const double s = shift[Eigen::Index(d) - 1];
-            elements.curves[curves[inside[i]]][d] =
-                start[i][d] + .5 * s * (start[i][d + 1] - start[i][d - 1]);
-          }
-        return elements.hexahedron(e);
-      };
-      const auto error = [](const Hexahedron& h) {
-        const double all = h.volume();
-        Eigen::Matrix<double, 5, 1> off;
-        for (int k = 0; k < 5; ++k) off[k] = h.volume(0., (k + 1) / 6.) / all - (k + 1) / 6.;
-        return off;
-      };
-      Eigen::Vector2d shift = Eigen::Vector2d::Zero();
-      for (int round = 0; round < 3; ++round) {
-        const Eigen::Matrix<double, 5, 1> now = error(put(shift));
-        if (now.cwiseAbs().maxCoeff() < 1e-3) break;
-        constexpr double step = .02;
-        Eigen::Matrix<double, 5, 2> slope;
-        for (int k = 0; k < 2; ++k) {
-          Eigen::Vector2d next = shift;
-          next[k] += step;
-          slope.col(k) = (error(put(next)) - now) / step;
-        }
-        const Eigen::Vector2d change = slope.colPivHouseholderQr().solve(now);
-        if (!change.allFinite()) break;
-        shift -= change.cwiseMax(-.3).cwiseMin(.3);
-      }
-      for (double share = 1.; !certify(put(share * shift)).positive(); share *= .5)
-        if (share < .1) {
-          put(Eigen::Vector2d::Zero());
-          break;
-        }
-    }
-    progress.advance(end - begin);
-  });
-  progress.end();
-}
-
 std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of) {
   std::vector<std::uint8_t> bad(of.size(), 0);
   parallel_for(of.size(), 64,

@@ -6,13 +6,14 @@
 //       ●──○──○──●      ● curves of corners, shared by the elements around
 //       ○  ·  ·  ○      ○ of sides, shared by two
 //       ○  ·  ·  ○      · its own
-//       ●──○──○──●      each at w = 0 (outer), 1/3, 2/3 and 1 (inner) of the volume of its own thin tube
+//       ●──○──○──●      each at w = 0 (outer), 1/3, 2/3 and 1 (inner), about thirds of the volume
 #pragma once
 
 #include <array>
 #include <cstdint>
 #include <vector>
 
+#include "forest/cortex/depth.h"
 #include "forest/cortex/hexahedron.h"
 #include "forest/cortex/quads.h"
 #include "forest/cortex/w_curve.h"
@@ -26,6 +27,7 @@ struct Elements {
   std::uint32_t corners = 0;                            // the first so many curves are corners
   std::vector<std::array<std::uint32_t, 16>> elements;  // curves; u runs fastest, then v
   std::vector<std::uint8_t> on_valley;                  // of every corner
+  Depth depth;                                          // by volume, of w
   std::size_t not_arrived = 0;                          // curves that took the straight way
 
   std::size_t size() const { return elements.size(); }
@@ -48,11 +50,6 @@ std::vector<std::uint32_t> uncertified(const Elements& elements);
 /// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
 /// on a creased surface cut its convex creases off.
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
-
-/// Makes w the share of volume in every element, as near as a cubic can: single tubes are so by themselves, their sum over a
-/// curved footprint is not quite. Curves within the elements move along themselves, sides and corners stay; an element that
-/// would no longer be valid stays as it was.
-void even_depths(Elements& elements, Progress& progress);
 
 struct Mending {
   std::size_t before = 0, after = 0;  // elements not certified

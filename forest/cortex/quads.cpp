@@ -14,6 +14,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/valence.h"
 #include "forest/geometry/triangle_tree.h"
 
 namespace forest::cortex {
@@ -665,6 +666,7 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     drop_doublets(coarse);
     Quads laid;
     halve(coarse, laid);
+    even_valences(laid);
     progress.end();
     const double off = double(laid.quads.size()) / count;
     if (quads.quads.empty() || std::abs(off - 1.) < nearest)

@@ -4,8 +4,6 @@
 #include <array>
 #include <cmath>
 
-#include <fmt/format.h>
-
 #include "forest/core/file.h"
 #include "forest/io/hdf5.h"
 
@@ -41,6 +39,12 @@ void write_elements(const std::filesystem::path& path, const Cortex& cortex, dou
   curves.reserve(cortex.elements.size() * 16);
   for (const auto& e : cortex.elements.elements) curves.insert(curves.end(), e.begin(), e.end());
   file.write("/elements/curves", std::span<const std::uint32_t>(curves));
+  for (const auto& [name, tables] : {std::pair{"/corners/depths", &cortex.elements.depth.corners},
+                                     std::pair{"/elements/depths", &cortex.elements.depth.elements}}) {
+    std::vector<float> flat;
+    for (const cortex::Depth::Table& table : *tables) flat.insert(flat.end(), table.begin(), table.end());
+    if (!flat.empty()) file.write(name, std::span<const float>(flat));
+  }
   file.write("/corners/on_valley", std::span<const std::uint8_t>(cortex.elements.on_valley));
   std::vector<double> points, strength;
   std::vector<std::uint32_t> starts;
@@ -98,10 +102,22 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   cortex.elements.corners = std::uint32_t(cortex.elements.on_valley.size());
   if (cortex.elements.corners > cortex.elements.curves.size())
     file.refuse("/corners/on_valley has more corners than curves");
-  for (std::size_t e = 0; e < cortex.elements.size(); ++e)
-    for (const std::uint32_t corner : cortex.elements.corners_of(e))
-      if (corner >= cortex.elements.corners)
-        file.refuse(fmt::format("/elements/curves has a curve as a corner of element {} that is none", e));
+  const auto tables = [&](const std::string& name, std::size_t rows) {
+    std::vector<cortex::Depth::Table> read(rows);
+    const auto numbers = file.reals(name);
+    if (numbers.size() != rows * read.front().size()) file.refuse(name + " has not one row for each");
+    for (std::size_t i = 0; i < numbers.size(); ++i) {
+      if (!(std::abs(numbers[i]) <= 1.f)) file.refuse(name + " has a number that is no depth");
+      read[i / read.front().size()][i % read.front().size()] = numbers[i];
+    }
+    return read;
+  };
+  if (file.kind("/corners/depths") != hdf5::Kind::none && cortex.elements.corners > 0)
+    cortex.elements.depth = {tables("/corners/depths", cortex.elements.corners),
+                             tables("/elements/depths", cortex.elements.size())};
+  for (const auto& e : cortex.elements.elements)
+    for (const std::size_t k : {0, 3, 12, 15})
+      if (e[k] >= cortex.elements.corners) file.refuse("/elements/curves has a corner that is none");
   const auto points = file.doubles("/lines/points"), strength = file.doubles("/lines/strength");
   const auto starts = file.integers("/lines/starts"), kinds = file.integers("/lines/kind");
   if (points.size() % 3 || starts.size() != kinds.size() || starts.size() != strength.size())

@@ -2,9 +2,10 @@
 // The elements of a cortex as an HDF5 file. Lengths in µm; rows of three are x, y, z.
 //
 //   /                    attributes: magic "brainforest cortex", version 1
-//   /curves/places       curves × 4 × 3: places at w = 0, 1/3, 2/3 and 1 of the volume; corners come first
+//   /curves/places       curves × 4 × 3: places at w = 0, 1/3, 2/3 and 1; corners come first
 //   /elements/curves     elements × 16 curves; u runs fastest, then v
 //   /corners/on_valley   corners: 1 on a valley line
+//   /corners/depths, /elements/depths   19 each: w at depths 1/20, 2/20, … (forest/cortex/depth.h); absent: depth is w
 //   /lines/{points, starts, kind, strength}   crests (0) and valleys (1): line i has the points from starts[i] on
 //   /facts               volume of an element asked for; volumes between the surfaces and under the wall; w-angles, …
 #pragma once

@@ -1,0 +1,248 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/depth.h"
+
+#include <algorithm>
+#include <cmath>
+#include <numbers>
+
+#include <Eigen/LU>
+
+#include "forest/core/parallel.h"
+#include "forest/cortex/elements.h"
+
+namespace forest::cortex {
+namespace {
+
+constexpr int steps = Depth::steps;
+
+// A cubic through all knots that rises where they rise (Fritsch & Carlson 1980, "Monotone piecewise cubic interpolation"): its slopes
+// at knots are harmonic means of those on both sides.
+double slope_at(const std::array<double, steps + 1>& y, int k) {
+  if (k == 0 || k == steps) {  // of the parabola through three, as far as it does not turn
+    const double one = k == 0 ? y[1] - y[0] : y[steps] - y[steps - 1];
+    const double two = k == 0 ? y[2] - y[1] : y[steps - 1] - y[steps - 2];
+    const double slope = 1.5 * one - .5 * two;
+    return std::clamp(slope, 0., 3. * std::max(0., one));
+  }
+  const double before = y[std::size_t(k)] - y[std::size_t(k) - 1],
+               after = y[std::size_t(k) + 1] - y[std::size_t(k)];
+  return before > 0. && after > 0. ? 2. * before * after / (before + after) : 0.;
+}
+
+double between(const std::array<double, steps + 1>& y, double depth) {
+  const double at = std::clamp(depth, 0., 1.) * steps;
+  const int k = std::min(steps - 1, int(at));
+  const double t = at - k, low = y[std::size_t(k)], high = y[std::size_t(k) + 1];
+  const double a = slope_at(y, k), b = slope_at(y, k + 1);
+  return low + t * (a + t * (3. * (high - low) - 2. * a - b + t * (2. * (low - high) + a + b)));
+}
+
+double bump(double u, double v) { return 16. * u * (1. - u) * v * (1. - v); }
+
+// Integrals over a footprint by Gauss and Legendre: det J is of degree 8 in u and in v.
+constexpr int side = 5, columns = side * side;
+struct Footprint {
+  std::array<double, columns> u, v, weight;
+};
+const Footprint& footprint() {
+  static const Footprint result = [] {
+    const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
+                 outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
+    const double near = (322. + 13. * std::sqrt(70.)) / 1800., far = (322. - 13. * std::sqrt(70.)) / 1800.;
+    const std::array<double, side> at{-outer, -inner, 0., inner, outer},
+        weight{far, near, 64. / 225., near, far};
+    Footprint f;
+    for (std::size_t j = 0; j < side; ++j)
+      for (std::size_t i = 0; i < side; ++i)
+        f.u[side * j + i] = .5 + .5 * at[i], f.v[side * j + i] = .5 + .5 * at[j],
+                       f.weight[side * j + i] = weight[i] * weight[j];
+    return f;
+  }();
+  return result;
+}
+
+// Along w det J is a polynomial of degree 8: known at nine places, it is known.
+constexpr int degree = 8;
+using Polynomial = Eigen::Matrix<double, degree + 1, 1>;
+struct Fit {
+  std::array<double, degree + 1> at;
+  Eigen::Matrix<double, degree + 1, degree + 1> coefficients;  // by the values there
+};
+const Fit& fit() {
+  static const Fit result = [] {
+    Fit f;
+    Eigen::Matrix<double, degree + 1, degree + 1> powers;
+    for (int i = 0; i <= degree; ++i) {
+      f.at[std::size_t(i)] = .5 - .5 * std::cos((i + .5) * std::numbers::pi / (degree + 1));
+      for (int p = 0; p <= degree; ++p) powers(i, p) = std::pow(f.at[std::size_t(i)], p);
+    }
+    f.coefficients = powers.inverse();
+    return f;
+  }();
+  return result;
+}
+
+// The volume over a place (u, v) of a footprint, as it grows with w.
+class Column {
+ public:
+  Column() = default;
+  Column(const Hexahedron& h, double u, double v) {
+    Polynomial values;
+    for (int i = 0; i <= degree; ++i) values[i] = h.jacobian(u, v, fit().at[std::size_t(i)]).determinant();
+    above_ = fit().coefficients * values;
+    for (int p = 1; p <= degree; ++p) above_[p] /= p + 1;
+  }
+  double above(double w) const {
+    double sum = 0.;
+    for (int p = degree; p >= 0; --p) sum = sum * w + above_[p];
+    return sum * w;
+  }
+
+ private:
+  Polynomial above_;  // of w, w², …
+};
+
+class Growth {
+ public:
+  explicit Growth(const Hexahedron& h) {
+    const Footprint& f = footprint();
+    for (std::size_t c = 0; c < columns; ++c) {
+      columns_[c] = Column(h, f.u[c], f.v[c]);
+      all_ += f.weight[c] * columns_[c].above(1.);
+    }
+  }
+  double all() const { return all_; }
+  // The x in [low, high] at which the volume above the places w(c, x) is the wanted one; it grows with x.
+  template <class Where>
+  double solve(double wanted, double low, double high, Where&& where) const {
+    constexpr double enough = 1e-6;
+    while (high - low > enough) {
+      const double x = .5 * (low + high);
+      double sum = 0.;
+      for (std::size_t c = 0; c < columns; ++c)
+        sum += footprint().weight[c] * columns_[c].above(std::clamp(where(c, x), 0., 1.));
+      (sum < wanted ? low : high) = x;
+    }
+    return .5 * (low + high);
+  }
+
+ private:
+  std::array<Column, columns> columns_;
+  double all_ = 0.;
+};
+
+}  // namespace
+
+Depth even_depth(const Elements& elements, Progress& progress) {
+  Depth result;
+  const std::size_t n = elements.size();
+  // First of every element by itself, level in w; corners have the mean of those around; then what is still wanting.
+  std::vector<Depth::Table> level(n);
+  progress.begin("evening depths", 2 * n);
+  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const Growth growth(elements.hexahedron(e));
+      for (int k = 1; k < steps; ++k)
+        level[e][std::size_t(k) - 1] =
+            float(growth.solve(growth.all() * k / steps, 0., 1., [](std::size_t, double x) { return x; }));
+    }
+    progress.advance(end - begin);
+  });
+  result.corners.assign(elements.corners, Depth::Table{});
+  std::vector<std::uint32_t> around(elements.corners, 0);
+  for (std::size_t e = 0; e < n; ++e)
+    for (const std::uint32_t c : elements.corners_of(e)) {
+      ++around[c];
+      for (std::size_t k = 0; k < level[e].size(); ++k) result.corners[c][k] += level[e][k];
+    }
+  for (std::size_t c = 0; c < result.corners.size(); ++c)
+    for (std::size_t k = 0; k < result.corners[c].size(); ++k)
+      result.corners[c][k] =
+          around[c] ? result.corners[c][k] / float(around[c]) : float(k + 1) / float(steps);
+  result.elements.assign(n, Depth::Table{});
+  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
+    const Footprint& f = footprint();
+    for (std::size_t e = begin; e < end; ++e) {
+      const Growth growth(elements.hexahedron(e));
+      const auto corners = elements.corners_of(e);
+      for (std::size_t k = 0; k + 1 < steps; ++k) {
+        const auto w = [&](std::size_t corner) { return double(result.corners[corners[corner]][k]); };
+        result.elements[e][k] =
+            float(growth.solve(growth.all() * double(k + 1) / steps, -1., 1., [&](std::size_t c, double x) {
+              return (1. - f.u[c]) * (1. - f.v[c]) * w(0) + f.u[c] * (1. - f.v[c]) * w(1) +
+                     (1. - f.u[c]) * f.v[c] * w(2) + f.u[c] * f.v[c] * w(3) + x * bump(f.u[c], f.v[c]);
+            }));
+      }
+    }
+    progress.advance(end - begin);
+  });
+  progress.end();
+  return result;
+}
+
+Layers::Layers(const Elements& elements, std::size_t element) {
+  const Depth& depth = elements.depth;
+  even_ = depth.corners.empty();
+  if (even_) return;
+  const auto fill = [](Knots& knots, const Depth::Table& table, double last) {
+    knots.front() = 0., knots.back() = last;
+    std::copy(table.begin(), table.end(), knots.begin() + 1);
+  };
+  const auto corners = elements.corners_of(element);
+  for (std::size_t c = 0; c < 4; ++c) fill(corners_[c], depth.corners[corners[c]], 1.);
+  fill(own_, depth.elements[element], 0.);
+}
+
+Layers::Knots Layers::knots(double u, double v) const {
+  const std::array<double, 4> share{(1. - u) * (1. - v), u * (1. - v), (1. - u) * v, u * v};
+  const double own = bump(u, v);
+  Knots result;
+  for (std::size_t k = 0; k < result.size(); ++k) {
+    result[k] = own * own_[k];
+    for (std::size_t c = 0; c < 4; ++c) result[k] += share[c] * corners_[c][k];
+    result[k] = std::clamp(result[k], k ? result[k - 1] : 0., 1.);
+  }
+  return result;
+}
+
+double Layers::w(double u, double v, double depth) const {
+  return even_ ? depth : between(knots(u, v), depth);
+}
+
+double Layers::depth(double u, double v, double w) const {
+  if (even_) return w;
+  const Knots at = knots(u, v);
+  double low = 0., high = 1.;
+  for (int round = 0; round < 45; ++round) {
+    const double middle = .5 * (low + high);
+    (between(at, middle) < w ? low : high) = middle;
+  }
+  return .5 * (low + high);
+}
+
+double depth_error(const Elements& elements, std::size_t element) {
+  // Other places than the tables were made from: Gauss and Legendre in each half of the footprint.
+  constexpr int levels = 24;
+  const double off = std::sqrt(.15);
+  const std::array<double, 6> at{.25 - .5 * off, .25, .25 + .5 * off, .75 - .5 * off, .75, .75 + .5 * off};
+  constexpr std::array<double, 6> weight{5. / 36., 8. / 36., 5. / 36., 5. / 36., 8. / 36., 5. / 36.};
+  const Hexahedron h = elements.hexahedron(element);
+  const Layers layers(elements, element);
+  std::array<double, levels + 1> above{};
+  for (std::size_t j = 0; j < at.size(); ++j)
+    for (std::size_t i = 0; i < at.size(); ++i) {
+      const Column column(h, at[i], at[j]);
+      const Layers::Knots knots = layers.even_ ? Layers::Knots{} : layers.knots(at[i], at[j]);
+      for (int k = 1; k <= levels; ++k) {
+        const double depth = double(k) / levels;
+        above[std::size_t(k)] +=
+            weight[i] * weight[j] * column.above(layers.even_ ? depth : between(knots, depth));
+      }
+    }
+  double worst = 0.;
+  for (int k = 1; k < levels; ++k)
+    worst = std::max(worst, std::abs(above[std::size_t(k)] / above[levels] - double(k) / levels));
+  return worst;
+}
+
+}  // namespace forest::cortex

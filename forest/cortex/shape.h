@@ -1,0 +1,32 @@
+// SPDX-License-Identifier: Apache-2.0
+// Elements whose parameters are nearly in one direction somewhere, or even turned inside out, get a better shape: all places of
+// their curves move, those on a surface along it, until
+//
+//     Σ max(0, wanted − s)²  +  small · Σ (way from the place before)²  +  Σ (distance from the surface)²
+//
+// is least, where s is the scaled Jacobian at every one of the 4×4×4 places of an element (Knupp 2000, "Achieving finite element mesh
+// quality via optimization of the Jacobian matrix norm and associated quantities", Int J Numer Meth Eng 48:401, of whose
+// measures this one is bounded and so can begin at folded elements). What is well shaped stays where it is.
+#pragma once
+
+#include "forest/cortex/elements.h"
+
+namespace forest::cortex {
+
+struct Shaping {
+  double enough = .5;              // scaled Jacobian: elements that have it everywhere are left alone
+  double wanted = .65;             // of others
+  double volume = 1e9;             // µm³
+  double least = .85, most = 1.2;  // of it
+  double even = 4.;
+  double along =
+      400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
+  double off = 25.;      // µm, likewise from a surface
+  int rounds = 3;        // of looking for what is badly shaped, and where the surfaces are
+  int iterations = 100;  // in each
+};
+
+void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
+                    const Shaping& shaping, Progress& progress);
+
+}  // namespace forest::cortex
