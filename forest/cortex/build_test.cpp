@@ -174,7 +174,8 @@ TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {
   EXPECT_THAT(oddities[0], HasSubstr(" mm"));
   Mesh noisy = outer;
   Random random(3);
-  for (Vec3& p : noisy.positions) p += 400.f * Eigen::Vector3d(random.normal(), random.normal(), random.normal()).cast<float>();
+  for (Vec3& p : noisy.positions)
+    p += 400.f * Eigen::Vector3d(random.normal(), random.normal(), random.normal()).cast<float>();
   EXPECT_THAT(refusal(noisy, inner), HasSubstr("triangles of the outer surface cut others"));
 }
 
