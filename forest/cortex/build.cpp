@@ -48,6 +48,26 @@ Place normal_around(const TriangleTree& tree, const Place& at, const Place& outw
   return sum;
 }
 
+// Volume between the surfaces outside the wall, µm³: under the triangles of the outer surface, down to the inner one. What lies
+// between that and the ribbon's inner triangles, which cut its folds, is measured at the middle of each.
+double covered(const Ribbon& ribbon, const TriangleTree& inner) {
+  constexpr double reach = 500.;  // µm
+  std::vector<double> under(ribbon.triangles.size(), 0.);
+  parallel_for(under.size(), 256, [&](std::size_t i) {
+    const Triangle& t = ribbon.triangles[i];
+    if (ribbon.is_wall(t)) return;
+    under[i] = volume_under(ribbon, t);
+    const Place &a = ribbon.inner[t[0]], &b = ribbon.inner[t[1]], &c = ribbon.inner[t[2]];
+    const Place middle = (a + b + c) / 3., normal = .5 * (b - a).cross(c - a);
+    const auto hit = inner.nearest(middle, reach);
+    if (!hit || inner.normal(hit->triangle).dot(normal) <= 0.) return;
+    under[i] -= normal.norm() * (hit->at - middle).dot(inner.normal(hit->triangle));
+  });
+  double sum = 0.;
+  for (const double u : under) sum += u;
+  return sum;
+}
+
 }  // namespace
 
 std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
@@ -140,13 +160,12 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const WCurves curves(field, inner_tree);
   // Two triangles to a side of the lattice that elements are laid by, or more.
   const double side = std::sqrt(options.volume / 2500.);
-  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .7 * side}, progress);
+  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
 
   Cortex cortex;
   cortex.oddities = oddities;
   cortex.between = volume(outer) - volume(inner);
-  for (const Triangle& t : ribbon.triangles)
-    if (ribbon.is_wall(t)) cortex.wall += volume_under(ribbon, t);
+  cortex.wall = cortex.between - covered(ribbon, inner_tree);
   progress.begin("looking for crests and valleys", 0);
   const auto bent = curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles),
                                options.line_scale);
@@ -179,8 +198,11 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const Shaping shaping{.volume = options.volume};
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
-  cortex.wall += cortex.mending.left_out_volume;
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
+  fit_faces(cortex.elements, outer_tree, inner_tree);
+  constexpr double least_jacobian = .2;
+  cortex.left_out = leave_out(cortex.elements, least_jacobian);
+  cortex.wall += cortex.left_out.volume;
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }

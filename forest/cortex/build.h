@@ -31,6 +31,7 @@ struct Cortex {
   Spread w_angle;         // degrees between the curves of corners and the surfaces' normals, over both ends
   double w_reached = 0.;  // share of all curves that reach the inner surface
   Mending mending;
+  LeftOut left_out;
   std::vector<std::string>
       oddities;  // sentences: what is not right with the surfaces and was taken all the same
 };

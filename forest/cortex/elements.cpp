@@ -39,6 +39,17 @@ constexpr std::array<std::array<std::size_t, 4>, 4> sides{{{slot(0, 0), slot(1, 
                                                            {slot(0, 0), slot(0, 1), slot(0, 2), slot(0, 3)},
                                                            {slot(3, 0), slot(3, 1), slot(3, 2), slot(3, 3)}}};
 
+// Corners of sides that only one element has.
+std::vector<std::uint8_t> by_the_wall(const Elements& elements) {
+  std::vector<std::uint8_t> rim(elements.corners, 0);
+  std::map<Edge, int> met;
+  for (const auto& e : elements.elements)
+    for (const auto& side : sides) ++met[std::minmax(e[side[0]], e[side[3]])];
+  for (const auto& [side, count] : met)
+    if (count == 1) rim[side.first] = rim[side.second] = 1;
+  return rim;
+}
+
 }  // namespace
 
 Hexahedron Elements::hexahedron(std::size_t element) const {
@@ -124,8 +135,27 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
   return result;
 }
 
+std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of) {
+  std::vector<std::uint8_t> bad(of.size(), 0);
+  parallel_for(of.size(), 64,
+               [&](std::size_t i) { bad[i] = !certify(elements.hexahedron(of[i])).positive(); });
+  std::vector<std::uint32_t> result;
+  for (std::size_t i = 0; i < of.size(); ++i)
+    if (bad[i]) result.push_back(of[i]);
+  return result;
+}
+
+std::vector<std::uint32_t> uncertified(const Elements& elements) {
+  std::vector<std::uint32_t> all(elements.size());
+  std::iota(all.begin(), all.end(), 0u);
+  return uncertified(elements, all);
+}
+
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner) {
   constexpr double reach = 300.;  // µm
+  const std::vector<Depths> before = elements.curves;
+  std::vector<std::uint8_t> valid(elements.size(), 1);
+  for (const std::uint32_t e : uncertified(elements)) valid[e] = 0;
   constexpr std::array<double, 3> at{1. / 6., .5, 5. / 6.};
   for (const std::size_t d : {std::size_t(0), std::size_t(3)}) {
     const TriangleTree& surface = d == 0 ? outer : inner;
@@ -157,27 +187,20 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
         if (times[c]) elements.curves[c][d] += move[c] / double(times[c]);
     }
   }
-}
-
-std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of) {
-  std::vector<std::uint8_t> bad(of.size(), 0);
-  parallel_for(of.size(), 64,
-               [&](std::size_t i) { bad[i] = !certify(elements.hexahedron(of[i])).positive(); });
-  std::vector<std::uint32_t> result;
-  for (std::size_t i = 0; i < of.size(); ++i)
-    if (bad[i]) result.push_back(of[i]);
-  return result;
-}
-
-std::vector<std::uint32_t> uncertified(const Elements& elements) {
-  std::vector<std::uint32_t> all(elements.size());
-  std::iota(all.begin(), all.end(), 0u);
-  return uncertified(elements, all);
+  // Where that would cost an element its validity, it stays as it was.
+  for (bool all = false; !all;) {
+    all = true;
+    for (const std::uint32_t e : uncertified(elements)) {
+      if (!valid[e]) continue;
+      valid[e] = all = false;
+      for (const std::uint32_t c : elements.elements[e]) elements.curves[c] = before[c];
+    }
+  }
 }
 
 Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress) {
   constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
-  constexpr double farthest_way = 1e3, no_tissue = 100.;  // µm
+  constexpr double farthest_way = 1e3;  // µm
   Mending result;
   std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
   for (std::uint32_t e = 0; e < elements.size(); ++e)
@@ -238,15 +261,7 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
   }
 
   // What is left is few: corners look for a better place each, as long as the worst element around them gains.
-  std::vector<std::uint8_t> rim(elements.corners, 0);
-  {
-    std::map<Edge, int> met;
-    for (std::uint32_t e = 0; e < elements.size(); ++e)
-      for (const auto& side : sides)
-        ++met[std::minmax(elements.elements[e][side[0]], elements.elements[e][side[3]])];
-    for (const auto& [side, count] : met)
-      if (count == 1) rim[side.first] = rim[side.second] = 1;
-  }
+  const std::vector<std::uint8_t> rim = by_the_wall(elements);
   const double mean_volume = [&] {
     double sum = 0.;
     for (std::uint32_t e = 0; e < elements.size(); e += 1 + std::uint32_t(elements.size() / 1000))
@@ -339,28 +354,6 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     bad = uncertified(elements, spread(spread(bad)));  // sides of the stars' rims changed, too
     progress.advance();
   }
-  // By the wall, where the surfaces meet at an edge, there may be no room for an element: those go to the wall. So do
-  // those where the surfaces touch.
-  for (std::uint32_t c = 0; c < elements.corners; ++c)
-    if ((elements.curves[c][0] - elements.curves[c][3]).norm() < no_tissue) rim[c] = 1;
-  while (!bad.empty()) {
-    std::vector<std::uint8_t> gone(elements.size(), 0);
-    for (const std::uint32_t e : bad)
-      for (const std::uint32_t c : elements.corners_of(e))
-        if (rim[c]) gone[e] = 1;
-    if (std::count(gone.begin(), gone.end(), 1) == 0) break;
-    std::vector<std::array<std::uint32_t, 16>> kept;
-    for (std::uint32_t e = 0; e < elements.size(); ++e) {
-      if (!gone[e]) {
-        kept.push_back(elements.elements[e]);
-        continue;
-      }
-      ++result.left_out, result.left_out_volume += elements.hexahedron(e).volume();
-      for (const std::uint32_t c : elements.corners_of(e)) rim[c] = 1;
-    }
-    elements.elements = std::move(kept);
-    bad = uncertified(elements);
-  }
   progress.end();
   result.after = bad.size();
   for (std::size_t c = 0; c < moved.size(); ++c) {
@@ -369,6 +362,35 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
     for (std::size_t d = 0; d < 4; ++d)
       result.farthest = std::max(result.farthest, (elements.curves[c][d] - before[c][d]).norm());
   }
+  return result;
+}
+
+LeftOut leave_out(Elements& elements, double least) {
+  constexpr double no_tissue = 400.;  // µm: cortex is nowhere so thin
+  LeftOut result;
+  std::vector<std::uint8_t> rim = by_the_wall(elements);
+  for (std::uint32_t c = 0; c < elements.corners; ++c)
+    if ((elements.curves[c][0] - elements.curves[c][3]).norm() < no_tissue) rim[c] = 1;
+  std::vector<std::uint8_t> bad(elements.size(), 0), gone(elements.size(), 0);
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const Hexahedron h = elements.hexahedron(e);
+    bad[e] = scaled_jacobian(h) < least || !certify(h).positive();
+  });
+  for (bool more = true; more;) {
+    more = false;
+    for (std::size_t e = 0; e < elements.size(); ++e) {
+      const auto corners = elements.corners_of(e);
+      if (!bad[e] || gone[e] || std::ranges::none_of(corners, [&](std::uint32_t c) { return rim[c] != 0; }))
+        continue;
+      gone[e] = 1, more = true;
+      for (const std::uint32_t c : corners) rim[c] = 1;
+      ++result.elements, result.volume += elements.hexahedron(e).volume();
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t e = 0; e < elements.size(); ++e)
+    if (!gone[e]) elements.elements[kept++] = elements.elements[e];
+  elements.elements.resize(kept);
   return result;
 }
 

@@ -48,18 +48,24 @@ std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const
 std::vector<std::uint32_t> uncertified(const Elements& elements);
 
 /// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
-/// on a creased surface cut its convex creases off.
+/// on a creased surface cut its convex creases off. Valid elements stay valid.
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
 
 struct Mending {
   std::size_t before = 0, after = 0;  // elements not certified
   std::size_t moved = 0;              // curves that were moved
   double farthest = 0.;               // µm, the longest such way
-  std::size_t left_out = 0;           // elements by the wall that nothing could mend
-  double left_out_volume = 0.;        // µm³
 };
 /// Makes elements valid that are not, by straightening their sides first and then moving their corners towards the middle
 /// of those around; what lies on a surface stays on it.
 Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress);
+
+struct LeftOut {
+  std::size_t elements = 0;
+  double volume = 0.;  // µm³
+};
+/// By the wall, where the surfaces meet at an edge, there may be no room for an element, and none where they touch: elements
+/// there that are not valid, or whose scaled Jacobian is less than `least` somewhere, go to the wall.
+LeftOut leave_out(Elements& elements, double least);
 
 }  // namespace forest::cortex

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "forest/core/clones.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/minimise.h"
 
@@ -55,118 +56,170 @@ constexpr Weights weights() {
 }
 constexpr Weights by_place = weights();
 
-using Rows = const double (&)[samples][4];
-constexpr Rows rows(int axis, int of) { return axis == of ? by_place.slope : by_place.value; }
+// Which of the two along a parameter, for the slopes along an axis.
+constexpr const double (&rows(int axis, int of))[samples][4] {
+  return axis == of ? by_place.slope : by_place.value;
+}
 
-// The slopes along an axis at all samples, by tensor products; `one` of the three coordinates.
-void slopes_at(const Places& places, int axis, int one, double (&out)[all]) {
-  double along_u[16][samples], along_v[4][samples * samples];
-  const Rows u = rows(0, axis), v = rows(1, axis), w = rows(2, axis);
-  for (int line = 0; line < 16; ++line)
-    for (int s = 0; s < samples; ++s)
-      along_u[line][s] = u[s][0] * places(one, 4 * line) + u[s][1] * places(one, 4 * line + 1) +
-                         u[s][2] * places(one, 4 * line + 2) + u[s][3] * places(one, 4 * line + 3);
-  for (int k = 0; k < 4; ++k)
-    for (int t = 0; t < samples; ++t)
+// Nine numbers of every sample: columns of J (axis), coordinates in each; samples with w fastest, then v.
+using Nine = double[3][3][all];
+// Places of an element by coordinate; k (w) fastest, then j (v).
+using Coordinates = double[3][64];
+
+// The slopes at all samples, by tensor products.
+FOREST_CLONES
+void jacobians(const Coordinates& places, Nine& out) {
+  constexpr int square = samples * samples;
+  for (int one = 0; one < 3; ++one)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto &u = rows(axis, 0), &v = rows(axis, 1), &w = rows(axis, 2);
+      double along_u[samples][16], along_v[4][square];  // the latter: k, then u and v
       for (int s = 0; s < samples; ++s)
-        along_v[k][samples * t + s] = v[t][0] * along_u[4 * k][s] + v[t][1] * along_u[4 * k + 1][s] +
-                                      v[t][2] * along_u[4 * k + 2][s] + v[t][3] * along_u[4 * k + 3][s];
-  for (int r = 0; r < samples; ++r)
-    for (int p = 0; p < samples * samples; ++p)
-      out[samples * samples * r + p] = w[r][0] * along_v[0][p] + w[r][1] * along_v[1][p] +
-                                       w[r][2] * along_v[2][p] + w[r][3] * along_v[3][p];
+        for (int line = 0; line < 16; ++line)
+          along_u[s][line] = u[s][0] * places[one][line] + u[s][1] * places[one][16 + line] +
+                             u[s][2] * places[one][32 + line] + u[s][3] * places[one][48 + line];
+      for (int s = 0; s < samples; ++s)
+        for (int t = 0; t < samples; ++t)
+          for (int k = 0; k < 4; ++k)
+            along_v[k][samples * s + t] = v[t][0] * along_u[s][k] + v[t][1] * along_u[s][4 + k] +
+                                          v[t][2] * along_u[s][8 + k] + v[t][3] * along_u[s][12 + k];
+      for (int r = 0; r < samples; ++r)
+        for (int p = 0; p < square; ++p)
+          out[axis][one][square * r + p] = w[r][0] * along_v[0][p] + w[r][1] * along_v[1][p] +
+                                           w[r][2] * along_v[2][p] + w[r][3] * along_v[3][p];
+    }
 }
+
 // The other way: adds to each place what the slopes at all samples ask of it.
-void pull_back(const double (&in)[all], int axis, int one, Places& gradient) {
-  double along_u[16][samples] = {}, along_v[4][samples * samples] = {};
-  const Rows u = rows(0, axis), v = rows(1, axis), w = rows(2, axis);
-  for (int r = 0; r < samples; ++r)
-    for (int k = 0; k < 4; ++k)
-      for (int p = 0; p < samples * samples; ++p) along_v[k][p] += w[r][k] * in[samples * samples * r + p];
-  for (int k = 0; k < 4; ++k)
-    for (int t = 0; t < samples; ++t)
-      for (int j = 0; j < 4; ++j)
-        for (int s = 0; s < samples; ++s) along_u[4 * k + j][s] += v[t][j] * along_v[k][samples * t + s];
-  for (int line = 0; line < 16; ++line)
-    for (int s = 0; s < samples; ++s)
-      for (int i = 0; i < 4; ++i) gradient(one, 4 * line + i) += u[s][i] * along_u[line][s];
+FOREST_CLONES
+void pull_back(const Nine& in, Coordinates& gradient) {
+  constexpr int square = samples * samples;
+  for (int one = 0; one < 3; ++one)
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto &u = rows(axis, 0), &v = rows(axis, 1), &w = rows(axis, 2);
+      double along_u[samples][16] = {}, along_v[4][square];
+      for (int k = 0; k < 4; ++k)
+        for (int p = 0; p < square; ++p) {
+          double sum = 0.;
+          for (int r = 0; r < samples; ++r) sum += w[r][k] * in[axis][one][square * r + p];
+          along_v[k][p] = sum;
+        }
+      for (int s = 0; s < samples; ++s)
+        for (int t = 0; t < samples; ++t)
+          for (int j = 0; j < 4; ++j)
+            for (int k = 0; k < 4; ++k) along_u[s][4 * j + k] += v[t][j] * along_v[k][samples * s + t];
+      for (int s = 0; s < samples; ++s)
+        for (int i = 0; i < 4; ++i)
+          for (int line = 0; line < 16; ++line) gradient[one][16 * i + line] += u[s][i] * along_u[s][line];
+    }
 }
 
-struct Jacobians {
-  double columns[3][3][all];  // axis, coordinate, sample
-
-  explicit Jacobians(const Places& places) {
-    for (int axis = 0; axis < 3; ++axis)
-      for (int one = 0; one < 3; ++one) slopes_at(places, axis, one, columns[axis][one]);
-  }
-  Matrix<3> at(int sample) const {
-    Matrix<3> j;
-    for (int axis = 0; axis < 3; ++axis)
-      for (int one = 0; one < 3; ++one) j(one, axis) = columns[axis][one][sample];
-    return j;
-  }
+// det J, the product of the lengths of its columns, and these squared, each a little more so that none is nothing.
+struct Measures {
+  double det[all], lengths[all], squares[3][all];
 };
+FOREST_CLONES
+void measure(const Nine& j, Measures& out) {
+  constexpr double tiny = 5. * 5.;  // µm²
+  for (int n = 0; n < all; ++n) {
+    const double ux = j[0][0][n], uy = j[0][1][n], uz = j[0][2][n], vx = j[1][0][n], vy = j[1][1][n],
+                 vz = j[1][2][n], wx = j[2][0][n], wy = j[2][1][n], wz = j[2][2][n];
+    out.det[n] = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx);
+    const double uu = ux * ux + uy * uy + uz * uz + tiny, vv = vx * vx + vy * vy + vz * vz + tiny,
+                 ww = wx * wx + wy * wy + wz * wz + tiny;
+    out.squares[0][n] = uu, out.squares[1][n] = vv, out.squares[2][n] = ww;
+    out.lengths[n] = std::sqrt(uu * vv * ww);
+  }
+}
 
-Place lengths_of(
-    const Matrix<3>& j) {      // of the columns, a little longer than they are so that none is nothing
-  constexpr double tiny = 5.;  // µm
-  return (j.colwise().squaredNorm().array() + tiny * tiny).sqrt().transpose();
+// What each sample lacks, lack² / χ(s), where χ(s) is s where that is well above 0 and never 0; and in place of J, the slope
+// of that and of the volume by its columns. fold: how softly it begins to weigh that an element is nearly folded.
+FOREST_CLONES
+void lacks(const Measures& m, const double (&shares)[all], double wanted, double fold, double by_volume,
+           Nine& j, double (&value)[all]) {
+  for (int n = 0; n < all; ++n) {
+    const double scaled = m.det[n] / m.lengths[n], lack = wanted > scaled ? wanted - scaled : 0.;
+    const double root = std::sqrt(scaled * scaled + fold * fold);
+    const double size = scaled > 0. ? scaled : -scaled;
+    const double chi = scaled > 0. ? .5 * (size + root) : .5 * fold * fold / (root + size);
+    value[n] = lack * lack / chi;
+    const double fall = (2. * lack + lack * lack / root) / chi;  // χ' = χ / root
+    const double by_det = by_volume * shares[n] - fall / m.lengths[n];
+    const double ux = j[0][0][n], uy = j[0][1][n], uz = j[0][2][n], vx = j[1][0][n], vy = j[1][1][n],
+                 vz = j[1][2][n], wx = j[2][0][n], wy = j[2][1][n], wz = j[2][2][n];
+    const double u = fall * scaled / m.squares[0][n], v = fall * scaled / m.squares[1][n],
+                 w = fall * scaled / m.squares[2][n];
+    j[0][0][n] = by_det * (vy * wz - vz * wy) + u * ux, j[0][1][n] = by_det * (vz * wx - vx * wz) + u * uy,
+    j[0][2][n] = by_det * (vx * wy - vy * wx) + u * uz;
+    j[1][0][n] = by_det * (wy * uz - wz * uy) + v * vx, j[1][1][n] = by_det * (wz * ux - wx * uz) + v * vy,
+    j[1][2][n] = by_det * (wx * uy - wy * ux) + v * vz;
+    j[2][0][n] = by_det * (uy * vz - uz * vy) + w * wx, j[2][1][n] = by_det * (uz * vx - ux * vz) + w * wy,
+    j[2][2][n] = by_det * (ux * vy - uy * vx) + w * wz;
+  }
 }
 
 // Of the volume, what det J at a sample counts (Boole's rule along each parameter).
-constexpr double share_of(int sample) {
+struct Shares {
+  double of[all];
+};
+constexpr Shares shares() {
   constexpr double boole[samples] = {7. / 90., 32. / 90., 12. / 90., 32. / 90., 7. / 90.};
-  return boole[sample % samples] * boole[sample / samples % samples] * boole[sample / samples / samples];
-}
-
-double least(const Places& places, double* volume = nullptr) {
-  const Jacobians jacobians(places);
-  double result = 1.;
-  for (int n = 0; n < all; ++n) {
-    const Matrix<3> j = jacobians.at(n);
-    const double det = j.determinant();
-    if (volume) *volume += share_of(n) * det;
-    result = std::min(result, det / lengths_of(j).prod());
-  }
+  Shares result{};
+  for (int n = 0; n < all; ++n)
+    result.of[n] = boole[n % samples] * boole[n / samples % samples] * boole[n / samples / samples];
   return result;
 }
+constexpr Shares by_sample = shares();
 
-// Of an element: what it lacks, the gradient of that by its places, and the least scaled Jacobian.
+// Of an element: what it lacks, the gradient of that by its places, its least scaled Jacobian, and its volume.
 struct Lack {
   double value = 0., least = 1., volume = 0.;
   Places gradient;
 };
-// fold: how softly it begins to weigh that an element is nearly folded.
-void lack_of(const Places& places, const Shaping& shaping, double fold, Lack& result) {
-  const Jacobians jacobians(places);
-  double by[3][3][all];
-  result.value = 0., result.least = 1., result.volume = 0.;
-  for (int n = 0; n < all; ++n) result.volume += share_of(n) * jacobians.at(n).determinant();
-  const double ratio = result.volume / shaping.volume;
-  const double off = std::max(0., ratio - shaping.most) - std::max(0., shaping.least - ratio);
-  result.value += shaping.even * off * off;
-  const double by_volume = 2. * shaping.even * off / shaping.volume;
-  for (int n = 0; n < all; ++n) {
-    const Matrix<3> j = jacobians.at(n);
-    const Place lengths = lengths_of(j);
-    const double scaled = j.determinant() / lengths.prod(), lack = std::max(0., shaping.wanted - scaled);
-    result.least = std::min(result.least, scaled);
-    // lack² / χ(s), where χ(s) is s where that is well above 0 and never 0.
-    const double root = std::sqrt(scaled * scaled + fold * fold);
-    const double chi = scaled > 0. ? .5 * (scaled + root) : .5 * fold * fold / (root - scaled);
-    result.value += lack * lack / chi;
-    const double fall = 2. * lack / chi + lack * lack / (chi * root);  // χ' = χ / root
-    const Matrix<3> by_det = cofactors<3>(j);
-    Matrix<3> slope = (by_volume * share_of(n) - fall / lengths.prod()) * by_det;
-    for (int axis = 0; axis < 3; ++axis)
-      slope.col(axis) += fall * scaled / (lengths[axis] * lengths[axis]) * j.col(axis);
-    for (int axis = 0; axis < 3; ++axis)
-      for (int one = 0; one < 3; ++one) by[axis][one][n] = slope(one, axis);
+
+class Gauge {
+ public:
+  void look(const Places& places, Lack& result) {
+    Coordinates by_coordinate;
+    for (int c = 0; c < 64; ++c)
+      for (int one = 0; one < 3; ++one) by_coordinate[one][turned(c)] = places(one, c);
+    jacobians(by_coordinate, j_);
+    measure(j_, m_);
+    result.least = 1., result.volume = 0.;
+    for (int n = 0; n < all; ++n) {
+      result.least = std::min(result.least, m_.det[n] / m_.lengths[n]);
+      result.volume += by_sample.of[n] * m_.det[n];
+    }
   }
-  result.gradient.setZero();
-  if (result.value == 0.) return;
-  for (int axis = 0; axis < 3; ++axis)
-    for (int one = 0; one < 3; ++one) pull_back(by[axis][one], axis, one, result.gradient);
+  void weigh(const Places& places, const Shaping& shaping, double fold, Lack& result) {
+    look(places, result);
+    const double ratio = result.volume / shaping.volume;
+    const double off = std::max(0., ratio - shaping.most) - std::max(0., shaping.least - ratio);
+    result.value = 0.;
+    if (off == 0. && result.least >= shaping.wanted) return;
+    double values[all];
+    lacks(m_, by_sample.of, shaping.wanted, fold, 2. * shaping.even * off / shaping.volume, j_, values);
+    result.value = shaping.even * off * off;
+    for (const double v : values) result.value += v;
+    Coordinates gradient{};
+    pull_back(j_, gradient);
+    for (int c = 0; c < 64; ++c)
+      for (int one = 0; one < 3; ++one) result.gradient(one, c) = gradient[one][turned(c)];
+  }
+
+ private:
+  // u fastest as w fastest.
+  static constexpr int turned(int c) { return 16 * (c % 4) + 4 * (c / 4 % 4) + c / 16; }
+
+  Nine j_;
+  Measures m_;
+};
+
+double least(const Places& places, double* volume = nullptr) {
+  Lack lack;
+  Gauge().look(places, lack);
+  if (volume) *volume = lack.volume;
+  return lack.least;
 }
 
 // What holds a place: (p − at)ᵀ hold (p − at).
@@ -176,6 +229,8 @@ struct Anchor {
 };
 
 using List = std::vector<std::uint32_t>;
+
+constexpr double very_bad = .6;  // so much of a good enough scaled Jacobian
 
 // What is shaped at once: badly shaped elements that touch one another, all whose curves may move, and all that see these.
 struct Patch {
@@ -241,11 +296,16 @@ class Shaper {
 
   void operator()(const Patch& patch) const {
     const std::size_t n = patch.curves.size();
+    // A surface may be creased more sharply than an element can be: the worst may leave it farther.
+    const bool worst = std::ranges::any_of(patch.seen, [&](std::uint32_t e) {
+      return least(places_of(elements_, e)) < very_bad * shaping_.enough;
+    });
+    const double give = worst ? 4. * shaping_.off : shaping_.off;
     std::vector<std::array<Anchor, 4>> anchors(n);
     Vector x(Eigen::Index(12 * n));
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t d = 0; d < 4; ++d) {
-        anchors[i][d] = anchor(elements_.curves[patch.curves[i]], d);
+        anchors[i][d] = anchor(elements_.curves[patch.curves[i]], d, give);
         x.segment<3>(Eigen::Index(12 * i + 3 * d)) = elements_.curves[patch.curves[i]][d];
       }
     const Vector before = x;
@@ -264,6 +324,7 @@ class Shaper {
     std::vector<std::uint8_t> whole;  // elements that are not folded, and must stay so
     for (const Places& p : places) whole.push_back(least(p) > 0.);
     Lack lack;
+    Gauge gauge;
     double fold = 0.;
     const auto sum = [&](const Vector& at, Vector& gradient) {
       gradient.setZero(at.size());
@@ -275,7 +336,7 @@ class Shaper {
               visit(16 * d + c, 12 * moving[e][std::size_t(c)] + 3 * d);
         };
         each([&](int column, int k) { places[e].col(column) = at.segment<3>(k); });
-        lack_of(places[e], shaping_, fold, lack);
+        gauge.weigh(places[e], shaping_, fold, lack);
         if (whole[e] && lack.least <= 0.) return std::numeric_limits<double>::infinity();
         if (lack.value == 0.) continue;
         value += lack.value;
@@ -290,44 +351,43 @@ class Shaper {
         }
       return value;
     };
-    // Where something is folded also softly at first, since the way out is steep; what comes out better is taken.
-    constexpr std::array schedules{std::array{.02, .02, .02, .02}, std::array{1., .2, .06, .02}};
-    const bool straight = std::ranges::all_of(whole, [](std::uint8_t w) { return w != 0; });
-    double best = -std::numeric_limits<double>::infinity();
-    for (const auto& schedule : schedules) {
-      Vector trial = before, unused;
-      for (std::size_t i = straight ? schedule.size() - 1 : 0; i < schedule.size(); ++i) {
-        fold = schedule[i];
-        minimise(trial, shaping_.iterations, .01, sum);
-      }
-      sum(trial, unused);
-      double worst = 1.;
-      for (const Places& p : places) worst = std::min(worst, least(p));
-      if (worst > best) best = worst, x = trial;
-      if (best > 0.) break;
-    }
-    // What was proven to be valid stays so: otherwise the patch goes half of its way, a quarter, … or stays.
-    const auto proven = [&](std::uint32_t e) { return certify(elements_.hexahedron(e)).positive(); };
-    List valid;
-    for (const std::uint32_t e : patch.seen)
-      if (proven(e)) valid.push_back(e);
     const auto put = [&](const Vector& at) {
       for (std::size_t i = 0; i < n; ++i)
         for (std::size_t d = 0; d < 4; ++d)
           elements_.curves[patch.curves[i]][d] = at.segment<3>(Eigen::Index(12 * i + 3 * d));
     };
+    const auto proven = [&](std::uint32_t e) { return certify(elements_.hexahedron(e)).positive(); };
+    List valid;
+    for (const std::uint32_t e : patch.seen)
+      if (proven(e)) valid.push_back(e);
+    // Where something is folded also softly at first, since the way out is steep; what leaves fewer that are not valid is taken.
+    constexpr std::array schedules{std::array{.02, .02, .02}, std::array{1., .1, .02}};
+    const bool straight = valid.size() == patch.seen.size();
+    std::pair best{patch.seen.size() + 1, 0.};
+    for (const auto& schedule : schedules) {
+      Vector trial = before;
+      double value = 0.;
+      for (std::size_t i = straight ? schedule.size() - 1 : 0; i < schedule.size(); ++i) {
+        fold = schedule[i];
+        value = minimise(trial, shaping_.iterations, .01, sum);
+      }
+      put(trial);
+      const std::pair now{patch.seen.size() - std::size_t(std::ranges::count_if(patch.seen, proven)), value};
+      if (now < best) best = now, x = trial;
+      if (best.first == 0) break;
+    }
+    // What was proven to be valid stays so: otherwise the patch goes half of its way, a quarter, … or stays.
     put(x);
-    for (double share = .5; !std::ranges::all_of(valid, proven); share *= .5) {
+    for (double share = .5; best.first > 0 && !std::ranges::all_of(valid, proven); share *= .5) {
       if (share < .1) return put(before);
       put(before + share * (x - before));
     }
   }
 
  private:
-  Anchor anchor(const Depths& curve, std::size_t d) const {
+  Anchor anchor(const Depths& curve, std::size_t d, double give) const {
     constexpr double reach = 500.;  // µm
-    const double small = .01 / (shaping_.along * shaping_.along),
-                 strong = .01 / (shaping_.off * shaping_.off);
+    const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
     Anchor result{curve[d], small * Matrix<3>::Identity()};
     if (d == 1 || d == 2) return result;
     const TriangleTree& surface = d == 0 ? outer_ : inner_;
@@ -352,13 +412,21 @@ void improve_shapes(Elements& elements, const TriangleTree& outer, const Triangl
   const Stars stars(elements);
   const Shaper shape(elements, outer, inner, shaping);
   for (int round = 0; round < shaping.rounds; ++round) {
-    std::vector<std::uint8_t> bad(elements.size(), 0);
+    std::vector<std::uint8_t> bad(elements.size(), 0), worse(elements.size(), 0);
     parallel_for(elements.size(), 256, [&](std::size_t e) {
       const Places places = places_of(elements, e);
       double volume = 0.;
-      bad[e] = least(places, &volume) < shaping.enough || volume < (shaping.least - .05) * shaping.volume ||
+      const double scaled = least(places, &volume);
+      bad[e] = scaled < shaping.enough || !certify(elements.hexahedron(e)).positive() ||
+               volume < (shaping.least - .05) * shaping.volume ||
                volume > (shaping.most + .05) * shaping.volume;
+      worse[e] = scaled < very_bad * shaping.enough;
     });
+    for (std::uint32_t e = 0; e < elements.size();
+         ++e)  // the worst need more room: what is around moves, too
+      if (worse[e])
+        for (const std::uint32_t c : elements.corners_of(e))
+          for (const std::uint32_t beside : stars.of(c)) bad[beside] = 1;
     const auto turns = patches(elements, stars, std::move(bad));
     std::size_t count = 0;
     for (const auto& turn : turns) count += turn.size();

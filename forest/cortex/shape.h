@@ -14,16 +14,16 @@
 namespace forest::cortex {
 
 struct Shaping {
-  double enough = .5;              // scaled Jacobian: elements that have it everywhere are left alone
+  double enough = .53;             // scaled Jacobian: elements that have it everywhere are left alone
   double wanted = .65;             // of others
   double volume = 1e9;             // µm³
   double least = .85, most = 1.2;  // of it
   double even = 4.;
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
-  double off = 25.;      // µm, likewise from a surface
-  int rounds = 3;        // of looking for what is badly shaped, and where the surfaces are
-  int iterations = 100;  // in each
+  double off = 25.;     // µm, likewise from a surface
+  int rounds = 3;       // of looking for what is badly shaped, and where the surfaces are
+  int iterations = 60;  // in each
 };
 
 void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,

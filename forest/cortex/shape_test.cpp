@@ -46,7 +46,7 @@ TEST_F(Shapes, ABadCornerIsMendedAndItsFacesStayOnTheSurfaces) {
 }
 
 TEST_F(Shapes, WhatIsFoldedUnfolds) {
-  push_middle(Place(620., 30., 0.));
+  push_middle(Place(560., 30., 0.));
   ASSERT_FALSE(uncertified(slab).empty());
   improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
   EXPECT_TRUE(uncertified(slab).empty());

@@ -1,0 +1,45 @@
+// SPDX-License-Identifier: Apache-2.0
+// A lattice along the crosses of a surface: a lattice point near every vertex, so that those of neighbours agree as well as they
+// can, coarse levels first, and lines of the lattice lie on the valleys (Jakob, Tarini, Panozzo & Sorkine-Hornung 2015, "Instant
+// field-aligned meshes", ACM Trans Graph 34:189). Private to this room.
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <vector>
+
+#include "forest/cortex/crosses.h"
+
+namespace forest::cortex {
+
+// A vertex of one level of the hierarchy, and the lattice seen from it.
+struct Site {
+  Place at, normal, along;  // along: one arm of its cross
+  double spacing, area;
+  Place point;  // a point of the lattice, the nearest
+  std::optional<Pass> line;
+
+  Place up() const { return normal.cross(along); }
+  Place rounded(const Place& from,
+                const Place& to) const {  // the lattice point next to `to` of the lattice with `from`
+    const Place d = to - from;
+    return from + along * (std::floor(along.dot(d) / spacing + .5) * spacing) +
+           up() * (std::floor(up().dot(d) / spacing + .5) * spacing);
+  }
+};
+
+struct Level {
+  std::vector<Site> sites;
+  std::vector<std::uint32_t> starts, list;
+  std::vector<float> weights;
+  std::vector<std::uint32_t> coarser;  // of each site, in the next level
+};
+
+/// Settles the lattice of the finest level, from a guess.
+void settle(Level& finest);
+
+/// The step of a lattice from the point of one site to that of another, in the frame of the first: none where they have one
+/// point in common.
+Eigen::Vector2i step_between(const Site& a, const Site& b);
+
+}  // namespace forest::cortex
