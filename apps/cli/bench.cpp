@@ -25,6 +25,7 @@ std::function<void()> bench_pick(CLI::App&, Console&);
 std::function<void()> bench_planting(CLI::App&, Console&);
 std::function<void()> bench_repository(CLI::App&, Console&);
 std::function<void()> bench_seam(CLI::App&, Console&);
+std::function<void()> bench_sections(CLI::App&, Console&);
 std::function<void()> bench_targets(CLI::App&, Console&);
 
 std::span<const Benchmark> benchmarks() {
@@ -48,6 +49,8 @@ std::span<const Benchmark> benchmarks() {
        bench_repository},
       {"seam", "How much quick pictures of a dolly differ from those of a slow and exact renderer",
        bench_seam},
+      {"sections", "How near a hemisphere comes back from its sections, and by how few curves they are drawn",
+       bench_sections},
       {"targets", "How long it takes to show thousands of neurons otherwise", bench_targets},
   });
   return table;

@@ -183,6 +183,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
     const cortex::Cortex built = cortex::build_cortex(
         outer, inner, {.volume = o->volume * 1e9, .spacing = o->spacing * 1e3, .line_scale = o->scale * 1e3},
         console.progress());
+    for (const std::string& oddity : built.oddities) console.warn(oddity);
     io::write_elements(o->out, built, o->volume * 1e9);
     const TriangleTree outer_tree(outer), inner_tree(inner);
     const cortex::Report r =

@@ -27,7 +27,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
     fs::path file;
     std::vector<fs::path> out;
     std::string outer = "outer", inner = "inner";
-    double voxel = 0., margin = .02, unit = 1.;
+    double voxel = 0., margin = .02, error = .02, unit = 1.;
     std::uint32_t between = 2;
     bool force = false;
   };
@@ -55,6 +55,11 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
       *command.add_option("--margin", o->margin, "What the outer surface keeps from the inner one, mm")
            ->capture_default_str(),
       1e-4, 1.);
+  must_be_within(*command
+                      .add_option("--error", o->error,
+                                  "Triangles are made fewer, by no more than this off; mm; 0 keeps them all")
+                      ->capture_default_str(),
+                 0., 10.);
   must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
                  1e3);
   add_force(command, o->force);
@@ -65,6 +70,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                                                         {.voxel = 1e3 * o->voxel,
                                                          .between = int(o->between),
                                                          .margin = 1e3 * o->margin,
+                                                         .error = 1e3 * o->error,
                                                          .outer = o->outer,
                                                          .inner = o->inner},
                                                         console.progress());
@@ -92,7 +98,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                        std::to_string(cut)});
     };
     tell(o->out[0], made.outer, made.outer_cut), tell(o->out[1], made.inner, made.inner_cut);
-    console.print({{"surfaces", rows}, {"pushed_voxels", made.pushed}});
+    console.print({{"surfaces", rows}, {"pushed_voxels", made.pushed}, {"triangles_before", made.triangles}});
     console.table({"file", "vertices", "triangles", "genus", "volume mm³", "area mm²", "voxels cut"}, table);
   };
 }

@@ -11,6 +11,8 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/shape.h"
+#include "forest/geometry/isosurface.h"
+#include "forest/geometry/self_intersection.h"
 
 namespace forest::cortex {
 namespace {
@@ -68,15 +70,24 @@ double covered(const Ribbon& ribbon, const TriangleTree& inner) {
 
 }  // namespace
 
-void check_surfaces(const Mesh& outer, const Mesh& inner) {
+std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
+  std::vector<std::string> oddities;
   const std::array<std::pair<const Mesh*, const char*>, 2> both{{{&outer, "outer"}, {&inner, "inner"}}};
   for (const auto& [mesh, name] : both) {
     if (mesh->triangles.empty()) throw Error(fmt::format("the {} surface has no triangles", name));
-    if (!is_closed(*mesh))
-      throw Error(fmt::format("the {} surface is open or not of one orientation; give a closed one", name));
+    for (std::size_t v = 0; v < mesh->positions.size(); ++v)
+      if (!mesh->positions[v].allFinite())
+        throw Error(
+            fmt::format("vertex {} of the {} surface has a coordinate that is no number; mend it", v, name));
+    const auto at = [&](std::uint32_t v) { return place_text(mesh->positions[v].cast<double>()); };
+    if (const auto edge = open_edge(*mesh))
+      throw Error(fmt::format(
+          "the {} surface is open or not of one orientation at the edge of vertices {} and {}, {}; give a "
+          "closed one",
+          name, (*edge)[0], (*edge)[1], at((*edge)[0])));
     if (count_pieces(*mesh) != 1)
       throw Error(fmt::format("the {} surface has {} pieces; give one piece", name, count_pieces(*mesh)));
-    const long euler = long(mesh->positions.size()) - long(mesh->triangles.size()) / 2;
+    const long euler = euler_number(*mesh);
     if (euler != 2)
       throw Error(fmt::format(
           "the {} surface has {} handles; give one without, such as FreeSurfer's after its topology is "
@@ -85,12 +96,39 @@ void check_surfaces(const Mesh& outer, const Mesh& inner) {
     if (!(volume(*mesh) > 0.))
       throw Error(fmt::format("the triangles of the {} surface face inwards; turn them", name));
   }
+  constexpr double least = 1., most = 1e7;  // mm³: of a shrew, of a whale
   const double cubic_mm = volume(outer) / 1e9;
-  if (cubic_mm < 1. || cubic_mm > 1e7)
+  if (cubic_mm < least || cubic_mm > most) {
+    const bool metres = cubic_mm < least;
+    const double other = metres ? cubic_mm * 1e9 : cubic_mm / 1e9;
     throw Error(fmt::format(
-        "the outer surface encloses {:.3g} mm³, which is no hemisphere; check that it is in mm", cubic_mm));
+        "the outer surface encloses {:.3g} mm³, which is no hemisphere; check that it is in mm{}", cubic_mm,
+        other > least && other < most
+            ? fmt::format(" and not in {}, of which that would be {:.3g} mm³", metres ? "m" : "µm", other)
+            : ""));
+  }
   if (volume(inner) > volume(outer))
-    throw Error("the inner surface encloses more than the outer one; were they swapped?");
+    throw Error(
+        fmt::format("the inner surface encloses {:.3g} mm³, more than the outer one with {:.3g}; were they "
+                    "swapped?",
+                    volume(inner) / 1e9, cubic_mm));
+  if (volume(inner) < .005 * volume(outer))
+    throw Error(
+        fmt::format("the inner surface encloses {:.3g} mm³ and the outer one {:.3g}; check that both are in "
+                    "mm",
+                    volume(inner) / 1e9, cubic_mm));
+  for (const auto& [mesh, name] : both) {
+    const std::size_t cut = count_cut_triangles(*mesh);
+    if (cut == 0) continue;
+    const auto first = self_intersection(*mesh);
+    const std::string what =
+        fmt::format("{} of {} triangles of the {} surface cut others of it, first {} and {} at {}", cut,
+                    mesh->triangles.size(), name, first->first, first->second, place_text(first->point));
+    if (cut * 200 > mesh->triangles.size())
+      throw Error(what +
+                  "; give one that does not cut itself, such as FreeSurfer's or one of 'cortex surfaces'");
+    oddities.push_back(what + "; elements by it may be mended or left out");
+  }
   // Inner vertices outside of the outer surface, and pieces of one that cut the other, are told by the first of them.
   const TriangleTree tree(outer);
   std::size_t outside = 0;
@@ -112,10 +150,11 @@ void check_surfaces(const Mesh& outer, const Mesh& inner) {
         "{} of {} vertices of the inner surface lie outside of the outer one, the farthest by {:.2f} mm "
         "at {}; check that both are of one hemisphere and that they were not swapped",
         outside, depths.size(), farthest / 1e3, place_text(where)));
+  return oddities;
 }
 
 Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& options, Progress& progress) {
-  check_surfaces(outer, inner);
+  const auto oddities = check_surfaces(outer, inner);
   const Laplace field(outer, inner, {.spacing = options.spacing}, progress);
   const TriangleTree outer_tree(outer), inner_tree(inner);
   const WCurves curves(field, inner_tree);
@@ -124,6 +163,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
 
   Cortex cortex;
+  cortex.oddities = oddities;
   cortex.between = volume(outer) - volume(inner);
   cortex.wall = cortex.between - covered(ribbon, inner_tree);
   progress.begin("looking for crests and valleys", 0);

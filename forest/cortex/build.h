@@ -4,6 +4,7 @@
 
 #include <cstdint>
 #include <span>
+#include <string>
 #include <vector>
 
 #include "forest/cortex/elements.h"
@@ -31,14 +32,19 @@ struct Cortex {
   double w_reached = 0.;  // share of all curves that reach the inner surface
   Mending mending;
   LeftOut left_out;
+  std::vector<std::string>
+      oddities;  // sentences: what is not right with the surfaces and was taken all the same
 };
 
 /// Surfaces closed, whole and in µm, triangles outwards, the inner one within the outer.
 /// Throws Error that says which of this does not hold, and where.
 Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& options, Progress& progress);
 
-/// What is wrong with a pair of surfaces, as Error with a place; returns when nothing is.
-void check_surfaces(const Mesh& outer, const Mesh& inner);
+/// Throws Error, a sentence with a place, when a pair of surfaces cannot be that of a cortex: one is empty, has coordinates
+/// that are no numbers, is open, in pieces, has handles, faces inwards, cuts itself at more than one triangle of 200; its
+/// size is no hemisphere's in mm; the inner one is larger or lies outside. Returns what is odd, in sentences: triangles that cut
+/// one another but are few.
+std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner);
 
 struct Report {
   std::size_t elements = 0, uncertified = 0;

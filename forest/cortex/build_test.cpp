@@ -30,7 +30,7 @@ Mesh ball(double radius, int halvings = 5) {
 
 std::string refusal(const Mesh& outer, const Mesh& inner) {
   try {
-    check_surfaces(outer, inner);
+    (void)check_surfaces(outer, inner);
   } catch (const Error& error) {
     return error.what();
   }
@@ -166,6 +166,10 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   Mesh open = outer;
   open.triangles.pop_back();
   EXPECT_THAT(refusal(open, inner), HasSubstr("outer surface is open"));
+  EXPECT_THAT(refusal(open, inner), HasSubstr("at the edge of vertices"));
+  Mesh nowhere = inner;
+  nowhere.positions[17].y() = NAN;
+  EXPECT_THAT(refusal(outer, nowhere), HasSubstr("vertex 17 of the inner surface"));
   Mesh turned = inner;
   for (Triangle& t : turned.triangles) std::swap(t[0], t[1]);
   EXPECT_THAT(refusal(outer, turned), HasSubstr("inner surface face inwards"));
@@ -175,7 +179,25 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   Mesh beside = inner;
   for (Vec3& p : beside.positions) p += Vec3(5e3f, 0, 0);
   EXPECT_THAT(refusal(outer, beside), HasSubstr("lie outside of the outer one"));
-  EXPECT_THAT(refusal(ball(10., 3), ball(8., 3)), HasSubstr("check that it is in mm"));
+  EXPECT_THAT(refusal(ball(10., 3), ball(8., 3)), HasSubstr("check that it is in mm and not in m"));
+  EXPECT_THAT(refusal(ball(1e7, 3), ball(8e6, 3)), HasSubstr("check that it is in mm and not in µm"));
+  EXPECT_THAT(refusal(outer, ball(8., 3)), HasSubstr("check that both are in mm"));
+}
+
+TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {
+  const Mesh outer = ball(10e3), inner = ball(8e3);
+  EXPECT_TRUE(check_surfaces(outer, inner).empty());
+  Mesh few = inner;  // one vertex is pulled through the other side
+  few.positions[20] = -1.2f * few.positions[20] + Vec3(137.f, 211.f, 97.f);
+  const auto oddities = check_surfaces(outer, few);
+  ASSERT_EQ(oddities.size(), 1u);
+  EXPECT_THAT(oddities[0], HasSubstr("triangles of the inner surface cut others of it, first"));
+  EXPECT_THAT(oddities[0], HasSubstr(" mm"));
+  Mesh noisy = outer;
+  Random random(3);
+  for (Vec3& p : noisy.positions)
+    p += 400.f * Eigen::Vector3d(random.normal(), random.normal(), random.normal()).cast<float>();
+  EXPECT_THAT(refusal(noisy, inner), HasSubstr("triangles of the outer surface cut others"));
 }
 
 TEST(Lines, ACrestRunsAroundALensAndAValleyAroundAWaist) {

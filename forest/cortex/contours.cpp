@@ -239,15 +239,50 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
   for (Section& section : result.sections)
     for (Contour& contour : section.contours) all.push_back(&contour);
   std::vector<FitSummary> each(all.size());
-  progress.begin("fitting curves", all.size());
-  parallel_for(all.size(), 1, [&](std::size_t i) {
-    const Fit fit = fit_loop(flattened(all[i]->curve, options.tolerance / 4.), options);
-    const double along = length(all[i]->curve);
+  std::vector<double> tolerances(all.size(), options.tolerance);
+  std::vector<BezierLoop> given;
+  for (const Contour* contour : all) given.push_back(contour->curve);
+  const auto fit_one = [&](std::size_t i) {
+    const double along = length(given[i]);
+    if (tolerances[i] < options.tolerance / 20.) {  // as it is
+      all[i]->curve = given[i];
+      each[i] = {1, given[i].pieces(), given[i].pieces(), along, 0., 0.};
+      return;
+    }
+    const Fit fit = fit_loop(flattened(given[i], tolerances[i] / 4.),
+                             {.tolerance = tolerances[i], .corner = options.corner});
     each[i] = {1, fit.curve.pieces(), fit.corners, along, fit.rms * fit.rms * along, fit.greatest};
     all[i]->curve = fit.curve;
+  };
+  progress.begin("fitting curves", all.size());
+  parallel_for(all.size(), 1, [&](std::size_t i) {
+    fit_one(i);
     progress.advance();
   });
   progress.end();
+  // Where curves cross whose polygons do not, by a narrow sulcus or a thin tip, they must lie nearer.
+  std::vector<std::size_t> first_of{0};
+  for (const Section& section : result.sections)
+    first_of.push_back(first_of.back() + section.contours.size());
+  parallel_for(result.sections.size(), 1, [&](std::size_t k) {
+    const Section& section = result.sections[k];
+    for (std::uint32_t object = 0; object < stack.objects.size(); ++object)
+      for (;;) {
+        std::vector<std::size_t> who;
+        std::vector<std::vector<Place>> polygons;
+        for (std::size_t i = 0; i < section.contours.size(); ++i)
+          if (section.contours[i].object == object)
+            who.push_back(first_of[k] + i), polygons.push_back(flattened(section.contours[i].curve, 2.));
+        const auto found = crossing_in(polygons);
+        if (!found) break;
+        const std::size_t one = who[found->first], other = who[found->second];
+        const double least = std::min(tolerances[one], tolerances[other]);
+        if (std::max(tolerances[one], tolerances[other]) < options.tolerance / 20.)
+          break;  // so do the polygons
+        for (const std::size_t i : {one, other})
+          if (tolerances[i] > .5 * least) tolerances[i] = .5 * least, fit_one(i);
+      }
+  });
   summary = {};
   for (const FitSummary& one : each) {
     summary.contours += one.contours, summary.pieces += one.pieces, summary.corners += one.corners;

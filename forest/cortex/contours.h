@@ -68,7 +68,8 @@ struct FitSummary {
   double length = 0.;              // µm
   double rms = 0., greatest = 0.;  // µm, over all contours
 };
-/// Every contour by the fewest cubics that lie along it (fit_loop). On all cores.
+/// Every contour by the fewest cubics that lie along it (fit_loop), closer where curves of an object would cross and what was
+/// given does not: then it is fitted to a half of the tolerance, and so on, or kept. On all cores.
 ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSummary& summary,
                     Progress& progress);
 

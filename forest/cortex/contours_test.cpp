@@ -129,6 +129,25 @@ TEST(Fitted, TellsHowManyCurvesAndHowFarOffTheyAre) {
   EXPECT_EQ(fault_of(curves), "");
 }
 
+TEST(Fitted, BanksOfANarrowSulcusDoNotCross) {
+  // A disc with a bent slit, 6 µm wide, which curves of 20 µm are free to cross.
+  std::vector<Place> disc;
+  const auto middle = [](double depth) { return Place(5000. - depth, 90. * std::sin(depth / 250.)); };
+  for (int i = 1; i < 400; ++i)
+    disc.push_back(5000. * Place(std::cos(2. * pi * i / 400.), std::sin(2. * pi * i / 400.)));
+  for (int i = 0; i <= 60; ++i) disc.push_back(middle(70. * i) - Place(0., 3.));
+  for (int i = 60; i >= 0; --i) disc.push_back(middle(70. * i) + Place(0., 3.));
+  ContourStack stack{.axis = Axis::y, .objects = {"outer"}, .sections = {Section{.at = 0., .contours = {}}}};
+  stack.sections[0].contours.push_back({.object = 0, .curve = straight_loop(disc)});
+  ASSERT_EQ(fault_of(stack), "");
+  ContourStack freely = stack;
+  freely.sections[0].contours[0].curve = fit_loop(disc).curve;
+  EXPECT_NE(fault_of(freely), "");
+  FitSummary summary;
+  EXPECT_EQ(fault_of(fitted(stack, {}, summary, Progress::none())), "");
+  EXPECT_LE(summary.rms, 20.);
+}
+
 TEST(Contours, OfTwoSurfacesAreOneStackWhenTheirSectionsAreAlike) {
   const auto planes = planes_between(-9000., 9000., 1000.);
   const ContourStack outer = cut(ball(), "outer", Axis::y, planes);

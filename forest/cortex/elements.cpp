@@ -154,8 +154,13 @@ std::vector<std::uint32_t> uncertified(const Elements& elements) {
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner) {
   constexpr double reach = 300.;  // µm
   const std::vector<Depths> before = elements.curves;
-  std::vector<std::uint8_t> valid(elements.size(), 1);
-  for (const std::uint32_t e : uncertified(elements)) valid[e] = 0;
+  // What an element must keep: validity, and a good shape, or the one it had.
+  constexpr double good = .5;
+  std::vector<double> least(elements.size(), -1.);
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const Hexahedron h = elements.hexahedron(e);
+    if (certify(h).positive()) least[e] = std::min(good, scaled_jacobian(h));
+  });
   constexpr std::array<double, 3> at{1. / 6., .5, 5. / 6.};
   for (const std::size_t d : {std::size_t(0), std::size_t(3)}) {
     const TriangleTree& surface = d == 0 ? outer : inner;
@@ -187,12 +192,17 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
         if (times[c]) elements.curves[c][d] += move[c] / double(times[c]);
     }
   }
-  // Where that would cost an element its validity, it stays as it was.
   for (bool all = false; !all;) {
+    std::vector<std::uint8_t> lost(elements.size(), 0);
+    parallel_for(elements.size(), 64, [&](std::size_t e) {
+      if (least[e] < 0.) return;
+      const Hexahedron h = elements.hexahedron(e);
+      lost[e] = scaled_jacobian(h) < least[e] || !certify(h).positive();
+    });
     all = true;
-    for (const std::uint32_t e : uncertified(elements)) {
-      if (!valid[e]) continue;
-      valid[e] = all = false;
+    for (std::size_t e = 0; e < elements.size(); ++e) {
+      if (!lost[e]) continue;
+      least[e] = -1., all = false;
       for (const std::uint32_t c : elements.elements[e]) elements.curves[c] = before[c];
     }
   }

@@ -48,7 +48,8 @@ std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const
 std::vector<std::uint32_t> uncertified(const Elements& elements);
 
 /// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
-/// on a creased surface cut its convex creases off. Valid elements stay valid.
+/// on a creased surface cut its convex creases off. An element that would lose its validity or a good
+/// shape by that stays as it was.
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
 
 struct Mending {

@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/progress.h"
+#include "forest/geometry/decimate.h"
 #include "forest/geometry/isosurface.h"
 
 namespace forest::cortex {
@@ -131,6 +132,31 @@ void stand_up(Mesh& mesh, Axis axis) {
     for (Triangle& t : mesh.triangles) std::swap(t[1], t[2]);
 }
 
+// Those triangles of a mesh whose corners have the label.
+Mesh labelled(const Mesh& mesh, std::uint8_t label) {
+  Mesh part;
+  std::vector<std::uint32_t> name(mesh.positions.size());
+  for (std::size_t v = 0; v < name.size(); ++v)
+    if (mesh.labels[v] == label) {
+      name[v] = std::uint32_t(part.positions.size());
+      part.positions.push_back(mesh.positions[v]);
+    }
+  for (const Triangle& t : mesh.triangles)
+    if (mesh.labels[t[0]] == label) part.triangles.push_back({name[t[0]], name[t[1]], name[t[2]]});
+  part.labels.assign(part.positions.size(), 0);
+  return part;
+}
+
+// Both at once, so that they keep out of one another.
+void make_fewer(Surfaces& surfaces, double error, double longest, Progress& progress) {
+  Mesh both = std::move(surfaces.outer);
+  std::ranges::fill(surfaces.inner.labels, std::uint8_t(1));
+  append(both, surfaces.inner);
+  surfaces.inner = {};
+  both = decimated(both, {.error = error, .longest = longest}, progress);
+  surfaces.outer = labelled(both, 0), surfaces.inner = labelled(both, 1);
+}
+
 }  // namespace
 
 std::vector<float> signed_distances(const Section& section, std::uint32_t object, const Place& origin,
@@ -210,9 +236,13 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
   }
   progress.begin("surfaces", 2);
   result.inner = isosurface(inner);
+  inner = {};
   progress.advance();
   result.outer = isosurface(outer);
+  outer = {};
   progress.end();
+  result.triangles = result.inner.triangles.size() + result.outer.triangles.size();
+  if (options.error > 0.) make_fewer(result, options.error, 1.5 * raster.spacing, progress);
   stand_up(result.inner, stack.axis), stand_up(result.outer, stack.axis);
   return result;
 }

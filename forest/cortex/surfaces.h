@@ -16,6 +16,7 @@ struct SurfaceOptions {
   double voxel = 0.;    // µm, in the sections; 0: a quarter of their distance
   int between = 2;      // grid points a section: 2 puts one in the middle of each two sections
   double margin = 20.;  // µm, about: what the outer surface keeps from the inner one
+  double error = 20.;   // µm: triangles are made fewer by so much (decimate.h); 0: all are kept
   std::string outer = "outer", inner = "inner";  // objects
 };
 
@@ -25,6 +26,7 @@ struct Surfaces {
   std::size_t outer_cut = 0, inner_cut = 0;
   /// Points of the grid where the contours had the inner surface outside the outer one: the outer one was moved.
   std::size_t pushed = 0;
+  std::size_t triangles = 0;  // of both, before they were made fewer
 };
 
 /// @param stack  sections at equal distances (to 1 %), none between two missing

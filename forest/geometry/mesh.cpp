@@ -29,18 +29,26 @@ void append(Mesh& mesh, const Mesh& other) {
     mesh.triangles.push_back({t[0] + shift, t[1] + shift, t[2] + shift});
 }
 
-bool is_closed(const Mesh& mesh) {
+std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh) {
   std::vector<std::uint64_t> there, back;
   there.reserve(3 * mesh.triangles.size()), back.reserve(3 * mesh.triangles.size());
+  const auto named = [](std::uint64_t edge) {
+    return std::array{std::uint32_t(edge >> 32), std::uint32_t(edge)};
+  };
   for (const Triangle& t : mesh.triangles)
     for (std::size_t i = 0; i < 3; ++i) {
       const std::uint64_t a = t[i], b = t[(i + 1) % 3];
-      if (a == b) return false;
+      if (a == b) return named(a << 32 | b);
       there.push_back(a << 32 | b), back.push_back(b << 32 | a);
     }
   std::ranges::sort(there), std::ranges::sort(back);
-  return there == back && std::ranges::adjacent_find(there) == there.end();
+  if (const auto twice = std::ranges::adjacent_find(there); twice != there.end()) return named(*twice);
+  const auto differ = std::ranges::mismatch(there, back);
+  if (differ.in1 != there.end()) return named(*differ.in1);
+  return {};
 }
+
+bool is_closed(const Mesh& mesh) { return !open_edge(mesh); }
 
 std::size_t count_pieces(const Mesh& mesh) {
   std::vector<std::uint32_t> of(mesh.positions.size());

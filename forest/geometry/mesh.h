@@ -5,6 +5,7 @@
 
 #include <array>
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -35,6 +36,8 @@ void append(Mesh& mesh, const Mesh& other);
 /// Whether every edge lies between exactly two triangles, which run along it in opposite directions: a surface without
 /// border, of one or more pieces, each with an inside.
 bool is_closed(const Mesh& mesh);
+/// An edge where that is not so: its two vertices. The first in their order.
+std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh);
 /// Number of pieces that share no vertex; vertices of no triangle do not count.
 std::size_t count_pieces(const Mesh& mesh);
 /// Of a closed mesh, by the divergence theorem; µm³, positive when triangles face outwards.

@@ -124,8 +124,8 @@ ElementsFile read_elements(const std::filesystem::path& path) {
     file.refuse("/lines has arrays of different lengths");
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const std::int64_t end = i + 1 < starts.size() ? starts[i + 1] : std::int64_t(points.size() / 3);
-    if (starts[i] < 0 || starts[i] + 2 > end || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
-        kinds[i] > 1)
+    if (starts[i] < 0 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
+        kinds[i] > 1 || !std::isfinite(strength[i]))
       file.refuse("/lines has a line that cannot be");
     Line line{.kind = Line::Kind(kinds[i]),
               .points = {},
@@ -143,6 +143,7 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   if (facts.size() != 7) file.refuse("/facts has not 7 numbers");
   for (const double x : facts)
     if (!std::isfinite(x)) file.refuse("/facts has a number that is not finite");
+  if (!(facts[6] >= 0. && facts[6] <= 4294967295.)) file.refuse("/facts has a count that is none");
   if (!(facts[0] > 0.)) file.refuse("/facts has a volume that is not positive");
   result.volume = facts[0], cortex.between = facts[1], cortex.wall = facts[2];
   cortex.w_angle = {facts[3], facts[4]}, cortex.w_reached = facts[5];

@@ -29,8 +29,9 @@ cortex::Cortex one_block() {
   cortex.elements.corners = 4;
   cortex.elements.on_valley = {0, 1, 0, 1};
   std::array<std::uint32_t, 16> e{};
-  for (std::uint32_t c = 0; c < 16; ++c)
-    e[c] = c < 4 ? std::array<std::uint32_t, 4>{5, 0, 3, 1}[c] : (c + 2) % 16;
+  // Corners are the curves 0 to 3, the others follow.
+  for (std::uint32_t c = 0, other = 4; c < 16; ++c)
+    e[c] = c == 0 ? 2 : c == 3 ? 0 : c == 12 ? 3 : c == 15 ? 1 : other++;
   cortex.elements.elements = {e};
   for (int c = 0; c < 16; ++c)
     cortex.elements.curves.push_back({Place(c, 0, 0), Place(c, 1, 0), Place(c, 2, .1), Place(c, 3, 1e6)});
@@ -69,6 +70,13 @@ TEST_F(ElementsOnDisk, CutOffAnywhereAreRefused) {
     write_file(folder / "cut.h5", std::string_view(bytes).substr(0, size));
     EXPECT_THROW(read_elements(folder / "cut.h5"), InputError) << size;
   }
+}
+
+TEST_F(ElementsOnDisk, ACornerThatIsNoneIsRefused) {
+  cortex::Cortex cortex = one_block();
+  std::swap(cortex.elements.elements[0][0], cortex.elements.elements[0][1]);
+  write_elements(folder / "e.h5", cortex, 1e9);
+  EXPECT_THROW((void)read_elements(folder / "e.h5"), InputError);
 }
 
 TEST_F(ElementsOnDisk, OfAnotherKindAreRefusedWithTheRemedy) {

@@ -63,7 +63,7 @@ Mesh read_freesurfer_surface(std::string_view bytes, const std::string& name) {
   for (std::uint64_t i = 0; i < vertices; ++i) {
     Vec3 at;
     for (float& x : at) x = words.real();
-    mesh.positions.push_back(micrometres(at, name));
+    mesh.positions.push_back(micrometres(at, name, i));
   }
   mesh.labels.assign(vertices, 0);
   for (std::uint64_t i = 0; i < triangles; ++i) {

@@ -255,7 +255,8 @@ Mesh read_gifti_surface(std::string_view text, const std::string& name) {
   Mesh mesh;
   mesh.positions.reserve(points->rows), mesh.triangles.reserve(triangles->rows);
   for (std::size_t i = 0; i < points->rows; ++i)
-    mesh.positions.push_back(micrometres(Eigen::Vector3d::Map(&points->numbers[3 * i]).cast<float>(), name));
+    mesh.positions.push_back(
+        micrometres(Eigen::Vector3d::Map(&points->numbers[3 * i]).cast<float>(), name, i));
   mesh.labels.assign(points->rows, 0);
   for (std::size_t i = 0; i < triangles->rows; ++i) {
     Triangle& corners = mesh.triangles.emplace_back();

@@ -12,6 +12,7 @@
 #include "forest/io/freesurfer.h"
 #include "forest/io/gifti.h"
 #include "forest/io/inflate.h"
+#include "forest/io/obj.h"
 #include "forest/io/plain_text.h"
 
 namespace forest::io {
@@ -63,7 +64,8 @@ SurfaceValues read_lines(std::string_view text, const std::string& name) {
 }  // namespace
 
 bool may_be_surface(std::string_view bytes) {
-  return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) || is_gifti(bytes);
+  return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) || is_gifti(bytes) ||
+         is_obj(bytes);
 }
 
 Mesh read_surface(std::string_view bytes, const std::string& name) {
@@ -71,9 +73,10 @@ Mesh read_surface(std::string_view bytes, const std::string& name) {
   const std::string_view content = unpacked(bytes, place, name);
   if (is_freesurfer_surface(content)) return read_freesurfer_surface(content, name);
   if (is_gifti(content)) return read_gifti_surface(content, name);
+  if (is_obj(content)) return read_obj_surface(content, name);
   throw InputError(name, 0,
-                   "is no surface that is known; give a GIFTI file (.surf.gii) or FreeSurfer's triangles "
-                   "(lh.pial); mris_convert makes either of many others");
+                   "is no surface that is known; give a GIFTI file (.surf.gii), FreeSurfer's triangles "
+                   "(lh.pial) or OBJ; mris_convert makes either of many others");
 }
 
 SurfaceValues read_surface_values(std::string_view bytes, const std::string& name) {
@@ -100,11 +103,13 @@ std::string printable(std::string_view word) {
   return result;
 }
 
-Vec3 micrometres(const Vec3& millimetres, const std::string& name) {
-  constexpr float farthest = 1e5f;  // mm
-  if (!(millimetres.array().abs() <= farthest)
-           .all())  // each by itself: a maximum may pass over what is no number
-    throw InputError(name, 0, "has a vertex that is nowhere (not a number, or farther than 100 m); mend it");
+Vec3 micrometres(const Vec3& millimetres, const std::string& name, std::size_t vertex) {
+  constexpr float farthest = 1e5f;                     // mm
+  if (!(millimetres.array().abs() <= farthest).all())  // each by itself: a maximum may pass over no number
+    throw InputError(
+        name, 0,
+        fmt::format("has a vertex that is nowhere, number {} (not a number, or farther than 100 m); mend it",
+                    vertex));
   return millimetres * 1000.f;
 }
 

@@ -3,6 +3,7 @@
 // told by what is in them, packed by gzip or not:
 //
 //   GIFTI (gifti.h)           lh.pial.surf.gii, lh.thickness.shape.gii, lh.aparc.label.gii, …
+//   OBJ (obj.h)               surfaces only, of Wavefront and of the Montreal Neurological Institute
 //   FreeSurfer (freesurfer.h) lh.pial, lh.white, lh.inflated; lh.curv, lh.thickness, lh.sulc, lh.area
 //   text                      values only, one a line
 //
@@ -47,8 +48,8 @@ std::string write_surface(const Mesh& mesh, std::string_view file_name);
 
 /// A word of a file as an error may quote it: its first 40 characters, none that a terminal obeys.
 std::string printable(std::string_view word);
-/// µm of a coordinate in mm. Throws InputError when it is not finite or farther away than any brain.
-Vec3 micrometres(const Vec3& millimetres, const std::string& name);
+/// µm of a vertex in mm. Throws InputError when it is not finite or farther away than any brain.
+Vec3 micrometres(const Vec3& millimetres, const std::string& name, std::size_t vertex);
 /// Throws InputError when one names a vertex that is not there.
 void check_corners(const Mesh& mesh, const std::string& name);
 

@@ -159,6 +159,50 @@ TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {
                                   "g"));
 }
 
+std::string wavefront() {
+  std::string text = "# made for a test\r\nmtllib none.mtl\no t\n";
+  for (const auto& place : places) text += fmt::format("v {} {} {} 1 0 0\r\n", place[0], place[1], place[2]);
+  text += "vn 0 0 1\ns off\n";
+  for (const auto& c : corners) text += fmt::format("f {}/1/1 {}//1 {}\n", c[0] + 1, c[1] + 1, int(c[2]) - 4);
+  return text;
+}
+std::string mni() {
+  std::string text = "P 0.3 0.3 0.4 10 1 4\n";
+  for (const auto& place : places) text += fmt::format(" {} {} {}\n", place[0], place[1], place[2]);
+  text += "\n 0 0 1\n 0 1 0\n 1 0 0\n 0 0 -1\n\n 4\n 0 1 1 1 1\n\n 3 6 9 12\n\n";
+  for (const auto& c : corners) text += fmt::format(" {} {} {}", c[0], c[1], c[2]);
+  return text + "\n";
+}
+
+TEST(Surface, OfEitherObjIsTheSame) {
+  expect_tetrahedron(read_surface(wavefront(), "s.obj"));
+  expect_tetrahedron(read_surface(mni(), "s.obj"));
+  expect_tetrahedron(read_surface(gzipped(mni()), "s.obj.gz"));
+  // A face of four corners is two triangles.
+  EXPECT_EQ(read_surface("v 0 0 0\nv 1 0 0\nv 1 1 0\nv 0 1 0\nf 1 2 3 4\n", "s.obj").triangles,
+            (std::vector<Triangle>{{0, 1, 2}, {0, 2, 3}}));
+}
+
+TEST(Surface, ObjThatIsCutOffOrCannotBeIsRefusedWithItsLine) {
+  const std::string whole = mni();
+  for (std::size_t size = 0; size + 2 < whole.size(); ++size)
+    EXPECT_NE(surface_error(whole.substr(0, size)), "") << size;
+  EXPECT_NE(surface_error("v 0 0 0\nv 1 0 0\nv 1 1 0\nf 1 2 4\n").find("4: a face names vertex '4' of 3"),
+            std::string::npos);
+  EXPECT_NE(surface_error("v 0 0 0\nv 1 x 0\n").find("2: 'x' is no coordinate"), std::string::npos);
+  EXPECT_NE(surface_error("v 0 0 0\nv 1 nan 0\n").find("number 1"), std::string::npos);
+  EXPECT_NE(surface_error("v 0 0 0\n").find("no triangle"), std::string::npos);
+  EXPECT_NE(surface_error("P 0 0 0 1 1 4000000000\n0 0 0\n").find("4000000000 points"), std::string::npos);
+}
+
+TEST(Surface, AMacaqueIsReadFromObj) {
+  FOREST_REAL_DATA(file, "cortex/contour_stacks/macaqueHemi.obj");
+  const MappedFile bytes(file);
+  const Mesh mesh = read_surface(bytes.text(), file.string());
+  EXPECT_EQ(mesh.positions.size(), 27837u);
+  EXPECT_EQ(mesh.triangles.size(), 55052u);
+}
+
 TEST(Surface, ValuesAreReadFromEveryFormat) {
   const float values[] = {1.5f, -2.f, NAN, 3e-5f};
   const auto expect = [&](const SurfaceValues& read) {

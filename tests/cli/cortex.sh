@@ -50,6 +50,14 @@ border("dent.border", order[:30], len(p))   # along the dent
 border("pole.border", order[-30:], len(p))  # where there is none
 border("other.border", [0], 7)
 write("small", ([tuple(x / 1000 for x in q) for q in p], f))
+write("large", ([tuple(x * 1000 for x in q) for q in p], f))
+write("cut_itself", ([tuple(x * (1 + .05 * math.sin(1e4 * x)) for x in q) for q in p], f))
+write("beside", ([(q[0] + 5, q[1], q[2]) for q in ball(7)[0]], f))
+write("nan", ([(math.nan if i == 7 else q[0], q[1], q[2]) for i, q in enumerate(p)], f))
+with open("inner.obj", "w") as o:
+    p, f = ball(7, dent=1.2)
+    for q in p: o.write("v %.9g %.9g %.9g\n" % q)
+    for q in f: o.write("f %d %d %d\n" % tuple(c + 1 for c in q))
 PY
 
 $BRAINFOREST cortex build outer inner -o e.h5 --json >built.json
@@ -81,8 +89,12 @@ cmp e.h5 again.h5
 
 # Nothing is written where something is wrong.
 refuses 'swapped' $BRAINFOREST cortex build inner outer -o no.h5
-refuses 'outer surface is open' $BRAINFOREST cortex build open inner -o no.h5
-refuses 'check that it is in mm' $BRAINFOREST cortex build small small -o no.h5
+refuses 'outer surface is open or not of one orientation at the edge of vertices' $BRAINFOREST cortex build open inner -o no.h5
+refuses 'check that it is in mm and not in m' $BRAINFOREST cortex build small small -o no.h5
+refuses 'check that it is in mm and not in µm' $BRAINFOREST cortex build large inner -o no.h5
+refuses 'triangles of the outer surface cut others of it' $BRAINFOREST cortex build cut_itself inner -o no.h5
+refuses 'lie outside of the outer one' $BRAINFOREST cortex build outer beside -o no.h5
+refuses 'nan: has a vertex that is nowhere, number 7' $BRAINFOREST cortex build nan inner -o no.h5
 head -c 5000 outer >cut
 refuses 'cut' $BRAINFOREST cortex build cut inner -o no.h5
 [ ! -e no.h5 ]
@@ -94,7 +106,29 @@ refuses 'outer' $BRAINFOREST cortex report outer
 # Sections of a surface, what lies between them, and a surface again.
 $BRAINFOREST cortex contours outer inner -o s.contours --axis y --spacing 1 >/dev/null
 $BRAINFOREST cortex compare s.contours >compared.txt
+$BRAINFOREST cortex contours outer inner.obj -o obj.contours --axis y --spacing 1 >/dev/null
+$BRAINFOREST cortex compare obj.contours >from_obj.txt
+[ "$(wc -l <compared.txt)" = "$(wc -l <from_obj.txt)" ]
 $BRAINFOREST cortex surfaces s.contours -o outer.gii inner.gii --json >surfaces.json
+$BRAINFOREST cortex surfaces s.contours -o outer_all.gii inner_all.gii --error 0 --json >all.json
+told surfaces.json 'd["triangles_before"] > 2 * sum(s["triangles"] for s in d["surfaces"])'
+told all.json 'd["triangles_before"] == sum(s["triangles"] for s in d["surfaces"])'
+told surfaces.json 'all(s["euler"] == 2 for s in d["surfaces"])'
+head -c 100000 outer_all.gii >cut.gii
+refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
+
+# Contours that cross, and objects that were swapped.
+python3 - <<'PY2'
+import json
+d = json.load(open("s.contours"))
+for s in d["sections"]:
+    s["contours"] = [c if c["object"] == "outer" else
+                     {"object": "inner", "polygon": [[0, 0], [1000, 0], [0, 1000], [1000, 1000]]} for c in s["contours"]]
+json.dump(d, open("cross.contours", "w"))
+PY2
+refuses "of 'inner' crosses itself in section" $BRAINFOREST cortex surfaces cross.contours -o no.gii no2.gii
+refuses 'swap them' $BRAINFOREST cortex surfaces s.contours --outer inner --inner outer -o no.gii no2.gii
+[ ! -e no.gii ] && [ ! -e no2.gii ] && [ ! -e no.h5 ]
 $BRAINFOREST cortex build outer.gii inner.gii -o from_sections.h5 --json >from_sections.json
 python3 - <<'PY'
 import json
