@@ -269,10 +269,11 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   double wanted = 0.;
   all.layer_volumes.resize(recipe.layers.size());
   for (const std::uint32_t e : all.elements) {
-    for (const auto& layer : planter.counts(elements[e]))
+    for (const auto& layer : planter.counts(elements[e], cortex::Layers(file.cortex.elements, e)))
       wanted += std::accumulate(layer.begin(), layer.end(), 0.);
     for (std::size_t l = 0; l < recipe.layers.size(); ++l)
-      all.layer_volumes[l] += elements[e].volume(l ? planter.depths()[l - 1] : 0., planter.depths()[l]);
+      all.layer_volumes[l] += cortex::Layers(file.cortex.elements, e)
+                                  .volume(elements[e], l ? planter.depths()[l - 1] : 0., planter.depths()[l]);
   }
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
   constexpr double most = 50e6, most_bent = 200'000;
@@ -287,7 +288,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   progress.begin("planting", all.elements.size());
   for (const std::uint32_t e : all.elements) {
     all.first.push_back(rooted.size());
-    const auto here = planter.plant(elements[e], e);
+    const auto here = planter.plant(elements[e], e, cortex::Layers(file.cortex.elements, e));
     rooted.insert(rooted.end(), here.begin(), here.end());
     progress.advance();
   }

@@ -2,8 +2,8 @@
 // Planting in curved elements: a hemisphere as a rule rather than a list. The neurons of an element follow from (element, recipe,
 // candidates, seed) alone, whichever others are asked for and in whatever order.
 //
-// Layers are slices of the element: a layer of a tenth of the recipe's thickness takes a tenth of the depth w, which is a share
-// of volume. A recipe's densities hold per mm³ of tissue; in a recipe with counts they are those of its column.
+// Layers are slices of the element: a layer of a tenth of the recipe's thickness takes a tenth of the depth, which is a share
+// of volume (cortex/depth.h). A recipe's densities hold per mm³ of tissue; in a recipe with counts they are those of its column.
 //
 // Places come from packings (cortex/packing.h), one for each layer, that fill all space whether there is tissue or not: an element
 // has those that lie in it, a few more than it needs, and takes as many as are wanted by lot. So somata do not overlap in an
@@ -22,6 +22,7 @@
 #include "forest/circuit/plant.h"
 #include "forest/circuit/recipe.h"
 #include "forest/core/random.h"
+#include "forest/cortex/depth.h"
 #include "forest/cortex/hexahedron.h"
 #include "forest/cortex/packing.h"
 
@@ -52,7 +53,7 @@ class ElementPlanter {
   ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
                  const ElementPlanting& options = {});
 
-  /// w where the layers end; the first begins at 0 and the last ends at 1.
+  /// Depths where the layers end; the first begins at 0 and the last ends at 1.
   std::span<const double> depths() const { return depths_; }
   std::size_t left_out(std::size_t layer) const {
     return left_out_[layer];
@@ -62,14 +63,17 @@ class ElementPlanter {
 
   /// How many neurons an element has, [layer][type]: all of them are the nearest whole number, shared out by largest remainders
   /// among the layers, then among the types of a layer.
-  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element) const;
+  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element,
+                                                 const cortex::Layers& layers = {}) const;
 
   /// In the order of layers, then types. A neuron is one of its type's that end under the pia at its place, or the lowest one.
   /// @param number  of the element, for what is thrown: Error when its layer has no room for all somata
-  std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number) const;
+  std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,
+                            const cortex::Layers& layers = {}) const;
 
  private:
-  double room_for_soma(std::size_t layer, double w, const cortex::Linear& here) const;
+  double room_for_soma(std::size_t layer, const Eigen::Vector3d& uvw, const cortex::Linear& here,
+                       const cortex::Layers& layers) const;
   std::uint32_t choose(std::span<const std::uint32_t> choice, double height, double radius,
                        Random& random) const;
 

@@ -13,6 +13,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/cortex/curved_elements.h"
+#include "forest/cortex/slab_test.h"
 #include "forest/cortex/warp.h"
 
 #include "tests/refused.h"
@@ -165,6 +166,40 @@ TEST(PlantElements, PlacesAreEvenInVolumeWithinALayerAndStayInIt) {
   // The negative control: parameters are not even, as the element is curved.
   const std::array<double, n> flat{count / n, count / n, count / n, count / n, count / n, count / n};
   EXPECT_LT(p_of(across, flat), 1e-3);
+}
+
+// Tissue around an edge of the white matter, 200 µm thick there and 2200 at the pia, and not the same everywhere.
+TEST(PlantElements, LayersShareTheVolumeAlsoWhereWDoesNotAndDoNotTouch) {
+  cortex::Elements edge = cortex::make_slab(2, [](const Place& p) {
+    const double angle = (p.x() - 500.) / 2200., r = 2200. + p.z();
+    return Place(r * std::sin(angle), p.y() + .05 * p.z() * angle, r * std::cos(angle));
+  });
+  edge.depth = cortex::even_depth(edge, Progress::none());
+  const ElementPlanter planter(layered(), candidates, 3);
+  std::vector<Rooted> all;
+  for (std::size_t e = 0; e < edge.size(); ++e) {
+    const cortex::Layers layers(edge, e);
+    const Hexahedron element = edge.hexahedron(e);
+    const auto wanted = planter.counts(element, layers);
+    std::array<std::size_t, 3> seen{};
+    double before = 0.;
+    for (const Rooted& r : planter.plant(element, e, layers)) {
+      ++seen[r.layer];
+      // By where it is: depth is a share of the ring's area.
+      const double radius = std::hypot(double(r.position.x()), double(r.position.z()));
+      const double depth = (2200. * 2200. - radius * radius) / (2200. * 2200. - 200. * 200.);
+      EXPECT_GT(depth, (r.layer ? planter.depths()[r.layer - 1] : 0.) - .01);
+      EXPECT_LT(depth, planter.depths()[r.layer] + .01);
+      all.push_back(r);
+    }
+    for (std::size_t l = 0; l < 3; ++l) {
+      EXPECT_EQ(seen[l], wanted[l][0] + wanted[l][1]);
+      EXPECT_NEAR(double(seen[l]),
+                  planter.density(l) * 1e-9 * (planter.depths()[l] - before) * element.volume(), 1.);
+      before = planter.depths()[l];
+    }
+  }
+  EXPECT_GT(least_gap(all), .5);
 }
 
 TEST(PlantElements, NeuronsPointToThePiaAlongW) {

@@ -182,8 +182,8 @@ Depth even_depth(const Elements& elements, Progress& progress) {
 
 Layers::Layers(const Elements& elements, std::size_t element) {
   const Depth& depth = elements.depth;
-  even_ = depth.corners.empty();
-  if (even_) return;
+  plain_ = depth.corners.empty();
+  if (plain_) return;
   const auto fill = [](Knots& knots, const Depth::Table& table, double last) {
     knots.front() = 0., knots.back() = last;
     std::copy(table.begin(), table.end(), knots.begin() + 1);
@@ -206,11 +206,11 @@ Layers::Knots Layers::knots(double u, double v) const {
 }
 
 double Layers::w(double u, double v, double depth) const {
-  return even_ ? depth : between(knots(u, v), depth);
+  return plain_ ? depth : between(knots(u, v), depth);
 }
 
 double Layers::depth(double u, double v, double w) const {
-  if (even_) return w;
+  if (plain_) return w;
   const Knots at = knots(u, v);
   double low = 0., high = 1.;
   for (int round = 0; round < 45; ++round) {
@@ -218,6 +218,23 @@ double Layers::depth(double u, double v, double w) const {
     (between(at, middle) < w ? low : high) = middle;
   }
   return .5 * (low + high);
+}
+
+std::pair<double, double> Layers::range(double from_depth, double to_depth) const {
+  if (plain_) return {from_depth, to_depth};
+  // The own table adds from nothing to all of itself; between knots w lies between theirs.
+  const auto low = std::size_t(std::clamp(from_depth, 0., 1.) * steps);
+  const auto high = std::size_t(std::ceil(std::clamp(to_depth, 0., 1.) * steps));
+  std::pair result{1., 0.};
+  for (const Knots& corner : corners_) {
+    result.first = std::min(result.first, corner[low] + std::min(0., own_[low]));
+    result.second = std::max(result.second, corner[high] + std::max(0., own_[high]));
+  }
+  return {std::max(0., result.first), std::min(1., result.second)};
+}
+
+double Layers::volume(const Hexahedron& element, double from_depth, double to_depth) const {
+  return plain_ ? element.volume(from_depth, to_depth) : (to_depth - from_depth) * element.volume();
 }
 
 double depth_error(const Elements& elements, std::size_t element) {
@@ -232,11 +249,11 @@ double depth_error(const Elements& elements, std::size_t element) {
   for (std::size_t j = 0; j < at.size(); ++j)
     for (std::size_t i = 0; i < at.size(); ++i) {
       const Column column(h, at[i], at[j]);
-      const Layers::Knots knots = layers.even_ ? Layers::Knots{} : layers.knots(at[i], at[j]);
+      const Layers::Knots knots = layers.plain_ ? Layers::Knots{} : layers.knots(at[i], at[j]);
       for (int k = 1; k <= levels; ++k) {
         const double depth = double(k) / levels;
         above[std::size_t(k)] +=
-            weight[i] * weight[j] * column.above(layers.even_ ? depth : between(knots, depth));
+            weight[i] * weight[j] * column.above(layers.plain_ ? depth : between(knots, depth));
       }
     }
   double worst = 0.;

@@ -11,7 +11,7 @@
 
 #include <array>
 #include <cstdint>
-#include <span>
+#include <utility>
 #include <vector>
 
 #include "forest/core/progress.h"
@@ -19,6 +19,7 @@
 namespace forest::cortex {
 
 struct Elements;
+struct Hexahedron;
 
 struct Depth {
   static constexpr int steps = 20;             // between 0 and 1; tables have what lies within
@@ -34,17 +35,22 @@ Depth even_depth(const Elements& elements, Progress& progress);
 /// The layers of one element.
 class Layers {
  public:
+  Layers() = default;  // without tables: depth is w
   Layers(const Elements& elements, std::size_t element);
 
   double w(double u, double v, double depth) const;
   double depth(double u, double v, double w) const;
+  /// Between these values lies w from one depth to another, anywhere in the element.
+  std::pair<double, double> range(double from_depth, double to_depth) const;
+  /// µm³ between two depths of the element; with tables, to half a percent of it.
+  double volume(const Hexahedron& element, double from_depth, double to_depth) const;
 
  private:
   using Knots = std::array<double, Depth::steps + 1>;
   friend double depth_error(const Elements& elements, std::size_t element);
   Knots knots(double u, double v) const;
 
-  bool even_ = false;  // there are no tables
+  bool plain_ = true;  // there are no tables
   std::array<Knots, 4> corners_;
   Knots own_;
 };
