@@ -32,30 +32,27 @@ namespace fs = std::filesystem;
 struct Measure {
   const char* name;
   const char* what;
-  double (*of)(const cortex::Hexahedron&);
+  double (*of)(const cortex::Elements&, std::size_t element);
 };
 
-double worst_depth(const cortex::Hexahedron& h) {
-  const double all = h.volume();
-  double worst = 0.;
-  for (const double w : {1. / 6., 1. / 3., .5, 2. / 3., 5. / 6.})
-    worst = std::max(worst, std::abs(h.volume(0., w) / all - w));
-  return worst;
-}
+using cortex::Elements;
 
 constexpr Measure measures[] = {
-    {"volume", "mm³", [](const cortex::Hexahedron& h) { return h.volume() / 1e9; }},
+    {"volume", "mm³", [](const Elements& all, std::size_t e) { return all.hexahedron(e).volume() / 1e9; }},
     {"thickness", "mm, from face to face in the middle",
-     [](const cortex::Hexahedron& h) { return (h.at(.5, .5, 0.) - h.at(.5, .5, 1.)).norm() / 1e3; }},
+     [](const Elements& all, std::size_t e) {
+       const cortex::Hexahedron h = all.hexahedron(e);
+       return (h.at(.5, .5, 0.) - h.at(.5, .5, 1.)).norm() / 1e3;
+     }},
     {"jacobian", "scaled Jacobian, the least",
-     [](const cortex::Hexahedron& h) { return cortex::scaled_jacobian(h); }},
-    {"equivolume", "largest |V(0 → w)/V − w|", worst_depth},
+     [](const Elements& all, std::size_t e) { return cortex::scaled_jacobian(all.hexahedron(e)); }},
+    {"equivolume", "largest |V(0 → depth)/V − depth|", cortex::depth_error},
 };
 
 struct Options {
   fs::path file, out, values;
   std::string measure = "volume";
-  double w = .5;
+  double depth = .5;
   std::string edges;   // of which elements
   double radius = 4.;  // of edges, µm
   bool force = false;
@@ -109,14 +106,18 @@ void run(const Options& o, Console& console) {
   std::vector<double> values(elements.size());
   parallel_for(elements.size(), 64, [&](std::size_t e) {
     const cortex::Hexahedron h = elements.hexahedron(e);
-    values[e] = measure->of(h);
+    values[e] = measure->of(elements, e);
+    const cortex::Layers layers(elements, e);
+    const auto at = [&](double u, double v) -> Vec3 {
+      return h.at(u, v, layers.w(u, v, o.depth)).cast<float>();
+    };
     constexpr double ring[4][2] = {{0., 0.}, {0., 1.}, {1., 1.}, {1., 0.}};  // counter-clockwise from outside
     const auto first = std::uint32_t(5 * e);
     for (std::uint32_t k = 0; k < 4; ++k) {
-      mesh.positions[first + k] = h.at(ring[k][0], ring[k][1], o.w).cast<float>();
+      mesh.positions[first + k] = at(ring[k][0], ring[k][1]);
       mesh.triangles[4 * e + k] = {first + k, first + (k + 1) % 4, first + 4};
     }
-    mesh.positions[first + 4] = h.at(.5, .5, o.w).cast<float>();
+    mesh.positions[first + 4] = at(.5, .5);
   });
   mesh.labels.assign(mesh.positions.size(), 0);
   std::string text;
@@ -125,8 +126,8 @@ void run(const Options& o, Console& console) {
   write_unless_there(o.out, io::write_surface(mesh, o.out.string()), o.force);
   if (!o.values.empty()) write_unless_there(o.values, text, o.force);
   const auto [least, most] = std::ranges::minmax(values);
-  console.say(fmt::format("{} at w = {} in {}; {} ({}) from {:.4g} to {:.4g}{}",
-                          counted(elements.size(), "element"), o.w, o.out.string(), measure->name,
+  console.say(fmt::format("{} at depth {} in {}; {} ({}) from {:.4g} to {:.4g}{}",
+                          counted(elements.size(), "element"), o.depth, o.out.string(), measure->name,
                           measure->what, least, most,
                           o.values.empty() ? std::string() : " in " + o.values.string()));
   console.print(
@@ -149,9 +150,9 @@ std::function<void()> cortex_faces(CLI::App& command, Console& console) {
       ->type_name("FILE");
   command.add_option("--values", o->values, "Text, a number a vertex, as render --overlay takes it")
       ->type_name("FILE");
-  must_be_within(
-      *command.add_option("--w", o->w, "Depth: 0 the outer surface, 1 the inner one")->capture_default_str(),
-      0., 1.);
+  must_be_within(*command.add_option("--depth", o->depth, "By volume: 0 the outer surface, 1 the inner one")
+                      ->capture_default_str(),
+                 0., 1.);
   command.add_option("--measure", o->measure, help)->check(CLI::IsMember(names))->capture_default_str();
   CLI::Option* const edges =
       command
