@@ -50,6 +50,56 @@ std::vector<std::uint8_t> by_the_wall(const Elements& elements) {
   return rim;
 }
 
+// A curve that ran astray, to another bank: far from what is around it, where curves that are only fanned out lie on both sides.
+// It becomes their mean.
+void call_back_strays(Elements& elements) {
+  constexpr double far_corner = 2500., far_inside = 1500.;  // µm
+  std::vector<std::vector<std::uint32_t>> near(elements.corners);
+  for (const auto& e : elements.elements)
+    for (const auto& side : sides)
+      near[e[side[0]]].push_back(e[side[3]]), near[e[side[3]]].push_back(e[side[0]]);
+  const auto mean = [&](std::uint32_t c, std::size_t depth) {
+    Place sum = Place::Zero();
+    for (const std::uint32_t other : near[c]) sum += elements.curves[other][depth];
+    return Place(sum / double(near[c].size()));
+  };
+  // The farthest of each neighbourhood first, since it pulls the mean of those around it.
+  std::vector<double> off(elements.corners, 0.);
+  constexpr int most_rounds = 50;
+  bool more = true;
+  for (int round = 0; more && round < most_rounds; ++round) {
+    more = false;
+    parallel_for(elements.corners, 256, [&](std::size_t i) {
+      const auto c = std::uint32_t(i);
+      off[c] = near[c].empty() ? 0.
+                               : std::max((elements.curves[c][3] - mean(c, 3)).norm(),
+                                          (elements.curves[c][1] - mean(c, 1)).norm());
+    });
+    for (std::uint32_t c = 0; c < elements.corners; ++c) {
+      if (off[c] < far_corner ||
+          std::ranges::any_of(near[c], [&](std::uint32_t o) { return off[o] > off[c]; }))
+        continue;
+      for (std::size_t d = 1; d < 4; ++d) elements.curves[c][d] = mean(c, d);
+      more = true;
+    }
+  }
+  for (const auto& e : elements.elements) {
+    std::array<Depths, 4> corners;
+    for (std::size_t k = 0; k < 4; ++k) corners[k] = elements.curves[e[slot(k & 1 ? 3 : 0, k & 2 ? 3 : 0)]];
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        if (i % 3 == 0 && j % 3 == 0) continue;
+        const double u = i / 3., v = j / 3.;
+        for (std::size_t d = 0; d < 4; ++d) {
+          const Place even = (1. - v) * ((1. - u) * corners[0][d] + u * corners[1][d]) +
+                             v * ((1. - u) * corners[2][d] + u * corners[3][d]);
+          if (Place& place = elements.curves[e[slot(i, j)]][d]; (place - even).norm() > far_inside)
+            place = even;
+        }
+      }
+  }
+}
+
 }  // namespace
 
 Hexahedron Elements::hexahedron(std::size_t element) const {
@@ -118,6 +168,7 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
     progress.advance(end - begin);
   });
   progress.end();
+  call_back_strays(result);
   for (const auto& [side, c] : first)
     for (std::size_t d = 0; d < 4; ++d)
       calm(result.curves[side.first][d], result.curves[c][d], result.curves[c + 1][d],

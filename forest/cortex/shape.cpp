@@ -230,7 +230,8 @@ struct Anchor {
 
 using List = std::vector<std::uint32_t>;
 
-constexpr double very_bad = .6;  // so much of a good enough scaled Jacobian
+constexpr double farthest_way = 1000.;  // µm, that a place may move at once: not to another bank
+constexpr double very_bad = .6;         // so much of a good enough scaled Jacobian
 
 // What is shaped at once: badly shaped elements that touch one another, all whose curves may move, and all that see these.
 struct Patch {
@@ -346,6 +347,8 @@ class Shaper {
         for (std::size_t d = 0; d < 4; ++d) {
           const auto k = Eigen::Index(12 * i + 3 * d);
           const Place off = at.segment<3>(k) - anchors[i][d].at, pull = anchors[i][d].hold * off;
+          if ((at.segment<3>(k) - before.segment<3>(k)).squaredNorm() > farthest_way * farthest_way)
+            return std::numeric_limits<double>::infinity();
           value += off.dot(pull);
           gradient.segment<3>(k) += 2. * pull;
         }
