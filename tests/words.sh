@@ -32,3 +32,18 @@ small_forest() {  # how many
   "$program" plant --recipe column-1000 --repo r.db --seed 7 --out circuit >/dev/null
   "$program" pack circuit -o a.forest >/dev/null
 }
+
+# two_cells POPULATION RADIUS: two neurons into the population of cells.db, the soma away from the origin.
+two_cells() {
+  local i
+  for i in 1 2; do
+    cat >$1-$i.swc <<SWC
+1 1 10 20 30 $(($2 + i)) -1
+2 3 10 3$i 30 1 1
+3 3 10 9$i 30 1 2
+4 3 60 15$i 30 .5 3
+5 3 -40 14$i 50 .5 3
+SWC
+  done
+  $BRAINFOREST import $1-*.swc --repo cells.db --population $1 >import.txt
+}

@@ -4,19 +4,8 @@ trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 
 source "$FOREST_SOURCE_DIR/tests/words.sh"
 
-# Two cells of each of the three populations that the shipped recipes plant; the soma away from the origin.
-for population in pyramidal purkinje motoneuron; do
-  for i in 1 2; do
-    cat >$population-$i.swc <<SWC
-1 1 10 20 30 $((4 + i)) -1
-2 3 10 3$i 30 1 1
-3 3 10 9$i 30 1 2
-4 3 60 15$i 30 .5 3
-5 3 -40 14$i 50 .5 3
-SWC
-  done
-  $BRAINFOREST import $population-*.swc --repo cells.db --population $population >import.txt
-done
+# Two cells of each of the three populations that the shipped recipes plant.
+for population in pyramidal purkinje motoneuron; do two_cells $population 4; done
 
 $BRAINFOREST plant --recipe column-1000 --repo cells.db --seed 7 --out column/ >planted.txt
 grep -q '^L4 .*Purkinje cell' planted.txt

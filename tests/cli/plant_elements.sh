@@ -6,50 +6,16 @@ trap 'echo "failed in line $LINENO: $BASH_COMMAND"' ERR
 source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 python3 - <<'PY'
-import math, struct
-def ball(radius, halvings=4):
-    t = (1 + 5 ** .5) / 2
-    p = [(-1, t, 0), (1, t, 0), (-1, -t, 0), (1, -t, 0), (0, -1, t), (0, 1, t), (0, -1, -t), (0, 1, -t),
-         (t, 0, -1), (t, 0, 1), (-t, 0, -1), (-t, 0, 1)]
-    f = [(0, 11, 5), (0, 5, 1), (0, 1, 7), (0, 7, 10), (0, 10, 11), (1, 5, 9), (5, 11, 4), (11, 10, 2), (10, 7, 6), (7, 1, 8),
-         (3, 9, 4), (3, 4, 2), (3, 2, 6), (3, 6, 8), (3, 8, 9), (4, 9, 5), (2, 4, 11), (6, 2, 10), (8, 6, 7), (9, 8, 1)]
-    for _ in range(halvings):
-        middle, g = {}, []
-        def half(a, b):
-            key = (min(a, b), max(a, b))
-            if key not in middle:
-                middle[key] = len(p)
-                p.append(tuple((x + y) / 2 for x, y in zip(p[a], p[b])))
-            return middle[key]
-        for a, b, c in f:
-            x, y, z = half(a, b), half(b, c), half(c, a)
-            g += [(a, x, z), (b, y, x), (c, z, y), (x, y, z)]
-        f = g
-    scale = [radius / math.sqrt(sum(x * x for x in q)) for q in p]
-    return [tuple(x * s for x in q) for q, s in zip(p, scale)], f
-def write(name, mesh):
-    p, f = mesh
-    with open(name, "wb") as o:
-        o.write(b"\xff\xff\xfe" + b"made for a test\n\n" + struct.pack(">ii", len(p), len(f)))
-        for q in p: o.write(struct.pack(">fff", *q))
-        for q in f: o.write(struct.pack(">iii", *q))
+import os, sys
+sys.dont_write_bytecode = True
+sys.path.append(os.environ["FOREST_SOURCE_DIR"] + "/tests")
+from balls import ball, write
 write("outer", ball(8))
 write("inner", ball(6))
 PY
 $BRAINFOREST cortex build outer inner -o e.h5 >/dev/null
 
-for population in pyramidal interneuron; do
-  for i in 1 2; do
-    cat >$population-$i.swc <<SWC
-1 1 10 20 30 $((3 + i)) -1
-2 3 10 3$i 30 1 1
-3 3 10 9$i 30 1 2
-4 3 60 15$i 30 .5 3
-5 3 -40 14$i 50 .5 3
-SWC
-  done
-  $BRAINFOREST import $population-*.swc --repo cells.db --population $population >import.txt
-done
+for population in pyramidal interneuron; do two_cells $population 3; done
 
 plant() { $BRAINFOREST plant --elements e.h5 --recipe human-frontal --repo cells.db "$@"; }
 plant --element 3,7 --seed 2 --scale .1 --out two --json >two.json
