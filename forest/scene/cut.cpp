@@ -428,7 +428,16 @@ std::vector<std::uint32_t> parts_of(std::span<const Brick> bricks) {
   return parts;
 }
 
-void append(auto& to, const auto& from) { to.insert(to.end(), from.begin(), from.end()); }
+// One member of every so many-th cut from `first` on, behind one another.
+template <class Thing>
+void join(std::vector<Thing>& to, std::vector<Thing> Cut::*member, std::span<const Cut> cuts,
+          std::size_t first, std::size_t stride) {
+  std::size_t count = 0;
+  for (std::size_t p = first; p < cuts.size(); p += stride) count += (cuts[p].*member).size();
+  to.reserve(count);
+  for (std::size_t p = first; p < cuts.size(); p += stride)
+    to.insert(to.end(), (cuts[p].*member).begin(), (cuts[p].*member).end());
+}
 
 // What `choose_one(i, cuts)` adds to each of so many cuts for each i below `count`, in this order; `chunk` of them at a time.
 std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_one) {
@@ -439,11 +448,9 @@ std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cut
   });
   std::vector<Cut> whole(cuts);
   parallel_for(cuts, 1, [&](std::size_t c) {
+    const auto take = [&](auto member) { join(whole[c].*member, member, std::span(std::as_const(parts)), c, cuts); };
+    take(&Cut::dots), take(&Cut::lines), take(&Cut::capsules), take(&Cut::left_out);
     for (std::size_t p = c; p < parts.size(); p += cuts) {
-      append(whole[c].dots, parts[p].dots);
-      append(whole[c].lines, parts[p].lines);
-      append(whole[c].capsules, parts[p].capsules);
-      append(whole[c].left_out, parts[p].left_out);
       whole[c].segments += parts[p].segments;
       whole[c].neurons += parts[p].neurons;
     }

@@ -49,6 +49,10 @@ float Occluders::farthest(std::uint32_t left, std::uint32_t top, std::uint32_t r
   const auto k = std::min<std::size_t>(std::size_t(std::bit_width(shorter) - 1), squares_.size() - 1);
   const std::uint32_t side = 1u << k, last_x = right + 1 - side, last_y = bottom + 1 - side;
   const float* squares = squares_[k].data();
+  if (right - left < 2 * side && bottom - top < 2 * side) {  // of a sphere: four do, without a branch
+    const float *first = squares + std::size_t(top) * width_, *last = squares + std::size_t(last_y) * width_;
+    return std::max(std::max(first[left], first[last_x]), std::max(last[left], last[last_x]));
+  }
   float result = 0.f;
   for (std::uint32_t y = top;; y = std::min(y + side, last_y)) {
     for (std::uint32_t x = left;; x = std::min(x + side, last_x)) {

@@ -4,6 +4,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <cstring>
 
 #include "forest/core/clones.h"
 #include "forest/core/parallel.h"
@@ -24,23 +25,39 @@ double srgb(double light) {
   return light <= .0031308 ? 12.92 * light : 1.055 * std::pow(light, 1. / 2.4) - .055;
 }
 
-// 255 × sRGB of light 0–1, in even steps.
-using Codes = std::array<float, steps + 2>;
+// 255 × sRGB of light 0–1 in even steps: of each step the value it begins with, above the lower 12 bits, and in these how
+// much it rises, both in units of 2⁻¹². One look gives both.
+using Codes = std::array<std::uint32_t, steps + 1>;
 const Codes& codes() {
   static const Codes table = [] {
+    const auto code = [](std::size_t step) {
+      return std::uint32_t(std::lround(4096. * 255. * std::min(1., srgb(double(step) / double(steps)))));
+    };
     Codes t{};
-    for (std::size_t i = 0; i < t.size(); ++i)
-      t[i] = float(255. * std::min(1., srgb(double(i) / double(steps))));
+    for (std::size_t i = 0; i < t.size(); ++i) t[i] = code(i) << 12 | (code(i + 1) - code(i));
     return t;
   }();
   return table;
 }
 
-[[gnu::always_inline]] inline float encoded(const float* table, float light) {
-  const float at = smaller(larger(light, 0.f), 1.f) * float(steps);
-  const auto i = std::int32_t(at);
-  return table[i] + (at - float(i)) * (table[i + 1] - table[i]);
+// That of a light, in units of 2⁻²⁰. In whole numbers, whose limits stay without branches.
+[[gnu::always_inline]] inline std::int32_t encoded(const std::uint32_t* table, float light) {
+  constexpr std::int32_t bits = 8;  // within a step
+  const std::int32_t at =
+      std::clamp(std::int32_t(light * float(steps << bits)), 0, std::int32_t(steps << bits));
+  const auto code = std::int32_t(table[at >> bits]), value = std::int32_t(table[at >> bits] >> 12);
+  return (value << bits) + (code & 4095) * (at & ((1 << bits) - 1));
 }
+
+constexpr float whole_code = float(1 << 20);
+[[gnu::always_inline]] inline std::int32_t byte_of(std::int32_t code) { return std::min(code >> 20, 255); }
+
+// Sums of pixels that follow one another, a plane for each channel and one for coverage.
+struct Planes {
+  std::int32_t* first;
+  std::size_t size;
+  std::int32_t* operator[](std::size_t channel) const { return first + channel * size; }
+};
 
 // Pixels that follow one another in a row, to be shown: what their samples' light and coverage are multiplied by.
 struct Exposed {
@@ -50,16 +67,18 @@ struct Exposed {
   float exposure, share;
 };
 
-// From sums to bytes; `light` is scratch.
-FOREST_CLONES void show(const Exposed& e, const float* table, const std::int32_t* __restrict sums,
-                        float* __restrict light, std::uint8_t* __restrict bytes) {
+// From sums to pixels of four bytes, the first the lowest.
+FOREST_CLONES void show(const Exposed& e, const std::uint32_t* table, const Planes& sums,
+                        std::uint32_t* __restrict shown) {
   const float exposure = e.exposure, share = e.share;
-  for (std::size_t i = 0; i < 4 * e.pixels; ++i) light[i] = encoded(table, float(sums[i]) * exposure);
+  const std::int32_t *red = sums[0], *green = sums[1], *blue = sums[2], *coverage = sums[3];
   for (std::size_t i = 0; i < e.pixels; ++i) {
-    const float noise = noise_at(e.x + std::int32_t(i), e.y, e.subframe);
-    for (std::size_t j = 0; j < 3; ++j)
-      bytes[4 * i + j] = std::uint8_t(std::int32_t(smaller(light[4 * i + j] + noise, 255.f)));
-    bytes[4 * i + 3] = std::uint8_t(std::int32_t(255.f * float(sums[4 * i + 3]) * share + .5f));
+    const auto noise = std::int32_t(whole_code * noise_at(e.x + std::int32_t(i), e.y, e.subframe));
+    const auto byte = [&](const std::int32_t* channel) __attribute__((always_inline)) {
+      return std::uint32_t(byte_of(encoded(table, float(channel[i]) * exposure) + noise));
+    };
+    const auto alpha = std::uint32_t(std::int32_t(255.f * float(coverage[i]) * share + .5f));
+    shown[i] = byte(red) | byte(green) << 8 | byte(blue) << 16 | alpha << 24;
   }
 }
 
@@ -127,7 +146,7 @@ using Channels = std::array<std::array<float, 128>, 3>;  // of the palette
 
 // The sums of a pixel's samples.
 template <int S>
-[[gnu::always_inline]] inline void add_samples(const std::uint32_t* keys, std::uint32_t wanted,
+[[gnu::always_inline]] inline void sum_samples(const std::uint32_t* keys, std::uint32_t wanted,
                                                const float* lit, const float* fog, const Channels& palette,
                                                const Vec3& mist, const Vec3& sky, std::int32_t (&sums)[4]) {
   std::int32_t covered[S];
@@ -150,48 +169,50 @@ template <int S>
       const float colour = covered[k] ? base + fog[k] * (mist_i - base) : sky_i;
       sum += fixed(colour) & mask[k];
     }
-    sums[i] += sum;
+    sums[i] = sum;
   }
   std::int32_t sum = 0;
   FOREST_LANES
   for (int k = 0; k < S; ++k) sum += covered[k] & mask[k];
-  sums[3] += sum;
+  sums[3] = sum;
 }
 
 struct Row {
   std::size_t pixels;
   const std::uint32_t* keys;
   const float *lit, *fog;
-  std::int32_t* sums;  // four a pixel
+  Planes sums;
 };
 
 template <int S>
-[[gnu::always_inline]] inline void add_row(const Row& row, std::uint32_t wanted, const Channels& palette,
+[[gnu::always_inline]] inline void set_row(const Row& row, std::uint32_t wanted, const Channels& palette,
                                            const Vec3& mist, const Vec3& sky) {
+  std::int32_t *__restrict red = row.sums[0], *__restrict green = row.sums[1],
+                           *__restrict blue = row.sums[2], *__restrict coverage = row.sums[3];
   for (std::size_t x = 0; x < row.pixels; ++x) {
-    std::int32_t sums[4] = {};
-    add_samples<S>(row.keys + x * S, wanted, row.lit + x * S, row.fog + x * S, palette, mist, sky, sums);
-    for (std::size_t i = 0; i < 4; ++i) row.sums[4 * x + i] += sums[i];
+    std::int32_t sums[4];
+    sum_samples<S>(row.keys + x * S, wanted, row.lit + x * S, row.fog + x * S, palette, mist, sky, sums);
+    red[x] = sums[0], green[x] = sums[1], blue[x] = sums[2], coverage[x] = sums[3];
   }
 }
 
-FOREST_CLONES void add_1(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+FOREST_CLONES void set_1(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
                          const Vec3& sky) {
-  add_row<1>(row, wanted, palette, mist, sky);
+  set_row<1>(row, wanted, palette, mist, sky);
 }
-FOREST_CLONES void add_4(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+FOREST_CLONES void set_4(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
                          const Vec3& sky) {
-  add_row<4>(row, wanted, palette, mist, sky);
+  set_row<4>(row, wanted, palette, mist, sky);
 }
-FOREST_CLONES void add_16(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+FOREST_CLONES void set_16(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
                           const Vec3& sky) {
-  add_row<16>(row, wanted, palette, mist, sky);
+  set_row<16>(row, wanted, palette, mist, sky);
 }
 
 // Adds to a pixel's sums what glass before its samples changes, sample by sample.
 void tint(const frame::Constants& c, const std::uint32_t* keys, std::uint32_t wanted, int samples,
           std::int32_t x, std::int32_t y, const float* lit, const float* fog, const Channels& palette,
-          const Vec3& mist, const Vec3& sky, std::int32_t* sums) {
+          const Vec3& mist, const Vec3& sky, const Planes& sums, std::size_t pixel) {
   const Vec3 glass(c.glass_red, c.glass_green, c.glass_blue);
   FOREST_LANES
   for (int k = 0; k < samples; ++k) {
@@ -203,7 +224,7 @@ void tint(const frame::Constants& c, const std::uint32_t* keys, std::uint32_t wa
     for (int i = 0; i < 3; ++i) {
       const float base = palette[std::size_t(i)][keys[k] >> 5 & 127] * lit[k];
       const float colour = empty ? sky[i] : base + fog[k] * (mist[i] - base);
-      sums[i] += fixed(colour + c.glass_opacity * (glass[i] - colour)) - fixed(colour);
+      sums[std::size_t(i)][pixel] += fixed(colour + c.glass_opacity * (glass[i] - colour)) - fixed(colour);
     }
   }
 }
@@ -226,7 +247,7 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
     for (std::size_t e = 0; e < palette.size(); ++e) channels[i][e] = palette[e][Eigen::Index(i)];
   const bool tinted = c.glass_opacity > 0.f;
   const float share = 1.f / float(so_far), exposure = c.exposure * share / unit;
-  const float* table = codes().data();
+  const std::uint32_t* table = codes().data();
   std::array<std::uint32_t, most_samples> ignored{};
   for (int k = 0; k < samples; ++k) ignored[std::size_t(k)] = wanted >> k & 1 ? 0u : ~0u;
   const std::int32_t left = std::int32_t(area.left), right = std::int32_t(area.right),
@@ -242,9 +263,8 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
                        end_x = std::min(right, begin_x + columns);
     const auto S = std::size_t(samples), pixels = std::size_t(end_x - begin_x),
                row_size = (pixels + 2 * beside) * S;
-    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S),
-        light(4 * pixels);
-    std::vector<std::uint32_t> keys((rows_at_once + 2 * beside) * row_size);
+    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S);
+    std::vector<std::uint32_t> keys((rows_at_once + 2 * beside) * row_size), shown(pixels);
     std::vector<std::int32_t> row_sums(4 * pixels);
     std::vector<std::uint8_t> empty(pixels);
     // Rows and columns around the block; the picture's edges are repeated.
@@ -266,9 +286,9 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
       for (std::size_t i = 0; i < 5; ++i) shading.rows[i] = &octaves[(k + i) * row_size + beside * S];
       find_empty(samples, row_keys, pixels, ignored.data(), empty.data());
       const Vec3 sky = top + (float(y) + .5f) / float(height) * (bottom - top);
-      std::int32_t sky_sum[3];
+      std::int32_t sky_sum[4] = {};
       for (int i = 0; i < 3; ++i) sky_sum[i] = fixed(sky[i]) * std::popcount(wanted);
-      float sky_code[3];
+      std::int32_t sky_code[3];
       for (int i = 0; i < 3; ++i) sky_code[i] = encoded(table, float(sky_sum[i]) * exposure);
       const auto row_at = std::size_t(y) * std::size_t(width) + std::size_t(begin_x);
       // Runs of pixels in which something is drawn, and what lies between.
@@ -283,34 +303,35 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
         if (nothing && at_once && !tinted) {
           for (std::size_t i = from; i < x; ++i) {
             std::uint8_t* pixel = &image.pixels[4 * (row_at + i)];
-            const float noise = noise_at(begin_x + std::int32_t(i), y, so_far - 1);
-            for (std::size_t j = 0; j < 3; ++j) pixel[j] = std::uint8_t(smaller(sky_code[j] + noise, 255.f));
+            const auto noise = std::int32_t(whole_code * noise_at(begin_x + std::int32_t(i), y, so_far - 1));
+            for (std::size_t j = 0; j < 3; ++j) pixel[j] = std::uint8_t(byte_of(sky_code[j] + noise));
             pixel[3] = 0;
           }
           continue;
         }
-        std::int32_t* to = row_sums.data();
-        std::fill(to, to + 4 * (x - from), 0);
+        const std::size_t count = x - from;
+        const Planes to{row_sums.data(), pixels};
         if (nothing && !tinted) {
-          for (std::size_t i = 0; i < x - from; ++i) std::copy(sky_sum, sky_sum + 3, to + 4 * i);
+          for (std::size_t i = 0; i < 4; ++i) std::fill_n(to[i], count, sky_sum[i]);
         } else {
           shade(shading, from * S, x * S, lit.data(), fog.data());
-          const Row row{x - from, row_keys + from * S, &lit[from * S], &fog[from * S], to};
-          (samples == 1 ? add_1 : samples == 4 ? add_4 : add_16)(row, wanted, channels, mist, sky);
+          const Row row{count, row_keys + from * S, &lit[from * S], &fog[from * S], to};
+          (samples == 1 ? set_1 : samples == 4 ? set_4 : set_16)(row, wanted, channels, mist, sky);
           for (std::size_t i = from; tinted && i < x; ++i)
             tint(c, row_keys + i * S, wanted, samples, begin_x + std::int32_t(i), y, &lit[i * S], &fog[i * S],
-                 channels, mist, sky, to + 4 * (i - from));
+                 channels, mist, sky, to, i - from);
         }
         if (!at_once) {
-          std::int32_t* before = &sums[4 * (row_at + from)];
-          for (std::size_t i = 0; i < 4 * (x - from); ++i)
-            to[i] = before[i] = (first ? 0 : before[i]) + to[i];
+          const Planes before{&sums[4 * std::size_t(y) * std::size_t(width) + std::size_t(begin_x) + from],
+                              std::size_t(width)};
+          for (std::size_t channel = 0; channel < 4; ++channel)
+            for (std::size_t i = 0; i < count; ++i)
+              to[channel][i] = before[channel][i] = (first ? 0 : before[channel][i]) + to[channel][i];
         }
         if (!last) continue;
-        std::uint8_t* bytes = &image.pixels[4 * (row_at + from)];
-        show({x - from, begin_x + std::int32_t(from), y, so_far - 1, exposure, share}, table, to,
-             light.data(), bytes);
-        for (std::size_t i = 3; i < 4 * (x - from); i += 4) alpha += bytes[i];
+        show({count, begin_x + std::int32_t(from), y, so_far - 1, exposure, share}, table, to, shown.data());
+        std::memcpy(&image.pixels[4 * (row_at + from)], shown.data(), 4 * count);
+        for (std::size_t i = 0; i < count; ++i) alpha += shown[i] >> 24;
       }
     }
     covered += alpha;

@@ -7,7 +7,8 @@
 
 namespace forest::render::cpu {
 
-/// Sums over samples in fixed point, red, green, blue and coverage of every pixel: the same whatever samples come together.
+/// Sums over samples in fixed point, of each row its red, its green, its blue and its coverage: the same whatever samples
+/// come together.
 using Sums = std::vector<std::int32_t>;
 
 /// Adds the samples of the canvas to the sums of those before them, and after the last ones makes the image: palette × shade,
