@@ -189,17 +189,24 @@ class Sketch {
     std::uint32_t near = 0;  // the segment that is asked first
     for (std::size_t i = 0; i < points.size();) {
       const std::size_t end = std::min(i + 4, points.size());
-      if (end == i + 4) {  // four points to one segment
+      if (end == i + 4) {  // four points to one segment, and to the next few, as the branch goes on
         Mat4 four = Eigen::Map<const Mat4>(points[i].data());
         four.transposeInPlace();
-        const Group& g = groups[near / 4];
-        const std::uint32_t n = near % 4;
-        const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
-        const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
-                   pz = four.col(2).array() - g.z[n];
-        const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
-        if (((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square() <= worst_squared)
-                .all()) {
+        Four squared = Four::Constant(INFINITY);
+        bool all = false;
+        for (const std::uint32_t beyond = std::min(near + 4, count); near < beyond && !all; ++near) {
+          const Group& g = groups[near / 4];
+          const std::uint32_t n = near % 4;
+          const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
+          const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
+                     pz = four.col(2).array() - g.z[n];
+          const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
+          squared =
+              squared.min((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square());
+          all = (squared <= worst_squared).all();
+        }
+        --near;
+        if (all) {
           i = end;
           continue;
         }
@@ -254,10 +261,16 @@ class Sketch {
     return sum;
   }
   float area(const Line& line) const {
-    float sum = 0.f;
-    for (std::uint32_t v = line.first + 1; v < line.first + line.count; ++v)
-      sum += distance(v, v - 1) * (radius_[v] + radius_[v - 1]);
-    return sum;
+    Four sum = Four::Zero();
+    for (std::uint32_t v = line.first + 1, end = line.first + line.count; v < end; v += 4) {
+      const auto rise = [v](const OfVertices<float>& list) {
+        return Four(Eigen::Map<const Four>(&list[v]) - Eigen::Map<const Four>(&list[v - 1]));
+      };
+      const Four radii = Eigen::Map<const Four>(&radius_[v]) + Eigen::Map<const Four>(&radius_[v - 1]);
+      const Four of = (rise(x_).square() + rise(y_).square() + rise(z_).square()).sqrt() * radii;
+      sum += (Four(0.f, 1.f, 2.f, 3.f) < float(end - v)).select(of, 0.f);
+    }
+    return sum.sum();
   }
 
   // Which lines follow one another through a node at which nothing else begins or ends, here or outside.

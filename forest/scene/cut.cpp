@@ -448,7 +448,9 @@ std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cut
   });
   std::vector<Cut> whole(cuts);
   parallel_for(cuts, 1, [&](std::size_t c) {
-    const auto take = [&](auto member) { join(whole[c].*member, member, std::span(std::as_const(parts)), c, cuts); };
+    const auto take = [&](auto member) {
+      join(whole[c].*member, member, std::span(std::as_const(parts)), c, cuts);
+    };
     take(&Cut::dots), take(&Cut::lines), take(&Cut::capsules), take(&Cut::left_out);
     for (std::size_t p = c; p < parts.size(); p += cuts) {
       whole[c].segments += parts[p].segments;

@@ -187,8 +187,7 @@ struct Row {
 template <int S>
 [[gnu::always_inline]] inline void set_row(const Row& row, std::uint32_t wanted, const Channels& palette,
                                            const Vec3& mist, const Vec3& sky) {
-  std::int32_t *__restrict red = row.sums[0], *__restrict green = row.sums[1],
-                           *__restrict blue = row.sums[2], *__restrict coverage = row.sums[3];
+  std::int32_t* __restrict red = row.sums[0], * __restrict green = row.sums[1], * __restrict blue = row.sums[2], * __restrict coverage = row.sums[3];
   for (std::size_t x = 0; x < row.pixels; ++x) {
     std::int32_t sums[4];
     sum_samples<S>(row.keys + x * S, wanted, row.lit + x * S, row.fog + x * S, palette, mist, sky, sums);
