@@ -201,8 +201,7 @@ class Sketch {
           const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
                      pz = four.col(2).array() - g.z[n];
           const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
-          squared =
-              squared.min((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square());
+          squared = squared.min((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square());
           all = (squared <= worst_squared).all();
         }
         --near;
