@@ -52,8 +52,10 @@ void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> ey
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];
     c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
-    c.revealed_segments_ = c.revealed_neurons_ = c.drawings_ = 0;
+    c.revealed_segments_ = c.drawings_ = 0;
     c.cut_ = std::move(cuts[i]);
+    c.in_sight_.clear(c.forest_.instances().size());
+    c.in_sight_.add(c.cut_);
     if (painter) painter(c.cut_, eyes[i]);
   }
 }
@@ -69,7 +71,7 @@ void Chooser::complete(frame::Frame& frame) {
       const bool rounds = !seen.depths.empty() && round_ + 1 < horizons_.size();
       const float horizon = rounds ? horizons_[round_ + 1] : INFINITY;
       revealed_ = revealed(forest_, {*eye_, &now, horizon}, left, shown_);
-      revealed_neurons_ += revealed_.neurons;
+      in_sight_.add(revealed_);
       ++round_;
     } while (revealed_.lists().empty());
     if (painter_) painter_(revealed_, *eye_);

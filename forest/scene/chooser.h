@@ -32,11 +32,9 @@ class Chooser {
   /// To be told after each drawing of such a frame.
   void remember(const frame::DepthMap& seen);
 
-  /// Of the last picture, all subframes' mean: chosen and revealed.
+  /// Of the last picture, chosen and revealed: segments, all subframes' mean, and neurons in sight.
   std::uint64_t segments() const { return cut_.segments + (drawings_ ? revealed_segments_ / drawings_ : 0); }
-  std::uint32_t neurons() const {
-    return cut_.neurons + std::uint32_t(drawings_ ? revealed_neurons_ / drawings_ : 0);
-  }
+  std::uint32_t neurons() const { return in_sight_.count(); }
 
  private:
   Forest forest_;
@@ -51,7 +49,8 @@ class Chooser {
   std::size_t round_ = 0;  // of those after the cut
   Painter painter_;
   Cut cut_, revealed_;
-  std::uint64_t revealed_segments_ = 0, revealed_neurons_ = 0, drawings_ = 0;
+  NeuronsInSight in_sight_;
+  std::uint64_t revealed_segments_ = 0, drawings_ = 0;
 };
 
 }  // namespace forest::scene

@@ -77,7 +77,11 @@ TEST(Whole, HoldsEverySegmentOnceWhenAllIsInSight) {
   camera.eye += camera.eye - camera.target;
   const Cut all = whole(forest, camera, viewport);
   EXPECT_EQ(all.segments, forest.segment_total());
-  EXPECT_EQ(all.neurons, forest.instances().size());
+  NeuronsInSight in_sight;
+  in_sight.clear(forest.instances().size());
+  in_sight.add(all);
+  in_sight.add(all);
+  EXPECT_EQ(in_sight.count(), forest.instances().size());     // each once
   camera.target = camera.eye + (camera.eye - camera.target);  // looking away
   EXPECT_EQ(whole(forest, camera, viewport).segments, 0u);
 }

@@ -308,14 +308,11 @@ void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, 
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   if (!neuron.cluster_count) return;
   if (const std::uint32_t far = look.far(index, sights)) {
-    each_of(far, [&](std::size_t s) { cuts[s].neurons += 1; });
+    each_of(far, [&](std::size_t s) { ++cuts[s].far; });
     if (!(sights &= ~far)) return;
   }
-  std::array<std::uint64_t, most_sights> before;
-  std::ranges::transform(cuts, before.begin(), &Cut::segments);
   // The soma lies within its root.
   choose_soma(look, index, choose_clusters(look, index, neuron.first_cluster, sights, cuts), cuts);
-  for (std::size_t s = 0; s < cuts.size(); ++s) cuts[s].neurons += cuts[s].segments > before[s];
 }
 
 struct Open {
@@ -336,7 +333,7 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
       const Sight& sight = look.sights[s];
       if (!look.in_sight(sight, judged.seen())) return;
       if (look.plain && look.straws_do(sight, judged.seen())) {
-        cuts[s].neurons += node.count;
+        cuts[s].far += node.count;
         return;
       }
       if (!judged.left_out(look, sight, {LeftOut::grove, 0, at, 0}, cuts[s])) within |= 1u << s;
@@ -454,7 +451,7 @@ std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cut
     take(&Cut::dots), take(&Cut::lines), take(&Cut::capsules), take(&Cut::left_out);
     for (std::size_t p = c; p < parts.size(); p += cuts) {
       whole[c].segments += parts[p].segments;
-      whole[c].neurons += parts[p].neurons;
+      whole[c].far += parts[p].far;
     }
   });
   return whole;
@@ -525,6 +522,16 @@ std::vector<const frame::State*> section_states(const Forest& forest, const Show
   return states;
 }
 
+void NeuronsInSight::add(const Cut& cut) {
+  count_ += cut.far;
+  for (const auto* list : {&cut.capsules, &cut.lines, &cut.dots})
+    for (const frame::Item& item : *list) {
+      if (item.instance == FOREST_IN_WORLD || marked_[item.instance]) continue;
+      marked_[item.instance] = true;
+      ++count_;
+    }
+}
+
 std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown) {
   const Look look{forest, sights, true, shown};
   const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
@@ -560,10 +567,7 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
         break;
     }
     if (!l.groups) {
-      const std::uint64_t before = cuts.front().segments;
       choose_clusters(look, l.instance, l.number, 1, cuts);
-      const Neuron& neuron = forest.neurons()[forest.instances()[l.instance].morphology];
-      cuts.front().neurons += l.number == neuron.first_cluster && cuts.front().segments > before;
       return;
     }
     const Placed placed(forest.instances()[l.instance]);

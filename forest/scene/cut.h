@@ -44,7 +44,7 @@ struct Cut {
   std::vector<frame::Item> dots, lines, capsules;  // nearest neurons first
   std::vector<frame::Band> bands;
   std::uint64_t segments = 0;  // drawn
-  std::uint32_t neurons = 0;   // in sight; of those that are straws, in a part of the forest that is
+  std::uint32_t far = 0;       // neurons that straws do for, in a part of the forest that is in sight
   std::vector<LeftOut> left_out;
   // Palette entries of the lists' segments (frame::Entries), where something coloured them (playback.h).
   struct Entries {
@@ -57,6 +57,18 @@ struct Cut {
     if (entries) lists.entries = {entries->dots, entries->lines, entries->capsules};
     return lists;
   }
+};
+
+/// Of how many neurons something is drawn, cut after cut of one picture.
+class NeuronsInSight {
+ public:
+  void clear(std::size_t neurons) { marked_.assign(neurons, false), count_ = 0; }
+  void add(const Cut& cut);
+  std::uint32_t count() const { return count_; }
+
+ private:
+  std::vector<bool> marked_;
+  std::uint32_t count_ = 0;
 };
 
 /// The depth cue of a picture.

@@ -218,7 +218,7 @@ TEST(Layers, ChosenTogetherAreWhatEachChoosesAlone) {
       EXPECT_TRUE(same(together[i].lines, alone.lines));
       EXPECT_TRUE(same(together[i].capsules, alone.capsules));
       EXPECT_EQ(together[i].segments, alone.segments);
-      EXPECT_EQ(together[i].neurons, alone.neurons);
+      EXPECT_EQ(together[i].far, alone.far);
       EXPECT_EQ(together[i].bands.size(), alone.bands.size());
     }
   }

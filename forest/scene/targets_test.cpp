@@ -279,7 +279,10 @@ TEST(Appearance, ABranchIsShownByItself) {
   view.targets.push_back(with(R"([{"name":"all","visible":true,"opacity":1}])").targets[0]);
   c = colour(targets, view);
   const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
-  EXPECT_EQ(again.neurons, 40u);
+  NeuronsInSight in_sight;
+  in_sight.clear(f.instances().size());
+  in_sight.add(again);
+  EXPECT_EQ(in_sight.count(), 40u);
   EXPECT_EQ(c.parts[0].state.opacity, 255);
   EXPECT_THAT(refused([&] {
                 view.targets[1].branch = Branch{40};

@@ -11,7 +11,6 @@ Cut whole(const Forest& forest, const frame::Camera& camera, const frame::Viewpo
     const Neuron& neuron = forest.neurons()[instance.morphology];
     const Vec3 place(instance.x, instance.y, instance.z);
     const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
-    const std::uint64_t before = cut.segments;
     for (const Cluster& c : forest.clusters().subspan(neuron.first_cluster, neuron.cluster_count)) {
       const Sphere sphere{place + turn * Vec3(c.x, c.y, c.z), c.radius};
       if (!c.is_leaf() || !frustum.may_see(sphere)) continue;
@@ -19,7 +18,6 @@ Cut whole(const Forest& forest, const frame::Camera& camera, const frame::Viewpo
                               sphere.centre.z(), sphere.radius});
       cut.segments += c.segment_count;
     }
-    cut.neurons += cut.segments > before;
   }
   cut.bands = {{0, 0, std::uint32_t(cut.capsules.size())}};
   return cut;

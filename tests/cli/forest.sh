@@ -11,7 +11,13 @@ view='{"eye":[700,1500,900],"target":[0,1300,0],"samples":2}'
 "$program" render a.forest --view "$view" --size 320x200 -o a.png --threads 1 --json >a.json
 "$program" render b.forest --view "$view" --size 320x200 -o b.png --threads 2 >/dev/null
 cmp a.png b.png || fail "the picture depends on the number of threads"
-grep -q '"neurons"' a.json || fail "no figures in JSON"
+# From where all are in sight, all are counted, whatever lies before them.
+far='"eye":[0,1000,5000],"target":[0,1000,0]'
+for how in '' ',"targets":[{"name":"all","kind":"somata"}]'; do
+  "$program" render a.forest --size 640x400 --view "{$far$how}" -o far.png --json >far.json
+  grep -q '"neurons": 1000,' far.json || fail "not all of 1000 neurons are counted: $how"
+  rm far.png
+done
 /usr/bin/python3 -c 'import json, sys; d = json.load(open("a.json")); sys.exit(not (0.05 < d["covered"] < 1 and d["segments"] > 10000))' ||
   fail "the picture shows too little"
 echo "$view" >view.json
