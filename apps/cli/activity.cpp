@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <memory>
+#include <optional>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -32,7 +34,15 @@ void run(const Options& options, Console& console) {
   for (const auto& input : {options.report, options.spikes})
     if (std::filesystem::equivalent(input, options.out, none))
       throw Error(options.out.string() + ": is what is read, so it is not replaced; name another file");
-  const reports::Report report = io::read_sonata_report(options.report, options.population);
+  const bool spikes_alone = options.report.empty();
+  if (spikes_alone && options.spikes.empty())
+    throw Error("there is nothing to pack; name a report, or spikes with --spikes");
+  std::vector<reports::Spikes> spikes;
+  if (!options.spikes.empty()) spikes = io::read_sonata_spikes(options.spikes, options.population);
+  std::optional<io::SonataCircuit> known;
+  if (spikes_alone) known = io::read_sonata(options.circuit, console.progress());
+  const reports::Report report = spikes_alone ? reports::without_values(spikes, known->nodes)
+                                              : io::read_sonata_report(options.report, options.population);
   reports::PackOptions pack;
   if (!options.range.empty())
     pack.range = {options.range[0], options.range[1]};
@@ -40,16 +50,17 @@ void run(const Options& options, Console& console) {
     throw InputError(
         options.report.string(), 0,
         fmt::format("holds values in {}; say from where to where they reach, with --range", report.units));
-  const io::SonataCircuit circuit = io::read_sonata(options.circuit, console.progress());
-  std::vector<reports::Spikes> spikes;
-  if (!options.spikes.empty()) spikes = io::read_sonata_spikes(options.spikes, options.population);
+  const io::SonataCircuit circuit =
+      known ? std::move(*known) : io::read_sonata(options.circuit, console.progress());
   reports::pack(report, circuit.circuit, circuit.morphologies, circuit.nodes, spikes, options.out, pack,
                 console.progress());
 
   const auto packed = reports::Activity::open(options.out);
   const reports::Facts& facts = packed.facts();
   const std::uint64_t values = packed.width(reports::Level::compartment);
-  if (facts.not_numbers)
+  if (spikes_alone)
+    console.warn("there are spikes alone: they flash on branches that have no values");
+  else if (facts.not_numbers)
     console.warn(
         fmt::format("{} of {} values are no numbers; they are kept as such, and drawn without a value",
                     facts.not_numbers, values * facts.steps));
@@ -79,15 +90,18 @@ void run(const Options& options, Console& console) {
                 {{options.out.string(), std::to_string(packed.rows().size()), std::to_string(values),
                   std::to_string(facts.steps), fmt::format("{:g}", facts.step),
                   std::to_string(packed.spikes().size()), std::to_string(packed.bytes())}});
-  console.say(fmt::format("\nValues of {:g} to {:g} {} are kept to {:.3f} {}", facts.range.low,
-                          facts.range.high, facts.units, facts.range.error(), facts.units));
+  if (!spikes_alone)
+    console.say(fmt::format("\nValues of {:g} to {:g} {} are kept to {:.3f} {}", facts.range.low,
+                            facts.range.high, facts.units, facts.range.error(), facts.units));
 }
 
 }  // namespace
 
 std::function<void()> activity(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  command.add_option("report", options->report, "A compartment or soma report of SONATA (HDF5)")->required();
+  command.add_option(
+      "report", options->report,
+      "A compartment or soma report of SONATA (HDF5); it may be left out where there are spikes");
   command
       .add_option("--circuit", options->circuit,
                   "The circuit that was simulated: its folder, or its configuration file")

@@ -92,9 +92,14 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     const scene::PackFigures figures =
         scene::pack(outline.circuit, read, options->out, console.progress(), names);
     const double seconds = seconds_since(begin);
-    const std::size_t synapses = options->no_synapses ? 0
-                                                      : pack_synapses(options->circuit, outline, options->out,
-                                                                      outline.warnings, console.progress());
+    std::size_t synapses = 0;
+    if (!options->no_synapses) try {
+        synapses =
+            pack_synapses(options->circuit, outline, options->out, outline.warnings, console.progress());
+      } catch (const Error& e) {  // the forest is whole without them
+        console.warn(fmt::format("{}; the forest has no synapses, --no-synapses leaves them out without this",
+                                 e.what()));
+      }
     count += outline.warnings.size();
     if (options->verbose) {
       for (const io::Warning& w : outline.warnings) console.warn(w.sentence);

@@ -129,6 +129,10 @@ void run(const Options& options, Console& console) {
   else
     io::write_png(options.out, picture.width_pixels, picture.height_pixels,
                   scene::paint(slice, colouring, picture).pixels);
+  if (slice.profiles.empty())
+    console.warn(
+        "the plane cuts no neuron where one looks; without --plane, --centre and --height it goes through "
+        "the middle of the forest");
   double total = 0.;
   std::size_t neurons = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {

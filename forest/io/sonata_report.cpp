@@ -78,7 +78,12 @@ Part read_part(const std::shared_ptr<const hdf5::File>& file, const std::string&
             .pointers = {},
             .elements = {},
             .positions = {}};
-  if (part.units.empty()) part.units = "mV";
+  if (part.units.empty()) {  // a voltage, unless it is called otherwise
+    const std::string variable = file->text_attribute(path + "/data", "variable");
+    const bool voltage =
+        variable.empty() || (variable.front() | 32) == 'v' || variable.starts_with("membrane");
+    part.units = voltage ? "mV" : fmt::format("unknown units of '{}'", variable);
+  }
   const std::size_t columns = part.data->columns();
 
   const std::string times = map + "/time";

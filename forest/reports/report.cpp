@@ -45,4 +45,32 @@ void check(const Report& report) {
   });
 }
 
+Report without_values(std::span<const Spikes> spikes, const Nodes& nodes) {
+  constexpr double before = 5., after = 100., finest = .1;  // ms
+  constexpr double most_steps = 1000.;
+  double first = INFINITY, last = -INFINITY;
+  for (const Spikes& of : spikes)
+    for (const double time : of.times) {
+      if (!std::isfinite(time)) throw InputError(of.source, 0, "a spike's time is no number; write it again");
+      first = std::min(first, time), last = std::max(last, time);
+    }
+  if (!(first <= last))
+    throw InputError(spikes.empty() ? "" : spikes.front().source, 0,
+                     "holds no spikes, so there is nothing to play; let the simulation run longer");
+  Report report;
+  report.source = spikes.front().source;
+  report.start = std::max(0., first - before);
+  const double length = last + after - report.start;
+  report.step = std::max(finest, length / most_steps);
+  report.steps = std::size_t(std::ceil(length / report.step));
+  report.populations = nodes.populations;
+  report.nodes = nodes.of_instance;
+  for (std::uint64_t i = 0; i <= report.nodes.size(); ++i) report.first_column.push_back(i);
+  report.element_ids.assign(report.nodes.size(), 0);
+  report.read = [](std::size_t, std::size_t rows, std::size_t, std::size_t columns, float* out) {
+    std::fill_n(out, rows * columns, NAN);
+  };
+  return report;
+}
+
 }  // namespace forest::reports

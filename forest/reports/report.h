@@ -5,6 +5,7 @@
 
 #include <cstdint>
 #include <functional>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -56,6 +57,11 @@ struct Spikes {
   std::vector<double> times;         // ms
   std::vector<std::uint64_t> nodes;  // as many
 };
+
+/// A report for spikes of which no values are known: one compartment without a number for every node, from 5 ms before
+/// the first spike to 100 ms after the last one, in at most a thousand steps.
+/// Throws InputError when there are no spikes, or when a time is not finite.
+Report without_values(std::span<const Spikes> spikes, const Nodes& nodes);
 
 /// A spike of a neuron of the circuit.
 struct Spike {

@@ -129,6 +129,22 @@ refuses 'node 7 of population few_cells is not in the circuit, where 7 neurons o
 $python report.py other.h5 40 element=1
 refuses 'has a compartment in section 6, but its morphology cell-' "$program" activity other.h5 --circuit column --out run.activity
 $python report.py other.h5 40 spiking=1
+"$program" activity --circuit column --spikes run.h5 --out spikes.activity --json >spikes.json 2>told
+grep -q "spikes alone" told
+told spikes.json "d['spikes'] == 3 and d['neurons'] == 7 and d['compartments'] == 7 and d['not_numbers'] == 7 * d['steps']"
+"$program" pack column -o spikes.forest >/dev/null
+"$program" render spikes.forest --activity spikes.activity --time 30.5 --size 160x120 -o flash.png --json >flash.json
+told flash.json "d['activity']['flashes'] >= 1"
+refuses "nothing to pack" "$program" activity --circuit column --out x.activity
+$python - <<'PY'
+import h5py, shutil
+shutil.copy("run.h5", "calcium.h5")
+with h5py.File("calcium.h5", "a") as file:
+    data = next(iter(file["report"].values()))["data"]
+    data.attrs.pop("units", None)
+    data.attrs["variable"] = "cai"
+PY
+refuses "unknown units of 'cai'; say from where to where they reach, with --range" "$program" activity calcium.h5 --circuit column --out x.activity
 refuses 'node 7 of population few_cells spikes and is not in the circuit' "$program" activity other.h5 --circuit column --spikes other.h5 --out run.activity
 $python report.py other.h5 40 units=nA
 refuses 'holds values in nA; say from where to where they reach, with --range' "$program" activity other.h5 --circuit column --out run.activity

@@ -29,6 +29,8 @@ svg = tree.parse("a.svg").getroot()
 assert svg.tag.endswith("svg") and any(g.get("id", "").startswith("neuron-") for g in svg), "no contours"
 PY
 
+"$program" section a.forest --plane 0,99999,0,0,1,0 -o nothing.png >told 2>&1
+grep -q "cuts no neuron" told || fail "an empty section is silent"
 fails_with 1 "no direction" "$program" section a.forest --plane 0,0,0,0,0,0 -o x.png
 fails_with 1 "nan" "$program" section a.forest --plane 0,0,0,nan,0,1 -o x.png
 fails_with 1 "x,y,z,nx,ny,nz" "$program" section a.forest --plane 1,2,3 -o x.png

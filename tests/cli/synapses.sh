@@ -92,4 +92,10 @@ import h5py
 with h5py.File("again/edges.h5", "a") as file:
     group = next(iter(file["edges"].values()))["0"]
     group["afferent_section_id"][7] = 30000'
-refuses "section 30000 of its target" "$program" pack again -o x.forest
+"$program" pack again -o x.forest 2>told >/dev/null || fail "edges that cannot be read hold up the forest"
+grep -q "section 30000 of its target.*has no synapses" told || fail "nobody is told of edges that cannot be read"
+rm again/edges.h5
+"$program" pack again -o y.forest 2>told >/dev/null || fail "edges that are missing hold up the forest"
+grep -q "edges.h5.*--no-synapses" told || fail "nobody is told of missing edges"
+cmp x.forest y.forest
+[ ! -e x.synapses ] && [ ! -e y.synapses ] || fail "there are synapses of damaged edges"
