@@ -108,7 +108,7 @@ inline Morphology neuron(std::uint64_t number, std::size_t sections = 40, std::s
     if (s % 5 == 0)
       builder.add_spine({.section = SectionId(s),
                          .position = value(),
-                         .head = {value(), value(), value()},
+                         .head = {value(), s % 2 ? -0.f : 0.f, value()},
                          .head_diameter = 0.3f,
                          .neck_diameter = 0.1f,
                          .shape = SpineShape(s % 6)});

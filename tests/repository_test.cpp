@@ -2,7 +2,7 @@
 // Neurons of every sort through the repository: the zoo, and every real file.
 #include "forest/repository/repository.h"
 
-#include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <unistd.h>
 
@@ -46,14 +46,33 @@ TEST_F(RepositoryOfNeurons, GiveTheZooBack) {
   EXPECT_TRUE(repository.check().empty());
 }
 
+/// Tracers write -0.00, which is equal to 0 and has other bits; the checksum is of the bits.
+TEST_F(RepositoryOfNeurons, GiveTracedSpinesBackWithTheSignsOfTheirZeros) {
+  const Morphology traced = io::find_format("asc")
+                                ->read(
+                                    "((Dendrite) (0.00 0 0 1) (0.00 10 0 1) "
+                                    "<((Color Pink) (-0.00 10.00 -0.00 0.50))> (0.00 20 0 1))",
+                                    "spine.asc")
+                                .morphology;
+  ASSERT_EQ(traced.spines().size(), 1u);
+  ASSERT_TRUE(std::signbit(traced.spines()[0].head.x()));
+  Repository repository = Repository::open(file_, Access::write);
+  const Morphology stored = repository.morphology(repository.add(traced, {.name = "cell"}).id);
+  EXPECT_EQ(stored, traced);
+  for (int axis = 0; axis < 3; ++axis)
+    EXPECT_EQ(std::signbit(stored.spines()[0].head[axis]), std::signbit(traced.spines()[0].head[axis]));
+  EXPECT_TRUE(repository.check().empty());
+}
+
 /// Out of a repository, into a file and back: the same sections, and length and area to a millionth.
 TEST_F(RepositoryOfNeurons, GiveEveryRealFileBack) {
   FOREST_REAL_DATA(folder, "morphologies/real");
   std::vector<fs::path> files;
-  for (const auto& entry : fs::recursive_directory_iterator(folder))
-    if (entry.path().extension() == ".swc") files.push_back(entry.path());
-  std::ranges::sort(files);
-  ASSERT_FALSE(files.empty());
+  for (const char* extension : {".asc", ".swc"}) {
+    const auto of_kind = files_below(folder, extension);
+    ASSERT_FALSE(of_kind.empty()) << extension;
+    files.insert(files.end(), of_kind.begin(), of_kind.end());
+  }
   Repository repository = Repository::open(file_, Access::write);
   auto transaction = repository.begin();
   const io::Format& swc = *io::find_format("swc");

@@ -206,6 +206,12 @@ inline std::vector<Specimen> zoo() {
   b.add_spine({SectionId(0), 31.f, Vec3(-1, 0, 0), .4f, .1f, SpineShape::thin});
   add("spines", 1, 1, 50.);
 
+  b.set_soma({.kind = SomaKind::sphere, .points = {{-0.f, 0, -0.f, 5}}, .parents = {}, .contour_starts = {}});
+  b.add_section({}, apical, Points{{-0.f, 5, 0, 1}, {0, 15, -0.f, 1}, {-0.f, 25, -0.f, 1}}, 4, 0);
+  b.add_spine({SectionId(0), 5.f, Vec3(-0.f, 1, -0.f), .5f, .1f, SpineShape::thin});
+  b.add_spine({SectionId(0), 15.f, Vec3(1, -0.f, 0), .5f, .1f, SpineShape::stubby});
+  add("zeros with a sign", 1, 1, 20.);
+
   b.annotate("CREATURE", "rat");
   b.annotate("comment", "  two\nlines # and a\ttab  ");
   b.annotate("species", "Mus musculus");

@@ -330,9 +330,11 @@ void print_rows(Console& console, const Options& options, const Table& table) {
   console.table(header, lines);
 }
 
-/// What the rows say of the neurons `ids`: of a metric with many values their mean.
-void store(const Options& options, const Picks& picks, const std::vector<repository::NeuronId>& ids,
-           const std::vector<Row>& rows, Progress& progress) {
+/// Keeps what the rows say of the neurons `ids`: of a metric with many values their mean. Of all metrics, those that can be
+/// kept; returns how many they are.
+std::size_t store(const Options& options, const Picks& picks, const std::vector<repository::NeuronId>& ids,
+                  const std::vector<Row>& rows, Progress& progress) {
+  const auto kept = [&](const Metric* m) { return !options.metrics.empty() || repository::can_store(*m); };
   auto repository = repository::Repository::open(options.repo, repository::Access::write);
   auto transaction = repository.begin();
   progress.begin("storing", ids.size());
@@ -341,7 +343,7 @@ void store(const Options& options, const Picks& picks, const std::vector<reposit
     values.clear();
     auto cell = rows[i].begin() + 1;
     for (const Metric* m : picks) {
-      values.emplace_back(m, std::get<double>(*cell));
+      if (kept(m)) values.emplace_back(m, std::get<double>(*cell));
       cell += m->level == Level::neuron ? 1 : std::ptrdiff_t(parts.size());
     }
     repository.store_metrics(ids[i], values);
@@ -349,6 +351,7 @@ void store(const Options& options, const Picks& picks, const std::vector<reposit
   }
   transaction.commit();
   progress.end();
+  return std::size_t(std::ranges::count_if(picks, kept));
 }
 
 void list(Console& console) {
@@ -414,7 +417,7 @@ void run(const Options& options, Console& console) {
   }
   if (unread == measured.size()) throw Error("no neuron could be read, so nothing was measured");
 
-  if (options.store) store(options, picks, ids, table.rows, console.progress());
+  const std::size_t stored = options.store ? store(options, picks, ids, table.rows, console.progress()) : 0;
   io::Workbook book{{sheet("metrics", table)}, {}};
   if (!options.by.empty()) {
     table = grouped(options, table, groups);
@@ -438,7 +441,7 @@ void run(const Options& options, Console& console) {
                               table.columns.size(), path.string()));
   if (options.store)
     console.say(fmt::format("{} of {} are kept in {}; list --where and query find them",
-                            counted(picks.size(), "metric"), counted(ids.size(), "neuron"), options.repo));
+                            counted(stored, "metric"), counted(ids.size(), "neuron"), options.repo));
   if (!written && options.level == "neuron" && options.metrics.empty() && table.rows.size() > 1)
     console.say("--metric NAME shows other metrics, --csv FILE writes them all, --list says what they are");
   if (failed)

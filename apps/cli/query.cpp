@@ -30,22 +30,19 @@ struct ToText {
   std::string operator()(std::monostate) const { return ""; }
   std::string operator()(std::int64_t value) const { return fmt::format("{}", value); }
   std::string operator()(double value) const { return fmt::format("{}", value); }
-  std::string operator()(const std::string& value) const { return repository::escaped(value); }
+  std::string operator()(const std::string& value) const { return repository::one_line(value); }
 };
 
 struct ToJson {
   nlohmann::ordered_json operator()(std::monostate) const { return nullptr; }
   nlohmann::ordered_json operator()(std::int64_t value) const { return value; }
   nlohmann::ordered_json operator()(double value) const { return value; }
-  nlohmann::ordered_json operator()(const std::string& value) const { return repository::escaped(value); }
+  nlohmann::ordered_json operator()(const std::string& value) const { return value; }
 };
 
 std::string csv_of(Answer answer) {
   io::TableSheet sheet{"answer", {}, std::move(answer.rows)};
   for (std::string& column : answer.columns) sheet.columns.push_back({std::move(column), ""});
-  for (auto& row : sheet.rows)
-    for (Answer::Value& value : row)
-      if (auto* text = std::get_if<std::string>(&value)) *text = repository::escaped(*text);
   return io::csv_of(sheet);
 }
 

@@ -29,17 +29,22 @@ std::string text_of(const Value& value) {
   return std::visit(text, value);
 }
 
-/// What looks like the code of a character in a workbook (_x0041_) gets a code for its first letter, so that it is none.
+/// Whether a character must be written as its code (_x005F_): the first of what looks like such a code, so that it is none
+/// (_x0041_), and of what libxlsxwriter would take for XML of its own (<r>…).
+bool needs_code(std::string_view text, std::size_t at) {
+  if (at == 0 && text.starts_with("<r>")) return true;
+  const std::string_view c = text.substr(at, 7);
+  return c.size() == 7 && c.starts_with("_x") && c[6] == '_' &&
+         c.substr(2, 4).find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
+}
+
 std::string coded(std::string_view text) {
   std::string result;
-  const auto is_code = [](std::string_view c) {
-    return c.size() == 7 && c.starts_with("_x") && c[6] == '_' &&
-           c.substr(2, 4).find_first_not_of("0123456789abcdefABCDEF") == std::string_view::npos;
-  };
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    if (is_code(text.substr(i, 7))) result += "_x005F";
-    result += text[i];
-  }
+  for (std::size_t i = 0; i < text.size(); ++i)
+    if (needs_code(text, i))
+      result += fmt::format("_x{:04X}_", static_cast<unsigned char>(text[i]));
+    else
+      result += text[i];
   return result;
 }
 
@@ -116,11 +121,57 @@ void add_chart(lxw_workbook* book, const Workbook& workbook, const Chart& chart,
                          lxw_col_t(int(beside) + right * (chart_width / 64 + 1)), drawn);
 }
 
+bool is_empty(const Value& value) {
+  const auto* number = std::get_if<double>(&value);
+  return number ? !std::isfinite(*number) : text_of(value).empty();
+}
+
+bool shows(const ReadCell& cell, const Value& value) {
+  if (is_empty(value)) return cell.kind == ReadCell::Kind::empty;
+  if (const auto* text = std::get_if<std::string>(&value)) return cell.text == cell_text(*text);
+  const auto* whole = std::get_if<std::int64_t>(&value);
+  const double number = whole ? double(*whole) : std::get<double>(value);
+  return cell.kind == ReadCell::Kind::number &&
+         std::abs(cell.number - number) <= 1e-14 * std::abs(number);  // it is written with 16 digits
+}
+
+bool shows(const ReadSheet& read, const TableSheet& sheet) {
+  if (read.header.size() != sheet.columns.size()) return false;
+  for (std::size_t c = 0; c < sheet.columns.size(); ++c)
+    if (read.header[c] != sheet.columns[c].title()) return false;
+  std::size_t at = 0;
+  for (std::size_t r = 0; r < sheet.rows.size(); ++r) {
+    if (std::ranges::all_of(sheet.rows[r], is_empty)) continue;
+    if (at == read.rows.size() || read.rows[at] != r + 2) return false;
+    for (std::size_t c = 0; c < sheet.columns.size(); ++c)
+      if (!shows(read.cell(at, c), sheet.rows[r][c])) return false;
+    ++at;
+  }
+  return at == read.rows.size();
+}
+
+/// libxlsxwriter writes each part into a file of its own first and does not look whether that found room, so what came of
+/// it is read again.
+bool is_whole(const std::filesystem::path& file, const Workbook& workbook) {
+  const MappedFile bytes(file);
+  try {
+    check_parts(bytes.text(), file.string());
+    const ReadWorkbook read = read_workbook(bytes.text(), file.string());
+    return std::ranges::equal(read.sheets, workbook.sheets,
+                              [](const ReadSheet& is, const TableSheet& sheet) { return shows(is, sheet); });
+  } catch (const InputError&) {
+    return false;
+  }
+}
+
 }  // namespace
 
 std::string_view cell_text(std::string_view text) {
-  if (text.size() <= longest_text) return text;
-  std::size_t end = longest_text;
+  text = text.substr(0, text.find('\0'));
+  std::size_t end = 0;
+  for (std::size_t size = 0; end < text.size(); ++end)
+    if ((size += needs_code(text, end) ? 7 : 1) > longest_text) break;
+  if (end == text.size()) return text;
   while (end && (static_cast<unsigned char>(text[end]) & 0xc0) == 0x80) --end;
   return text.substr(0, end);
 }
@@ -152,6 +203,10 @@ void write_workbook(const std::filesystem::path& path, const Workbook& workbook)
   if (const lxw_error error = workbook_close(owner.release()))
     throw Error(fmt::format("{}: the workbook cannot be written ({}); check that the disk has room", target,
                             lxw_strerror(error)));
+  if (!is_whole(part, workbook))
+    throw Error(
+        fmt::format("{}: the workbook cannot be written; make room in the folder {}, or choose fewer neurons",
+                    target, part.parent_path().string()));
   write_file(path, MappedFile(part).bytes());
 }
 

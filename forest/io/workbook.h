@@ -46,7 +46,7 @@ struct Workbook {
 
 constexpr std::size_t most_rows = 1048575;  // of a sheet, and a header
 
-/// The start of a text that fits into one cell (32,767 bytes), whole characters.
+/// The start of a text that fits into one cell (32,767 bytes), whole characters, none of them zero.
 std::string_view cell_text(std::string_view text);
 
 /// The file is written whole or not at all, and the same workbook gives the same bytes. Throws Error when a sheet has
@@ -110,6 +110,10 @@ bool recognises_workbook(std::string_view bytes);
 /// What Excel, LibreOffice or a program wrote. Throws InputError (file `name`) when it is cut off, damaged, locked by a
 /// password, something else, or beyond a limit.
 ReadWorkbook read_workbook(std::string_view bytes, const std::string& name);
+
+/// Throws InputError (file `name`) when a part of a workbook, be it a chart, is damaged or cut off. Sheets and shared texts
+/// are not looked at, which read_workbook() does.
+void check_parts(std::string_view bytes, const std::string& name);
 
 /// Appends a sheet from a CSV file: fields between commas, or semicolons or tabs where the header has those. Throws
 /// InputError (file `name`, line) when a quotation does not end or a row is longer than the header.

@@ -135,6 +135,12 @@ class Archive {
     throw InputError(name_, 0, fmt::format(sentence, std::forward<Words>(words)...));
   }
 
+  std::vector<std::string> parts() const {
+    std::vector<std::string> parts;
+    for (zip_int64_t i = 0, count = zip_get_num_entries(zip_.get(), 0); i < count; ++i)
+      if (const char* part = zip_get_name(zip_.get(), zip_uint64_t(i), 0)) parts.emplace_back(part);
+    return parts;
+  }
   bool has(const std::string& part) const { return zip_name_locate(zip_.get(), part.c_str(), 0) >= 0; }
 
   /// Calls `use` with piece after piece of a part.
@@ -437,6 +443,14 @@ ReadWorkbook read_workbook(std::string_view bytes, const std::string& name) {
     }
   }
   return book;
+}
+
+void check_parts(std::string_view bytes, const std::string& name) {
+  Archive archive(bytes, name);
+  pugi::xml_document document;
+  for (const std::string& part : archive.parts())
+    if (!part.starts_with("xl/worksheets/sheet") && part != "xl/sharedStrings.xml")
+      archive.load(part, document);
 }
 
 void read_csv(ReadWorkbook& book, std::string sheet, std::string_view bytes, const std::string& name) {

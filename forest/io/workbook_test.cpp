@@ -2,12 +2,15 @@
 #include "forest/io/workbook.h"
 
 #include <cmath>
+#include <csignal>
 #include <filesystem>
 #include <unistd.h>
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
+#include <sys/resource.h>
+#include <sys/wait.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -72,6 +75,69 @@ TEST(Workbook, WhatIsWrittenIsRead) {
   EXPECT_EQ(sheet.cell(2, 2).number, -1.25e-30);
   EXPECT_EQ(sheet.place(2, 2), "neurons!C5");
   EXPECT_EQ(read.find("points"), nullptr);
+}
+
+TEST(Workbook, OddTextsAreReadAsTheyWereWrittenOrAsTheirBeginning) {
+  using namespace std::string_literals;
+  std::string codes;
+  while (codes.size() < 30000) codes += "_x0041_";
+  Workbook book;
+  book.sheets.push_back({"texts", {{"text", ""}}, {}});
+  const std::vector<std::string> texts{"<r>no markup</r>", "<r>", "before\0after"s, codes,
+                                       "a\r\nb\tc",        " \n "};
+  for (const std::string& text : texts) book.sheets[0].rows.push_back({text});
+  const fs::path file = fs::temp_directory_path() / fmt::format("forest-workbook-odd-{}.xlsx", ::getpid());
+  write_workbook(file, book);
+  const ReadWorkbook read = read_workbook(MappedFile(file).text(), file.string());
+  fs::remove(file);
+  ASSERT_EQ(read.sheets.at(0).rows.size(), texts.size());
+  for (std::size_t i = 0; i < texts.size(); ++i) {
+    const std::string_view is = read.sheets[0].cell(i, 0).text;
+    EXPECT_EQ(is, cell_text(texts[i])) << i;
+    EXPECT_TRUE(!is.empty() && texts[i].starts_with(is)) << i;
+  }
+}
+
+/// However far each file can grow on the way, the workbook is whole or it is not there and a sentence says so.
+TEST(Workbook, OnAFullDiskItIsRefusedAndNotCut) {
+  Workbook book;
+  book.sheets.push_back({"points", {{"x", "µm"}, {"note", ""}}, {}});
+  for (int i = 0; i < 4000; ++i) book.sheets[0].rows.push_back({i / 7., fmt::format("point {}", i)});
+  book.charts.push_back({.title = "x", .x_title = "", .y_title = "", .sheet = 0, .x_column = 0, .count = 4});
+  const fs::path file = fs::temp_directory_path() / fmt::format("forest-workbook-full-{}.xlsx", ::getpid());
+  write_workbook(file, book);
+  const std::uintmax_t whole = fs::file_size(file);
+  const auto with_room = [&](std::uintmax_t bytes) {
+    const pid_t child = ::fork();
+    if (child == 0) {
+      std::signal(SIGXFSZ, SIG_IGN);
+      const rlimit limit{bytes, bytes};
+      ::setrlimit(RLIMIT_FSIZE, &limit);
+      try {
+        write_workbook(file, book);
+      } catch (const Error& error) {
+        ::_exit(std::string_view(error.what()).find("room") == std::string_view::npos ? 2 : 1);
+      }
+      ::_exit(0);
+    }
+    int status = 0;
+    ::waitpid(child, &status, 0);
+    return WIFEXITED(status) ? WEXITSTATUS(status) : -1;
+  };
+  std::size_t refused = 0, written = 0;
+  for (std::uintmax_t room = 0; room < 16 * whole; room += whole / 4) {
+    fs::remove(file);
+    const int status = with_room(room);
+    ASSERT_TRUE(status == 0 || status == 1) << room << ": " << status;
+    ASSERT_EQ(fs::exists(file), status == 0) << room;
+    if (status == 0) {
+      EXPECT_EQ(fs::file_size(file), whole) << room;
+    }
+    ++(status ? refused : written);
+  }
+  EXPECT_GT(refused, 8u) << "else this has tested nothing: a sheet takes more room than the packed workbook";
+  EXPECT_GT(written, 0u);
+  fs::remove(file);
 }
 
 TEST(Workbook, EveryFloatComesBackExactly) {

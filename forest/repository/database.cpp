@@ -3,6 +3,7 @@
 
 #include <iterator>
 
+#include "forest/core/error.h"
 #include "forest/morphology/morphology.h"
 #include "forest/repository/schema.h"
 #include "forest/repository/stored_metrics.h"
@@ -50,8 +51,14 @@ bool is_postgresql(std::string_view place) {
 }
 
 std::unique_ptr<Database> connect(const std::string& place, bool write, Refill refill) {
-  return is_postgresql(place) ? connect_postgresql(place, write, refill)
-                              : connect_sqlite(place, write, refill);
+  if (is_postgresql(place)) return connect_postgresql(place, write, refill);
+  if (is_meant_for_a_server(place))
+    throw Error(
+        "the repository is neither a file nor the address of a server; write "
+        "postgresql://role@host:port/database, with "
+        "the password in PGPASSWORD or ~/.pgpass, or ./ before the name of a file that looks like an "
+        "address");
+  return connect_sqlite(place, write, refill);
 }
 
 void migrate(Database& database, int from, Refill refill) {

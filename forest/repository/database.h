@@ -63,6 +63,9 @@ std::unique_ptr<Database> connect(const std::string& place, bool write, Refill r
 std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, Refill refill);
 std::unique_ptr<Database> connect_postgresql(const std::string& place, bool write, Refill refill);
 bool is_postgresql(std::string_view place);
+/// Whether a place that is none of a server was meant for one: another spelling of an address, or the keywords and values of
+/// one. It may hold a password, so it is not to be printed or made the name of a file.
+bool is_meant_for_a_server(std::string_view place);
 
 /// Runs what schema.h asks for after version `from`, in the open transaction, then `refill`; `from` 0: everything, and there
 /// is nothing to refill.

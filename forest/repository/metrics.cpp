@@ -11,13 +11,15 @@
 
 namespace forest::repository {
 
+bool can_store(const statistics::Metric& metric) { return metric.name != "type"; }
+
 /// Its number in the table `metrics`, where it is entered if it is not there.
 int Repository::Impl::number_of_metric(const statistics::Metric& metric) {
   if (const int number = stored_number(metric)) return number;
   const std::string name(metric.name), level(statistics::name_of(metric.level)), unit(metric.unit),
       definition(metric.definition);
   if (const auto known = ask<int>("select id from metrics where name = :name", name)) return *known;
-  if (name == "type")
+  if (!can_store(metric))
     throw Error("the metric type cannot be stored, for a neuron has a type anyway; leave it out");
   const int number = std::max(first_further_number, ask<int>("select max(id) from metrics").value_or(0) + 1);
   sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, "

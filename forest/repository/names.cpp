@@ -105,6 +105,16 @@ std::string unescaped(std::string_view text) {
   return bytes;
 }
 
+std::string one_line(std::string_view bytes) {
+  std::string line;
+  for (std::size_t i = 0; i < bytes.size(); ++i)
+    if (bytes[i] == '\n')
+      line += "␤";
+    else if (bytes.substr(i, 2) != "\r\n")
+      line += bytes[i];
+  return replaced(line, "\\x", [](std::string_view c) { return !is_control(c); });
+}
+
 std::string shown(std::string_view text) {
   const bool cut = text.size() > 80;
   return "'" + escaped(text.substr(0, 80)) + (cut ? "…'" : "'");

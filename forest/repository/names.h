@@ -22,6 +22,9 @@ std::string escaped(std::string_view bytes);
 std::string escaped_lines(std::string_view bytes);
 std::string unescaped(std::string_view text);  // the inverse of both
 
+/// A text on one line, to be looked at: an end of a line is ␤, what is no UTF-8 and other control characters are \xHH.
+std::string one_line(std::string_view bytes);
+
 /// The start of a long or strange text, to be quoted in a sentence.
 std::string shown(std::string_view text);
 

@@ -25,8 +25,6 @@ struct Sentence {
 
 // The first row that fits.
 constexpr Sentence sentences[] = {
-    {"42501",
-     "this role may not write there; ask the owner of the database to grant it, or name another role"},
     {"25006", "this connection may only read; ask the owner of the database to grant writing"},
     {"53100", "the server's disk is full and nothing of this was stored; make room and try again"},
     {"53", "the server is short of memory or connections and nothing of this was stored; try again later"},
@@ -40,23 +38,44 @@ constexpr Sentence sentences[] = {
     {"3F000", "there is no schema to make tables in; ask the owner of the database to make one"},
 };
 
+using Options = std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)>;
+
+/// What libpq makes of an address, or of keywords and values; null when it is none of both.
+Options options_of(const std::string& text) {
+  char* wrong = nullptr;
+  Options options(PQconninfoParse(text.c_str(), &wrong), PQconninfoFree);
+  PQfreemem(wrong);
+  return options;
+}
+
+/// Whether an option is a password, or may hold one that came there by mistake: role%3Apassword@host, role:pass/word@host.
+bool may_be_secret(std::string_view keyword, std::string_view value) {
+  const auto has = [&](std::string_view what) { return value.find(what) != value.npos; };
+  return keyword.ends_with("password") || (keyword == "user" && has(":")) ||
+         (keyword == "port" && value.find_first_not_of("0123456789,") != value.npos) ||
+         (keyword == "dbname" && (has("@") || has("password=")));
+}
+
+/// That a role may not do what it would (42501). @param why  the server's words, which name the table
+std::string not_allowed(bool write, std::string_view why) {
+  return fmt::format(
+      "this role may not {} there ({}); ask the owner of the database to grant it, or name another role",
+      write ? "write" : "read", why);
+}
+
 /// The address as the keywords and values that SOCI hands on to libpq, which knows the parts of an address best.
 std::string keywords_of(const std::string& place) {
-  char* wrong = nullptr;
-  const std::unique_ptr<PQconninfoOption, void (*)(PQconninfoOption*)> options(
-      PQconninfoParse(place.c_str(), &wrong), PQconninfoFree);
+  const Options options = options_of(place);
   const std::string shown = place.substr(0, place.find("://") + 3) + "…";  // without what may be secret
-  if (!options) {
-    PQfreemem(wrong);
-    throw InputError(shown, 0, "is no address; write it postgresql://role@host:port/database");
-  }
+  if (!options) throw InputError(shown, 0, "is no address; write it postgresql://role@host:port/database");
   std::string keywords;
   for (const PQconninfoOption* option = options.get(); option->keyword; ++option) {
     if (!option->val) continue;
-    if (std::string_view(option->keyword) == "password")
-      throw InputError(shown, 0,
-                       "holds a password, which others on this machine could read; give it in PGPASSWORD or "
-                       "~/.pgpass and leave it out of the address");
+    if (may_be_secret(option->keyword, option->val))
+      throw InputError(
+          shown, 0,
+          "holds what may be a password, which others on this machine could read; give it in PGPASSWORD or "
+          "~/.pgpass, and leave it out of the address");
     keywords += fmt::format("{}{}='", keywords.empty() ? "" : " ", option->keyword);
     for (const char* c = option->val; *c; ++c) {
       if (*c == '\'' || *c == '\\') keywords += '\\';
@@ -160,6 +179,12 @@ class Postgresql final : public Database {
                       "PGPASSWORD or ~/.pgpass",
                       why));
     }
+    const char* encoding = PQparameterStatus(connection(), "server_encoding");
+    if (encoding && std::string_view(encoding) != "UTF8" && std::string_view(encoding) != "SQL_ASCII")
+      throw InputError(place, 0,
+                       fmt::format("its texts are {}, which has no letters for all names and units; make a "
+                                   "database with encoding 'UTF8' template template0 and name that",
+                                   encoding));
     sql_ << "set client_min_messages = error";
     sql_ << "set client_encoding = 'UTF8'";
     sql_ << "set lock_timeout = '60s'";
@@ -167,8 +192,14 @@ class Postgresql final : public Database {
     sql_ << "set standard_conforming_strings = on";
   }
 
-  void begin_reading() override { sql_ << "begin transaction isolation level repeatable read read only"; }
-  void begin_writing() override { sql_ << "begin transaction isolation level read committed"; }
+  void begin_reading() override {
+    writing_ = false;
+    sql_ << "begin transaction isolation level repeatable read read only";
+  }
+  void begin_writing() override {
+    writing_ = true;
+    sql_ << "begin transaction isolation level read committed";
+  }
 
   std::string dialect(std::string_view text) const override {
     constexpr std::pair<std::string_view, std::string_view> words[] = {
@@ -196,7 +227,7 @@ class Postgresql final : public Database {
   void forbid_writing() override { sql_ << "set session characteristics as transaction read only"; }
 
   std::vector<std::string> each(const std::string& question, const Take& take) override {
-    PGconn* connection = static_cast<soci::postgresql_session_backend&>(*sql_.get_backend()).conn_;
+    PGconn* const connection = this->connection();
     using Result = std::unique_ptr<PGresult, void (*)(PGresult*)>;
     const auto send = [&](const std::string& text) {
       return Result(PQexecParams(connection, text.c_str(), 0, nullptr, nullptr, nullptr, nullptr, 0),
@@ -224,7 +255,8 @@ class Postgresql final : public Database {
                              [](char c) { return c >= 'A' && c <= 'Z' ? char(c | 32) : c; });
       if (state == "25006" || (state == "42601" && first != "select" && first != "with"))
         throw Error("a question can read and not write; ask with select");
-      if (state.starts_with("42") && state != "42501")
+      if (state == "42501") throw Error(not_allowed(false, why));
+      if (state.starts_with("42"))
         throw Error(fmt::format(
             "the question is not understood ({}); docs/repository/schema.md has the tables and views", why));
       throw Error(fmt::format("the question cannot be answered ({})", why));
@@ -265,10 +297,14 @@ class Postgresql final : public Database {
       throw;
     } catch (const soci::postgresql_soci_error& error) {
       const std::string state = error.sqlstate();
-      for (const Sentence& row : sentences)
-        if (state.starts_with(row.state)) throw InputError(place, 0, row.text);
       std::string why = error.what();
       std::ranges::replace(why, '\n', ' ');
+      if (state == "42501") {
+        const std::size_t begin = std::min(why.find("permission denied"), why.size());
+        throw InputError(place, 0, not_allowed(writing_, why.substr(begin, why.find("  ", begin) - begin)));
+      }
+      for (const Sentence& row : sentences)
+        if (state.starts_with(row.state)) throw InputError(place, 0, row.text);
       throw InputError(place, 0, fmt::format("the database refuses ({}); see the server's log", why));
     } catch (const soci::soci_error& error) {
       throw InputError(
@@ -305,9 +341,33 @@ class Postgresql final : public Database {
     return value<int>(sql_, "select case when has_table_privilege('neurons', 'insert') then 1 else 0 end") ==
            1;
   }
+
+ private:
+  PGconn* connection() { return static_cast<soci::postgresql_session_backend&>(*sql_.get_backend()).conn_; }
+
+  bool writing_ = false;  // what the transaction that was begun last is for
 };
 
 }  // namespace
+
+bool is_meant_for_a_server(std::string_view place) {
+  std::string text;
+  for (const char c : place)
+    if (c != ' ' && c != '\t' && c != '\r' && c != '\n') text += c >= 'A' && c <= 'Z' ? char(c | 32) : c;
+  for (const char* word : {"password=", "passwd=", "pwd="})
+    if (text.find(word) != text.npos) return true;
+  if (text.find('=') != text.npos && options_of(std::string(place))) return true;
+  const std::string_view scheme =
+      std::string_view(text).substr(0, text.find("://"));  // letters, then +driver
+  if (scheme.size() < text.size() && !scheme.empty() &&
+      scheme.find_first_not_of("abcdefghijklmnopqrstuvwxyz0123456789+-._:") == scheme.npos)
+    return true;
+  text.erase(0, text.find_first_not_of('/') < 2 ? 0 : std::min(text.find_first_not_of('/'), text.size()));
+  const std::string_view name = std::string_view(text).substr(0, text.find('/'));
+  const std::size_t colon = name.find(':');
+  return colon != name.npos && (name.substr(0, colon).find("postgres") != name.npos ||  // no name of a file
+                                name.find('@', colon) != name.npos);                    // role:password@host
+}
 
 std::unique_ptr<Database> connect_postgresql(const std::string& place, bool write, Refill refill) {
   auto database = std::make_unique<Postgresql>(place);
@@ -327,7 +387,8 @@ std::unique_ptr<Database> connect_postgresql(const std::string& place, bool writ
               "was made by a newer Brain Forest (its tables are of version {}, this program knows {}); "
               "use the newer program",
               version, schema_version));
-    if (write && !database->may_write()) throw InputError(place, 0, sentences[0].text);
+    if (write && !database->may_write())
+      throw InputError(place, 0, not_allowed(true, "it has no right to insert into neurons"));
     if (!write) database->sql() << "set session characteristics as transaction read only";
   } catch (...) {
     database->rethrow(place);

@@ -135,6 +135,9 @@ struct Revision {
   std::optional<Morphology> morphology = {};                     // none: as it is
 };
 
+/// Whether store_metrics() takes it: all but `type`, which is a column of neurons anyway.
+bool can_store(const statistics::Metric& metric);
+
 enum class Access : std::uint8_t { read, write };
 
 /// A neuron made ready to be stored: its rows, metrics, packed points and checksum. Most of the work of storing one, and
@@ -219,7 +222,7 @@ class Repository {
 
   /// Keeps metrics of a neuron so that it is found by them: those that are stored with every neuron anew, others besides, until
   /// its points are revised. One value each, of a metric of sections and the like their mean; NaN: none. Throws Error when there
-  /// is no such neuron, or the metric has the name of what a neuron has anyway (`type`).
+  /// is no such neuron, or the metric is none that can_store().
   void store_metrics(NeuronId id, std::span<const std::pair<const statistics::Metric*, double>> values);
 
   bool remove(NeuronId id);  // false when there was none

@@ -19,6 +19,7 @@
 #include "forest/morphology/measure.h"
 #include "forest/repository/names.h"
 #include "forest/repository/schema.h"
+#include "forest/statistics/metric.h"
 
 #include "tests/every_database.h"
 
@@ -423,6 +424,12 @@ TEST_P(EveryDatabase, IsSearchedByWhatIsKnownAndMeasured) {
       20u);
   EXPECT_EQ(repository.neurons_where("type = 'total_length'").size(), 0u) << "a text is no metric";
   EXPECT_THAT(message([&] { repository.neurons_where("colour = 'red'"); }), HasSubstr("not understood"));
+  const std::string metric = message([&] { repository.neurons_where("type <> 'x' and circularity > 0.5"); });
+  EXPECT_THAT(metric, HasSubstr("the metric circularity is not stored"));
+  EXPECT_THAT(metric, HasSubstr(fmt::format("--repo {} --metric circularity --store", place_)));
+  const std::pair<const statistics::Metric*, double> value{statistics::find_metric("circularity"), 0.75};
+  repository.store_metrics(NeuronId(2), std::span(&value, 1));
+  EXPECT_EQ(repository.neurons_where("circularity > 0.5").size(), 1u);
   EXPECT_THAT(message([&] { repository.neurons_where("1 = 1); delete from neurons; --"); }),
               testing::Ne("no error"));
   EXPECT_EQ(repository.neurons().size(), 20u);
@@ -457,7 +464,8 @@ TEST_P(EveryDatabase, AnswersQuestionsInSqlAndLetsNothingBeWritten) {
         "with x as (select 1) delete from neurons", "set transaction read write",
         "set session characteristics as transaction read write"})
     message([&] { repository.query(question); });
-  for (const char* question : {"delete from neurons", "create table t (x integer)", "drop view metric"})
+  for (const char* question :
+       {"delete from neurons", "create table t (x integer)", "drop view metric", "vacuum", "begin", "commit"})
     EXPECT_THAT(message([&] { repository.query(question); }), HasSubstr("read and not write")) << question;
   EXPECT_EQ(Repository::open(place_, Access::read).morphology(NeuronId(1)), m);
   EXPECT_FALSE(fs::exists("/tmp/forest-attached.db") || fs::exists("/tmp/forest-copied"));
@@ -475,6 +483,18 @@ TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
   EXPECT_THAT(message([&] { Repository::open(theirs, Access::read); }), HasSubstr("holds no repository"));
   EXPECT_THAT(message([&] { Repository::open(theirs, Access::write); }), HasSubstr("may not write"));
   Repository::open(mine, Access::write).add(neuron(3), called("three"));
+  for (const Access access : {Access::read, Access::write})
+    EXPECT_THAT(message([&] { Repository::open(theirs, access); }),
+                HasSubstr("may not read there (permission denied for table brainforest_schema)"));
+  ASSERT_TRUE(server.run("grant select on brainforest_schema, metrics to reader", "shared"));
+  {
+    Repository reader = Repository::open(theirs, Access::read);
+    EXPECT_THAT(message([&] { reader.neurons(); }), HasSubstr("may not read there (permission denied for"));
+    EXPECT_THAT(message([&] { reader.query("select * from points"); }),
+                HasSubstr("may not read there (permission denied for table points)"));
+    EXPECT_THAT(message([&] { reader.morphology(NeuronId(1)); }),
+                HasSubstr("may not read there (permission denied for table neurons)"));
+  }
   ASSERT_TRUE(server.run("grant select on all tables in schema public to reader", "shared"));
   Repository reader = Repository::open(theirs, Access::read);
   EXPECT_EQ(reader.morphology(NeuronId(1)), neuron(3));
@@ -482,6 +502,15 @@ TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
   EXPECT_THAT(message([&] { Repository::open(theirs, Access::write); }), HasSubstr("may not write"));
   EXPECT_THAT(message([&] { Repository::open(server.address("nowhere"), Access::read); }),
               HasSubstr("the server cannot be reached"));
+}
+
+TEST(Postgresql, ADatabaseThatIsNotUtf8IsToldSo) {
+  const auto& server = PostgresqlServer::get();
+  if (!server.runs()) GTEST_SKIP() << "there is no PostgreSQL here";
+  ASSERT_TRUE(server.run("create database latin encoding 'LATIN1' locale 'C' template template0"));
+  for (const Access access : {Access::read, Access::write})
+    EXPECT_THAT(message([&] { Repository::open(server.address("latin"), access); }),
+                HasSubstr("its texts are LATIN1"));
 }
 
 TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
@@ -493,7 +522,7 @@ TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
     return changed;
   };
   const std::vector<std::pair<std::string, std::string>> wrong{
-      {"", "is no repository"},
+      {"", "is no repository but an empty file"},
       {"n", "is no repository"},
       {"# a cell\n1 1 0 0 0 1 -1\n", "is no repository"},
       {std::string(100'000, '\0'), "is no repository"},
@@ -518,12 +547,39 @@ TEST_F(RepositoryTest, WhatIsNoRepositoryIsRefusedAndNotTouched) {
                 testing::Lt(300u));
     EXPECT_THAT(message([&] { Repository::open("postgresql://127.0.0.1:1/cells", access); }),
                 HasSubstr("the server cannot be reached"));
-    for (const char* secret :
-         {"postgresql://me:Rosebud@host/cells", "postgresql://host/cells?password=Rosebud"}) {
+    const fs::path before = fs::current_path();
+    fs::current_path(folder_);  // what were taken for a file would lie there
+    for (const char* secret : {"postgresql://me:Rosebud@host/cells",
+                               "postgresql://host/cells?password=Rosebud",
+                               "postgresql://host/cells?sslpassword=Rosebud",
+                               "postgresql://me%3ARosebud@host/cells",
+                               "postgresql://me:Rose/Rosebud@host/cells",
+                               "postgresql://me:12/Rosebud@host/cells",
+                               "postgresql://host/password=Rosebud",
+                               "POSTGRESQL://me:Rosebud@host/cells",
+                               "Postgres://me:Rosebud@host/cells",
+                               " postgresql://me:Rosebud@host/cells",
+                               "\tpostgres://me:Rosebud@host/cells",
+                               "postgresql:/me:Rosebud@host/cells",
+                               "postgresql:me:Rosebud@host/cells",
+                               "postgresql :// me:Rosebud@host/cells",
+                               "postgresql+psycopg2://me:Rosebud@host/cells",
+                               "jdbc:postgresql://host/cells?user=me&password=Rosebud",
+                               "postgressql://me:Rosebud@host/cells",
+                               "mysql://me:Rosebud@host/cells",
+                               "//me:Rosebud@host/cells",
+                               "me:Rosebud@host/cells",
+                               "host=127.0.0.1 password=Rosebud",
+                               "password = 'Rosebud' host=/tmp",
+                               "HOST=127.0.0.1 PASSWORD=Rosebud",
+                               "Server=127.0.0.1;Pwd=Rosebud;",
+                               "user=me host=127.0.0.1"}) {
       const std::string said = message([&] { Repository::open(secret, access); });
-      EXPECT_THAT(said, HasSubstr("PGPASSWORD"));
-      EXPECT_THAT(said, testing::Not(HasSubstr("Rosebud")));
+      EXPECT_THAT(said, HasSubstr("PGPASSWORD")) << secret;
+      EXPECT_THAT(said, testing::Not(HasSubstr("Rose"))) << secret;
+      EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1) << secret;
     }
+    fs::current_path(before);
   }
   EXPECT_THAT(message([&] { Repository::open(file_ + "x", Access::read); }),
               HasSubstr("there is no such repository"));

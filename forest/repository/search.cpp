@@ -108,6 +108,7 @@ namespace {
 /// A condition whose names of metrics have become columns of joined tables, and the joins.
 struct Condition {
   std::string text, joins;
+  std::vector<std::string> not_stored;  // words that name a metric, where no column has that name
 };
 
 /// @param numbers  of the metrics that are stored, by name
@@ -138,6 +139,7 @@ Condition condition_of(std::string_view text, const std::map<std::string, int, s
         condition.text += fmt::format("m{}.value", number);
       } else {
         condition.text += word;
+        if (metric) condition.not_stored.emplace_back(word);
       }
       at = end;
     } else {
@@ -148,6 +150,13 @@ Condition condition_of(std::string_view text, const std::map<std::string, int, s
   return condition;
 }
 
+std::string lower(std::string_view text) {
+  std::string result(text);
+  for (char& c : result)
+    if (c >= 'A' && c <= 'Z') c = char(c | 32);
+  return result;
+}
+
 }  // namespace
 
 std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::string_view population) const {
@@ -155,7 +164,19 @@ std::vector<NeuronRow> Repository::neurons_where(const std::string& text, std::s
   std::map<std::string, int, std::less<>> numbers;
   for (const auto& row : known.rows) numbers[text_of(row[0])] = int(number_in(row[1]));
   const Condition condition = condition_of(text, numbers);
-  return impl_->rows(fmt::format("({}) and {}", condition.text, in_population(population)), condition.joins);
+  try {
+    return impl_->rows(fmt::format("({}) and {}", condition.text, in_population(population)),
+                       condition.joins);
+  } catch (const Error& error) {
+    const std::string why = lower(error.what());
+    for (const std::string& word : condition.not_stored)
+      if (why.find(lower(word)) != why.npos)
+        throw Error(
+            fmt::format("the metric {0} is not stored with the neurons; store it with 'brainforest measure "
+                        "--repo {1} --metric {0} --store'",
+                        statistics::find_metric(word)->name, impl_->place));
+    throw;
+  }
 }
 
 Answer Repository::query(const std::string& question) {

@@ -308,7 +308,9 @@ std::vector<std::string> Sqlite::each(const std::string& question, const Take& t
   const int result =
       sqlite::sqlite3_prepare_v2(handle(), question.c_str(), int(question.size()), &prepared, &rest);
   const Statement statement(prepared, sqlite::sqlite3_finalize);
-  if (result == SQLITE_AUTH) throw Error("a question can read and not write; ask with select");
+  const int columns = sqlite::sqlite3_column_count(prepared);
+  if (result == SQLITE_AUTH || (prepared && columns == 0))
+    throw Error("a question can read and not write; ask with select");
   if (result == SQLITE_ERROR)
     throw Error(
         fmt::format("the question is not understood ({}); docs/repository/schema.md has the tables and views",
@@ -319,7 +321,6 @@ std::vector<std::string> Sqlite::each(const std::string& question, const Take& t
     throw Error("one question at a time; leave out what follows the first semicolon");
   std::vector<std::string> names;
   std::vector<Answer::Value> row;
-  const int columns = sqlite::sqlite3_column_count(prepared);
   for (int c = 0; c < columns; ++c) names.emplace_back(sqlite::sqlite3_column_name(prepared, c));
   int step;
   while ((step = sqlite::sqlite3_step(prepared)) == SQLITE_ROW) {
@@ -453,6 +454,8 @@ std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, R
     if (status.type() != fs::file_type::regular)
       throw InputError(place, 0,
                        "is not a regular file that can be read; name a file, not a folder or device");
+    if (fs::file_size(path, error) == 0)
+      throw InputError(place, 0, "is no repository but an empty file; remove it, or name another");
     database->open(path, SQLITE_OPEN_READWRITE);  // SQLite reads only when that is all the permissions allow
     const int version = examine(*database, place, path);
     const bool fixed = sqlite::sqlite3_db_readonly(database->handle(), "main");

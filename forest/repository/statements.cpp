@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 #include <numeric>
 #include <type_traits>
 #include <utility>
@@ -45,6 +46,12 @@ bool same(const Answer::Value& a, const Answer::Value& b, bool whole) {
   if (!x || !y) return a == b;
   const double larger = std::max({1., std::abs(*x), std::abs(*y)});
   return *x == *y || std::abs(*x - *y) <= (whole ? 1. : 0.) + 1e-9 * larger;
+}
+
+/// A float in a column from which the very same is read. SQLite keeps no -0, so it becomes the number next to it, too small to
+/// be any other float.
+double exactly(float number) {
+  return number == 0.f && std::signbit(number) ? -std::numeric_limits<double>::denorm_min() : double(number);
 }
 
 std::string shown(const Answer::Value& value) {
@@ -243,7 +250,7 @@ void Statements::fill(const Morphology& m) {
   for (const Spine& s : rows.spines) {
     const std::array<float, 6> numbers{s.position, s.head.x(),      s.head.y(),
                                        s.head.z(), s.head_diameter, s.neck_diameter};
-    for (std::size_t i = 0; i < 6; ++i) spine_[i].push_back(numbers[i]);
+    for (std::size_t i = 0; i < 6; ++i) spine_[i].push_back(exactly(numbers[i]));
     spine_section_.push_back(int(s.section.value()));
     spine_shape_.push_back(int(s.shape));
   }

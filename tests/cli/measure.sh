@@ -107,6 +107,11 @@ $BRAINFOREST measure --repo types.db --metric tmd_path_births,total_length --sto
 $BRAINFOREST check --repo types.db >/dev/null
 $BRAINFOREST export --repo types.db --out tables --format csv >/dev/null && grep -q 'tmd_path_births' tables/metrics.csv
 fails_with 1 'type' $BRAINFOREST measure --repo types.db --metric type --store
+fails_with 1 '--metric circularity --store' $BRAINFOREST list --repo types.db --where 'circularity >= 0'
+$BRAINFOREST measure --repo types.db --store >out.txt  # all but type, which a neuron has anyway
+all=$($BRAINFOREST measure --list --json | /usr/bin/python3 -c 'import json, sys; print(len(json.load(sys.stdin)))')
+grep -q "^$((all - 1)) metrics of" out.txt
+$BRAINFOREST list --repo types.db --where 'circularity >= 0 or circularity is null' >/dev/null
 fails_with 2 'whole neurons' $BRAINFOREST measure --repo types.db --kind axon --store
 fails_with 2 'repo' $BRAINFOREST measure fork.swc --store
 

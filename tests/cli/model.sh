@@ -40,7 +40,7 @@ TEXT
   [ "$($model show bush.ratio --repo "$repo")" = $'#define half 0.5\ndistribution ratio = truncnormal(half, 0.1, 0.2, 1)  # of diameters' ]
   [ "$($model show bush@2 --repo "$repo" --json | json '[(x["name"], x["version"]) for x in d[0]["distributions"]]')" = "[('bush.ratio', 1), ('bush.turn', 2)]" ]
   [ "$($model show bush.turn@1 --repo "$repo")" = 'distribution turn = uniform(20, 40)' ]
-  [ "$($BRAINFOREST query "select text from distribution where name = 'bush.turn' and version = 2" --repo "$repo" --json | json 'd["rows"][0][0]')" = 'distribution turn = uniform(10, 50)\x0A' ]
+  [ "$($BRAINFOREST query "select text from distribution where name = 'bush.turn' and version = 2" --repo "$repo" --json | json 'd["rows"][0][0]')" = 'distribution turn = uniform(10, 50)' ]
   short 1 "there is no model 'shrub'; those that are there: bush, pyramidal" $model show shrub --repo "$repo"
   short 1 "model 'bush' has no version 3; its newest is 2" $model show bush@3 --repo "$repo"
 

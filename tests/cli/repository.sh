@@ -222,10 +222,34 @@ PY
 [ "$($BRAINFOREST list --repo one.db --where "total_length > 3000 and name like 'cell%'" --json | json 'len(d["neurons"])')" = "$(sqlite3 one.db 'select count(*) from neurons where length > 3000')" ]
 $BRAINFOREST query "select name, 'a \"b\", c' as odd from neuron where id = 1" --repo one.db --csv answer.csv >out.txt
 [ "$(cat answer.csv)" = $'name,odd\r\ncell01,"a ""b"", c"\r' ]
+# Texts are what they are, lines and backslashes too; a table shows them on one line.
+question="select 'a' || char(13) || char(10) || 'b\\c, \"' || char(10) as text, x'00ff' as bytes"
+$BRAINFOREST query "$question" --repo one.db --csv lines.csv --json >lines.json
+/usr/bin/python3 - <<'PY'
+import csv, json
+text = 'a\r\nb\\c, "\n'
+assert json.load(open("lines.json"))["rows"] == [[text, "\\x00ff"]]
+assert list(csv.reader(open("lines.csv", newline=""))) == [["text", "bytes"], [text, "\\x00ff"]]
+PY
+$BRAINFOREST query "$question" --repo one.db >lines.txt
+grep -qF 'a␤b\c, "␤  \x00ff' lines.txt
 cp one.db kept.db
 fails_with 1 "read and not write" $BRAINFOREST query "delete from neurons" --repo one.db
 fails_with 1 "not understood" $BRAINFOREST query "select colour from neuron" --repo one.db
 fails_with 1 "not understood" $BRAINFOREST list --repo one.db --where "colour = 3"
 cmp one.db kept.db
-fails_with 1 "PGPASSWORD" $BRAINFOREST list --repo postgresql://me:secret@localhost/cells
-! grep -q secret err.txt
+for question in vacuum begin; do fails_with 1 "read and not write" $BRAINFOREST query "$question" --repo one.db; done
+cmp one.db kept.db
+: >nothing.db
+fails_with 1 "an empty file" $BRAINFOREST list --repo nothing.db
+
+# An address with a password, however it is misspelt, is neither printed nor made a file.
+for place in postgresql://me:secret@localhost/cells POSTGRESQL://me:secret@localhost/cells ' postgresql://me:secret@localhost/cells' \
+  postgresql:/me:secret@localhost/cells postgresql:me:secret@localhost postgresql+psycopg2://me:secret@localhost/cells \
+  postgresql://me%3Asecret@localhost/cells 'postgresql://localhost/cells?sslpassword=secret' 'host=127.0.0.1 password=secret'; do
+  for command in list "import cells" "query vacuum" "show cell07" "export --out none" measure "grow --grammar motoneuron --count 1"; do
+    fails_with 1 "PGPASSWORD" $BRAINFOREST $command --repo "$place"
+    ! grep -q secret out.txt err.txt || { echo "printed by $command: $place"; exit 1; }
+  done
+done
+[ -z "$(find . -name '*secret*')" ]

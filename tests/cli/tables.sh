@@ -32,6 +32,18 @@ assert len(files) == 7, files
 rows = list(csv.reader(open("tables/sections.csv", newline="", encoding="utf-8")))
 assert rows[0] == header and len(rows) == book["sections"].max_row
 PY
+# A full disk, also where the sheets lie before they are packed: a sentence, and no part of a workbook.
+for room in 4 20 100 400 800; do  # KiB
+  for command in "export --format xlsx --out" "measure --xlsx"; do
+    rm -f full.xlsx
+    if (ulimit -f $room && exec $BRAINFOREST $command full.xlsx --repo r.db) >out.txt 2>err.txt; then
+      /usr/bin/python3 -c 'import openpyxl; book = openpyxl.load_workbook("full.xlsx"); assert book.worksheets[-1].max_row > 1'
+    else
+      grep -q 'room' err.txt && [ ! -e full.xlsx ] || { echo "$command with $room KiB: $(cat err.txt)"; exit 1; }
+    fi
+  done
+done
+! (ulimit -f 400 && exec $BRAINFOREST export --repo r.db --format xlsx --out full.xlsx) >out.txt 2>err.txt
 ! $BRAINFOREST export --repo r.db --format xlsx --out /nowhere/cells.xlsx 2>err.txt
 [ ! -e /nowhere ]
 if $BRAINFOREST export --repo r.db --format xlsx --out cells.xlsx 2>err.txt; then exit 1; fi  # an edited workbook is not lost
