@@ -167,7 +167,7 @@ TEST(Asc, EveryDeviationIsToldWithItsLineAndRead) {
       {"several-outlines", 2, cell + cell + stem + ")", 1, 10.},
       {"outline-by-name", 1, "(\"Cell Body\" (Closed) (1 0 0 0) (0 1 0 0) (-1 0 0 0))" + stem + ")", 1, 10.},
       {"small-outline", 1, "(\"Soma\" (CellBody) (1 0 0 6))" + stem + ")", 1, 10.},
-      {"empty-outline", 2, cell + "(\"x\" (CellBody))" + stem + ")", 1, 10.},
+      {"empty-outline", 2, cell + "(\"Soma\" (CellBody))" + stem + ")", 1, 10.},
       {"no-type", 1, "((Color Red) (0 0 0 1)\n(0 10 0 1) )", 1, 10.},
       {"type-in-branch", 2, stem + "( (Dendrite) (0 20 0 1) | (9 10 0 1)))", 3, 29.},
       {"no-diameter", 2, stem + "(0 20 0))", 1, 20.},
