@@ -2,6 +2,7 @@
 // brainforest check: what is odd in neuron files, how it is read, what can be done; and mended copies, with a log from
 // which the original can be made again byte for byte.
 #include <algorithm>
+#include <array>
 #include <filesystem>
 #include <functional>
 #include <map>
@@ -46,7 +47,12 @@ struct Options {
 struct Found {
   std::size_t line = 0;
   std::string cell, code, what, mend;
+  bool note = false;  // to be looked at; many sound neurons have it
 };
+
+/// Notes of validate() that are told. The others (bifurcations, changes of kind) are what neurons are like.
+constexpr std::array<std::string_view, 6> told_notes{"no-soma",           "zero-length", "far-stem",
+                                                     "single-point-stem", "fat-end",     "narrow-start"};
 
 struct Checked {
   fs::path path;
@@ -70,29 +76,34 @@ void look_at(const io::Cell& cell, Checked& checked) {
   struct Rest {
     std::size_t count = 0;
     std::string mend;
+    bool note = false;
   };
   std::map<std::string_view, Rest> codes;
   for (const Finding& f : validate(cell.read.morphology)) {
-    if (f.severity == Severity::note || std::ranges::count(cell.read.warnings, f.code, &io::Warning::code))
+    const bool note = f.severity == Severity::note;
+    if ((note && !std::ranges::count(told_notes, f.code)) ||
+        std::ranges::count(cell.read.warnings, f.code, &io::Warning::code))
       continue;
     const std::size_t half = std::min(f.sentence.find("; "), f.sentence.size());
     Rest& rest = codes[f.code];
+    rest.note = note;
     rest.mend = half < f.sentence.size() ? f.sentence.substr(half + 2) : "";
     if (++rest.count > told) continue;
     const std::string place = f.section.valid() ? fmt::format("section {}: ", f.section.value()) : "";
     checked.found.push_back(
-        {0, cell.name, std::string(f.code), place + f.sentence.substr(0, half), rest.mend});
+        {0, cell.name, std::string(f.code), place + f.sentence.substr(0, half), rest.mend, note});
   }
   for (const auto& [code, rest] : codes)
     if (rest.count > told)
       checked.found.push_back({0, cell.name, std::string(code),
                                fmt::format("the same at {}", counted(rest.count - told, "more place")),
-                               rest.mend});
+                               rest.mend, rest.note});
 }
 
 Json json_of(const Found& f) {
   Json json{{"line", f.line}, {"code", f.code}, {"what", escaped(f.what)}, {"mend", f.mend}};
   if (!f.cell.empty()) json["cell"] = escaped(f.cell);
+  if (f.note) json["note"] = true;
   return json;
 }
 
@@ -141,15 +152,20 @@ void check_file(Checked& checked, const Options& options, const fs::path& to, co
 void report(const std::vector<Checked>& files, Console& console) {
   Json list = Json::array();
   std::vector<std::vector<std::string>> rows;
-  std::size_t sound = 0, odd = 0, failed = 0, skipped = 0, mended = 0, together = 0;
+  std::size_t sound = 0, noted = 0, odd = 0, failed = 0, skipped = 0, mended = 0, together = 0;
   for (const Checked& file : files) {
     const std::string path = escaped(file.path.string());
-    (file.skipped ? skipped : !file.error.empty() ? failed : file.found.empty() ? sound : odd) += 1;
+    (file.skipped                                    ? skipped
+     : !file.error.empty()                           ? failed
+     : file.found.empty()                            ? sound
+     : std::ranges::all_of(file.found, &Found::note) ? noted
+                                                     : odd) += 1;
     mended += !file.mended.empty(), together += file.together > 0;
     Json entry{{"file", path}, {"format", file.format}, {"findings", Json::array()}};
     for (const Found& f : file.found) {
       entry["findings"].push_back(json_of(f));
-      rows.push_back({path, f.line ? std::to_string(f.line) : "", f.code, escaped(f.what), f.mend});
+      rows.push_back({path, f.line ? std::to_string(f.line) : "", f.note ? f.code + " (note)" : f.code,
+                      escaped(f.what), f.mend});
     }
     if (!file.error.empty()) {
       entry[file.skipped ? "skipped" : "error"] = file.error;
@@ -165,11 +181,13 @@ void report(const std::vector<Checked>& files, Console& console) {
   }
   if (!rows.empty())
     console.table({"file", "line", "code", "what, and how it was read", "how to mend it"}, rows);
-  console.say(fmt::format("{} without a finding, {} with some, {} not read{}{}", counted(sound, "file"), odd,
-                          failed, skipped ? fmt::format(", {} skipped", skipped) : "",
+  console.say(fmt::format("{} without a finding, {} with some{}, {} not read{}{}", counted(sound, "file"),
+                          odd, noted ? fmt::format(", {} with notes only", noted) : "", failed,
+                          skipped ? fmt::format(", {} skipped", skipped) : "",
                           mended ? fmt::format("; {} mended, each with a log beside it", mended) : "") +
               (together ? fmt::format("; {} of several cells not mended", together) : ""));
   console.print({{"sound", sound},
+                 {"noted", noted},
                  {"odd", odd},
                  {"failed", failed},
                  {"skipped", skipped},

@@ -63,16 +63,22 @@ Target find_target(std::string_view name) {
 /// A neuron on its way from one file to another.
 struct Conversion {
   fs::path from, to;
+  std::string cell;                   // its name in a container
   std::vector<io::Warning> warnings;  // oddities of the file that was read
   std::vector<io::Warning> losses;    // what the other one cannot hold
   std::string error;                  // why it could not be read; empty when it could
   bool skipped = false;               // it holds no neuron, and lay in a folder
 };
 
+fs::path numbered(const fs::path& path, int number) {
+  return path.parent_path() / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
+}
+
 using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
 
-/// Where the cells of a file go, each by its own name when there are several.
-std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to) {
+/// Where the cells of a file go, each by its own name when there are several; to none of the `others`.
+std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to,
+                                const std::set<fs::path>& others) {
   if (cells.count == 1) return {to};
   std::vector<std::string> names(cells.count);
   parallel_for(cells.count, 16, [&](std::size_t i) {
@@ -82,41 +88,49 @@ std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to)
     }
   });
   std::vector<fs::path> places;
-  std::set<std::string> taken;
+  std::set<fs::path> taken;
   for (std::size_t i = 0; i < cells.count; ++i) {
-    std::string cell = names[i].empty() ? std::to_string(i + 1) : repository::file_name(names[i]);
-    const std::string wanted = cell;
-    for (int number = 2; !taken.insert(cell).second; ++number) cell = fmt::format("{}-{}", wanted, number);
-    places.push_back(to.parent_path() / (to.stem().string() + "-" + cell + to.extension().string()));
+    const std::string cell = names[i].empty() ? std::to_string(i + 1) : repository::file_name(names[i]);
+    const fs::path wanted = to.parent_path() / (to.stem().string() + "-" + cell + to.extension().string());
+    fs::path place = wanted;
+    for (int number = 2; others.contains(place) || !taken.insert(place).second; ++number)
+      place = numbered(wanted, number);
+    places.push_back(std::move(place));
   }
   return places;
 }
 
+/// A file that is open while its cells are read.
+struct Opened {
+  MappedFile file;
+  const io::Format& format;
+  io::CellReader cells;
+
+  explicit Opened(const fs::path& path)
+      : file(path),
+        format(io::format_of(path, file.text())),
+        cells(io::read_each(format, file.text(), escaped(path.string()))) {}
+};
+
+/// What is done with cell i of a file, by any thread.
+using Take = std::function<void(std::size_t i, Conversion&, io::Cell)>;
+
 /// The conversions of one file: one, or one for each of its cells.
-std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, const Target& target,
-                                     const Options& options, const Put& put) {
+/// @param begin  is told the file before its first cell is taken
+std::vector<Conversion> convert_file(const fs::path& from, const Options& options,
+                                     const std::function<Take(const Opened&)>& begin) {
   std::vector<Conversion> done;
   try {
-    const MappedFile file(from);
-    const io::CellReader cells =
-        io::read_each(io::format_of(from, file.text()), file.text(), escaped(from.string()));
-    const std::vector<fs::path> places = places_of(cells, to);
-    done.resize(cells.count);
-    parallel_for(cells.count, 4, [&](std::size_t i) {
+    const Opened opened(from);
+    const Take take = begin(opened);
+    done.resize(opened.cells.count);
+    parallel_for(done.size(), 4, [&](std::size_t i) {
       Conversion& conversion = done[i];
-      conversion.from = from, conversion.to = places[i];
+      conversion.from = from;
       try {
-        io::Cell cell = cells.read(i);
+        io::Cell cell = opened.cells.read(i);
         conversion.warnings = std::move(cell.read.warnings);
-        const Morphology& m = cell.read.morphology;
-        if (target.neuron) {
-          conversion.losses = io::losses(m, target.neuron->keeps);
-          put(conversion.to, target.neuron->write(m));
-        } else {
-          const io::Model model =
-              io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
-          put(conversion.to, target.model->write(model));
-        }
+        take(i, conversion, std::move(cell));
       } catch (const LimitError& error) {
         conversion.error = fmt::format("{}: {}", escaped(from.string()), error.what());
       } catch (const InputError& error) {  // the other cells may be sound
@@ -124,7 +138,7 @@ std::vector<Conversion> convert_file(const fs::path& from, const fs::path& to, c
       }
     });
   } catch (const InputError& error) {
-    done.emplace_back(Conversion{from, {}, {}, {}, error.what(), may_skip(error, from, options.files)});
+    done.emplace_back(Conversion{from, {}, {}, {}, {}, error.what(), may_skip(error, from, options.files)});
   }
   return done;
 }
@@ -135,8 +149,8 @@ void tell(const Conversion& conversion, const Options& options, Console& console
     console.warn(conversion.skipped ? conversion.error + "; skipped" : conversion.error);
     return;
   }
-  if (options.verbose)
-    for (const io::Warning& w : conversion.warnings)
+  for (const io::Warning& w : conversion.warnings)
+    if (options.verbose || w.lost)
       console.warn(
           fmt::format("{}{}: {}: {}", from, w.line ? fmt::format(":{}", w.line) : "", w.code, w.sentence));
   for (const io::Warning& w : conversion.losses)
@@ -150,9 +164,10 @@ nlohmann::ordered_json json_of(const std::vector<io::Warning>& warnings) {
   return list;
 }
 
-/// Where each file goes: beside its name with another extension, folders as they lie below the one that was named.
+/// Where each file goes: beside its name with another extension, folders as they lie below the one that was named; twins
+/// are numbered.
 std::vector<fs::path> targets(const Options& options, const std::vector<fs::path>& files,
-                              std::string_view extension) {
+                              std::string_view extension, Console& console) {
   std::vector<fs::path> targets;
   std::map<fs::path, fs::path> taken;
   for (const fs::path& file : files) {
@@ -162,72 +177,36 @@ std::vector<fs::path> targets(const Options& options, const std::vector<fs::path
         if (const fs::path relative = file.lexically_relative(named);
             !relative.empty() && *relative.begin() != "..")
           below = relative;
-    fs::path to = options.out / below.replace_extension(std::string(extension));
-    if (const auto [other, fresh] = taken.try_emplace(to, file); !fresh)
-      throw Error(fmt::format("{} and {} would both become {}; convert them into different folders",
-                              other->second.string(), file.string(), to.string()));
+    const fs::path wanted = options.out / below.replace_extension(std::string(extension));
+    fs::path to = wanted;
+    for (int number = 2; !taken.try_emplace(to, file).second; ++number) to = numbered(wanted, number);
+    if (to != wanted)
+      console.warn(fmt::format("{}: becomes {}, for {} becomes {}", escaped(file.string()),
+                               escaped(to.string()), escaped(taken[wanted].string()),
+                               escaped(wanted.string())));
     targets.push_back(std::move(to));
   }
   return targets;
 }
 
-void run(Options options, Console& console) {
-  // `convert A B`: the second name is the target when no folder is named.
-  fs::path single;
-  if (options.out.empty()) {
-    single = options.files[1];
-    if (fs::is_directory(single))
-      throw Error(fmt::format("{} is a folder; convert into it with --format NAME --out {}", single.string(),
-                              single.string()));
-    options.files.pop_back();
-  }
-  const Target target = single.empty() ? find_target(options.format) : target_of(single);
-  if (target.neuron && !target.neuron->write)
-    throw Error(fmt::format("{} can be read but not written; choose another format", target.title()));
-  options.model.geometry = *io::geometry(options.geometry);
-  if (target.model) io::check(*target.model, options.model.geometry);
-  const std::vector<fs::path> files = neuron_files(options.files, console);
-  const std::vector<fs::path> to =
-      single.empty() ? targets(options, files, target.extension()) : std::vector{single};
-  std::vector<std::vector<Conversion>> done(files.size());
-  const auto each = [&](const char* stage, const Put& put) {
-    console.progress().begin(stage, files.size());
-    parallel_for(files.size(), 1, [&](std::size_t i) {
-      done[i] = convert_file(files[i], to[i], target, options, put);
-      console.progress().advance();
-    });
-    console.progress().end();
-  };
-  const auto folder = [](const fs::path& file) {
-    return file.parent_path().empty() ? "." : file.parent_path();
-  };
-  if (!options.force && holds_files(single.empty() ? options.out : folder(single))) {
-    Overwrites overwrites;
-    each("comparing", [&](const fs::path& path, std::string_view bytes) { overwrites.look(path, bytes); });
-    overwrites.refuse();
-  }
-  std::error_code error;
-  for (const fs::path& path : to)
-    if (!path.parent_path().empty() && (fs::create_directories(path.parent_path(), error), error))
-      throw Error(fmt::format("{}: the folder cannot be made ({}); name one that can be written",
-                              path.parent_path().string(), error.message()));
-
-  each("converting", [](const fs::path& path, std::string_view bytes) { write_file(path, bytes); });
-
+void report(const std::vector<std::vector<Conversion>>& done, const Target& target, const Options& options,
+            Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t written = 0, failed = 0, skipped = 0, oddities = 0, lost = 0;
   for (const auto& conversions : done)
     for (const Conversion& c : conversions) {
       tell(c, options, console);
       (c.error.empty() ? written : c.skipped ? skipped : failed) += 1;
-      oddities += c.warnings.size(), lost += c.losses.size();
+      const auto not_kept = std::size_t(std::ranges::count_if(c.warnings, &io::Warning::lost));
+      oddities += c.warnings.size() - not_kept, lost += c.losses.size() + not_kept;
       nlohmann::ordered_json entry{{"from", escaped(c.from.string())}};
-      if (c.error.empty())
-        entry.update({{"to", escaped(c.to.string())},
-                      {"warnings", json_of(c.warnings)},
-                      {"losses", json_of(c.losses)}});
-      else
+      if (c.error.empty()) {
+        entry["to"] = escaped(c.to.string());
+        if (!c.cell.empty()) entry["cell"] = escaped(c.cell);
+        entry.update({{"warnings", json_of(c.warnings)}, {"losses", json_of(c.losses)}});
+      } else {
         entry[c.skipped ? "skipped" : "error"] = c.error;
+      }
       list.push_back(std::move(entry));
     }
   console.print({{"format", target.name()},
@@ -242,7 +221,140 @@ void run(Options options, Console& console) {
                                                        : ""));
   if (failed)
     throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
-                            files.size()));
+                            done.size()));
+}
+
+void make_folder_of(const fs::path& file) {
+  std::error_code error;
+  if (!file.parent_path().empty() && (fs::create_directories(file.parent_path(), error), error))
+    throw Error(fmt::format("{}: the folder cannot be made ({}); name one that can be written",
+                            file.parent_path().string(), error.message()));
+}
+
+/// All neurons into one file. They are called as their files are, several of a file with their own names behind; those of
+/// a container alone keep theirs.
+void run_together(const Options& options, const std::vector<fs::path>& files, const Target& target,
+                  const fs::path& out, Console& console) {
+  std::vector<std::vector<Conversion>> done(files.size());
+  std::vector<std::vector<io::NamedMorphology>> read(files.size());
+  console.progress().begin("converting", files.size());
+  parallel_for(files.size(), 1, [&](std::size_t f) {
+    done[f] = convert_file(files[f], options, [&](const Opened& opened) -> Take {
+      const std::size_t count = opened.cells.count;
+      read[f].resize(count);
+      std::string stem = files.size() > 1 || count == 1 ? escaped(files[f].stem().string()) : "";
+      const bool as_it_is = stem.empty() && &opened.format == target.neuron;
+      return [&, f, count, stem, as_it_is](std::size_t i, Conversion& conversion, io::Cell cell) {
+        std::string name = stem;
+        if (count > 1) {
+          if (!name.empty()) name += '-';
+          name += cell.name.empty() ? std::to_string(i + 1)
+                  : as_it_is        ? cell.name
+                                    : repository::file_name(cell.name);
+        }
+        conversion.to = out;
+        conversion.losses = io::losses(cell.read.morphology, target.neuron->keeps);
+        read[f][i] = {std::move(name), std::move(cell.read.morphology)};
+      };
+    });
+    console.progress().advance();
+  });
+  console.progress().end();
+
+  std::vector<io::NamedMorphology> cells;
+  std::set<std::string> taken;
+  for (std::size_t f = 0; f < files.size(); ++f)
+    for (std::size_t i = 0; i < done[f].size(); ++i) {
+      Conversion& conversion = done[f][i];
+      if (!conversion.error.empty()) continue;
+      conversion.cell = read[f][i].name;
+      for (int number = 2; !taken.insert(conversion.cell).second; ++number)
+        conversion.cell = fmt::format("{}-{}", read[f][i].name, number);
+      if (conversion.cell != read[f][i].name)
+        console.warn(fmt::format("{}: another neuron is called '{}', so this one is written as '{}'",
+                                 escaped(files[f].string()), escaped(read[f][i].name),
+                                 escaped(conversion.cell)));
+      cells.push_back({conversion.cell, std::move(read[f][i].morphology)});
+    }
+  if (!cells.empty()) {
+    const std::string bytes = target.neuron->write_all(cells);
+    make_folder_of(out);
+    write_unless_there(out, bytes, options.force);
+  }
+  report(done, target, options, console);
+}
+
+/// A file, or several, for each file.
+void run_apart(const Options& options, const std::vector<fs::path>& files, const std::vector<fs::path>& to,
+               const Target& target, const fs::path& folder, Console& console) {
+  std::vector<std::vector<Conversion>> done(files.size());
+  const std::set<fs::path> others(to.begin(), to.end());
+  const auto each = [&](const char* stage, const Put& put) {
+    console.progress().begin(stage, files.size());
+    parallel_for(files.size(), 1, [&](std::size_t f) {
+      done[f] = convert_file(files[f], options, [&](const Opened& opened) -> Take {
+        return [&, places = places_of(opened.cells, to[f], others)](std::size_t i, Conversion& conversion,
+                                                                    io::Cell cell) {
+          conversion.to = places[i];
+          const Morphology& m = cell.read.morphology;
+          if (target.neuron) {
+            conversion.losses = io::losses(m, target.neuron->keeps);
+            put(conversion.to, target.neuron->write(m));
+          } else {
+            const io::Model model =
+                io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
+            put(conversion.to, target.model->write(model));
+          }
+        };
+      });
+      console.progress().advance();
+    });
+    console.progress().end();
+  };
+  if (!options.force && holds_files(folder)) {
+    Overwrites overwrites;
+    each("comparing", [&](const fs::path& path, std::string_view bytes) { overwrites.look(path, bytes); });
+    overwrites.refuse();
+  }
+  for (const fs::path& path : to) make_folder_of(path);
+  each("converting", [](const fs::path& path, std::string_view bytes) { write_file(path, bytes); });
+  report(done, target, options, console);
+}
+
+bool holds_several(const fs::path& path) {
+  try {
+    return Opened(path).cells.count > 1;
+  } catch (const InputError&) {  // told when its turn comes
+    return false;
+  }
+}
+
+void run(Options options, Console& console) {
+  // `convert A B`: the second name is the target when no folder is named.
+  fs::path single;
+  if (options.out.empty()) {
+    single = options.files[1];
+    if (fs::is_directory(single))
+      throw Error(fmt::format("{} is a folder; convert into it with --format NAME --out {}", single.string(),
+                              single.string()));
+    options.files.pop_back();
+  }
+  const io::Format* const container = container_of(options.out);
+  const Target target = !single.empty() ? target_of(single)
+                        : container     ? Target{.neuron = container}
+                                        : find_target(options.format);
+  if (target.neuron && !target.neuron->write)
+    throw Error(fmt::format("{} can be read but not written; choose another format", target.title()));
+  options.model.geometry = *io::geometry(options.geometry);
+  if (target.model) io::check(*target.model, options.model.geometry);
+  const std::vector<fs::path> files = neuron_files(options.files, console);
+  if (container) return run_together(options, files, target, options.out, console);
+  if (single.empty())
+    return run_apart(options, files, targets(options, files, target.extension(), console), target,
+                     options.out, console);
+  if (target.neuron && target.neuron->write_all && holds_several(files[0]))
+    return run_together(options, files, target, single, console);
+  run_apart(options, files, {single}, target, single.has_parent_path() ? single.parent_path() : ".", console);
 }
 
 }  // namespace
@@ -259,8 +371,12 @@ std::function<void()> convert(CLI::App& command, Console& console) {
       ->required();
   command.add_option("--format", options->format, "Format of the files that are made")
       ->check(CLI::IsMember(formats));
-  command.add_option("--out", options->out, "Folder for the files that are made; made when there is none")
-      ->type_name("DIR");
+  command
+      .add_option(
+          "--out", options->out,
+          "Folder for the files that are made, made when there is none; or one file for all, when it ends "
+          "in .h5 or .cells")
+      ->type_name("PATH");
   const auto geometries = io::geometry_names();
   command
       .add_option("--geometry", options->geometry,
@@ -282,7 +398,12 @@ std::function<void()> convert(CLI::App& command, Console& console) {
     if (options->out.empty() && (options->files.size() != 2 || fs::is_directory(options->files[0], none)))
       throw CLI::ValidationError(
           "say where the files go: convert A B for two files, or --format NAME --out DIR for many");
-    if (!options->out.empty() && options->format.empty())
+    const io::Format* const container = container_of(options->out);
+    if (container && !options->format.empty() && options->format != container->name)
+      throw CLI::ValidationError(
+          fmt::format("--format {} and --out {} say different formats; leave --format out", options->format,
+                      options->out.string()));
+    if (!options->out.empty() && options->format.empty() && !container)
       throw CLI::ValidationError("say which format the files are to have, with --format NAME");
   });
   return [options, &console] { run(*options, console); };

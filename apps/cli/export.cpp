@@ -46,12 +46,66 @@ void run_tables(const Options& options, const std::vector<NeuronRow>& rows, Cons
   console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
 }
 
+/// use(i, neuron) for every row, by any thread; neuron() reads it.
+template <class Use>
+void each_neuron(const Options& options, const std::vector<NeuronRow>& rows, const char* stage,
+                 Console& console, const Use& use) {
+  console.progress().begin(stage, rows.size());
+  parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
+    const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
+    for (std::size_t i = begin; i < end; ++i) {
+      use(i, [&] { return repository.morphology(rows[i].id); });
+      console.progress().advance();
+    }
+  });
+  console.progress().end();
+}
+
+void report(const Options& options, const std::vector<NeuronRow>& rows, const std::vector<fs::path>& files,
+            const std::vector<std::vector<io::Warning>>& losses, std::string_view format, Console& console) {
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (std::size_t i = 0; i < rows.size(); ++i) {
+    nlohmann::ordered_json lost = nlohmann::ordered_json::array();
+    for (const io::Warning& loss : losses[i]) {
+      console.warn(fmt::format("{}: {}: {}", escaped(files[i].string()), loss.code, loss.sentence));
+      lost.push_back({{"code", loss.code}, {"sentence", loss.sentence}});
+    }
+    list.push_back(
+        {{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}, {"losses", lost}});
+  }
+  console.print({{"format", format}, {"files", list}});
+  console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
+}
+
+/// All neurons into one file, under their names.
+void run_together(const Options& options, const std::vector<NeuronRow>& rows, const io::Format& format,
+                  Console& console) {
+  std::set<std::string> populations;
+  for (const NeuronRow& row : rows) populations.insert(row.population);
+  std::vector<io::NamedMorphology> cells(rows.size());
+  std::vector<std::vector<io::Warning>> losses(rows.size());
+  each_neuron(options, rows, "exporting", console, [&](std::size_t i, const auto& neuron) {
+    const std::string name = file_name(rows[i].name);  // groups are separated by slashes as folders are
+    cells[i] = {populations.size() > 1 ? file_name(rows[i].population) + '/' + name : name, neuron()};
+    losses[i] = io::losses(cells[i].morphology, format.keeps);
+  });
+  const std::string bytes = format.write_all(cells);
+  std::error_code error;
+  if (options.out.has_parent_path() && (fs::create_directories(options.out.parent_path(), error), error))
+    throw Error(fmt::format("{}: cannot be made ({}); name a folder that can be written",
+                            options.out.parent_path().string(), error.message()));
+  write_unless_there(options.out, bytes, options.force);
+  report(options, rows, std::vector(rows.size(), options.out), losses, format.name, console);
+}
+
 void run(const Options& options, Console& console) {
   const auto rows =
       pick_neurons(Repository::open(options.repo, Access::read), options.names, options.population);
   if (rows.empty())
     throw Error(fmt::format("{} holds no neuron to export; import or grow some first", options.repo));
   if (options.format == "xlsx" || options.format == "csv") return run_tables(options, rows, console);
+  if (const io::Format* const container = container_of(options.out))
+    return run_together(options, rows, *container, console);
   const io::Format& format = *io::find_format(options.format);
 
   // Names are unique in a population only, so several populations get a folder each.
@@ -63,15 +117,7 @@ void run(const Options& options, Console& console) {
     files.push_back(folder / (file_name(row.name) + std::string(format.extensions[0])));
   }
   const auto each = [&](const char* stage, const auto& use) {
-    console.progress().begin(stage, rows.size());
-    parallel_ranges(rows.size(), 16, [&](std::size_t begin, std::size_t end) {
-      const Repository repository = Repository::open(options.repo, Access::read);  // each thread has its own
-      for (std::size_t i = begin; i < end; ++i) {
-        use(i, [&] { return repository.morphology(rows[i].id); });
-        console.progress().advance();
-      }
-    });
-    console.progress().end();
+    each_neuron(options, rows, stage, console, use);
   };
   const auto written = [&](std::size_t i, const Morphology& m) {
     try {
@@ -102,18 +148,7 @@ void run(const Options& options, Console& console) {
     write_file(files[i], std::string_view(written(i, m)));
   });
 
-  nlohmann::ordered_json list = nlohmann::ordered_json::array();
-  for (std::size_t i = 0; i < rows.size(); ++i) {
-    nlohmann::ordered_json lost = nlohmann::ordered_json::array();
-    for (const io::Warning& loss : losses[i]) {
-      console.warn(fmt::format("{}: {}: {}", escaped(files[i].string()), loss.code, loss.sentence));
-      lost.push_back({{"code", loss.code}, {"sentence", loss.sentence}});
-    }
-    list.push_back(
-        {{"id", rows[i].id.value()}, {"name", rows[i].name}, {"file", files[i].string()}, {"losses", lost}});
-  }
-  console.print({{"format", options.format}, {"files", list}});
-  console.say(fmt::format("{} written to {}", counted(rows.size(), "neuron"), options.out.string()));
+  report(options, rows, files, losses, options.format, console);
 }
 
 }  // namespace
@@ -134,11 +169,21 @@ std::function<void()> export_files(CLI::App& command, Console& console) {
       ->capture_default_str()
       ->check(CLI::IsMember(formats));
   command
-      .add_option("--out", options->out,
-                  "Folder the files are written to, or the workbook; made when there is none")
+      .add_option(
+          "--out", options->out,
+          "Folder for the files that are made, made when there is none; or the workbook; or one file for "
+          "all, when it ends in .h5 or .cells")
       ->required()
       ->type_name("PATH");
   add_force(command, options->force);
+  command.parse_complete_callback([options, &command] {
+    const io::Format* const container = container_of(options->out);
+    if (container && command.count("--format") && options->format != container->name)
+      throw CLI::ValidationError(
+          fmt::format("--format {} and --out {} say different formats; leave --format out", options->format,
+                      options->out.string()));
+    if (container) options->format = container->name;
+  });
   return [options, &console] { run(*options, console); };
 }
 

@@ -147,6 +147,15 @@ bool holds_files(const fs::path& folder) {
   return fs::is_directory(folder, none) && !fs::is_empty(folder, none);
 }
 
+const io::Format* container_of(const fs::path& out) {
+  std::error_code none;
+  if (fs::is_directory(out, none)) return nullptr;
+  const auto found = std::ranges::find_if(io::formats(), [&](const io::Format& f) {
+    return f.write_all && std::ranges::find(f.extensions, extension_of(out)) != f.extensions.end();
+  });
+  return found == io::formats().end() ? nullptr : &*found;
+}
+
 bool is_cells_file(const fs::path& path) {
   std::error_code none;
   return extension_of(path) == io::find_format("cells")->extensions[0] && !fs::is_directory(path, none);

@@ -13,6 +13,10 @@ namespace forest {
 class Error;
 }
 
+namespace forest::io {
+struct Format;
+}
+
 namespace forest::cli {
 
 class Console;
@@ -47,6 +51,10 @@ void refuse_existing(const std::vector<std::filesystem::path>& files);
 
 /// Whether there may be something to overwrite: the folder is there and not empty.
 bool holds_files(const std::filesystem::path& folder);
+
+/// The format of a file that takes all neurons together: what this name ends in, if its files hold many and it is no
+/// folder. Otherwise null.
+const io::Format* container_of(const std::filesystem::path& out);
 
 /// Whether this is a file of cells (io/cells.h) by its name, there or not; a folder of such a name is none.
 bool is_cells_file(const std::filesystem::path& path);

@@ -51,17 +51,22 @@ enum class AscOddity : std::uint8_t {
   text_in_tree,
   trailing_text,
   spine_without_place,
+  spine_before_points,
   stray_bracket,
+  comments_not_kept,
+  properties_not_kept,
   count
 };
 
 constexpr std::string_view several_cells =
     "nothing, if they are outlines of one soma; split the file if it holds several cells";
 
+constexpr std::string_view keep_original = "nothing, but keep the original if they matter";
+
 constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"byte-order-mark", false, "the mark is skipped"},
     {"padding", false, "what stands behind the text is skipped"},
-    {"thumbnail", false, "the picture is skipped"},
+    {"thumbnail", false, "the picture is skipped", {}, true},
     {"several-outlines", false, "read as one soma, a stack of outlines", several_cells},
     {"outline-by-name", true, "read as an outline of the soma"},
     {"small-outline", true, "read as a sphere of its size", "trace the outline with three points or more"},
@@ -76,7 +81,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"unknown-diameter", true, "read as that of the point before", "measure it where thickness matters"},
     {"unknown-place", true, "read as that of the point before",
      "look it up in the tracing, or remove the point"},
-    {"extra-numbers", false, "all but the first four are skipped"},
+    {"extra-numbers", false, "all but the first four are skipped", {}, true},
     {"empty-tree", true, "skipped"},
     {"tree-begins-with-split", true, "its branches are read as trees of their own",
      "give it the point they leave from"},
@@ -86,10 +91,13 @@ constexpr std::array<Oddity, static_cast<std::size_t>(AscOddity::count)> table{{
     {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
     {"second-split", true, "its branches leave from the same branch point"},
     {"unknown-word", true, "kept like the words for the end of a branch", "nothing, if it is meant so"},
-    {"text-in-tree", true, "skipped", "keep it outside of the tree"},
-    {"trailing-text", false, "skipped", "see whether trees are missing"},
-    {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
+    {"text-in-tree", true, "skipped", "keep it outside of the tree", true},
+    {"trailing-text", false, "skipped", "see whether trees are missing", true},
+    {"spine-without-place", true, "skipped", "put it behind the point it sits on", true},
+    {"spine-before-points", true, "put on that point", "put it behind the point it sits on"},
     {"stray-bracket", true, "skipped"},
+    {"comments-not-kept", false, "they are skipped", keep_original, true},
+    {"properties-not-kept", false, "they are skipped", keep_original, true},
 }};
 
 constexpr std::string_view layout = "a point is (x y z diameter)";
@@ -117,6 +125,25 @@ std::optional<SectionKind> type_of(std::string_view word) {
   if (same_word(word, "apical") || same_word(word, "apicaldendrite")) return SectionKind::apical;
   return std::nullopt;
 }
+
+/// What is skipped, counted. Places rather than times, since the reader goes over some twice.
+class Lost {
+ public:
+  void add(std::size_t line, std::string_view text) {
+    if (text.empty() || (count_ && text.data() <= last_)) return;
+    if (count_++ == 0) line_ = line, first_ = shown(text);
+    last_ = text.data();
+  }
+  void tell(OddityList<AscOddity>& oddities, AscOddity code, std::string_view what) const {
+    if (count_)
+      oddities.add(code, line_, [&] { return fmt::format("{} {}, the first \"{}\"", count_, what, first_); });
+  }
+
+ private:
+  std::size_t count_ = 0, line_ = 0;
+  const char* last_ = nullptr;
+  std::string first_;
+};
 
 class Reader {
  public:
@@ -156,6 +183,10 @@ class Reader {
   ReadResult result() {
     set_soma();
     sections_.add_spines();
+    lost_comments_.tell(oddities_, AscOddity::comments_not_kept,
+                        "comments inside of brackets or behind them");
+    lost_properties_.tell(oddities_, AscOddity::properties_not_kept,
+                          "properties (names, colours and others) of outlines, branches and spines");
     for (auto& [key, value] : annotations_) builder_.annotate(std::move(key), std::move(value));
     return {builder_.build(), oddities_.take()};
   }
@@ -191,7 +222,7 @@ class Reader {
   void comment() {
     const char* const begin = p_;
     while (!is_line_end(*p_) && p_ < end_) ++p_;
-    if (inside_ && !to_the_letter_) return;
+    if (inside_ && !to_the_letter_) return lose_comment(asc_comment({begin, p_}));
     const char* before = begin;
     while (before > text_.data() && is_blank(before[-1])) --before;
     const std::string_view said = asc_comment({begin, p_});
@@ -199,11 +230,18 @@ class Reader {
       if (said.starts_with(asc_own_prefix)) own_comment(said);
     } else if (line_ == 1 && said == asc_marker) {
       to_the_letter_ = true;
-    } else if (const bool whole_line = before == text_.data() || is_line_end(before[-1]);
-               whole_line && !said.empty()) {
+    } else if (const bool whole_line = before == text_.data() || is_line_end(before[-1]); !whole_line) {
+      lose_comment(said);
+    } else if (!said.empty()) {
       const auto [key, value] = swc_comment(said);
       annotations_.emplace_back(key, value);
     }
+  }
+
+  /// "3, R-1-2", "Root" and "End of split" number what the brackets say.
+  void lose_comment(std::string_view text) {
+    const bool numbering = text.find_first_not_of("0123456789 ,.-[]R") == text.npos;
+    if (!numbering && text != "Root" && !text.starts_with("End of ")) lost_comments_.add(line_, text);
   }
 
   /// The run of characters that begins here, one at least; stays in front of it.
@@ -389,6 +427,7 @@ class Reader {
     std::optional<std::string_view> title;
     bool cell_body = false;
     std::string properties;
+    std::vector<std::pair<std::size_t, std::string_view>> lost_of_outline;
     ++p_;
     if (const char c = next(); is_letter(c)) {
       const std::string_view word = this->word();
@@ -407,6 +446,7 @@ class Reader {
       if (c == '"') {
         const std::string_view string = quoted();
         if (!title) title = string;
+        if (!names_soma(string)) lost_of_outline.emplace_back(at_line, string);
         properties += fmt::format("{}\"{}\"", properties.empty() ? "" : " ", string);
         continue;
       }
@@ -426,10 +466,15 @@ class Reader {
         refuse_broken_point(block, at_line);
         if (!properties.empty()) properties += ' ';
         properties += block.text;
+        if (block.more) lost_of_outline.emplace_back(at_line, std::string_view(at, p_));
       }
     }
     if (p_ == end_) unfinished("a block", begin_line);
-    if (cell_body) return outline(begin_line);
+    const auto soma = [&] {
+      for (const auto& [line, text] : lost_of_outline) lost_properties_.add(line, text);
+      outline(begin_line);
+    };
+    if (cell_body) return soma();
     if (type) return tree(*type, properties);
     const char* const content = p_;
     const std::size_t content_line = line_;
@@ -440,7 +485,7 @@ class Reader {
         return fmt::format("an outline is called \"{}\" but has no (CellBody)", shown(*title));
       });
       back_to(content, content_line);
-      outline(begin_line);
+      soma();
     } else if (title) {
       keep_block(whole.points > 0 ? "contour" : "text", std::move(whole));
     } else if (whole.quotes || (whole.points < 2 && !whole.splits)) {
@@ -474,7 +519,7 @@ class Reader {
       if (c == ')') break;
       if (p_ == end_) unfinished("an outline", begin);
       if (c == '"') {
-        quoted();
+        lost_properties_.add(line_, quoted());
         continue;
       }
       if (c != '(') unexpected("an outline");
@@ -492,7 +537,10 @@ class Reader {
         back_to(at, at_line);
         Block block = skip_block();
         refuse_broken_point(block, at_line);
-        if (is_marker(block)) keep_block("marker", std::move(block));
+        if (is_marker(block))
+          keep_block("marker", std::move(block));
+        else if (block.more)
+          lost_properties_.add(at_line, {at, p_});
       } else {
         unexpected("an outline");
       }
@@ -660,6 +708,9 @@ class Reader {
     if (closed.only_branch_point)
       oddities_.add(AscOddity::only_branch_point, branch_.line,
                     "a branch holds only the point it leaves from");
+    for (std::size_t i = 0; i < closed.early_spines; ++i)
+      oddities_.add(AscOddity::spine_before_points, branch_.line,
+                    "a spine stands before the first point of its tree");
     for (std::size_t i = 0; i < closed.lost_spines; ++i)
       oddities_.add(AscOddity::spine_without_place, branch_.line,
                     "a spine stands where its tree has no point");
@@ -677,7 +728,7 @@ class Reader {
       if (c == '>') break;
       if (p_ == end_) unfinished("a spine", begin);
       if (c == '"') {
-        quoted();
+        lost_properties_.add(line_, quoted());
         continue;
       }
       if (c == ')' && depth > 0) {
@@ -698,6 +749,8 @@ class Reader {
         const Block block = skip_block();
         refuse_broken_point(block, at_line);
         if (same_word(block.word, "class")) seat.spine.shape = spine_shape(block.quoted);
+        if (block.more && (!same_word(block.word, "class") || seat.spine.shape == SpineShape::unknown))
+          lost_properties_.add(at_line, {at, p_});
       } else if (p_ == end_) {
         unfinished("a spine", begin);
       } else if (inner == '(') {
@@ -716,6 +769,7 @@ class Reader {
 
   /// A block among the points of a tree: a property, a marker, a type.
   void inner_block() {
+    const char* const at = p_;
     const std::size_t line = line_;
     Block block = skip_block();
     if (const auto kind = type_of(block.word); kind && !block.more) {
@@ -734,6 +788,8 @@ class Reader {
       keep_block(block.word.empty() ? "contour" : "marker", std::move(block));
     else if (block.word.empty())
       oddities_.add(AscOddity::text_in_tree, line, "a text stands in a tree");
+    else if (block.more)
+      lost_properties_.add(line, {at, p_});
   }
 
   void leaf_word() {
@@ -824,6 +880,7 @@ class Reader {
   std::vector<Point> own_soma_;
   std::vector<std::int32_t> own_soma_parents_;
 
+  Lost lost_comments_, lost_properties_;
   Point last_;  // the one before, for numbers that are not known
   Branch branch_;
   std::vector<Split> splits_;

@@ -21,7 +21,7 @@
 namespace forest::io {
 namespace {
 
-constexpr std::string_view soma = "(\"CellBody\" (Color Red) (CellBody) (1 0 0 0) (0 1 0 0) (-1 0 0 0))\n";
+constexpr std::string_view soma = "(\"CellBody\" (CellBody) (1 0 0 0) (0 1 0 0) (-1 0 0 0))\n";
 
 Morphology neuron(std::string_view text) { return read_asc(text, "cell.asc").morphology; }
 
@@ -39,6 +39,20 @@ TEST(Asc, ReadsSomaStemAndBranches) {
   EXPECT_EQ(m.points(SectionId(1))[0], (Point{0, 15, 0, .5f}));
   EXPECT_DOUBLE_EQ(total_length(m), 20.);
   EXPECT_EQ(m.annotations(), (Annotations{{"comment", "by hand"}}));
+}
+
+TEST(Asc, WhatIsNotKeptIsCountedAndTold) {
+  const ReadResult result = read_asc(
+      "(\"soma A\" (Name \"soma A\") (CellBody) (5 0 0 0) (0 5 0 0) (Color Green) (-5 0 0 0))\n"
+      "((Axon) (Color Red) (0 0 0 1) (0 9 0 1) <(Class 1 \"thin\") (Name \"s\") (1 9 0 1)> (Color Blue))\n"
+      "(\"CellBody\" (CellBody) (5 0 9 0))",
+      "cell");
+  const auto told =
+      std::ranges::find(result.warnings, std::string_view("properties-not-kept"), &Warning::code);
+  ASSERT_NE(told, result.warnings.end());
+  EXPECT_TRUE(told->lost);
+  EXPECT_EQ(told->line, 1u);
+  EXPECT_EQ(told->sentence.find("5 properties"), 0u) << told->sentence;  // the tree's own is kept
 }
 
 TEST(Asc, ABranchHasTheRadiusOfItsOwnFirstPointAtTheNode) {
@@ -100,7 +114,8 @@ TEST(Asc, WhatIsNoNeuriteIsKeptAsItsText) {
       "( (Color Red) (Set \"axons\") (Axon) (0 0 0 1) (0 1 0 1) (Cross (0 1 0 1)) ( (1 2 0 1) Incomplete | "
       "(2 2 0 1) Normal ))",
       "cell.asc");
-  EXPECT_TRUE(warnings.empty());
+  ASSERT_EQ(warnings.size(), 1u);
+  EXPECT_EQ(warnings[0].code, "comments-not-kept");  // "none"
   const Annotations expected{{"asc", "(Sections S1 \"a \\\" 3 100 0)"},
                              {"marker", "(Dot (Color RGB (1, 2, 3)) (Name \"m;1\") (1 2 3 .5))"},
                              {"contour", "(\"pia\" (Closed) (1 2 3 4) (2 3 4 5))"},
@@ -151,8 +166,8 @@ TEST(Asc, EveryDeviationIsToldWithItsLineAndRead) {
       {"thumbnail", 1, "(Thumbnail (Cols 4) \"ff00\")\n" + stem + ")", 1, 10.},
       {"several-outlines", 2, cell + cell + stem + ")", 1, 10.},
       {"outline-by-name", 1, "(\"Cell Body\" (Closed) (1 0 0 0) (0 1 0 0) (-1 0 0 0))" + stem + ")", 1, 10.},
-      {"small-outline", 1, "(\"x\" (CellBody) (1 0 0 6))" + stem + ")", 1, 10.},
-      {"empty-outline", 2, cell + "(\"x\" (CellBody))" + stem + ")", 1, 10.},
+      {"small-outline", 1, "(\"Soma\" (CellBody) (1 0 0 6))" + stem + ")", 1, 10.},
+      {"empty-outline", 2, cell + "(\"Soma\" (CellBody))" + stem + ")", 1, 10.},
       {"no-type", 1, "((Color Red) (0 0 0 1)\n(0 10 0 1) )", 1, 10.},
       {"type-in-branch", 2, stem + "( (Dendrite) (0 20 0 1) | (9 10 0 1)))", 3, 29.},
       {"no-diameter", 2, stem + "(0 20 0))", 1, 20.},
@@ -170,7 +185,10 @@ TEST(Asc, EveryDeviationIsToldWithItsLineAndRead) {
       {"second-split", 3, stem + "( (1 10 0 1) | (2 10 0 1))\n( (3 10 0 1) | (4 10 0 1)))", 5, 20.},
       {"unknown-word", 2, stem + "Ending)", 1, 10.},
       {"text-in-tree", 2, stem + "\"text\" (0 20 0 1))", 1, 20.},
-      {"spine-without-place", 2, stem + "<(Color Red)> (0 20 0 1))", 1, 20.},
+      {"spine-before-points", 1, "((Axon) <(1 2 3 1)> (0 0 0 1) (0 20 0 1))", 1, 20.},
+      {"comments-not-kept", 2, "((Axon) ; R\n (0 0 0 1) ; a swelling\n (0 20 0 1)) ; 1, R-1", 1, 20.},
+      {"properties-not-kept", 2, "((Axon) (Color Red)\n (0 0 0 1) (Name \"b\") (0 20 0 1))", 1, 20.},
+      {"spine-without-place", 2, stem + "< > (0 20 0 1))", 1, 20.},
       {"stray-bracket", 2, stem + "))", 1, 10.},
       {"text-in-tree", 2, stem + "(\"text\" (Color Red)) (0 20 0 1))", 1, 20.},
       {"trailing-text", 2, stem + ") the end", 1, 10.},
@@ -288,7 +306,7 @@ TEST(AscRealData, EveryTracedNeuronIsReadAndSurvivesExport) {
       const auto [m, warnings] = read(path);
       expect_round_trip(m, path.string());
       EXPECT_EQ(m.soma().kind, SomaKind::contours) << path;
-      EXPECT_LE(warnings.size(), 1u) << path;
+      EXPECT_LE(std::ranges::count(warnings, false, &Warning::lost), 1) << path;
       ++neurons, spines += m.spines().size();
     }
   }

@@ -22,7 +22,8 @@
 namespace forest::io {
 namespace {
 
-constexpr std::array<std::string_view, 2> swc_extensions{".swc", ".eswc"};
+constexpr std::array<std::string_view, 1> swc_extensions{".swc"};
+constexpr std::array<std::string_view, 1> eswc_extensions{".eswc"};
 constexpr std::array<std::string_view, 2> h5_extensions{".h5", ".hdf5"};
 constexpr std::array<std::string_view, 1> cells_extensions{".cells"};
 constexpr std::array<std::string_view, 2> neuroml_extensions{".nml", ".xml"};
@@ -45,6 +46,14 @@ constexpr std::array table{
            .read = read_swc,
            .read_all = nullptr,
            .write = write_swc,
+           .keeps = swc_keeps},
+    Format{.name = "eswc",
+           .title = "eSWC (Vaa3D)",
+           .extensions = eswc_extensions,
+           .recognises = recognises_swc,
+           .read = read_swc,
+           .read_all = nullptr,
+           .write = write_eswc,
            .keeps = swc_keeps},
     Format{.name = "hoc",
            .title = "NEURON cell template (hoc)",
@@ -85,6 +94,7 @@ constexpr std::array table{
            .read = read_h5,
            .read_all = read_all_h5,
            .write = write_h5,
+           .write_all = write_h5,
            .keeps = {}},
     Format{.name = "cells",
            .title = "Brain Forest cells (millions of them)",
@@ -94,6 +104,7 @@ constexpr std::array table{
            .read_all = read_all_cells,
            .read_each = read_each_cells,
            .write = write_cells,
+           .write_all = [](std::span<const NamedMorphology> cells) { return write_cells(cells); },
            .keeps = {}},
     Format{.name = "neuroml",
            .title = "NeuroML 2",

@@ -30,6 +30,7 @@ struct Oddity {
   bool every_line = true;         // each line is told (up to a limit, then counted), or only the first one
   std::string_view reading;       // how it is read, the second half of the sentence
   std::string_view mending = {};  // what a person can do, where writing the file anew does not mend it
+  bool lost = false;              // something that is said of the cell is not kept
 };
 
 struct ReadResult {
@@ -72,6 +73,8 @@ struct Format {
   CellReader (*read_each)(std::string_view bytes, const std::string& name) = nullptr;
   /// The same neuron gives the same bytes. Null when the format is only read.
   std::string (*write)(const Morphology& morphology);
+  /// Cells of different names in one file, under them; throws Error when a name will not do. Null where files hold one.
+  std::string (*write_all)(std::span<const NamedMorphology> cells) = nullptr;
   Keeps keeps;
 };
 

@@ -56,7 +56,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
     {"parameters", false, "kept as annotations; they do not change the shape", keep_the_file},
     {"prototypes", false, "kept as annotations; prototypes themselves are left out", keep_the_file},
     {"spine-options", false, "kept as annotations; the spines they scatter are not made", keep_the_file},
-    {"unknown-option", true, "skipped", keep_the_file},
+    {"unknown-option", true, "skipped", keep_the_file, true},
     {"channels", false, "kept as annotations", keep_the_file},
     {"unknown-diameter", true, "read as the diameter of the parent", "measure it where thickness matters"},
     {"missing-parent", true, "read as a root", "give it the parent it was traced from"},

@@ -68,9 +68,9 @@ constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
     {"type-custom", false, "read as neurites of custom kind, the numbers kept",
      "nothing, where all who read it know the numbers"},
     {"glia-unsaid", false, "read as glia"},
-    {"perimeters-size", false, "left out", keep_the_file},
-    {"organelles-odd", false, "left out", keep_the_file},
-    {"not-kept", false, "left out", keep_the_file},
+    {"perimeters-size", false, "left out", keep_the_file, true},
+    {"organelles-odd", false, "left out", keep_the_file, true},
+    {"not-kept", false, "left out", keep_the_file, true},
 }};
 
 using Oddities = OddityList<H5Oddity>;
@@ -155,6 +155,15 @@ class Members {
   std::vector<Image::Link> links_;
 };
 
+/// A cell of version 1 may be called neuron1, too.
+bool is_version_2(const Image& image, const Members& members) {
+  const auto neuron = members.find("neuron1");
+  if (!neuron) return false;
+  if (!neuron->is_group()) return true;  // which is refused
+  const auto structure = Members(image, *neuron).find("structure");
+  return !structure || !structure->is_array();
+}
+
 /// One cell of an image: a group with `points` and `structure`, or `neuron1`.
 class CellReader {
  public:
@@ -162,8 +171,8 @@ class CellReader {
       : image_(image), group_(group), members_(members), oddities_(oddities) {}
 
   Morphology read() {
-    if (const auto second = members_.find("neuron1")) {
-      read_version_2(Members(image_, *second));
+    if (is_version_2(image_, members_)) {
+      read_version_2(Members(image_, *members_.find("neuron1")));
     } else {
       read_version_1();
     }
@@ -750,8 +759,13 @@ class CellReader {
   Annotations own_annotations_;
 };
 
-bool is_cell(const Members& members) {
-  return (members.has("points") && members.has("structure")) || members.has("neuron1");
+/// How many of the two arrays are there that make a cell of version 1. Cells of a container may be called so, too.
+int arrays_of_cell(const Members& members) {
+  const auto has = [&](std::string_view name) {
+    const auto object = members.find(name);
+    return object && object->is_array();
+  };
+  return has("points") + has("structure");
 }
 
 /// Calls visit(name, group, members) for the cells of the file until it returns false.
@@ -772,7 +786,7 @@ void cells(const Image& image, Visit visit) {
     const Members members(image, group);
     // What has nothing but arrays in the file's root is told by the reader of cells what is missing.
     const bool root = place.name.empty();
-    const bool cell = is_cell(members) || (root && (members.has("points") || members.has("structure")));
+    const bool cell = arrays_of_cell(members) >= (root ? 1 : 2) || is_version_2(image, members);
     if (cell) {
       if (!visit(place.name, group, members)) return;
       continue;
@@ -1086,14 +1100,21 @@ std::string write_h5(const Morphology& morphology) {
 }
 
 std::string write_h5(std::span<const NamedMorphology> cells) {
-  hdf5::NewFile file;
-  std::set<std::string_view> names;
+  std::set<std::string> paths, groups;
   for (const auto& [name, morphology] : cells) {
-    if (name.empty() || !names.insert(name).second)
+    const std::string path = '/' + name;
+    if ((path + '/').find("//") != path.npos || (path + '/').find("/./") != path.npos ||
+        !paths.insert(path).second)
       throw Error(fmt::format(
-          "a container needs different names for its cells; '{}' is empty or stands twice", name));
-    Writer(file, '/' + name, morphology).write();
+          "a container needs different names for its cells; '{}' will not do or stands twice", name));
+    for (std::size_t slash = path.find('/', 1); slash != path.npos; slash = path.find('/', slash + 1))
+      groups.insert(path.substr(0, slash));
   }
+  for (const std::string& group : groups)
+    if (paths.contains(group))
+      throw Error(fmt::format("a container cannot hold cells in the cell '{}'; rename it", group.substr(1)));
+  hdf5::NewFile file;
+  for (const auto& [name, morphology] : cells) Writer(file, '/' + name, morphology).write();
   return file.bytes();
 }
 

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <thread>
 
 #include <gtest/gtest.h>
 
@@ -186,6 +187,43 @@ TEST(H5, AContainerHoldsManyNeurons) {
   EXPECT_TRUE(told(read_h5(bytes, "container"), "several-cells"));
   cells.push_back(cells.front());
   EXPECT_THROW(write_h5(cells), Error);
+}
+
+TEST(H5, CellsOfAContainerMayBeCalledAsThePartsOfOne) {
+  std::vector<NamedMorphology> cells;
+  for (const char* name :
+       {"neuron1", "points", "structure", "metadata", "a/neuron1", "b/points", "b/structure"})
+    cells.push_back({name, zoo_parts::random_tree(cells.size(), 5)});
+  const std::vector<Cell> read = read_all_h5(write_h5(cells), "container");
+  ASSERT_EQ(read.size(), cells.size());
+  for (const Cell& cell : read) {
+    const auto written = std::ranges::find(cells, cell.name, &NamedMorphology::name);
+    ASSERT_NE(written, cells.end()) << cell.name;
+    EXPECT_EQ(cell.read.morphology, written->morphology);
+  }
+  for (const char* name : {"", "/a", "a//b", "a/", ".", "a/./b", "points/of", "b"}) {
+    SCOPED_TRACE(name);
+    std::vector<NamedMorphology> more = cells;
+    more.push_back({name, cells[0].morphology});
+    EXPECT_THROW(write_h5(more), Error);
+  }
+}
+
+TEST(H5, ManyThreadsWriteAtOnce) {
+  std::vector<Morphology> cells;
+  for (std::uint64_t i = 0; i < 64; ++i) cells.push_back(zoo_parts::random_tree(i, 20));
+  std::vector<std::string> written(cells.size());
+  {
+    std::vector<std::jthread> threads;
+    for (std::size_t t = 0; t < 4; ++t)
+      threads.emplace_back([&, t] {
+        for (std::size_t i = t; i < cells.size(); i += 4) written[i] = write_h5(cells[i]);
+      });
+  }
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    EXPECT_EQ(written[i], write_h5(cells[i]));
+    EXPECT_EQ(read_h5(written[i], "many").morphology, cells[i]);
+  }
 }
 
 /// Written by h5py, in every layout the library has: fuzz/corpus/h5.

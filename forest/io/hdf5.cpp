@@ -346,8 +346,9 @@ NewFile::NewFile() : path_("a file in memory") {
   H5Pset_fapl_core(access, growth, false);
   H5Pset_meta_block_size(access, 256);  // by default 2 kB are set aside, most of a small neuron's file
   H5Pset_small_data_block_size(access, 256);
-  // Never a file of this name: the core driver keeps all in memory.
-  file_ = H5Fcreate("brainforest-memory", H5F_ACC_TRUNC, H5P_DEFAULT, access);
+  // Never a file of this name: the core driver keeps all in memory. The library opens a name only once at a time.
+  static std::size_t made = 0;
+  file_ = H5Fcreate(fmt::format("brainforest-memory-{}", ++made).c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, access);
   check(file_ >= 0, "created");
 }
 

@@ -21,6 +21,7 @@ struct Warning {
   std::string_view code;          // a stable word, for example "negative-radius"
   std::string sentence;           // what stands there and how it was read
   std::string_view mending = {};  // as in Oddity
+  bool lost = false;              // as in Oddity
 };
 
 /// What of a neuron a format has words for. What it has none for is told when a neuron that has it is written.

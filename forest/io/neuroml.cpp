@@ -56,8 +56,9 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NeuromlOddity::count)> tab
     {"morphology-elsewhere", true, "left out; read that file for its shape", "give the file that holds it"},
     {"include", false, "included files are not opened; name them as well",
      "give the included files as well, where they hold cells"},
-    {"not-kept", false, "left out: shapes are read, not what they do", keep_the_file},
-    {"groups-not-kept", false, "used as far as they say kinds and sections, else left out", keep_the_file},
+    {"not-kept", false, "left out: shapes are read, not what they do", keep_the_file, true},
+    {"groups-not-kept", false, "used as far as they say kinds and sections, else left out", keep_the_file,
+     true},
     {"duplicate-id", true, "children hang on the first segment of that number",
      "give each segment a number of its own"},
     {"missing-parent", true, "read as a root", "give it the parent it was traced from"},
@@ -634,7 +635,7 @@ class Assembler {
   }
 
   void find_soma() {
-    soma_points_.assign(segments_.size(), {-1, -1});
+    soma_points_.assign(segments_.size(), {});
     std::vector<std::size_t> parts;
     for (const std::size_t i : order_) {
       Segment& s = segments_[i];
@@ -648,6 +649,9 @@ class Assembler {
       parts.push_back(i);
     }
     if (parts.empty()) return;
+    for (const Segment& s : segments_)
+      if (s.parent != none && is_soma(s.parent) && s.fraction > 0.f && s.fraction < 1.f)
+        segments_[s.parent].splits.push_back(s.fraction);
     const auto is_ball = [&](const Segment& s) {
       return s.proximal == s.distal && (!to_the_letter_ || attribute(s.node, "name") == sphere_name);
     };
@@ -656,7 +660,7 @@ class Assembler {
                .points = {segments_[parts[0]].distal},
                .parents = {},
                .contour_starts = {}};
-      soma_points_[parts[0]] = {0, 0};
+      soma_points_[parts[0]].assign(segments_[parts[0]].splits.size() + 2, 0);
       return;
     }
     soma_.kind = SomaKind::cylinders;
@@ -666,11 +670,11 @@ class Assembler {
       return std::int32_t(soma_.points.size()) - 1;
     };
     for (const std::size_t i : parts) {
-      const Segment& s = segments_[i];
+      Segment& s = segments_[i];
+      sort_splits(s);
       std::int32_t begin = -1;
       if (s.parent != none) {
-        const auto& [proximal, distal] = soma_points_[s.parent];
-        begin = s.fraction < .5f ? proximal : distal;
+        begin = soma_point_of(s);
         if (!(soma_.points[std::size_t(begin)] == s.proximal)) begin = add(s.proximal, begin);
       } else {
         if (!soma_.points.empty())
@@ -678,8 +682,25 @@ class Assembler {
                         [&] { return fmt::format("segment {} is a second soma", s.id); });
         begin = add(s.proximal, soma_.points.empty() ? -1 : 0);
       }
-      soma_points_[i] = {begin, add(s.distal, begin)};
+      std::vector<std::int32_t>& along = soma_points_[i];
+      along.push_back(begin);
+      for (const float split : s.splits)
+        along.push_back(add(between(s.proximal, s.distal, split), along.back()));
+      along.push_back(add(s.distal, along.back()));
     }
+  }
+
+  static void sort_splits(Segment& s) {
+    std::ranges::sort(s.splits);
+    s.splits.erase(std::unique(s.splits.begin(), s.splits.end()), s.splits.end());
+  }
+
+  /// The soma point that a child of the soma hangs on.
+  std::int32_t soma_point_of(const Segment& child) const {
+    const auto& along = soma_points_[child.parent];
+    if (child.fraction <= 0.f) return along.front();
+    const auto& splits = segments_[child.parent].splits;
+    return along[1 + std::size_t(std::ranges::lower_bound(splits, child.fraction) - splits.begin())];
   }
 
   /// The kind and number of a segment.
@@ -714,8 +735,7 @@ class Assembler {
     std::vector<std::vector<Place>> places(segments_.size());  // after each piece
     for (std::size_t i = 0; i < segments_.size(); ++i) {
       auto& splits = segments_[i].splits;
-      std::ranges::sort(splits);
-      splits.erase(std::unique(splits.begin(), splits.end()), splits.end());
+      sort_splits(segments_[i]);
       places[i].resize(splits.size() + 1);
       for (std::size_t k = 0; k < splits.size(); ++k)
         places[i][k].children = 1;  // what is left of the segment
@@ -740,8 +760,7 @@ class Assembler {
       if (root) {
         run = begin_run(none, kind, tag, s.section);
         if (s.parent != none) {
-          const auto& [proximal, distal] = soma_points_[s.parent];
-          runs_[run].soma_point = s.fraction < .5f ? proximal : distal;
+          runs_[run].soma_point = soma_point_of(s);
         } else if (std::exchange(rooted, true) && !to_the_letter_) {
           oddities_.add(NeuromlOddity::several_roots, line(s),
                         [&] { return fmt::format("segment {} has no parent either", s.id); });
@@ -786,8 +805,8 @@ class Assembler {
   std::vector<Group> groups_;
   std::size_t to_steps_ = 0, walked_ = 0;
   Soma soma_;
-  std::vector<std::pair<std::int32_t, std::int32_t>>
-      soma_points_;  // of proximal and distal of a soma segment
+  // Of a soma segment: those of its beginning, of the places where children hang on, and of its end.
+  std::vector<std::vector<std::int32_t>> soma_points_;
   std::vector<Run> runs_;
 };
 

@@ -12,6 +12,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/keeps.h"
+#include "forest/io/neuron.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/swc.h"
 #include "forest/morphology/measure.h"
@@ -66,6 +67,32 @@ TEST(Neuroml, SegmentsBecomeSectionsAndABallASoma) {
   EXPECT_EQ(m.section(SectionId(2)).kind, SectionKind::axon);
   EXPECT_FLOAT_EQ(m.points(SectionId(2))[0].radius, 1.5f);
   EXPECT_NEAR(total_length(m), 30., 1e-6);
+}
+
+TEST(Neuroml, AChildAtAFractionOfTheSomaHangsThere) {
+  const auto at = [](const char* fraction) { return " fractionAlong=\"" + std::string(fraction) + "\""; };
+  const ReadResult result =
+      read_text(in_cell(segment(0, -1, from("0", "8") + to("10", "4")) + segment(1, 0, to("20"), at("0.5")) +
+                        segment(2, 0, to("30"), at("0.5")) + segment(3, 0, to("40"), at("0.75")) +
+                        segment(4, 0, to("50"), at("0")) + segment(5, 0, to("60")) +
+                        "<segmentGroup id=\"soma_group\"><member segment=\"0\"/></segmentGroup>"));
+  EXPECT_TRUE(result.warnings.empty());
+  const Morphology& m = result.morphology;
+  ASSERT_EQ(m.soma().kind, SomaKind::cylinders);
+  ASSERT_EQ(m.soma().points.size(), 4u);
+  EXPECT_EQ(m.soma().points[1], (Point{5, 0, 0, 3}));
+  EXPECT_NEAR(m.soma().area(),
+              read_text(in_cell(segment(0, -1, from("0", "8") + to("10", "4")) +
+                                "<segmentGroup id=\"soma_group\"><member "
+                                "segment=\"0\"/></segmentGroup>"))
+                  .morphology.soma()
+                  .area(),
+              1e-4);
+  const std::int32_t places[] = {1, 1, 2, 0, 3};
+  ASSERT_EQ(m.sections().size(), 5u);
+  for (std::size_t i = 0; i < 5; ++i) EXPECT_EQ(m.section(SectionId(i)).soma_point, places[i]) << i;
+  EXPECT_NE(write_neuron_hoc(m).find("connect dend_0[0](0), soma[0](0.5)"), std::string::npos);
+  EXPECT_EQ(read_text(write_neuroml(m)).morphology, m);
 }
 
 TEST(Neuroml, AChildAtAFractionSplitsItsParent) {

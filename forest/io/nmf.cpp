@@ -43,6 +43,7 @@ enum class NmfOddity : std::uint8_t {
   empty_branch,
   single_daughter,
   spine_without_place,
+  spine_before_points,
   skipped_element,
   several_documents,
   count
@@ -68,8 +69,9 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"only-branch-point", true, "left out; what hangs on it hangs on the branch point itself"},
     {"empty-branch", true, "skipped"},
     {"single-daughter", true, "kept as a section of its own", "nothing, if a section begins there"},
-    {"spine-without-place", true, "skipped", "put it behind the point it sits on"},
-    {"skipped-element", true, "skipped", "keep the file beside what is made of it"},
+    {"spine-without-place", true, "skipped", "put it behind the point it sits on", true},
+    {"spine-before-points", true, "put on that point", "put it behind the point it sits on"},
+    {"skipped-element", true, "skipped", "keep the file beside what is made of it", true},
     {"several-documents", false, "the first one is read", "split the file"},
 }};
 
@@ -443,6 +445,9 @@ class Reader {
     if (closed.only_branch_point)
       oddities_.add(NmfOddity::only_branch_point, line_of(branch.element),
                     "a branch holds only the point it leaves from");
+    for (std::size_t i = 0; i < closed.early_spines; ++i)
+      oddities_.add(NmfOddity::spine_before_points, line_of(branch.element),
+                    "a spine stands before the first point of its tree");
     for (std::size_t i = 0; i < closed.lost_spines; ++i)
       oddities_.add(NmfOddity::spine_without_place, line_of(branch.element),
                     "a spine stands where its tree has no point");

@@ -95,6 +95,7 @@ TEST(Nmf, EveryDeviationIsToldWithItsLineAndRead) {
       {"empty-branch", 3, file(tree(stem + branch("") + a + b)), 13.},
       {"single-daughter", 2, file(tree(stem + a)), 11.},
       {"spine-without-place", 3, file(tree(stem + "<spine classification=\"thin\"/>")), 10.},
+      {"spine-before-points", 2, file(tree("<spine>" + point(1, 0, 0, 1) + "</spine>" + stem)), 10.},
       {"skipped-element", 2, file("<vessel/>" + tree(stem)), 10.},
       {"several-documents", 5, file(tree(stem)) + file(tree(stem)), 10.},
   };

@@ -36,9 +36,10 @@ class OddityList {
     if (tally.count++ >= (table_[index].every_line ? told_lines : 1)) return;
     const Oddity& row = table_[index];
     if constexpr (std::invocable<What>)
-      warnings_.push_back({line, row.code, fmt::format("{}; {}", what(), row.reading), row.mending});
+      warnings_.push_back(
+          {line, row.code, fmt::format("{}; {}", what(), row.reading), row.mending, row.lost});
     else
-      warnings_.push_back({line, row.code, fmt::format("{}; {}", what, row.reading), row.mending});
+      warnings_.push_back({line, row.code, fmt::format("{}; {}", what, row.reading), row.mending, row.lost});
   }
   bool has(Code code) const { return tallies_[static_cast<std::size_t>(code)].count > 0; }
 
@@ -49,7 +50,7 @@ class OddityList {
         warnings_.push_back({tally.last_line, table_[i].code,
                              fmt::format("the same on {} more lines, this the last; {}",
                                          tally.count - told_lines, table_[i].reading),
-                             table_[i].mending});
+                             table_[i].mending, table_[i].lost});
     std::ranges::stable_sort(warnings_, {}, &Warning::line);
     return std::move(warnings_);
   }

@@ -34,6 +34,10 @@ ReadResult read_swc(std::string_view bytes, const std::string& name);
 /// skip.
 std::string write_swc(const Morphology& morphology);
 
+/// The same with the columns of Vaa3D behind each row: segment (0 the soma, then the sections from 1), level (0 the soma, a
+/// stem 1, its daughters 2), and zeros for mode, time and index.
+std::string write_eswc(const Morphology& morphology);
+
 inline constexpr std::array<std::string_view, 1> swc_keys{"synapse"};
 inline constexpr Keeps swc_keeps{.keys = false, .own_keys = swc_keys};
 

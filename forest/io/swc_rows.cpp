@@ -275,7 +275,7 @@ class Scanner {
     point.radius = real(tokens, 5);
     add(id, type, point, integer(tokens, 6));
     if (data.find('\t') != data.npos) oddities_.add(SwcOddity::tabs, line_, "columns are separated by tabs");
-    if (tokens.size() > columns.size())
+    if (tokens.size() > columns.size() && !rows_.to_the_letter)
       oddities_.add(SwcOddity::extra_columns, line_,
                     [&] { return fmt::format("there are {} columns", tokens.size()); });
     if (hash != text.npos) oddities_.add(SwcOddity::trailing_comment, line_, "a comment follows the row");

@@ -486,5 +486,22 @@ TEST(SwcRealData, OneNeuronWrittenManyWaysIsOneNeuron) {
   }
 }
 
+TEST(Eswc, ColumnsOfVaa3dFollowFromTheNeuron) {
+  const ReadResult traced = read_swc(
+      "1 1 0 0 0 5 -1 7 7 7 7 7\n2 3 0 5 0 1 1 7 7 7 7 7\n3 3 0 9 0 1 2 7 7 7 7 7\n4 3 4 9 0 1 3 7 7 7 7 7\n"
+      "5 3 -4 9 0 1 3 7 7 7 7 7\n",
+      "cell");
+  ASSERT_EQ(traced.warnings.size(), 1u);
+  EXPECT_EQ(traced.warnings[0].code, "extra-columns");
+  EXPECT_TRUE(traced.warnings[0].lost);
+  const std::string text = write_eswc(traced.morphology);
+  for (const char* row :
+       {"\n1 1 0 0 0 5 -1 0 0 0 0 0\n", "\n3 3 0 9 0 1 2 1 1 0 0 0\n", "\n5 3 -4 9 0 1 3 3 2 0 0 0\n"})
+    EXPECT_NE(text.find(row), text.npos) << row << text;
+  const ReadResult again = read_swc(text, "cell");
+  EXPECT_TRUE(again.warnings.empty());
+  EXPECT_EQ(again.morphology, traced.morphology);
+}
+
 }  // namespace
 }  // namespace forest::io

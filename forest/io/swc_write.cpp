@@ -17,7 +17,7 @@ bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.
 
 class Writer {
  public:
-  explicit Writer(const Morphology& m) : m_(m), soma_place_(m) {}
+  explicit Writer(const Morphology& m, bool extended = false) : m_(m), soma_place_(m), extended_(extended) {}
 
   std::string write() {
     rows();  // first, since the header names ids
@@ -43,16 +43,21 @@ class Writer {
     append_number(rows_, ++id_), rows_ += ' ';
     append_number(rows_, type), rows_ += ' ';
     for (const float number : {p.x, p.y, p.z, p.radius}) append_number(rows_, number), rows_ += ' ';
-    append_number(rows_, parent), rows_ += '\n';
+    append_number(rows_, parent);
+    if (extended_) rows_ += fmt::format(" {} {} 0 0 0", segment_, level_);
+    rows_ += '\n';
   }
 
   void rows() {
     rows_.reserve(48 * (m_.points().size() + 16));
     soma();
     std::vector<std::int64_t> last_ids(m_.sections().size());
+    std::vector<std::int64_t> levels(m_.sections().size());
     for (std::size_t s = 0; s < m_.sections().size(); ++s) {
       const Section& section = m_.sections()[s];
       const std::span<const Point> points = m_.points(SectionId(s));
+      levels[s] = section.parent.valid() ? levels[section.parent.value()] + 1 : 1;
+      segment_ = s + 1, level_ = levels[s];
       std::int64_t parent = -1;
       std::size_t first = 0;
       if (!section.parent.valid()) {
@@ -124,11 +129,14 @@ class Writer {
   const Morphology& m_;
   SomaPlaces soma_place_;
   std::string header_, rows_;
-  std::int64_t id_ = 0;
+  std::int64_t id_ = 0, level_ = 0;
+  std::size_t segment_ = 0;
+  const bool extended_;  // eSWC
 };
 
 }  // namespace
 
 std::string write_swc(const Morphology& morphology) { return Writer(morphology).write(); }
+std::string write_eswc(const Morphology& morphology) { return Writer(morphology, true).write(); }
 
 }  // namespace forest::io

@@ -11,6 +11,9 @@ TracedSections::Closed TracedSections::close(TracedBranch& branch, std::vector<P
   Closed closed;
   std::size_t joint = 0;  // points put before the branch's own
   branch.over = true;
+  if (!branch.node.valid() && !points.empty())
+    closed.early_spines = std::size_t(
+        std::ranges::count_if(spines, [](const SpineSeat& s) { return s.points == 0 && !s.said; }));
   if (branch.node.valid() && !points.empty()) {
     const Point& node = end(branch.node);
     const bool repeated = points[0].x == node.x && points[0].y == node.y && points[0].z == node.z;

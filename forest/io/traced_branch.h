@@ -40,8 +40,9 @@ class TracedSections {
 
   struct Closed {
     bool only_branch_point =
-        false;                    // the branch held nothing but the point it leaves from, and has no section
-    std::size_t lost_spines = 0;  // that stand where their tree has no point
+        false;                     // the branch held nothing but the point it leaves from, and has no section
+    std::size_t lost_spines = 0;   // that stand where their tree has no point
+    std::size_t early_spines = 0;  // that stand before the first point of their tree, and are put on it
   };
   /// The branch has no more points: `points` become a section and `spines` sit on it; both are left empty. A branch that
   /// does not repeat the point it leaves from begins there with the radius of its own first point.

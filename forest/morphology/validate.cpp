@@ -12,6 +12,9 @@ namespace {
 
 constexpr double jump_factor = 50.;     // of the median segment length
 constexpr double stem_gap_factor = 3.;  // of the soma's radius
+constexpr std::size_t end_points = 5;   // of a tip; as NeuroM takes them
+constexpr double fat_end_factor = 2.;   // of their mean radius
+constexpr double narrow_factor = .5;    // of the second point's radius
 
 double median_segment_length(const Morphology& m) {
   std::vector<double> lengths;
@@ -24,6 +27,14 @@ double median_segment_length(const Morphology& m) {
   const auto middle = lengths.begin() + std::ptrdiff_t(lengths.size() / 2);
   std::nth_element(lengths.begin(), middle, lengths.end());
   return *middle;
+}
+
+/// Whether a tip ends in a ball: a last radius of more than twice the mean of the last five.
+bool ends_fat(std::span<const Point> points) {
+  const auto last = points.last(std::min(points.size(), end_points));
+  double sum = 0.;
+  for (const Point& p : last) sum += double(p.radius);
+  return double(last.back().radius) > fat_end_factor * sum / double(last.size());
 }
 
 }  // namespace
@@ -68,6 +79,14 @@ std::vector<Finding> validate(const Morphology& m) {
     if (section.parent.valid() && m.section(section.parent).kind != section.kind)
       add(Severity::note, "kind-change", id, -1,
           fmt::format("{} grows out of {}", name_of(section.kind), name_of(m.section(section.parent).kind)));
+    if (daughters == 0 && ends_fat(points))
+      add(Severity::note, "fat-end", id, std::int64_t(points.size()) - 1,
+          "the tip is more than twice as thick as what leads to it; look whether it is a growth cone or a "
+          "slip");
+    if (!section.parent.valid() && points.size() > 1 &&
+        double(points[0].radius) <= narrow_factor * double(points[1].radius) && points[1].radius > 0.f)
+      add(Severity::note, "narrow-start", id, 0,
+          "the stem begins at most half as thick as it goes on; measure where it leaves the soma");
     if (!section.parent.valid() && soma.radius > 0.f) {
       const double gap = segment_length(soma, points[0]);
       if (gap > stem_gap_factor * soma.radius + points[0].radius)

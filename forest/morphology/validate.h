@@ -22,7 +22,7 @@ struct Finding {
 
 /// Looks for: no soma, no section, zero radii, zero-length segments, single-point stems, unifurcations,
 /// multifurcations, kinds that change below a branch point, jumps (a segment much longer than the rest),
-/// stems far from the soma.
+/// stems far from the soma, tips that end thick, stems that begin thin.
 std::vector<Finding> validate(const Morphology& m);
 
 }  // namespace forest

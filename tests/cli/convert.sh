@@ -96,4 +96,23 @@ done
 printf '("CellBody" (CellBody) (5 0 0 0) (0 5 0 0) (-5 0 0 0) (0 -5 0 0))\n((Dendrite) (0 6 0 2) (0 20 0 1) Normal)\n' >traced.asc
 "$program" convert traced.asc traced.nml >/dev/null 2>&1
 [[ $(grep -c '<parent segment="0"/>' traced.nml) == 1 ]] || fail "the dendrite hangs on no soma in NeuroML"
+# Files of one stem become files side by side, none of them lost.
+mkdir stems && cp "cells/$first" stems/simple.swc && cp "cells/$first" stems/simple-2.swc && "$program" convert "cells/$first" stems/simple.asc >/dev/null
+"$program" convert stems --format neuroml --out numbered >/dev/null 2>said.txt || fail "two files of one stem are not converted: $(cat said.txt)"
+[[ $(ls numbered | wc -l) == 3 ]] || fail "of three files became $(ls numbered)"
+grep -q '^stems/simple.swc: becomes numbered/simple-3.nml, for stems/simple.asc becomes numbered/simple.nml$' said.txt || fail "said: $(cat said.txt)"
+
+# What of a file is not kept is told as a loss, and eSWC has Vaa3D's columns.
+printf '1 1 0 0 0 5 -1 7 7 7\n2 3 0 5 0 1 1 7 7 7\n3 3 0 9 0 1 2 7 7 7\n' >vaa3d.eswc
+"$program" convert vaa3d.eswc again.eswc >out.txt 2>lost.txt
+grep -q '^vaa3d.eswc:1: extra-columns: ' lost.txt || fail "that columns are lost is not told: $(cat lost.txt)"
+grep -q ' 1 loss told' out.txt || fail "$(cat out.txt)"
+grep -q '^3 3 0 9 0 1 2 1 1 0 0 0$' again.eswc || fail "eSWC has not its columns: $(cat again.eswc)"
+"$program" check again.eswc --json | /usr/bin/python3 -c 'import json, sys; d = json.load(sys.stdin); assert d["sound"] == 1, d'
+
+# Notes are shown by check, counted for themselves, and are nothing to mend.
+printf '1 3 0 0 0 1 -1\n2 3 0 5 0 1 1\n3 3 0 5 0 1 2\n' >no_soma.swc
+"$program" check no_soma.swc --repair notes >out.txt
+grep -q 'no-soma (note)' out.txt && grep -q 'zero-length (note)' out.txt && grep -q '0 files without a finding, 0 with some, 1 with notes only' out.txt || fail "$(cat out.txt)"
+[[ ! -e notes ]] || fail "a file with notes only was mended"
 echo "convert.sh: all is well"

@@ -1,10 +1,10 @@
 #!/usr/bin/env bash
-# Exported cells load in NEURON with the sections, lengths and areas that were measured: grown ones, made-up odd ones and a
-# spread sample of the real ones (all of them with NEURON_EVERY=1, some 40 s).
+# Exported cells load in NEURON with the sections, lengths and areas that were measured: grown ones, made-up odd ones, every
+# real one, and the samples of other formats.
 set -euo pipefail
 program=$BRAINFOREST
 required=${BRAINFOREST_REQUIRE_DATA:-0}
-data=${BRAINFOREST_DATA:-$FOREST_SOURCE_DIR/../shared/data}/morphologies/real
+data=${BRAINFOREST_DATA:-$FOREST_SOURCE_DIR/../shared/data}
 unset DISPLAY  # NEURON opens windows where there is one
 if ! /usr/bin/python3 -c 'import neuron' 2>/dev/null; then
   echo "neuron.sh: python3-neuron is not installed; ./dev setup installs it"
@@ -47,13 +47,26 @@ cat >cells/odd/all.swc <<'SWC'
 SWC
 printf '1 3 0 0 0 1 -1\n2 3 0 9 0 1 1\n3 3 4 12 0 1 2\n4 3 -4 12 0 1 2\n' >cells/odd/no_soma.swc
 printf '1 1 0 0 0 0 -1\n2 3 0 9 0 0 1\n3 3 4 12 0 0 2\n' >cells/odd/no_radii.swc
-if [[ -d $data ]]; then
-  step=5
-  [[ ${NEURON_EVERY:-0} == 1 ]] && step=1
+if [[ -d $data/morphologies/real ]]; then
   number=0
-  while IFS= read -r -d '' file; do
-    if ((number++ % step == 0)); then cp "$file" "cells/real/$number-$(basename "$file")"; fi
-  done < <(find "$data" -name '*.swc' -print0 | sort -z)
+  gather() {  # folder, extension…: the files below, by names of their own
+    local to=$1 folder=$2 extension
+    mkdir -p "$to"
+    for extension in "${@:3}"; do
+      while IFS= read -r -d '' file; do
+        cp "$file" "$to/$((number++))-$(basename "$file")"
+      done < <(find "$folder" -name "*.$extension" -print0 | sort -z)
+    done
+  }
+  gather cells/real "$data/morphologies/real" swc asc
+  # HDF5 holds all of a neuron, and files of several cells become several.
+  gather others "$data/morphologies/real" xml
+  gather others "$data/morphologies/h5" h5
+  gather others "$data/eutectic" nts
+  gather others "$data/genesis" p
+  gather others "$data/neuroml/smith_l23" nml
+  gather others "$data/neuroml/cvapp_cases" nml
+  "$program" convert others --format h5 --out cells/others >/dev/null 2>&1 || true  # some are no neurons
 elif [[ $required == 1 ]]; then
   echo "neuron.sh: there is no real data in $data"
   exit 1
