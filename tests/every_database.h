@@ -47,10 +47,7 @@ class EveryDatabase : public RepositoryTest, public testing::WithParamInterface<
     place_ = file_;
     if (GetParam() == "sqlite") return;
     const auto& server = PostgresqlServer::get();
-    if (!server.runs()) {
-      if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
-      GTEST_SKIP() << "there is no PostgreSQL here";
-    }
+    FOREST_POSTGRESQL(server);
     ASSERT_NO_FATAL_FAILURE(renew());
   }
   bool is_file() const { return GetParam() == "sqlite"; }

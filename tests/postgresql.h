@@ -9,6 +9,15 @@
 #include <string>
 #include <unistd.h>
 
+/// At the beginning of a test: leaves it out where there is no PostgreSQL; where BRAINFOREST_REQUIRE_DATA says that all must
+/// run, it fails.
+#define FOREST_POSTGRESQL(server)                                                         \
+  do {                                                                                    \
+    if ((server).runs()) break;                                                           \
+    if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here"; \
+    GTEST_SKIP() << "there is no PostgreSQL here";                                        \
+  } while (false)
+
 namespace forest {
 
 class PostgresqlServer {

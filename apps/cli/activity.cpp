@@ -4,8 +4,6 @@
 
 #include <filesystem>
 #include <memory>
-#include <optional>
-#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -39,9 +37,8 @@ void run(const Options& options, Console& console) {
     throw Error("there is nothing to pack; name a report, or spikes with --spikes");
   std::vector<reports::Spikes> spikes;
   if (!options.spikes.empty()) spikes = io::read_sonata_spikes(options.spikes, options.population);
-  std::optional<io::SonataCircuit> known;
-  if (spikes_alone) known = io::read_sonata(options.circuit, console.progress());
-  const reports::Report report = spikes_alone ? reports::without_values(spikes, known->nodes)
+  const io::SonataCircuit circuit = io::read_sonata(options.circuit, console.progress());
+  const reports::Report report = spikes_alone ? reports::without_values(spikes, circuit.nodes)
                                               : io::read_sonata_report(options.report, options.population);
   reports::PackOptions pack;
   if (!options.range.empty())
@@ -50,8 +47,6 @@ void run(const Options& options, Console& console) {
     throw InputError(
         options.report.string(), 0,
         fmt::format("holds values in {}; say from where to where they reach, with --range", report.units));
-  const io::SonataCircuit circuit =
-      known ? std::move(*known) : io::read_sonata(options.circuit, console.progress());
   reports::pack(report, circuit.circuit, circuit.morphologies, circuit.nodes, spikes, options.out, pack,
                 console.progress());
 

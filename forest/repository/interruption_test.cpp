@@ -401,10 +401,7 @@ TEST_P(EveryDatabase, WhoReadsWhileThousandsAreStoredSeesWholeNeurons) {
 
 TEST(Postgresql, AServerThatStopsIsASentenceAndLosesNothing) {
   const PostgresqlServer server("halted");
-  if (!server.runs()) {
-    if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
-    GTEST_SKIP() << "there is no PostgreSQL here";
-  }
+  FOREST_POSTGRESQL(server);
   ASSERT_TRUE(server.run("create database cells"));
   const std::string place = server.address("cells");
   std::vector<Morphology> source;

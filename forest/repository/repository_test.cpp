@@ -473,10 +473,7 @@ TEST_P(EveryDatabase, AnswersQuestionsInSqlAndLetsNothingBeWritten) {
 
 TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
   const auto& server = PostgresqlServer::get();
-  if (!server.runs()) {
-    if (std::getenv("BRAINFOREST_REQUIRE_DATA")) FAIL() << "there is no PostgreSQL here";
-    GTEST_SKIP() << "there is no PostgreSQL here";
-  }
+  FOREST_POSTGRESQL(server);
   ASSERT_TRUE(server.run("create database shared"));
   ASSERT_TRUE(server.run("create role reader login"));
   const std::string mine = server.address("shared"), theirs = server.address("shared", "reader");
@@ -506,7 +503,7 @@ TEST(Postgresql, ARoleThatMayOnlyReadIsToldSo) {
 
 TEST(Postgresql, ADatabaseThatIsNotUtf8IsToldSo) {
   const auto& server = PostgresqlServer::get();
-  if (!server.runs()) GTEST_SKIP() << "there is no PostgreSQL here";
+  FOREST_POSTGRESQL(server);
   ASSERT_TRUE(server.run("create database latin encoding 'LATIN1' locale 'C' template template0"));
   for (const Access access : {Access::read, Access::write})
     EXPECT_THAT(message([&] { Repository::open(server.address("latin"), access); }),

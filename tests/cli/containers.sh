@@ -1,15 +1,7 @@
 #!/usr/bin/env bash
 # Many cells go into one file and come out of it again, whatever they are called.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "containers.sh: $*" >&2; exit 1; }
-refuses() {
-  local words=$1 said status=0
-  shift
-  said=$("$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == "${expected:-1}" ]] || fail "status $status: $*"
-  [[ $said == *"$words"* ]] || fail "said '$said' instead of a sentence with '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 "$program" grow --grammar motoneuron --count 12 --seed 3 --out cells >/dev/null
 first=motoneuron-3-00000.swc
@@ -47,12 +39,12 @@ grep -q '^28 written as' both.txt || fail "$(cat both.txt)"
 for f in exported/*other*; do cmp "$f" "cells/$first"; done
 "$program" export --repo r.db --population other --format h5 --out new/other.h5 >/dev/null
 refuses "holds something else" "$program" export --repo r.db --population other --out exported.h5
-expected=2 refuses "say different formats" "$program" export --repo r.db --format swc --out x.h5
-expected=2 refuses "say different formats" "$program" convert cells --format swc --out x.h5
+fails_with 2 "say different formats" "$program" export --repo r.db --format swc --out x.h5
+fails_with 2 "say different formats" "$program" convert cells --format swc --out x.h5
 
 # A broken file is told; the others are written.
 printf '1 1 0 0\n' >broken.swc
-refuses "1 of 2 files" "$program" convert broken.swc "cells/$first" --out rest.h5
+fails_with 1 "1 of 2 files" "$program" convert broken.swc "cells/$first" --out rest.h5
 "$program" convert rest.h5 rest.swc >/dev/null 2>&1
 cmp rest.swc "cells/$first"
 echo "containers.sh: all is well"

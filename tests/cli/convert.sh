@@ -1,15 +1,7 @@
 #!/usr/bin/env bash
 # Files of one format become files of another, odd files are told and mended, and no byte of them is lost.
 set -euo pipefail
-program=$BRAINFOREST
-fail() { echo "convert.sh: $*" >&2; exit 1; }
-refuses() {
-  local words=$1 said status=0
-  shift
-  said=$("$@" 2>&1 >/dev/null) || status=$?
-  [[ $status == "${expected:-1}" ]] || fail "status $status: $*"
-  [[ $said == *"$words"* ]] || fail "said '$said' instead of a sentence with '$words'"
-}
+source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 "$program" grow --grammar motoneuron --count 2 --seed 3 --out cells >/dev/null
 first=$(ls cells | head -1)
@@ -18,15 +10,15 @@ cmp "cells/$first" copy.swc || fail "a file converted to its own format has chan
 "$program" convert cells --format swc --out deep/er --json >report.json
 /usr/bin/python3 -c 'import json; d = json.load(open("report.json")); assert d["written"] == 2 and d["failed"] == 0, d'
 cmp "cells/$first" "deep/er/$first" || fail "a converted folder has changed"
-expected=2 refuses "say where" "$program" convert cells
+fails_with 2 "say where" "$program" convert cells
 refuses "no known format" "$program" convert "cells/$first" cell.doc
-expected=2 refuses "say which format" "$program" convert cells --out x
+fails_with 2 "say which format" "$program" convert cells --out x
 
 # An odd file: extra columns, CR LF, a type change and an unknown radius. And a broken one.
 printf '# CREATURE rat\r\n1 1 0 0 0 5 -1 9\r\n\r\n3 3 0 5 0 1 1\r\n4 3 0 9 0 NaN 3\r\n7 2 0 19 0 1 4\xff\r\n' | sed 's/\xff//' >odd.swc
 printf '1 1 0 0\n' >broken.swc
 cp odd.swc kept.swc
-refuses "1 of 3" "$program" check odd.swc broken.swc "cells/$first" --repair mended --json
+fails_with 1 "1 of 3" "$program" check odd.swc broken.swc "cells/$first" --repair mended --json
 "$program" check odd.swc "cells/$first" --repair mended --json >check.json
 /usr/bin/python3 - <<'PY'
 import json
@@ -70,7 +62,7 @@ refuses ".glb, .obj" "$program" convert "cells/$first" cell.foo
 
 # A file of several cells is read and not mended, and says so for itself; its cells are converted one by one.
 printf '\xef\xbb\xbf*start_cell /a\nsoma none 0 0 0 9\nd soma 0 9 0 nan\n*start_cell /b\nsoma none 0 0 0 5\nd soma 0 7 0 1\n' >pair.p
-refuses "1 of 2 files, of several cells, was not mended; convert" "$program" check pair.p odd.swc --repair several
+fails_with 1 "1 of 2 files, of several cells, was not mended; convert" "$program" check pair.p odd.swc --repair several
 [[ -s several/odd.swc && ! -e several/pair.p ]] || fail "the other file is not mended"
 "$program" check pair.p --repair several --json >several.json 2>/dev/null || true
 /usr/bin/python3 - <<'PY2'
