@@ -272,7 +272,7 @@ class Writer {
         style(c.kinds.at(s.kind).style);
         put(" -> {} {} {} {} ", s.cell, s.next, rounded(s.ahead, 10.), rounded(s.length, 1e2));
         vector(s.aim - s.place, 10.);
-        trace(s.heading, s.points);
+        trace(s.heading, Vec3::Zero(), s.points);
       }
   }
 
@@ -326,7 +326,7 @@ class Writer {
         put(" ");
         vector(i < f.daughters.size() ? f.daughters[i].aim : Vec3(Vec3::Zero()), 10.);
       }
-      for (const Fork::Daughter& d : f.daughters) trace(f.heading, d.points);
+      for (const Fork::Daughter& d : f.daughters) trace(f.heading, f.last_step, d.points);
     }
   }
 
@@ -420,10 +420,12 @@ class Writer {
   void style(const Style& of) {
     for (const double s : of) put(" {}", rounded(s, 1e2));
   }
-  void trace(const Vec3& heading, std::span<const Point> points) {
+  void trace(const Vec3& heading, const Vec3& last_step, std::span<const Point> points) {
     put(" | ");
     vector(heading, 1e3);
-    put(" {}:", rounded(2. * double(points[0].radius), 1e3));
+    put(" {}", rounded(2. * double(points[0].radius), 1e3));
+    if (!last_step.isZero(0.f)) put(", "), vector(last_step, 1e3);
+    put(":");
     const auto stops = stops_of(points);
     for (std::size_t i = 0; i < stops.size(); ++i) {
       put("{} ", i ? "," : "");

@@ -52,6 +52,14 @@ double kink_of(std::span<const Point> points) {
   return sum / double(points.size() - 2);
 }
 
+// Unit; zero for a branch without length.
+Vec3 last_step_of(std::span<const Point> points) {
+  for (std::size_t i = points.size(); i-- > 1;)
+    if (const Vec3 step = points[i].position() - points[i - 1].position(); !step.isZero(0.f))
+      return step.stableNormalized();
+  return Vec3::Zero();
+}
+
 double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
 
 // Of one neuron.
@@ -156,6 +164,7 @@ struct Learner {
               .depth = double(place.z()),
               .heading = bud(i) ? ahead_of(i) : end_heading(points(i)),
               .aim = ahead_of(i),
+              .last_step = last_step_of(points(i)),
               .daughters = {}};
     for (const std::uint32_t d : daughters[i])
       fork.daughters.push_back({.tips = tips[d],

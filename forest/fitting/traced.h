@@ -47,6 +47,7 @@ struct Fork {
   double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
   double side, height, depth;                 // from the soma: across, above and before it, µm
   Vec3 heading, aim;                          // aim: unit, towards the farthest tip
+  Vec3 last_step;                             // unit: of the branch that ends here
   // How far to the right of the way out from the soma it heads, in the plane of the slice.
   double lean() const {
     return (side * double(heading.y()) - height * double(heading.x())) /

@@ -574,7 +574,8 @@ class Parser {
     grammar_.lookups.samples.push_back(std::move(sample));
   }
 
-  // Heading and diameter before it, then places with their diameters: `0 1 0 1.2: 0.5 3.1 0 1.1, 2 6.4 0.8 0.9`.
+  // Heading and diameter before it, perhaps also the last step before it, then places with their diameters:
+  // `0 1 0 1.2: 0.5 3.1 0 1.1, 2 6.4 0.8 0.9` or `0 1 0 1.2, 0.6 0.8 0: …`.
   Trace trace() {
     const auto place = [&] {
       const auto x = float(text_.signed_number()), y = float(text_.signed_number());
@@ -583,6 +584,7 @@ class Parser {
     Trace trace;
     trace.heading = place().stableNormalized();
     trace.diameter = float(text_.number());
+    if (text_.takes(",")) trace.last_step = place().stableNormalized();
     text_.expect(":", "between what a branch begins with and its places");
     do {
       const Vec3 at = place();

@@ -26,9 +26,10 @@ struct Trace {
     Vec3 at;             // µm
     float diameter = 0;  // µm
   };
-  Vec3 heading;             // unit: of the branch that it leaves, at its end
-  float diameter = 0.f;     // at its beginning, µm
-  std::vector<Stop> stops;  // at least one
+  Vec3 heading;                   // unit: of the branch that it leaves, at its end
+  Vec3 last_step = Vec3::Zero();  // unit: of that branch's last step; zero where it is not told
+  float diameter = 0.f;           // at its beginning, µm
+  std::vector<Stop> stops;        // at least one
   // Worked out by Sample::add().
   Vec3 ahead = Vec3::Zero();        // where it heads at its end
   std::vector<float> lengths = {};  // from its beginning to each place, µm

@@ -108,6 +108,7 @@ struct State {
   Eigen::Vector3d towards = Eigen::Vector3d::UnitY();  // of tropism
   Eigen::Vector3d across = Eigen::Vector3d::UnitZ();   // of flattening
   std::uint32_t node = none;                           // the drawn point the turtle stands on
+  std::uint32_t begun = none;                          // … and that where the traced branch to it began
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
 };
@@ -428,6 +429,8 @@ class Turtle {
     if (answers_ && free) {
       line_to(place(t.end()) + aside, 0.f);
     } else {
+      if (free && !t.last_step.isZero(0.f)) approach(turn * mirrored(t.last_step));
+      const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       const Course course(t, float(scale));
       const float whole = course.length(), mean_step = whole / float(course.places.size());
       const bool own = &calibre == &t && course.places.size() == t.stops.size();
@@ -451,11 +454,38 @@ class Turtle {
         line_to(next, start);
         start = float(0.5 * state_.diameter);
       }
+      state_.begun = begun;
     }
     state_.diameter = thick(calibre.stops.back().diameter, 1.f);
     const double length = scale * double(t.length());
     if (!t.ahead.isZero(0.f) && length > 0.)
       head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
+  }
+
+  /// Turns the end of the traced branch that leads here so that its last step has this direction: how a fork stands on the step
+  /// before it belongs to the fork. The turn fades over the steps before; what lies farther away stays.
+  void approach(const Eigen::Vector3d& direction) {
+    constexpr double reach = 10.;  // µm
+    if (state_.node == none || state_.begun == none) return;
+    const Eigen::Vector3d end = drawn_[state_.node].position;
+    std::uint32_t node = drawn_[state_.node].parent;
+    // How the branch itself left the fork before it belongs to that one.
+    const auto first = [&](std::uint32_t n) { return n == state_.begun || drawn_[n].parent == state_.begun; };
+    if (node == none || first(node)) return;
+    const Eigen::Vector3d step = end - drawn_[node].position;
+    if (step.isZero(0.)) return;
+    const Eigen::AngleAxisd whole(Eigen::Quaterniond::FromTwoVectors(step, direction));
+    Eigen::Vector3d after = end;
+    for (double way = -step.norm(); node != none && !first(node) && drawn_[node].children == 1;
+         node = drawn_[node].parent) {
+      const Eigen::Vector3d place = drawn_[node].position;
+      way += (place - after).norm();
+      if (way >= reach) break;
+      drawn_[node].position =
+          end +
+          Eigen::AngleAxisd(whole.angle() * (1. - std::max(0., way) / reach), whole.axis()) * (place - end);
+      after = place;
+    }
   }
 
   void head(const Eigen::Vector3d& direction) {
