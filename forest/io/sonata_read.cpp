@@ -87,7 +87,8 @@ class Assembler {
     } catch (const Error& error) {
       config_.refuse(error.what());
     }
-    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_), attributes()};
+    auto known = attributes();
+    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_), std::move(known)};
   }
 
  private:
@@ -137,19 +138,15 @@ class Assembler {
 
   /// Whatever else node sets may ask of the nodes; where they stand is known better from the instances.
   void note_attributes(const NodePopulation& nodes, std::span<const std::size_t> shaped) {
-    static constexpr std::string_view places[] = {"x",           "y",        "z",       "morphology",
-                                                  "orientation", "rotation", "recenter"};
-    static constexpr std::string_view told[] = {"population", "node_id"};
+    static constexpr std::string_view told[] = {"x",        "y",          "z",      "morphology",
+                                                "recenter", "population", "node_id"};
     // What we wrote is known from the circuit itself.
     static constexpr std::string_view of_ours[] = {"layer", "pop_name",   "ei",          "source_population",
                                                    "glia",  "model_type", "node_type_id"};
     for (const std::string& name : nodes.attributes()) {
       const auto is = [&](std::string_view known) { return name == known; };
-      const auto begins = [&](std::string_view known) {
-        return is(known) || name.starts_with(std::string(known) + "_");
-      };
-      if (std::ranges::any_of(places, begins) || std::ranges::any_of(told, is) ||
-          (ours_ && std::ranges::any_of(of_ours, is)))
+      if (std::ranges::any_of(told, is) || (ours_ && std::ranges::any_of(of_ours, is)) ||
+          name.starts_with("orientation_") || name.starts_with("rotation_angle_"))
         continue;
       Piece piece{circuit_.instances.size(), {}};
       try {

@@ -237,11 +237,11 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
   if (picture.scale_bar) {
     const ScaleBar bar = scale_bar_of(picture);
     const double margin = .035 * picture.height, bottom = picture.height - margin;
-    const double wide = std::max(bar.length, .55 * margin * double(bar.label.size()));
+    const double plate = std::max(bar.length, .55 * margin * double(bar.label.size()));
     svg += fmt::format(
         "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
         "fill-opacity=\"{}\"/>\n",
-        .5 * margin, bottom - 1.7 * margin, wide + margin, 2.2 * margin, hex(ground.paper), plate_opacity);
+        .5 * margin, bottom - 1.7 * margin, plate + margin, 2.2 * margin, hex(ground.paper), plate_opacity);
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
         "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
