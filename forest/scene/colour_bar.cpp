@@ -37,7 +37,7 @@ ColourBar bar_of_spikes(const ActivityView& activity, double time, Background ba
   return {.map = nullptr,
           .mark = screen_of(palette[spike_entry]),
           .title = fmt::format("{:.1f} ms", time),
-          .note = activity.speed > 0.f ? fmt::format("a spike, {:g} µm/ms along axons", activity.speed)
+          .note = activity.speed > 0.f ? fmt::format("a spike, {:g} µm/ms", activity.speed)
                                        : "spikes are not shown"};
 }
 
@@ -71,7 +71,8 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
   for (const ColourBar& bar : bars) {
     const float left = h * (margin + padding), right = left + h * wide;
     const float bottom = top + h * (2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
-    fill(image, {left - h * padding, top, right + h * padding, bottom}, ground, .62f);
+    const float note = bar.map ? 0.f : 1.9f * h + letters.width(bar.note);
+    fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, .62f);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
       letters.write(image, bar.title, left, base);

@@ -28,7 +28,7 @@ TEST(ColourBar, OfSpikesAloneIsADotOfTheirColourAndNoMapOfValues) {
   for (const Background background : {Background::dark, Background::light}) {
     const ColourBar bar = bar_of_spikes(ActivityView(), 12.5, background);
     EXPECT_EQ(bar.map, nullptr);
-    EXPECT_EQ(bar.note, "a spike, 300 µm/ms along axons");
+    EXPECT_EQ(bar.note, "a spike, 300 µm/ms");
     frame::Image image = black(640, 480);
     EXPECT_TRUE(paint(image, {&bar, 1}, background));
     std::size_t dot = 0;

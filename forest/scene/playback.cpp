@@ -23,9 +23,10 @@ constexpr float dimmest = 1.f / float(flash_steps);  // of a flash that is still
 constexpr float dimmest_over_value = .4f;            // … over a branch whose own value would be seen
 
 // Of the marks of spikes alone.
-constexpr float dimmest_mark = .06f, fading = .55f;  // brightness of the last that is seen; of fading_entry
-constexpr float least_branch = 1.f / 800.f,
-                least_soma = 1.f / 190.f;  // radius of a new mark at least, in heights of the picture
+constexpr float dimmest_mark = .15f, fading = .55f;  // brightness of the last that is seen; of fading_entry
+constexpr float least_branch = 1.f / 1000.f,
+                least_soma = 1.f / 260.f;  // radius of a new mark at least, in heights of the picture
+constexpr float through = .3f;             // marks are drawn at this share of their distance
 
 using Clock = std::chrono::steady_clock;
 double milliseconds_since(Clock::time_point start) {
@@ -347,8 +348,19 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
       const float least =
           (soma ? least_soma : least_branch) * height * camera.pixel_size(height, std::max(depth, 0.f));
       const float own = std::max(cone.radius_a, cone.radius_b);
-      marks.push_back({cone.a, cone.b, (.4f + .7f * bright) * std::max(own, least),
-                       bright > fading ? spike_entry : fading_entry});
+      frame::Overlay mark{cone.a, cone.b, (.3f + .8f * bright) * std::max(own, least),
+                          bright > fading ? spike_entry : fading_entry};
+      // As large in the picture and nearer, so that it is seen through the tissue.
+      if (camera.orthographic()) {
+        const Vec3 nearer = (1.f - through) * std::max(depth, 0.f) * forward;
+        mark.a -= nearer, mark.b -= nearer;
+      } else {
+        const float share = std::min(1.f, std::max(through, 1.05f * camera.near / depth));
+        mark.a = camera.eye + share * (mark.a - camera.eye);
+        mark.b = camera.eye + share * (mark.b - camera.eye);
+        mark.radius *= share;
+      }
+      marks.push_back(mark);
     }
     figures_.flashes += marks.size() > before;
   }
@@ -363,7 +375,7 @@ void make_quiet(frame::Palette& palette, Background background) {
     const Vec3 grey =
         Vec3::Constant(.2126f * palette[i].x() + .7152f * palette[i].y() + .0722f * palette[i].z());
     const Vec3 pale = .65f * palette[i] + .35f * grey;
-    palette[i] = light ? Vec3(.38f * pale + .62f * light_of(0xDDE3EB)) : Vec3(.13f * pale);
+    palette[i] = light ? Vec3(.2f * pale + .8f * light_of(0xDDE3EB)) : Vec3(.11f * pale);
   }
   palette[spike_entry] = light ? light_of(0xC00018) : Vec3(1.f, .98f, .86f);
   palette[fading_entry] = light ? light_of(0xE8602C) : light_of(0xFFA02C);

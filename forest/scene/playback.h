@@ -47,7 +47,8 @@ class Playback {
 
   /// The spikes that are under way, as marks over the branches that they run along: on axons, and on somata. A new one is
   /// spike_entry and widest; fading it becomes fading_entry and sinks into its branch. None is thinner than a share of the
-  /// picture's height, so that they are found in a poster as on a screen. Of neurons that show.
+  /// picture's height, so that they are found in a poster as on a screen, and they lie so near to the eye that they are seen
+  /// through the tissue before them. Of neurons that show.
   /// @param height  of the picture, pixels
   std::vector<frame::Overlay> flashes(const frame::Camera& camera, float height, const Colouring& colouring,
                                       const ActivityView& view, const PlaybackOptions& options = {});

@@ -404,8 +404,11 @@ TEST(Playback, SpikesAloneRunAsMarksThatAreWideAtAnySizeOfPicture) {
       const auto marks = playback.flashes(camera, height, colouring, view);
       EXPECT_EQ(marks.empty(), time < 5. || time > 19.) << time;
       for (const frame::Overlay& mark : marks) {
-        EXPECT_LT(mark.a.y(), 10.f);  // no dendrite
-        const float y = .5f * (mark.a.y() + mark.b.y());
+        // It lies nearer to the eye than what it marks, in the same place of the picture; the cable lies at x = 0.
+        const float nearer = (camera.eye.x() - .5f * (mark.a.x() + mark.b.x())) / camera.eye.x();
+        EXPECT_LT(nearer, .5f);
+        const float y = .5f * (mark.a.y() + mark.b.y()) / nearer;
+        EXPECT_LT(y, 10.f);  // no dendrite
         const double way = std::max(0., (-8. - double(y)) * std::sqrt(1.01)), age = time - 5. - way / 100.;
         EXPECT_GT(age, -.2) << "it is not there yet";
         EXPECT_LT(age, 1.7) << "it has faded";

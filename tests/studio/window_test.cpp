@@ -245,7 +245,7 @@ class Near : public Window {
 // Drawn by OpenGL, of which the driver can be made to say that the card was reset.
 class OnACard : public Window {
  protected:
-  std::vector<std::string> more() const override { return {"--renderer", "opengl", "--size", "640x480"}; }
+  std::vector<std::string> more() const override { return {"--renderer", "opengl"}; }
   void SetUp() override {
     setenv("LD_PRELOAD", STUDIO_LOST_CARD, 1);
     Window::SetUp();
