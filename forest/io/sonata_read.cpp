@@ -88,7 +88,8 @@ class Assembler {
       config_.refuse(error.what());
     }
     auto known = attributes();
-    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_), std::move(known)};
+    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_),
+            std::move(known)};
   }
 
  private:
