@@ -38,12 +38,17 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     choosers.push_back(&layers_[i]->chooser);
   }
   if (first == 0) scene::Chooser::choose(choosers, eyes, viewports, colouring.shown(), painter);
+  // Outlines are drawn over the picture, but for what the finest layer shows of them.
+  std::vector<frame::Overlay> outlines, others;
+  for (const frame::Overlay& overlay : overlays)
+    (plan.size() > 1 && overlay.colour == scene::outline_entry ? outlines : others).push_back(overlay);
   std::vector<frame::Frame> frames;
   for (std::size_t i = 0; i < plan.size(); ++i) {
     const scene::Layer& layer = plan[i];
     const scene::View shown = scene::view_for(view, layer);
     frame::Frame& frame = frames.emplace_back(
-        scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height, overlays));
+        scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height,
+                       i == 0 ? overlays : std::span<const frame::Overlay>(others)));
     frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
     frame.glass = glass;
     if (view.samples > 1) frame.first_subframe = first, frame.last_subframe = last;
@@ -77,6 +82,11 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     pictures.push_back(image ? image : &layers_[i]->image);
   }
   scene::unite(view, plan, pictures, width, height, whole_);
+  const frame::Camera& camera = view.camera;
+  const Bounds& somata = forest_.soma_bounds();
+  const Vec3 middle = somata.empty() ? camera.target : somata.centre();
+  scene::trace_lines(view, plan, outlines, frames.front(), -(middle - camera.eye).dot(camera.axes().col(2)),
+                     whole_);
   figures_.unite = milliseconds_since(start);
   return whole_;
 }

@@ -15,7 +15,6 @@
 #include "apps/cli/clock.h"
 
 namespace forest::cli {
-namespace {}  // namespace
 
 Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
     : forest_(std::move(forest)),
@@ -35,10 +34,20 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     coloured_by_ = view.colour_by, coloured_for_ = view.background, shown_as_ = view.targets;
   }
   Drawn drawn;
-  const auto lines =
-      with_outline ? std::span<const frame::Overlay>(outline_) : std::span<const frame::Overlay>();
+  std::vector<frame::Overlay> marks;
+  if (with_outline) marks = outline_;
+  const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
+  std::optional<scene::Colouring> quiet;
+  if (spikes_alone) {
+    const auto flashes = playback_->flashes(view.camera, float(height), *colouring_,
+                                            view.activity.value_or(playback_->view()), {.window = window_});
+    marks.insert(marks.end(), flashes.begin(), flashes.end());
+    make_quiet(quiet.emplace(*colouring_).palette, view.background);
+  }
+  const std::span<const frame::Overlay> lines = marks;
+  const scene::Colouring& colouring = quiet ? *quiet : *colouring_;
   scene::Chooser::Painter painter;
-  if (playback_)
+  if (coloured)
     painter = [this, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
                                                                        const scene::Eye& from) {
       playback_->colour(cut, from, look, {.window = window_});
@@ -46,15 +55,14 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   auto start = Clock::now();
   if (view.detail.gaze) {
     Foveated::Dresser dress;
-    if (dressing_.wanted(view, *colouring_))
+    if (dressing_.wanted(view, colouring))
       dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
-        dressing_.put_on(frame, view, near, eye, *colouring_, playback_.has_value(), painter);
+        dressing_.put_on(frame, view, near, eye, colouring, coloured, painter);
         drawn.synapses += dressing_.chosen.balls.size();
       };
     else
       dressing_.rest();
-    drawn.image =
-        foveated_.draw(view, width, height, *colouring_, lines, {}, 0, view.samples, painter, dress);
+    drawn.image = foveated_.draw(view, width, height, colouring, lines, {}, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;
@@ -63,13 +71,13 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring_->shown(), painter);
+  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring.shown(), painter);
   if (playback_) drawn.activity = playback_->figures();
   drawn.cull = milliseconds_since(start);
-  frame::Frame frame = scene::compose(forest_, view, *colouring_, cut, width, height, lines);
+  frame::Frame frame = scene::compose(forest_, view, colouring, cut, width, height, lines);
   chooser_.complete(frame);
   start = Clock::now();
-  dressing_.put_on(frame, view, cut, eye, *colouring_, playback_.has_value(), painter);
+  dressing_.put_on(frame, view, cut, eye, colouring, coloured, painter);
   drawn.cull += milliseconds_since(start);
   drawn.synapses = dressing_.chosen.balls.size();
   const frame::Timing timing = renderer_->draw(frame);
@@ -87,8 +95,9 @@ void Artist::explain(const scene::View& view, frame::Image& image) const {
   std::vector<scene::ColourBar> bars;
   if (playback_) {
     const scene::ActivityView look = view.activity.value_or(playback_->view());
-    bars.push_back(
-        scene::bar_of(look, look.time.value_or(playback_->begin()), playback_->activity().facts().units));
+    const double time = look.time.value_or(playback_->begin());
+    bars.push_back(playback_->has_values() ? scene::bar_of(look, time, playback_->activity().facts().units)
+                                           : scene::bar_of_spikes(look, time, view.background));
   }
   if (dressing_.surfaces.has_values()) {
     const auto [low, high] = dressing_.surfaces.shown_range();
@@ -154,7 +163,8 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
   const scene::Playback& playback = *artist.playback();
   if (!view.activity) view.activity = playback.view();
   if (options.time) view.activity->time = options.time;
-  const double time = view.activity->time.value_or(playback.begin());
+  const double time = view.activity->time.value_or(playback.has_values() ? playback.begin()
+                                                                         : playback.busiest(*view.activity));
   if (!(time >= playback.begin() && time <= playback.end() + playback.activity().facts().step))
     throw Error(fmt::format("{}: holds no time {} ms; it runs from {} to {} ms", options.file.string(), time,
                             playback.begin(), playback.end()));

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest clamp: what compartments did over the whole of a simulation.
 #include <algorithm>
+#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -21,10 +22,12 @@
 namespace forest::cli {
 namespace {
 
+constexpr const char* soma = "soma";
+
 struct Options {
   std::filesystem::path file, csv;
   std::vector<std::uint64_t> neurons;
-  std::vector<std::uint32_t> sections{0};
+  std::vector<std::string> sections{soma};
   std::vector<float> positions{.5f};
   std::string population;
   bool force = false;
@@ -57,17 +60,28 @@ std::uint32_t row_of(const reports::Activity& activity, const Options& options, 
 }
 
 reports::Trace find(const reports::Activity& activity, const Options& options, std::uint64_t node,
-                    std::uint32_t section, float position) {
+                    const std::string& name, float position) {
+  std::uint32_t section = reports::soma_run;
+  if (name != soma) {
+    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), section);
+    if (error != std::errc() || end != name.data() + name.size())
+      throw Error(fmt::format(
+          "'{}' is no section; give its number, from 0, as a selection shows it, or 'soma'", name));
+  }
   const std::uint32_t row = row_of(activity, options, node);
   const reports::LayoutView layout = activity.layout(activity.rows()[row].layout);
-  const auto compartment = layout.at_element(section, position);
+  const auto compartment = layout.at(section, position);
   if (!compartment) {
     std::uint32_t most = 0;
-    for (const reports::SectionRun& run : layout.sections) most = std::max(most, run.element);
-    throw Error(fmt::format(
-        "{}: section {} of node {} was not reported; {} of its sections were, the last of them {} "
-        "(0 is the soma)",
-        options.file.string(), section, node, layout.sections.size(), most));
+    std::size_t count = 0;
+    for (const reports::SectionRun& run : layout.sections)
+      if (run.section != reports::soma_run) most = std::max(most, run.section), ++count;
+    throw Error(section == reports::soma_run
+                    ? fmt::format("{}: the soma of node {} was not reported; {} of its sections were",
+                                  options.file.string(), node, count)
+                    : fmt::format("{}: section {} of node {} was not reported; {} of its sections were{}",
+                                  options.file.string(), section, node, count,
+                                  count ? fmt::format(", the last of them {}", most) : ""));
   }
   return reports::trace(activity, row, *compartment);
 }
@@ -113,16 +127,16 @@ void run(const Options& options, Console& console) {
     const Told t = told(trace);
     const double when = facts.time(t.highest);
     list.push_back({{"neuron", trace.node},
-                    {"section", trace.element},
+                    {"section", trace.section == reports::soma_run ? nlohmann::ordered_json(soma)
+                                                                   : nlohmann::ordered_json(trace.section)},
                     {"position", trace.position},
                     {"lowest", t.low},
                     {"highest", t.high},
                     {"highest_at", when},
                     {"mean", t.mean},
                     {"not_numbers", facts.steps - t.numbers}});
-    lines.push_back({std::to_string(trace.node), std::to_string(trace.element),
-                     fmt::format("{:.3g}", trace.position), fmt::format("{:.1f}", t.low),
-                     fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
+    lines.push_back({std::to_string(trace.node), trace.section_name(), fmt::format("{:.3g}", trace.position),
+                     fmt::format("{:.1f}", t.low), fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
                      fmt::format("{:.1f}", t.mean)});
   }
   console.print({{"file", options.file.string()},
@@ -146,7 +160,8 @@ std::function<void()> clamp(CLI::App& command, Console& console) {
   command.add_option("--neuron", options->neurons, "Nodes, as the report numbers them")->required();
   command
       .add_option("--section", options->sections,
-                  "Their sections, as the report numbers them: 0 is the soma, then axon, basal, apical")
+                  "Their sections, numbered from 0 as the studio's selection shows them; or 'soma'")
+      ->type_name("SECTION")
       ->capture_default_str();
   command
       .add_option("--position", options->positions,

@@ -89,6 +89,7 @@ std::function<void()> pack(CLI::App& command, Console& console) {
     };
     circuit::NodeNames names = names_of(outline.nodes);
     names.sets = sets_of(outline.node_sets, console);
+    names.attributes = std::move(outline.attributes);
     const scene::PackFigures figures =
         scene::pack(outline.circuit, read, options->out, console.progress(), names);
     const double seconds = seconds_since(begin);

@@ -86,7 +86,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
       ->option_text("left|right|front|back|above|below")
       ->excludes(one_view);
   add_targets(command, options->targets);
-  add_activity(command, options->activity, "--time", "Its moment that is shown, ms; by default the first");
+  add_activity(command, options->activity, "--time",
+               "Its moment that is shown, ms; by default the first, of spikes alone the busiest");
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
   command
@@ -109,9 +110,12 @@ std::function<void()> render(CLI::App& command, Console& console) {
     scene::View view = options->view.empty()
                            ? default_view(forest, surfaces, options->side, float(width) / float(height))
                            : read_view(options->view);
-    const nlohmann::ordered_json of_surfaces = {{"triangles", surfaces.triangles()},
-                                                {"range", surfaces.shown_range()},
-                                                {"colour_map", surfaces.map->name}};
+    nlohmann::ordered_json of_surfaces;  // null where there are none
+    if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();
+    if (surfaces.has_values()) {
+      of_surfaces["range"] = surfaces.shown_range();
+      of_surfaces["colour_map"] = surfaces.map->name;
+    }
     if (!options->gaze.empty()) view.detail.gaze = Vec2(options->gaze[0], options->gaze[1]);
     add_appearances(options->targets, view.targets);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));

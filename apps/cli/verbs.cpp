@@ -118,7 +118,7 @@ std::span<const Verb> verbs() {
        "brainforest activity compartments.h5 --circuit column/ --spikes spikes.h5 --out run.activity",
        activity},
       {"clamp", "Show the history of compartments: the virtual clamp",
-       "brainforest clamp run.activity --neuron 3 --section 0 12 --csv traces.csv", clamp},
+       "brainforest clamp run.activity --neuron 3 --section soma 12 --csv traces.csv", clamp},
       {"raster", "Draw the somata of all neurons over time as a picture",
        "brainforest raster run.activity --out raster.png", raster},
       {"targets", "List the sets of neurons that a forest has, and define others",

@@ -12,6 +12,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
+#include "apps/cli/artist.h"
 #include "apps/cli/console.h"
 #include "apps/cli/studio.h"
 #include "apps/cli/target_options.h"
@@ -46,8 +47,8 @@ void open_studio(const std::filesystem::path& forest, const std::string& view,
 
 std::function<void()> view(CLI::App& command, Console&) {
   struct Options {
-    std::filesystem::path forest, activity;
-    std::string view;
+    std::filesystem::path forest, activity, synapses;
+    std::string view, size;
     std::vector<std::filesystem::path> node_sets;
     std::vector<std::string> surfaces, overlays;
   };
@@ -56,6 +57,10 @@ std::function<void()> view(CLI::App& command, Console&) {
   command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
   add_node_sets(command, options->node_sets);
   command.add_option("--activity", options->activity, "An activity file to play");
+  command.add_option(
+      "--synapses", options->synapses,
+      "Synapses, made by 'brainforest pack'; by default those of column.synapses beside column.forest");
+  command.add_option("--size", options->size, "Size of the window in pixels, for example 1280x800");
   command.add_option("--surface", options->surfaces, "Surface of a cortex to show, too")
       ->allow_extra_args(false);
   command
@@ -63,8 +68,14 @@ std::function<void()> view(CLI::App& command, Console&) {
       ->allow_extra_args(false);
   return [options] {
     MappedFile exists(options->forest);  // says so here rather than in a window
-    if (!options->activity.empty()) MappedFile also(options->activity);
+    for (const auto& file : {options->activity, options->synapses})
+      if (!file.empty()) MappedFile also(file);
     std::vector<std::string> more;
+    if (!options->size.empty()) {
+      parse_size(options->size);  // or says so here
+      more.insert(more.end(), {"--size", options->size});
+    }
+    if (!options->synapses.empty()) more.insert(more.end(), {"--synapses", options->synapses.string()});
     for (const std::string& file : options->surfaces) more.insert(more.end(), {"--surface", file});
     for (const std::string& file : options->overlays) more.insert(more.end(), {"--overlay", file});
     open_studio(options->forest, options->view, options->node_sets, options->activity, more);

@@ -25,7 +25,7 @@ namespace {
 const QColor trace_colours[] = {{230, 159, 0}, {86, 180, 233},  {0, 178, 130},   {240, 228, 66},
                                 {213, 94, 0},  {204, 121, 167}, {150, 170, 255}, {230, 230, 230}};
 const QColor ground(13, 16, 22), frame_colour(37, 45, 57), faint(108, 120, 138), ink(207, 215, 226),
-    moment_colour(255, 255, 255, 190);
+    moment_colour(255, 255, 255, 190), spike_colour(255, 250, 220);
 
 QColor colour_of(const Vec3& c) { return QColor::fromRgbF(c.x(), c.y(), c.z()); }
 
@@ -75,6 +75,15 @@ void RasterView::paintEvent(QPaintEvent*) {
     for (int y = 0; y < height(); ++y)
       for (int x = 0; x < width(); ++x)
         drawn_.setPixel(x, y, colours[codes[std::size_t(y) * std::size_t(width()) + std::size_t(x)]]);
+    if (!playback->has_values()) {  // spikes alone: a dot each
+      QPainter dots(&drawn_);
+      const double row_height = double(height()) / double(std::max<std::size_t>(1, activity.rows().size()));
+      for (const reports::Spike& spike : activity.spikes())
+        if (const auto row = activity.row_of_instance(spike.instance))
+          dots.fillRect(QRectF(share_of(*playback, spike.time) * width() - 1., *row * row_height, 2.,
+                               std::max(2., row_height)),
+                        spike_colour);
+    }
   }
   painter.drawImage(0, 0, drawn_);
   const double x = share_of(*playback, viewport_.time()) * width();
@@ -133,7 +142,9 @@ void TraceView::draw() {
   const QRectF area = plot();
   if (traces_.empty()) {
     painter.setPen(faint);
-    painter.drawText(rect(), Qt::AlignCenter, tr("Click a branch: its whole history is shown here."));
+    painter.drawText(rect(), Qt::AlignCenter,
+                     playback.has_values() ? tr("Click a branch: its whole history is shown here.")
+                                           : tr("There are spikes alone, and no values to show."));
     return;
   }
   float low = INFINITY, high = -INFINITY;
@@ -350,6 +361,8 @@ void ActivityPanel::show_activity() {
     slider_->setRange(0, int(std::min<std::uint64_t>(last, std::numeric_limits<int>::max())));
     threshold_->setValue(double(.5f * (viewport_.activity().low + viewport_.activity().high)));
   }
+  for (QWidget* of_values : std::initializer_list<QWidget*>{map_, low_, high_, has_threshold_, threshold_})
+    of_values->setVisible(playback.has_values());
   // All of it in some ten seconds.
   viewport_.set_rate(float(std::max(.001, (playback.end() - playback.begin()) / 10.)));
   raster_->forget();
@@ -361,7 +374,7 @@ void ActivityPanel::show_selection() {
   raster_->update();
   const auto& selection = viewport_.selection();
   const scene::Playback* playback = viewport_.playback();
-  if (!selection || !playback) return;
+  if (!selection || !playback || !playback->has_values()) return;
   const auto compartment = playback->compartment(selection->pick.instance, selection->pick.segment);
   if (!compartment) return;
   QElapsedTimer clock;

@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/scene/colour_bar.h"
+
 #include "apps/studio/selection.h"
 
 namespace forest::studio {
@@ -27,11 +29,8 @@ Ink ink_on(scene::Background background) {
 }
 
 QColor to_screen(const Vec3& linear) {
-  const auto srgb = [](float c) {
-    c = std::clamp(c, 0.f, 1.f);
-    return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
-  };
-  return QColor::fromRgbF(srgb(linear.x()), srgb(linear.y()), srgb(linear.z()));
+  const Vec3 c = scene::screen_of(linear);
+  return QColor::fromRgbF(c.x(), c.y(), c.z());
 }
 
 float round_length(float longest) {
@@ -133,6 +132,22 @@ void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityV
                      QString("spikes: %1 µm/ms").arg(activity.speed));
 }
 
+void paint_spikes(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
+                  scene::Background background, const Ink& ink) {
+  const scene::ColourBar bar = scene::bar_of_spikes(activity, time, background);
+  const qreal line = painter.fontMetrics().height() + 3.;
+  const QString note = QString::fromStdString(bar.note);
+  const QPointF corner(area.left() + margin, area.top() + margin), top = corner + QPointF(14, 6);
+  const QSizeF text(painter.fontMetrics().horizontalAdvance(note) + 4, line);
+  plate(painter, QRectF(corner, QSizeF(text.width() + 44, 2. * line + 14)), ink);
+  painter.setPen(ink.text);
+  painter.drawText(QRectF(top, text), Qt::AlignLeft, QString::fromStdString(bar.title));
+  painter.drawText(QRectF(top + QPointF(18, line), text), Qt::AlignLeft, note);
+  painter.setPen(Qt::NoPen);
+  painter.setBrush(QColor::fromRgbF(bar.mark.x(), bar.mark.y(), bar.mark.z()));
+  painter.drawEllipse(top + QPointF(6, 1.5 * line), 5, 5);
+}
+
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {
   painter.setBrush(Qt::NoBrush);
   painter.setPen(QPen(ink.faint, 1.4));
@@ -145,7 +160,8 @@ void mark_selection(frame::Palette& palette, scene::Background background, bool 
   if (dim) {
     const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
     for (std::size_t i = 0; i < palette.size(); ++i)
-      if (i != scene::highlight_entry && i != scene::outline_entry)
+      if (i != scene::highlight_entry && i != scene::outline_entry && i != scene::spike_entry &&
+          i != scene::fading_entry)
         palette[i] = .22f * palette[i] + .78f * back;
   }
   palette[scene::section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);

@@ -32,6 +32,9 @@ void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene:
 /// At the top left: the colours of activity with their values, and the moment that is shown.
 void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
                     const std::string& units, const Ink& ink);
+/// The same of spikes without values: what a flash is.
+void paint_spikes(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
+                  scene::Background background, const Ink& ink);
 /// A ring around the point that is looked at.
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink);
 

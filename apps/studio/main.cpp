@@ -7,6 +7,7 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <map>
 
 #include <CLI/CLI.hpp>
 
@@ -28,6 +29,7 @@ struct Options {
   std::string view, size;
   std::vector<std::filesystem::path> node_sets;
   bool report = false;
+  Drawer drawer = Drawer::automatic;
 };
 
 int fail(const std::string& sentence) {
@@ -112,7 +114,8 @@ int run(const Options& options, int& argc, char** argv) {
     for (circuit::NodeSet& set : more.sets) sets.put(std::move(set));
     sets.source = options.node_sets.size() == 1 ? more.source : "the node sets";
   }
-  Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets));
+  Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets),
+                options.drawer);
   if (size.isValid()) window.resize(size);
   if (options.report) report(window);
   if (!surfaces.empty()) window.viewport().show(surfaces);
@@ -171,6 +174,13 @@ int main(int argc, char** argv) {
   app.add_option("--overlay", options.overlays, "Values or areas that colour the surfaces, in their order")
       ->allow_extra_args(false);
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
+  const std::map<std::string, Drawer> drawers{
+      {"auto", Drawer::automatic}, {"opengl", Drawer::opengl}, {"cpu", Drawer::processor}};
+  app.add_option("--renderer", options.drawer,
+                 "Who draws: opengl (a graphics card or Mesa's llvmpipe), cpu, or auto: the card where there "
+                 "is one")
+      ->transform(CLI::CheckedTransformer(drawers))
+      ->option_text("auto|opengl|cpu");
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");
   app.set_version_flag("--version", FOREST_VERSION);

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/report.h"
 
+#include <QScrollArea>
 #include <QWidget>
 #include <cstdio>
 
@@ -18,6 +19,18 @@ Json place_of(const QWidget* widget) {  // on the screen
   return {{"x", corner.x()}, {"y", corner.y()}, {"width", widget->width()}, {"height", widget->height()}};
 }
 
+// Fields that are cut off on the right, by name: of those that scroll, beyond the edge of their panel.
+Json cut_off(const Window& window) {
+  Json names = Json::array();
+  for (const QScrollArea* panel : window.findChildren<QScrollArea*>())
+    for (const QWidget* field :
+         panel->widget() ? panel->widget()->findChildren<QWidget*>() : QList<QWidget*>())
+      if (field->isVisible() && (field->inherits("QAbstractSpinBox") || field->inherits("QComboBox")) &&
+          field->mapTo(panel, QPoint(field->width(), 0)).x() > panel->viewport()->width())
+        names.push_back(field->accessibleName().toStdString());
+  return names;
+}
+
 void print(const Json& line) {
   std::puts(line.dump().c_str());
   std::fflush(stdout);
@@ -33,6 +46,11 @@ void report(Window& window) {
     if (const auto& synapse = viewport->selected_synapse())
       known["synapse"] = to_json(*viewport->synapses(), *synapse);
     print({{"event", "selected"}, {"facts", known}});
+  });
+  QObject::connect(viewport, &Viewport::recovered, viewport, [viewport](const QString& sentence) {
+    print({{"event", "recovered"},
+           {"renderer", viewport->renderer_name().toStdString()},
+           {"why", sentence.toStdString()}});
   });
   QObject::connect(&window, &Window::clamped, &window, [&window](double milliseconds) {
     Json names = Json::array();
@@ -55,7 +73,8 @@ void report(Window& window) {
            {"synapses", f.synapses},
            {"skin_triangles", f.triangles},
            {"neurons", f.neurons},
-           {"samples", f.samples}});
+           {"samples", f.samples},
+           {"cut_off", cut_off(window)}});
   });
 }
 

@@ -15,6 +15,7 @@
 #include <QSpinBox>
 #include <QTreeWidget>
 #include <QVBoxLayout>
+#include <algorithm>
 #include <cmath>
 
 #include "apps/studio/annotation.h"
@@ -106,10 +107,17 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   problem_->hide();
   column->addWidget(problem_);
   connect(expression_, &QLineEdit::returnPressed, this, [this] {
-    const QString problem = changes_.add(expression_->text().trimmed());
+    const QString expression = expression_->text().trimmed(), problem = changes_.add(expression);
     problem_->setText(problem);
     problem_->setVisible(!problem.isEmpty());
-    if (problem.isEmpty()) expression_->clear(), expression_->clearFocus();
+    if (!problem.isEmpty()) return;
+    expression_->clear();
+    // What is said next, colour or kind, is meant of it.
+    const auto row = std::ranges::find_if(rows_, [name = expression.toStdString()](const TargetRow& r) {
+      return !r.who.branch && r.who.name == name;
+    });
+    if (row != rows_.end()) list_->setCurrentItem(list_->topLevelItem(int(row - rows_.begin())));
+    list_->setFocus();
   });
 
   auto* form = new QFormLayout;

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/view_panel.h"
 
+#include <QAbstractItemView>
 #include <QCheckBox>
 #include <QComboBox>
 #include <QDoubleSpinBox>
@@ -127,6 +128,9 @@ QWidget* ViewPanel::field(const Choice& choice) {
   box->setToolTip(with_shortcut(choice.hint, choice.shortcut));
   box->setFocusPolicy(Qt::TabFocus);
   for (const char* word : choice.words) box->addItem(word);
+  box->setSizeAdjustPolicy(QComboBox::AdjustToMinimumContentsLengthWithIcon);
+  box->setMinimumContentsLength(8);  // the longest word would widen the panel; the list below shows it whole
+  box->view()->setTextElideMode(Qt::ElideNone);
   connect(box, &QComboBox::activated, this, [this, &choice](int index) { set(choice, index); });
   refresh_.push_back([this, box, &choice] { box->setCurrentIndex(choice.value(settings_)); });
   return box;

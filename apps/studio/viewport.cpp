@@ -57,7 +57,8 @@ Vec2 vec(const QPointF& p) { return {float(p.x()), float(p.y())}; }
 
 }  // namespace
 
-Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets, QWidget* parent)
+Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets, Drawer drawer,
+                   QWidget* parent)
     : QOpenGLWidget(parent),
       forest_(std::move(forest)),
       targets_(forest_, std::move(sets)),
@@ -65,7 +66,8 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       settings_{.view = view},
       colouring_(scene::colour(targets_, view)),
       outline_(scene::outline(forest_)),
-      dressing_(forest_) {
+      dressing_(forest_),
+      drawer_(drawer) {
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
   setMinimumSize(240, 160);
@@ -81,9 +83,8 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
 }
 
 Viewport::~Viewport() {
-  makeCurrent();
-  renderer_.reset();
-  doneCurrent();
+  if (context()) disconnect(context(), nullptr, this, nullptr);
+  release();
 }
 
 void Viewport::change(const Settings& settings) {
@@ -227,6 +228,7 @@ void Viewport::set_playing(bool playing) {
 }
 
 frame::Image Viewport::picture() {
+  if (!renderer_) throw Error("there is no picture yet; wait until one is drawn");
   makeCurrent();
   const std::uint32_t samples = std::max(settings_.view.samples, 16u);
   draw_still(samples, 0, samples);
@@ -242,24 +244,65 @@ QImage Viewport::seen() {
   return grabFramebuffer().convertToFormat(QImage::Format_RGBA8888);
 }
 
-void Viewport::initializeGL() {
-  try {
+void Viewport::make_renderer() {
+  renderer_.reset();
+  card_ = nullptr, processor_ = nullptr, united_ = nullptr;
+  if (drawer_ != Drawer::processor) {
     auto card = std::make_unique<render::OpenGLRenderer>();
-    card_ = nullptr, processor_ = nullptr;
-    if (card->on_processor()) {
-      auto processor = std::make_unique<render::CpuRenderer>();
-      processor_ = processor.get();
-      renderer_ = std::move(processor);
-    } else {
+    if (drawer_ == Drawer::opengl || !card->on_processor()) {
+      card->load(forest_.geometry());
       card_ = card.get();
       renderer_ = std::move(card);
     }
-    renderer_->load(forest_.geometry());
-    renderer_name_ = QString::fromStdString(renderer_->name());
+  }
+  if (!renderer_) {
+    auto processor = std::make_unique<render::CpuRenderer>();
+    processor->load(forest_.geometry());
+    processor_ = processor.get();
+    renderer_ = std::move(processor);
+  }
+  renderer_name_ = QString::fromStdString(renderer_->name());
+  if (losses_) renderer_name_ += tr(" (the graphics card was lost)");
+  warming_up_ = 2;
+}
+
+void Viewport::release() {
+  makeCurrent();
+  renderer_.reset();
+  card_ = nullptr, processor_ = nullptr, united_ = nullptr;
+  doneCurrent();
+}
+
+// Called once for each context: Qt makes another when the widget goes to another window.
+void Viewport::initializeGL() {
+  connect(context(), &QOpenGLContext::aboutToBeDestroyed, this, &Viewport::release, Qt::DirectConnection);
+  try {
+    try {
+      make_renderer();
+    } catch (const std::exception& error) {
+      if (drawer_ == Drawer::processor) throw;
+      drawer_ = Drawer::processor;
+      make_renderer();
+      why_lost_ = QString::fromUtf8(error.what());
+    }
+    if (!why_lost_.isEmpty())
+      Q_EMIT recovered(processor_ ? tr("The processor draws from now on: %1").arg(why_lost_)
+                                  : tr("All is loaded anew: %1").arg(why_lost_));
+    why_lost_.clear();
+    touch();
   } catch (const std::exception& error) {
     renderer_.reset();
     Q_EMIT failed(QString::fromUtf8(error.what()));
   }
+}
+
+// The card may come back with another context; one that is lost again is left alone.
+void Viewport::recover(const std::string& why) {
+  why_lost_ = QString::fromUtf8(why.c_str());
+  if (++losses_ > 1) drawer_ = Drawer::processor;
+  renderer_.reset();
+  card_ = nullptr, processor_ = nullptr, united_ = nullptr;
+  Q_EMIT lost();
 }
 
 void Viewport::resizeGL(int, int) { touch(); }
@@ -295,7 +338,8 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
   scene::Chooser::Painter painter;
-  if (playback_)
+  const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
+  if (coloured)
     painter = [this, shown = activity(), window = window_](scene::Cut& cut, const scene::Eye& eye) {
       playback_->colour(cut, eye, shown, {.window = window});
     };
@@ -308,6 +352,12 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
     std::erase_if(overlays, [](const frame::Overlay& o) { return o.colour != scene::section_entry; });
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
+  if (spikes_alone) {
+    const auto flashes =
+        playback_->flashes(view.camera, float(h), colouring, activity(), {.window = window_});
+    overlays.insert(overlays.end(), flashes.begin(), flashes.end());
+    make_quiet(colouring.palette, view.background);
+  }
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
   std::optional<frame::Glass> glass;
   if (settings_.plane) {
@@ -328,7 +378,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   Foveated::Dresser dress;
   if (dressing_.wanted(view, colouring))
     dress = [&](frame::Frame& to, const scene::Cut& cut, const scene::Eye& eye) {
-      dressing_.put_on(to, view, cut, eye, colouring, playback_.has_value(), painter, limits);
+      dressing_.put_on(to, view, cut, eye, colouring, coloured, painter, limits);
       figures_.synapses += dressing_.chosen.balls.size(),
           figures_.triangles += dressing_.skin.figures().triangles;
     };
@@ -414,6 +464,7 @@ void Viewport::paintGL() {
     annotate();
     if (stage == Stage::moving && --warming_up_ < 0) took(float(clock.nsecsElapsed()) * 1e-6f);
   } catch (const std::exception& error) {
+    if (card_) return recover(error.what());
     renderer_.reset();
     Q_EMIT failed(QString::fromUtf8(error.what()));
     return;
@@ -449,7 +500,9 @@ void Viewport::annotate() {
     paint_scale(painter, rect(), settings_.view.camera, ink);
     paint_directions(painter, rect(), settings_.view.camera, ink);
   }
-  if (settings_.legend && playback_)
+  if (settings_.legend && playback_ && !playback_->has_values())
+    paint_spikes(painter, rect(), activity(), time(), settings_.view.background, ink);
+  else if (settings_.legend && playback_)
     paint_activity(painter, rect(), activity(), time(), playback_->activity().facts().units, ink);
   else if (settings_.legend)
     paint_legend(painter, rect(), legend(), ink);

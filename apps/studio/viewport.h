@@ -24,12 +24,16 @@
 
 namespace forest::studio {
 
+/// Who draws: a graphics card where there is one, OpenGL in any case, or the processor in any case.
+enum class Drawer : std::uint8_t { automatic, opengl, processor };
+
 class Viewport final : public QOpenGLWidget {
   Q_OBJECT
 
  public:
   /// @param sets  names that targets may use
-  Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets, QWidget* parent = nullptr);
+  Viewport(scene::Forest forest, const scene::View& view, circuit::NodeSets sets,
+           Drawer drawer = Drawer::automatic, QWidget* parent = nullptr);
   ~Viewport() override;
 
   const scene::Forest& forest() const { return forest_; }
@@ -102,6 +106,11 @@ class Viewport final : public QOpenGLWidget {
   void moved();       // its moment, or whether it plays
   void drawn();
   void settled();  // the picture is finished
+  /// The OpenGL context is of no use any more: whoever shows this widget must give it a new window (Window::renew). Its
+  /// renderer is gone; a new one is made with the new context.
+  void lost();
+  /// Drawing goes on after something was lost, by another renderer or in another context; a sentence says why.
+  void recovered(const QString& sentence);
   void failed(const QString& sentence);
 
  protected:
@@ -131,6 +140,9 @@ class Viewport final : public QOpenGLWidget {
   void set_camera(const frame::Camera& camera);
   void touch();                 // something changed: draw, and refine once it stands still
   void advance(float seconds);  // glide and flight
+  void make_renderer();         // in the current context; throws
+  void release();               // what lies in the current context
+  void recover(const std::string& why);
   bool flies() const { return !held_.empty(); }
   void draw_moving();
   void draw_still(std::uint32_t samples, std::uint32_t first, std::uint32_t last,
@@ -164,7 +176,9 @@ class Viewport final : public QOpenGLWidget {
   std::unique_ptr<render::Renderer> renderer_;
   render::OpenGLRenderer* card_ = nullptr;          // the renderer when it is OpenGL's …
   const render::CpuRenderer* processor_ = nullptr;  // … or this one where there is no graphics card
-  QString renderer_name_;
+  QString renderer_name_, why_lost_;
+  Drawer drawer_ = Drawer::automatic;
+  int losses_ = 0;  // of the graphics card
 
   Stage stage_ = Stage::moving;
   std::uint32_t refined_ = 0;  // samples that are drawn of the picture that is shown

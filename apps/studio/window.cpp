@@ -14,6 +14,7 @@
 #include <QMessageBox>
 #include <QScreen>
 #include <QScrollArea>
+#include <QScrollBar>
 #include <QSettings>
 #include <QStatusBar>
 #include <QTextBrowser>
@@ -46,10 +47,25 @@ constexpr const char* gestures[][2] = {
     {"Arrows", "turn the eye"},
 };
 
+// Scrolls up and down, and is never narrower than what is in it: no field is cut off.
+class Scroll final : public QScrollArea {
+ public:
+  explicit Scroll(QWidget* parent) : QScrollArea(parent) {
+    setWidgetResizable(true);
+    setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
+  }
+  QSize minimumSizeHint() const override {
+    const int inside = widget() ? widget()->minimumSizeHint().width() : 0;
+    return {std::max(300, inside + verticalScrollBar()->sizeHint().width() + 2 * frameWidth()),
+            QScrollArea::minimumSizeHint().height()};
+  }
+};
+
 }  // namespace
 
-Window::Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets)
-    : viewport_(new Viewport(std::move(forest), view, std::move(sets), this)) {
+Window::Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets,
+               Drawer drawer)
+    : viewport_(new Viewport(std::move(forest), view, std::move(sets), drawer, this)) {
   setWindowTitle(tr("%1 – Brain Forest").arg(title));
   setCentralWidget(viewport_);
   setDockNestingEnabled(true);
@@ -89,6 +105,11 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   });
   connect(viewport_, &Viewport::moved, this, [this] { activity_panel_->follow(); });
   connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
+  connect(viewport_, &Viewport::lost, this, &Window::renew, Qt::QueuedConnection);
+  connect(viewport_, &Viewport::recovered, this, [this](const QString& sentence) {
+    show_figures();
+    statusBar()->showMessage(sentence, 15'000);
+  });
 
   resize(1280, 800);
   QSettings kept;
@@ -97,15 +118,23 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   viewport_->setFocus();
 }
 
+// A card that was reset took the contexts of the picture and of the whole window with it: both are made anew.
+void Window::renew() {
+  takeCentralWidget()->setParent(nullptr);
+  setParent(nullptr, windowFlags());
+  setCentralWidget(viewport_);
+  viewport_->setVisible(true);
+  show();
+  activateWindow();
+  viewport_->setFocus();
+}
+
 void Window::add_docks() {
   view_panel_ = new ViewPanel(
       viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
   selection_panel_ = new SelectionPanel(this);
-  auto* scroll = new QScrollArea(this);
+  auto* scroll = new Scroll(this);
   scroll->setWidget(view_panel_);
-  scroll->setWidgetResizable(true);
-  scroll->setHorizontalScrollBarPolicy(Qt::ScrollBarAlwaysOff);
-  scroll->setMinimumWidth(300);
   targets_panel_ =
       new TargetsPanel({[this](const scene::Appearance& who, const scene::Appearance& what, bool own_colour) {
                           Settings settings = viewport_->settings();
@@ -136,7 +165,7 @@ void Window::add_docks() {
       added.push_back(dock);
     dock->setVisible(!section);
   }
-  resizeDocks(added, {260, 300, 160}, Qt::Vertical);
+  resizeDocks(added, {220, 260, 260}, Qt::Vertical);
   activity_panel_ = new ActivityPanel(
       *viewport_, [this](double milliseconds) { Q_EMIT clamped(milliseconds); }, this);
   activity_dock_ = new QDockWidget(tr("Activity"), this);

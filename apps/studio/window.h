@@ -27,7 +27,8 @@ class Window final : public QMainWindow {
   Q_OBJECT
 
  public:
-  Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets = {});
+  Window(scene::Forest forest, const scene::View& view, const QString& title, circuit::NodeSets sets = {},
+         Drawer drawer = Drawer::automatic);
 
   Viewport& viewport() { return *viewport_; }
   const std::vector<reports::Trace>& traces() const;
@@ -39,6 +40,7 @@ class Window final : public QMainWindow {
   void closeEvent(QCloseEvent* event) override;
 
  private:
+  void renew();  // the window on the screen, and all contexts with it
   void add_docks();
   void add_menus();
   void show_figures();

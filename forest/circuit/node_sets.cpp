@@ -5,6 +5,7 @@
 #include <array>
 #include <cctype>
 #include <charconv>
+#include <cmath>
 #include <map>
 #include <numeric>
 #include <regex>
@@ -95,8 +96,10 @@ class Resolver {
         refuse(fmt::format("the node set {} asks for {}, which is not known of these neurons; known are {}",
                            quoted(set.name), quoted(clause.attribute), table_.known));
       const std::vector<bool> holds = tested(set, clause, *attribute);
-      for (std::size_t i = 0; i < table_.count; ++i)
-        inside[i] = inside[i] && holds[attribute->words.empty() ? i : attribute->index[i]];
+      for (std::size_t i = 0; i < table_.count; ++i) {
+        const std::size_t at = attribute->words.empty() ? i : attribute->index[i];
+        inside[i] = inside[i] && at != Attribute::unknown && holds[at];
+      }
     }
     Members result;
     for (std::uint32_t i = 0; i < table_.count; ++i)
@@ -119,7 +122,8 @@ class Resolver {
           holds[i] = std::ranges::find(clause.words, attribute.words[i]) != clause.words.end() ||
                      (number && std::ranges::binary_search(numbers, *number));
         } else {
-          holds[i] = std::ranges::binary_search(numbers, attribute.numbers[i]);
+          holds[i] =
+              !std::isnan(attribute.numbers[i]) && std::ranges::binary_search(numbers, attribute.numbers[i]);
         }
       return holds;
     }

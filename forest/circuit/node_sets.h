@@ -49,9 +49,11 @@ struct NodeSets {
 
 /// What is known of each node by one name: a word (by its index in `words`) or a number.
 struct Attribute {
+  static constexpr std::uint32_t unknown = 0xffffffffu;
+
   std::vector<std::string> words;
-  std::vector<std::uint32_t> index;  // of each node, when there are words
-  std::vector<double> numbers;       // of each node, when there are none
+  std::vector<std::uint32_t> index;  // of each node, when there are words; unknown: it has none
+  std::vector<double> numbers;       // of each node, when there are none; NaN: it has none
 };
 
 /// What node sets are resolved against.
@@ -75,11 +77,17 @@ struct NodeRun {
 
   bool operator==(const NodeRun&) const = default;
 };
+/// Something that a circuit's files tell of its nodes, by the name that they use.
+struct NodeAttribute {
+  std::string name;
+  Attribute of;  // all instances
+};
 /// What SONATA calls the instances of a circuit, and sets of them.
 struct NodeNames {
   std::vector<std::string> populations;
   std::vector<NodeRun> runs;  // of all instances, in their order
   std::string sets{};  // the circuit's node sets, a JSON text as io/node_sets.h writes it; may be empty
+  std::vector<NodeAttribute> attributes{};  // what else is known of them, each name once
 };
 
 /// Members of an expression: names joined by "and", "or", "not" and parentheses; "and" binds tighter than "or". A name may

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/circuit/node_sets.h"
 
+#include <cmath>
+
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -24,9 +26,12 @@ NodeTable six() {
             if (name == "mtype") return Attribute{{"L2_a", "L2_b"}, {0, 1, 0, 1, 0, 1}, {}};
             if (name == "y") return Attribute{{}, {}, {0, 10, 20, 30, 40, 50}};
             if (name == "node_id") return Attribute{{}, {}, {0, 1, 2, 3, 4, 5}};
+            if (name == "some") return Attribute{{}, {}, {1, NAN, 3, NAN, 5, NAN}};
+            if (name == "class")
+              return Attribute{{"x", "y"}, {0, Attribute::unknown, 1, 1, Attribute::unknown, 0}, {}};
             return std::nullopt;
           },
-          "layer, mtype, node_id, y"};
+          "layer, mtype, node_id, y, some, class"};
 }
 
 Members of(std::vector<Clause> clauses) {
@@ -52,6 +57,14 @@ TEST(NodeSets, NumbersAreComparedAndWordsMeetPatterns) {
   EXPECT_THAT(of({{"y", Ask::at_most, {}, {10}}}), ElementsAre(0, 1));
   EXPECT_THAT(of({{"mtype", Ask::regex, {"^L[23].*b$"}, {}}}), ElementsAre(1, 3, 5));
   EXPECT_THAT(of({{"mtype", Ask::regex, {"_a"}, {}}}), ElementsAre(0, 2, 4));
+}
+
+TEST(NodeSets, ANodeWithoutTheAttributeIsInNoSetThatAsksForIt) {
+  EXPECT_THAT(of({{"some", Ask::less, {}, {99}}}), ElementsAre(0, 2, 4));
+  EXPECT_THAT(of({{"some", Ask::greater, {}, {-99}}}), ElementsAre(0, 2, 4));
+  EXPECT_THAT(of({{"some", Ask::any_of, {}, {0, 3, 7}}}), ElementsAre(2));
+  EXPECT_THAT(of({{"class", Ask::any_of, {"x", "y"}, {}}}), ElementsAre(0, 2, 3, 5));
+  EXPECT_THAT(of({{"class", Ask::regex, {""}, {}}}), ElementsAre(0, 2, 3, 5));
 }
 
 std::string refused(const NodeSets& sets, std::string_view name) {

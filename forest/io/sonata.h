@@ -9,6 +9,7 @@
 #include <span>
 #include <vector>
 
+#include "forest/circuit/node_sets.h"
 #include "forest/circuit/synapses.h"
 #include "forest/core/progress.h"
 #include "forest/io/format.h"
@@ -38,10 +39,11 @@ struct SonataCircuit {
 /// A circuit whose morphologies are still in their files, for those that do not fit into memory.
 struct SonataOutline {
   circuit::Circuit circuit;
-  std::vector<std::filesystem::path> files;  // of each of circuit.morphologies
-  std::vector<Warning> warnings;             // neurons left out
-  reports::Nodes nodes;                      // of each instance: what reports call it
-  std::filesystem::path node_sets{};         // the file that the configuration names; empty: none
+  std::vector<std::filesystem::path> files;          // of each of circuit.morphologies
+  std::vector<Warning> warnings;                     // neurons left out
+  reports::Nodes nodes;                              // of each instance: what reports call it
+  std::vector<circuit::NodeAttribute> attributes{};  // of all instances: what node sets may ask for besides
+  std::filesystem::path node_sets{};                 // the file that the configuration names; empty: none
 
   /// Reads one of circuit.morphologies, centre at the origin; warnings name its file. May be called by several threads.
   ReadResult morphology(std::size_t index) const;

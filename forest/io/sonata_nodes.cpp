@@ -2,6 +2,8 @@
 #include "forest/io/sonata_nodes.h"
 
 #include <charconv>
+#include <limits>
+#include <set>
 #include <unordered_map>
 
 #include <fmt/format.h>
@@ -161,6 +163,43 @@ std::optional<std::vector<float>> NodePopulation::reals(const std::string& attri
       if (!value)
         throw InputError(types_file_, types_->lines[row_of_[i]],
                          fmt::format("{} is \"{}\", not a number; correct it", attribute, *text));
+      values[i] = *value;
+    }
+  }
+  return values;
+}
+
+std::vector<std::string> NodePopulation::attributes() const {
+  std::set<std::string> names;
+  for (const Group& group : groups_) {
+    if (file_.kind(group.path) != hdf5::Kind::group) continue;
+    for (const std::string& name : file_.members(group.path))
+      if (file_.kind(group.path + "/" + name) != hdf5::Kind::group) names.insert(name);
+  }
+  if (types_) names.insert(types_->columns.begin(), types_->columns.end());
+  return {names.begin(), names.end()};
+}
+
+std::optional<std::vector<double>> NodePopulation::numbers(const std::string& attribute) const {
+  std::vector<std::vector<double>> of_group(groups_.size());
+  for (std::size_t g = 0; g < groups_.size(); ++g) {
+    const std::string path = groups_[g].path + "/" + attribute;
+    const hdf5::Kind kind = file_.kind(path);
+    if (kind == hdf5::Kind::none) continue;
+    if ((kind != hdf5::Kind::integers && kind != hdf5::Kind::reals) ||
+        file_.kind(groups_[g].path + "/@library/" + attribute) != hdf5::Kind::none)
+      return std::nullopt;
+    of_group[g] = file_.doubles(path);
+    check_size(path, of_group[g].size(), groups_[g]);
+  }
+  const auto column = types_ ? types_->column(attribute) : std::nullopt;
+  std::vector<double> values(size(), std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; i < size(); ++i) {
+    if (const auto& group = of_group[group_of_[i]]; !group.empty()) {
+      values[i] = group[index_in_group_[i]];
+    } else if (const std::string* text = cell(i, column); text && !absent(*text)) {
+      const auto value = number<double>(*text);
+      if (!value) return std::nullopt;
       values[i] = *value;
     }
   }

@@ -42,6 +42,11 @@ class NodePopulation {
   /// All indices none when no node has the attribute. Whole numbers are read as their digits, or by their library.
   Categories texts(const std::string& attribute) const;
 
+  /// All that is told of the nodes under a name: arrays of their groups and columns of their types; sorted.
+  std::vector<std::string> attributes() const;
+  /// Numbers, NaN where a node has none; none when any of them is a word.
+  std::optional<std::vector<double>> numbers(const std::string& attribute) const;
+
   /// Rows of the table of types that belong to this population, in its order; and what stands in them ("": NULL, or
   /// no such column).
   const std::vector<std::size_t>& type_rows() const { return type_rows_; }

@@ -3,6 +3,7 @@
 #include <cmath>
 #include <iterator>
 #include <limits>
+#include <map>
 #include <unordered_map>
 #include <unordered_set>
 
@@ -86,7 +87,9 @@ class Assembler {
     } catch (const Error& error) {
       config_.refuse(error.what());
     }
-    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_)};
+    auto known = attributes();
+    return {std::move(circuit_), std::move(files_), std::move(warnings_), std::move(nodes_),
+            std::move(known)};
   }
 
  private:
@@ -116,6 +119,7 @@ class Assembler {
     const auto positions = positions_of(nodes, name);
     const auto orientations = orientations_of(nodes);
     const auto recentre = nodes.reals("recenter", 1.f);
+    note_attributes(nodes, shaped);
     const auto cached = [](std::uint32_t& index, auto&& make) {
       return index == unknown ? index = make() : index;
     };
@@ -131,6 +135,73 @@ class Assembler {
            .layer = l == unknown ? this->layer("tissue")
                                  : cached(layer_index[l], [&] { return this->layer(layer.values[l]); })});
     }
+  }
+
+  /// Whatever else node sets may ask of the nodes; where they stand is known better from the instances.
+  void note_attributes(const NodePopulation& nodes, std::span<const std::size_t> shaped) {
+    static constexpr std::string_view told[] = {"x",        "y",          "z",      "morphology",
+                                                "recenter", "population", "node_id"};
+    // What we wrote is known from the circuit itself.
+    static constexpr std::string_view of_ours[] = {"layer", "pop_name",   "ei",          "source_population",
+                                                   "glia",  "model_type", "node_type_id"};
+    for (const std::string& name : nodes.attributes()) {
+      const auto is = [&](std::string_view known) { return name == known; };
+      if (std::ranges::any_of(told, is) || (ours_ && std::ranges::any_of(of_ours, is)) ||
+          name.starts_with("orientation_") || name.starts_with("rotation_angle_"))
+        continue;
+      Piece piece{circuit_.instances.size(), {}};
+      try {
+        if (const auto numbers = nodes.numbers(name)) {
+          for (const std::size_t i : shaped) piece.of.numbers.push_back((*numbers)[i]);
+        } else {
+          Categories texts = nodes.texts(name);
+          piece.of.words = std::move(texts.values);
+          for (const std::size_t i : shaped) piece.of.index.push_back(texts.index[i]);
+        }
+      } catch (const InputError& error) {
+        warn("attribute", fmt::format("{}; node sets cannot ask for {}", error.what(), name));
+        continue;
+      }
+      attributes_[name].push_back(std::move(piece));
+    }
+  }
+
+  /// Of all populations. Words where any of them has words.
+  std::vector<circuit::NodeAttribute> attributes() const {
+    std::vector<circuit::NodeAttribute> all;
+    const std::size_t count = circuit_.instances.size();
+    for (const auto& [name, pieces] : attributes_) {
+      circuit::Attribute a;
+      const bool words =
+          std::ranges::any_of(pieces, [](const Piece& piece) { return !piece.of.words.empty(); });
+      std::unordered_map<std::string, std::uint32_t> number_of;
+      const auto word = [&](const std::string& text) {
+        const auto [place, fresh] = number_of.try_emplace(text, std::uint32_t(a.words.size()));
+        if (fresh) a.words.push_back(text);
+        return place->second;
+      };
+      if (words)
+        a.index.assign(count, circuit::Attribute::unknown);
+      else
+        a.numbers.assign(count, std::numeric_limits<double>::quiet_NaN());
+      bool any = false;
+      for (const Piece& piece : pieces) {
+        for (std::size_t i = 0; i < piece.of.index.size(); ++i)
+          if (const std::uint32_t entry = piece.of.index[i]; entry != unknown)
+            a.index[piece.first + i] = word(piece.of.words[entry]), any = true;
+        for (std::size_t i = 0; i < piece.of.numbers.size(); ++i) {
+          const double value = piece.of.numbers[i];
+          if (std::isnan(value)) continue;
+          any = true;
+          if (words)
+            a.index[piece.first + i] = word(fmt::format("{}", value));
+          else
+            a.numbers[piece.first + i] = value;
+        }
+      }
+      if (any) all.push_back({name, std::move(a)});
+    }
+    return all;
   }
 
   /// The nodes that can be planted; how many cannot, and why, becomes a warning.
@@ -333,6 +404,11 @@ class Assembler {
   std::vector<Warning> warnings_;
   reports::Nodes nodes_;
   std::vector<fs::path> files_;  // by morphology
+  struct Piece {                 // of an attribute: instances of one population, from `first` on
+    std::size_t first;
+    circuit::Attribute of;
+  };
+  std::map<std::string, std::vector<Piece>> attributes_;
   std::unordered_map<std::string, std::uint32_t> morphology_of_file_;
   std::unordered_set<std::string> names_;   // of morphologies
   std::vector<std::uint32_t> not_centred_;  // instances whose morphology stays where its file has it

@@ -9,8 +9,11 @@
 
 namespace forest::reports {
 
+std::string Trace::section_name() const { return section == soma_run ? "soma" : std::to_string(section); }
+
 std::string Trace::name() const {
-  return fmt::format("node {} section {} at {:.4g}", node, element, position);
+  return section == soma_run ? fmt::format("node {} soma", node)
+                             : fmt::format("node {} section {} at {:.4g}", node, section, position);
 }
 
 Trace trace(const Activity& activity, std::uint32_t row, std::uint32_t compartment) {
@@ -23,7 +26,7 @@ Trace trace(const Activity& activity, std::uint32_t row, std::uint32_t compartme
   Trace t{.node = neuron.node_id,
           .row = row,
           .compartment = compartment,
-          .element = run->element,
+          .section = run->section,
           .position = layout.compartments[compartment].position,
           .values = {}};
   for (const Code code : activity.history(neuron.first[std::size_t(Level::compartment)] + compartment))

@@ -15,11 +15,12 @@ struct Trace {
   std::uint64_t node = 0;
   std::uint32_t row = 0;          // in Activity::rows()
   std::uint32_t compartment = 0;  // of that neuron
-  std::uint32_t element = 0;      // its section, as the report counts them: 0 the soma
+  std::uint32_t section = 0;      // its section, in Morphology::sections(), or soma_run
   float position = 0.f;           // of its middle along the section, 0 to 1
   std::vector<float> values;      // at every step, in the unit of the report; NaN where there is none
 
-  std::string name() const;  // "node 3 section 12 at 0.5"
+  std::string section_name() const;  // "12", or "soma": as a branch that is picked is called
+  std::string name() const;          // "node 3 section 12 at 0.5", "node 3 soma"
 };
 
 /// Reads it. Throws Error for a neuron or a compartment that is not in the file.

@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -32,7 +33,13 @@ TEST(Trace, IsWhatTheReportSaysOfThatPlace) {
       const Trace t = trace(activity, row, c);
       EXPECT_EQ(t.node, activity.rows()[row].node_id);
       const std::size_t column = sample.report.first_column[row] + layout.compartments[c].column;
-      EXPECT_EQ(t.element, sample.report.element_ids[column]);
+      const std::uint32_t element = sample.report.element_ids[column];
+      const auto order = sections_of_elements(sample.neurons[layout.morphology]);
+      EXPECT_EQ(t.section, element ? order[element - 1].value() : soma_run);
+      EXPECT_EQ(t.name(), element ? "node " + std::to_string(t.node) + " section " +
+                                        std::to_string(order[element - 1].value()) +
+                                        fmt::format(" at {:.4g}", t.position)
+                                  : "node " + std::to_string(t.node) + " soma");
       EXPECT_EQ(t.position, layout.compartments[c].position);
       ASSERT_EQ(t.values.size(), 70u);
       for (std::size_t step = 0; step < 70; step += 23) {

@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "forest/scene/playback.h"
+
 namespace forest::scene {
 namespace {
 
@@ -13,8 +15,9 @@ namespace {
 constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide = 20.f;
 
 std::size_t lines_of(const ColourBar& bar) {
-  return 1 + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
+  return (bar.map ? 1 : 0) + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
 }
+float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 
 }  // namespace
 
@@ -26,6 +29,16 @@ ColourBar bar_of(const ActivityView& activity, double time, const std::string& u
           .threshold = activity.threshold,
           .title = fmt::format("{:.1f} ms", time),
           .note = activity.speed > 0.f ? fmt::format("spikes: {:g} µm/ms", activity.speed) : ""};
+}
+
+ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background) {
+  frame::Palette palette = frame::black_palette();
+  make_quiet(palette, background);
+  return {.map = nullptr,
+          .mark = screen_of(palette[spike_entry]),
+          .title = fmt::format("{:.1f} ms", time),
+          .note = activity.speed > 0.f ? fmt::format("a spike, {:g} µm/ms", activity.speed)
+                                       : "spikes are not shown"};
 }
 
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters) {
@@ -50,20 +63,28 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
   const Lettering letters{.height = h, .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)};
   float tall = 0.f;
   for (const ColourBar& bar : bars)
-    tall += h * (margin + 2.f * padding + thick + line * float(lines_of(bar)));
+    tall += h * (margin + 2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
   if (bars.empty() || h * (wide + 2.f * padding) > .65f * float(image.width) ||
       tall > .65f * float(image.height))
     return false;
   float top = h * margin;
   for (const ColourBar& bar : bars) {
     const float left = h * (margin + padding), right = left + h * wide;
-    const float bottom = top + h * (2.f * padding + thick + line * float(lines_of(bar)));
-    fill(image, {left - h * padding, top, right + h * padding, bottom}, ground, .62f);
+    const float bottom = top + h * (2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
+    const float note = bar.map ? 0.f : 1.9f * h + letters.width(bar.note);
+    fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, .62f);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
       letters.write(image, bar.title, left, base);
       letters.write(image, bar.units, right - letters.width(bar.units), base);
       base += h * line;
+    }
+    if (!bar.map) {
+      const float dot = h * 1.1f;
+      fill(image, {left, base - dot, left + dot, base}, bar.mark);
+      letters.write(image, bar.note, left + 1.7f * dot, base);
+      top = bottom + h * margin;
+      continue;
     }
     const Box place{left, base - h, right, base - h + h * thick};
     paint(image, bar, place, letters);

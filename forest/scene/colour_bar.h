@@ -1,5 +1,5 @@
 // SPDX-License-Identifier: Apache-2.0
-// What colours mean, in the picture itself: the colour map from its lowest to its highest value, with their unit.
+// What colours mean, in the picture itself: the colour map from its lowest to its highest value, with their unit; or one colour.
 #pragma once
 
 #include <optional>
@@ -14,15 +14,18 @@
 namespace forest::scene {
 
 struct ColourBar {
-  const ColourMap* map = &colour_maps().front();
-  float low = 0.f, high = 1.f;       // values at its ends
-  std::string units{};               // of them; may be empty
-  std::optional<float> threshold{};  // what is less is grey
-  std::string title{}, note{};       // above and below; may be empty
+  const ColourMap* map = &colour_maps().front();  // null: a dot of `mark` before the note instead of a bar
+  Vec3 mark = Vec3::Ones();                       // sRGB 0–1
+  float low = 0.f, high = 1.f;                    // values at its ends
+  std::string units{};                            // of them; may be empty
+  std::optional<float> threshold{};               // what is less is grey
+  std::string title{}, note{};                    // above and below; may be empty
 };
 
 /// Of a simulation at a moment (ms).
 ColourBar bar_of(const ActivityView& activity, double time, const std::string& units);
+/// Of spikes without values: what a flash is, and how fast it runs.
+ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background);
 
 /// One below the other at the top left, on ground that lets the picture through. A picture that is too small to read them in
 /// (about 280 × 130 pixels for one bar) stays as it is.

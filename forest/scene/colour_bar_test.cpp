@@ -24,6 +24,23 @@ TEST(ColourBar, ShowsTheMapAndGreyBelowTheThreshold) {
   EXPECT_LT((at(60) - map.screen(.505f)).norm(), .02f);
 }
 
+TEST(ColourBar, OfSpikesAloneIsADotOfTheirColourAndNoMapOfValues) {
+  for (const Background background : {Background::dark, Background::light}) {
+    const ColourBar bar = bar_of_spikes(ActivityView(), 12.5, background);
+    EXPECT_EQ(bar.map, nullptr);
+    EXPECT_EQ(bar.note, "a spike, 300 µm/ms");
+    frame::Image image = black(640, 480);
+    EXPECT_TRUE(paint(image, {&bar, 1}, background));
+    std::size_t dot = 0;
+    for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
+      const Vec3 pixel = Vec3(image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]) / 255.f;
+      dot += (pixel - bar.mark).norm() < .02f;
+    }
+    EXPECT_GT(dot, 30u);
+    EXPECT_LT(dot, 400u);
+  }
+}
+
 TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {
   const ColourBar bars[] = {bar_of(ActivityView(), 12.5, "mV"), {.map = &colour_maps().front()}};
   EXPECT_EQ(bars[0].title, "12.5 ms");

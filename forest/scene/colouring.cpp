@@ -413,6 +413,13 @@ Vec3 light_of(std::uint32_t rgb) {
           linear(float(rgb & 255) / 255.f)};
 }
 
+Vec3 screen_of(const Vec3& light) {
+  return light.unaryExpr([](float c) {
+    c = std::clamp(c, 0.f, 1.f);
+    return c <= .0031308f ? 12.92f * c : 1.055f * std::pow(c, 1.f / 2.4f) - .055f;
+  });
+}
+
 Colouring colour(const Targets& targets, const View& view) { return Painter(targets, view).paint(); }
 
 Colouring colour(const Forest& forest, ColourBy by, Background background) {

@@ -66,11 +66,14 @@ Colouring colour(const Targets& targets, const View& view);
 Colouring colour(const Forest& forest, ColourBy by, Background background);
 
 /// Whose the entries of the palette are: eight a class of neurons; then eight that are always left for surfaces, which also take
-/// those of unused classes; synapses by sign; marks: what is picked, outlines, and what is bright.
-inline constexpr std::uint32_t colour_classes = 14, synapse_entry = 120, section_entry = 125,
-                               outline_entry = 126, highlight_entry = 127;
+/// those of unused classes; synapses by sign; marks: spikes that fade and that are new, what is picked, outlines, and what is bright.
+inline constexpr std::uint32_t colour_classes = 14, synapse_entry = 120, fading_entry = 123,
+                               spike_entry = 124, section_entry = 125, outline_entry = 126,
+                               highlight_entry = 127;
 
 /// Linear light of 0xrrggbb.
 Vec3 light_of(std::uint32_t rgb);
+/// sRGB 0–1 of linear light.
+Vec3 screen_of(const Vec3& light);
 
 }  // namespace forest::scene

@@ -35,6 +35,11 @@ circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
     for (const auto& t : json["types"])
       c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory"), t.value("glia", false)});
   if (json.contains("node_sets")) nodes.sets = json.at("node_sets");
+  if (json.contains("attributes"))
+    for (const auto& a : json["attributes"]) {
+      nodes.attributes.push_back({a.at("name"), {}});
+      if (a.contains("words")) nodes.attributes.back().of.words = a["words"];
+    }
   if (json.contains("nodes")) {
     nodes.populations = json.at("populations");
     for (const auto& run : json["nodes"])
@@ -105,22 +110,27 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
     if (!good) throw InputError(name, 0, sentence);
   };
   const std::string again = "; pack the circuit again";
-  Header header;
-  require(bytes.size() >= sizeof header, "is too short to be a forest file" + again);
-  std::memcpy(&header, bytes.data(), sizeof header);
+  Header header{};
+  constexpr std::size_t shorter = sizeof header - sizeof(Entry);
+  require(bytes.size() >= shorter, "is too short to be a forest file" + again);
+  std::memcpy(&header, bytes.data(), std::min(sizeof header, bytes.size()));
   require(header.magic == magic, "is not a forest file; make one with 'brainforest pack'");
-  require(header.version == version && header.parts == part_count,
+  const bool older = header.version == without_attributes && header.parts == part_count - 1;
+  require(older || (header.version == version && header.parts == part_count),
           fmt::format("has version {} of the forest file and this program reads version {}", header.version,
                       version) +
               again);
   require(header.file_size == bytes.size(),
           fmt::format("is cut short or has grown: {} bytes instead of {}", bytes.size(), header.file_size) +
               again);
-  require(hash64(std::as_bytes(std::span(header.table)), header.file_size) == header.table_hash,
+  const auto table = std::span(header.table).first(header.parts);
+  require(bytes.size() >= (older ? shorter : sizeof header) &&
+              hash64(std::as_bytes(table), header.file_size) == header.table_hash,
           "has a damaged table of contents" + again);
   std::uint64_t end =
-      sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
-  for (std::uint32_t p = 0; p < part_count; ++p) {
+      older ? shorter
+            : sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
+  for (std::uint32_t p = 0; p < header.parts; ++p) {
     const Entry& e = header.table[p];
     require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
                 e.offset <= bytes.size() && e.count <= (bytes.size() - e.offset) / e.element_size,
@@ -150,6 +160,26 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
               f.places().size() + f.owners().size() == f.segments().size() &&
               f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
           wrong);
+  std::span<const std::byte> told = data->parts[Part::attributes];
+  const auto take = [&](void* to, std::size_t size) {
+    require(size <= told.size(), wrong);
+    if (size) std::memcpy(to, told.data(), size);
+    told = told.subspan(size);
+  };
+  for (auto& [name_of, of] : data->nodes.attributes) {
+    const std::size_t count = f.instances().size();
+    require(count <= told.size() / 4, wrong);
+    if (of.words.empty()) {
+      of.numbers.resize(count);
+      take(of.numbers.data(), count * sizeof of.numbers[0]);
+    } else {
+      of.index.resize(count);
+      take(of.index.data(), count * sizeof of.index[0]);
+      for (const std::uint32_t i : of.index)
+        require(i == circuit::Attribute::unknown || i < of.words.size(), wrong);
+    }
+  }
+  require(told.empty(), wrong);
   const auto clusters = f.clusters();
   parallel_for(clusters.size(), 1024, [&](std::size_t own) {
     const Cluster& c = clusters[own];

@@ -14,7 +14,8 @@ static_assert(std::endian::native == std::endian::little,
               "the forest file is little-endian, as the graphics card is");
 
 inline constexpr std::array<char, 8> magic{'B', 'F', 'O', 'R', 'E', 'S', 'T', '\n'};
-inline constexpr std::uint32_t version = 4;
+inline constexpr std::uint32_t version = 5;
+inline constexpr std::uint32_t without_attributes = 4;  // this version is read, too
 inline constexpr std::size_t alignment = 64;
 
 // In the order of the file.
@@ -31,6 +32,7 @@ enum Part : std::uint32_t {
   places,
   bricks,
   owners,
+  attributes,
   part_count
 };
 inline constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(frame::Segment),
@@ -44,7 +46,8 @@ inline constexpr std::array<std::uint32_t, part_count> element_sizes{sizeof(fram
                                                                      1,
                                                                      sizeof(reports::Place),
                                                                      sizeof(Brick),
-                                                                     sizeof(frame::Owner)};
+                                                                     sizeof(frame::Owner),
+                                                                     4};
 
 struct Entry {
   std::uint32_t part, element_size;

@@ -35,6 +35,10 @@ std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes)
   for (const circuit::NodeRun& run : nodes.runs)
     json["nodes"].push_back({run.population, run.first_node, run.count});
   if (!nodes.sets.empty()) json["node_sets"] = nodes.sets;
+  for (const circuit::NodeAttribute& attribute : nodes.attributes) {
+    Json& row = json["attributes"].emplace_back(Json{{"name", attribute.name}});
+    if (!attribute.of.words.empty()) row["words"] = attribute.of.words;
+  }
   return json.dump(-1, ' ', false, Json::error_handler_t::replace);
 }
 
@@ -183,6 +187,14 @@ class Packer {
     add(Part::segments, bricks.straws);
     add(Part::bricks, bricks.bricks);
     add(Part::owners, bricks.owners);
+    for (const auto& [name, of] : nodes.attributes) {
+      if ((of.words.empty() ? of.numbers.size() : of.index.size()) != c.instances.size())
+        throw Error(fmt::format("the attribute {} is not of all {} neurons", name, c.instances.size()));
+      if (of.words.empty())
+        add(Part::attributes, of.numbers);
+      else
+        add(Part::attributes, of.index);
+    }
     const std::string description = describe(c, nodes);
     add(Part::text, description);
     for (std::uint32_t p = 0; p < part_count; ++p) {

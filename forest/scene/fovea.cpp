@@ -124,6 +124,18 @@ FOREST_CLONES void shares_of(const Vec3& way, const Vec3& ahead, float none, flo
   }
 }
 
+// The mean light of the half cylinder that one sees of a line, as renderers have it (render/cpu/run.cpp).
+float light_on(const Vec3& a, const Vec3& b, const Vec3& light, bool parallel) {
+  const Vec3 way = (b - a).normalized();
+  const Vec3 back = parallel ? Vec3(0.f, 0.f, -1.f) : Vec3(-(a + b).normalized());
+  const float along = way.dot(light), end_on = way.dot(back);
+  const float over = (back.dot(light) - end_on * along) / std::sqrt(std::max(1.f - end_on * end_on, 1e-4f));
+  const float beside = std::max(0.f, 1.f - along * along - over * over);
+  const float shade =
+      .5f * std::sqrt(std::max(0.f, 1.f + .5f * pi * over + (beside + 2.f * over * over) / 3.f));
+  return .16f + 1.05f * shade * shade;
+}
+
 }  // namespace
 
 std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_t height) {
@@ -178,7 +190,7 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
 
 Detail detail_for(const View& view, const Layer& layer, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
-  detail.fog = view.fog;
+  detail.fog = fog_strength(view);
   detail.thinnest = thinnest_in(view, layer);
   detail.area = layer.area;
   if (layer.hole != frame::Area{}) detail.hole = layer.hole;
@@ -273,6 +285,68 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
       }
     }
   });
+}
+
+void trace_lines(const View& view, std::span<const Layer> layers, std::span<const frame::Overlay> lines,
+                 const frame::Frame& like, float middle, frame::Image& whole) {
+  if (layers.size() < 2) return;
+  const frame::Camera& camera = like.camera;
+  const float width = float(whole.width), height = float(whole.height);
+  const Gaze gaze(view.camera, {width, height}, detail_for(view, whole.width, whole.height));
+  const Vec3 ahead = gaze.direction(), light = frame::light_direction();
+  const float full = std::cos(radians(std::min(layers.front().until, 179.f))),
+              none = std::cos(radians(std::min(layers.front().gone, 179.f)));
+  const Mat3 axes = camera.axes();
+  const auto in_camera = [&](const Vec3& p) -> Vec3 {  // x right, y up, z along the view
+    const Vec3 at = axes.transpose() * (p - camera.eye);
+    return {at.x(), at.y(), -at.z()};
+  };
+  const float focal = camera.focal(height);
+  const auto scale = [&](float z) { return camera.orthographic() ? focal : focal / z; };
+  // Seldom more than a few thousand pixels: lines are walked one after the other, so that each pixel's order is theirs.
+  for (const frame::Overlay& line : lines) {
+    Vec3 a = in_camera(line.a), b = in_camera(line.b);
+    if (a.z() < camera.near && b.z() < camera.near) continue;
+    if (a.z() < camera.near) a += (camera.near - a.z()) / (b.z() - a.z()) * (b - a);
+    if (b.z() < camera.near) b += (camera.near - b.z()) / (a.z() - b.z()) * (a - b);
+    const auto place = [&](const Vec3& p) {
+      return Vec2(.5f * width + scale(p.z()) * p.x(), .5f * height - scale(p.z()) * p.y());
+    };
+    Vec2 from = place(a), to = place(b);
+    const Vec2 way = to - from;
+    const bool steep = std::abs(way.y()) > std::abs(way.x());
+    const int major = steep ? 1 : 0, minor = 1 - major;
+    if (!(std::abs(way[major]) > 0.f)) continue;
+    if (to[major] < from[major]) std::swap(from, to), std::swap(a, b);
+    const float straight =
+        std::abs(way[major]) / way.norm();  // a step along the axis leads so far along the line
+    const Vec3 base = like.palette[line.colour] * light_on(a, b, light, camera.orthographic());
+    const float last = std::min(std::ceil(to[major] - .5f), major ? height : width);
+    for (float at = std::max(0.f, std::ceil(from[major] - .5f)); at < last; at += 1.f) {
+      const float t = (at + .5f - from[major]) / (to[major] - from[major]);
+      const float z = camera.orthographic() ? a.z() + t * (b.z() - a.z())
+                                            : 1.f / (1.f / a.z() + t * (1.f / b.z() - 1.f / a.z()));
+      const float beside = from[minor] + t * (to[minor] - from[minor]);
+      const float radius = std::max(1.f, line.radius * scale(z));
+      const float fog = 1.f - std::exp(-std::max(0.f, z - like.style.fog_start) / like.style.fog_length);
+      const Vec3 colour = 255.f * screen_of(Vec3(base + fog * (like.style.fog_colour - base)));
+      const float reach = (radius + .5f) / straight, limit = minor ? height : width;
+      for (float other = std::max(0.f, std::ceil(beside - reach - .5f));
+           other < std::min(limit, beside + reach); other += 1.f) {
+        Vec2 pixel;
+        pixel[major] = at + .5f, pixel[minor] = other + .5f;
+        const Vec3 look = gaze.way_to(pixel);
+        const float shown = std::clamp((look.normalized().dot(ahead) - none) / (full - none), 0.f, 1.f);
+        std::uint8_t* to_pixel =
+            &whole.pixels[4 * (std::size_t(pixel.y()) * whole.width + std::size_t(pixel.x()))];
+        const float gaps = z < middle ? 1.f : 1.f - float(to_pixel[3]) / 255.f;
+        const float distance = std::abs(other + .5f - beside) * straight;
+        const float share = std::clamp(radius + .5f - distance, 0.f, 1.f) * (1.f - shown) * gaps;
+        for (int c = 0; c < 3; ++c)
+          to_pixel[c] = std::uint8_t(float(to_pixel[c]) + share * (colour[c] - float(to_pixel[c])) + .5f);
+      }
+    }
+  }
 }
 
 }  // namespace forest::scene

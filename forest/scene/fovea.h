@@ -36,4 +36,11 @@ View view_for(const View& view, const Layer& layer);
 void unite(const View& view, std::span<const Layer> layers, std::span<const frame::Image* const> pictures,
            std::uint32_t width, std::uint32_t height, frame::Image& whole);
 
+/// Draws lines over a united picture where its first layer does not show: in the pixels of coarser layers they would be thick
+/// and blurred. What stands before them is judged by how much of a pixel branches cover (its fourth byte): a line that is nearer
+/// than `middle` (a depth, µm) hides it, one that is farther is seen through its gaps.
+/// @param like  a frame of all of the picture: its camera, palette and style
+void trace_lines(const View& view, std::span<const Layer> layers, std::span<const frame::Overlay> lines,
+                 const frame::Frame& like, float middle, frame::Image& whole);
+
 }  // namespace forest::scene

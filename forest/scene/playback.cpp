@@ -11,6 +11,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/scene/pick.h"
 
 namespace forest::scene {
 namespace {
@@ -20,6 +21,12 @@ using reports::Level;
 constexpr std::uint32_t none = 0xffffffffu;
 constexpr float dimmest = 1.f / float(flash_steps);  // of a flash that is still drawn …
 constexpr float dimmest_over_value = .4f;            // … over a branch whose own value would be seen
+
+// Of the marks of spikes alone.
+constexpr float dimmest_mark = .15f, fading = .55f;  // brightness of the last that is seen; of fading_entry
+constexpr float least_branch = 1.f / 1000.f,
+                least_soma = 1.f / 260.f;  // radius of a new mark at least, in heights of the picture
+constexpr float through = .3f;             // marks are drawn at this share of their distance
 
 using Clock = std::chrono::steady_clock;
 double milliseconds_since(Clock::time_point start) {
@@ -286,6 +293,92 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
     s.spikes_end = i + 1;
   }
   figures_.flashes = spikes_.size();
+}
+
+bool Playback::has_values() const {
+  return activity_.facts().not_numbers < activity_.width(Level::compartment) * activity_.facts().steps;
+}
+
+double Playback::busiest(const ActivityView& view) const {
+  constexpr double infinite = std::numeric_limits<double>::infinity();
+  const auto spikes = activity_.spikes(begin(), infinite);
+  const double seen = double(view.fade);
+  double best = begin();
+  std::size_t most = 0, first = 0;
+  for (std::size_t i = 0; i < spikes.size(); ++i) {
+    while (spikes[i].time - spikes[first].time > seen) ++first;
+    if (i + 1 - first > most) most = i + 1 - first, best = spikes[i].time;
+  }
+  // A little later the last of them has begun to run.
+  return std::clamp(best + .25 * double(view.fade), begin(), end());
+}
+
+std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float height,
+                                              const Colouring& colouring, const ActivityView& view,
+                                              const PlaybackOptions& options) {
+  const auto start = Clock::now();
+  figures_ = {};
+  std::vector<frame::Overlay> marks;
+  if (!(view.speed > 0.f)) return marks;
+  const double time = view.time.value_or(begin());
+  const double lasts = double(view.fade) * -std::log(double(dimmest_mark)) + options.window;
+  const auto spikes = activity_.spikes(time - double(farthest_ / view.speed) - lasts,
+                                       std::nextafter(time, std::numeric_limits<double>::infinity()));
+  const Vec3 forward = -camera.axes().col(2);
+  for (std::size_t k = spikes.size(); k-- > 0 && marks.size() < most_flash_marks;) {
+    const std::uint32_t instance = spikes[k].instance;
+    if (instance >= shown_.size()) continue;
+    const frame::State& state = colouring.states[instance];
+    if (!state.is(frame::State::visible)) continue;
+    const Neuron& neuron = forest_.neurons()[forest_.instances()[instance].morphology];
+    const Shape& shape = shapes_[forest_.instances()[instance].morphology];
+    const std::size_t before = marks.size();
+    for (std::uint32_t i = 0; i < neuron.original_count && marks.size() < most_flash_marks; ++i) {
+      if (shape.distance[i] < 0.f) continue;
+      const double age = time - spikes[k].time - double(shape.distance[i] / view.speed);
+      if (age < 0. || age > lasts) continue;
+      const std::uint32_t kind = forest_.segments()[neuron.first_segment + i].meta & 7u;
+      const bool soma = kind == 1;
+      if (state.kind == frame::Kind::somata && !soma) continue;
+      if (colouring.opacities[8u * state.colour_class + kind] < 26 || state.opacity < 26) continue;
+      const float bright = std::exp(-float(std::max(0., age - options.window)) / view.fade);
+      const RoundCone cone = in_world(forest_, instance, neuron.first_segment + i);
+      const float depth = (.5f * (cone.a + cone.b) - camera.eye).dot(forward);
+      if (!camera.orthographic() && depth < camera.near) continue;
+      const float least =
+          (soma ? least_soma : least_branch) * height * camera.pixel_size(height, std::max(depth, 0.f));
+      const float own = std::max(cone.radius_a, cone.radius_b);
+      frame::Overlay mark{cone.a, cone.b, (.3f + .8f * bright) * std::max(own, least),
+                          bright > fading ? spike_entry : fading_entry};
+      // As large in the picture and nearer, so that it is seen through the tissue.
+      if (camera.orthographic()) {
+        const Vec3 nearer = (1.f - through) * std::max(depth, 0.f) * forward;
+        mark.a -= nearer, mark.b -= nearer;
+      } else {
+        const float share = std::min(1.f, std::max(through, 1.05f * camera.near / depth));
+        mark.a = camera.eye + share * (mark.a - camera.eye);
+        mark.b = camera.eye + share * (mark.b - camera.eye);
+        mark.radius *= share;
+      }
+      marks.push_back(mark);
+    }
+    figures_.flashes += marks.size() > before;
+  }
+  figures_.segments = marks.size();
+  figures_.gather = milliseconds_since(start);
+  return marks;
+}
+
+void make_quiet(frame::Palette& palette, Background background) {
+  const bool light = background == Background::light;
+  for (std::uint32_t i = 0; i < synapse_entry; ++i) {
+    const Vec3 grey =
+        Vec3::Constant(.2126f * palette[i].x() + .7152f * palette[i].y() + .0722f * palette[i].z());
+    const Vec3 pale = .65f * palette[i] + .35f * grey;
+    palette[i] = light ? Vec3(.2f * pale + .8f * light_of(0xDDE3EB)) : Vec3(.11f * pale);
+  }
+  palette[spike_entry] = light ? light_of(0xC00018) : Vec3(1.f, .98f, .86f);
+  palette[fading_entry] = light ? light_of(0xE8602C) : light_of(0xFFA02C);
 }
 
 void Playback::paint(std::uint32_t instance, std::uint32_t first_segment, std::uint32_t count,

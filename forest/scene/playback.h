@@ -33,6 +33,10 @@ class Playback {
   ActivityView view() const;
   double begin() const { return activity_.facts().start; }  // ms, of the first step and of the last
   double end() const { return activity_.facts().time(activity_.facts().steps - 1); }
+  /// Whether there is any; else there are spikes alone, and a picture shows `flashes` instead of `colour`.
+  bool has_values() const;
+  /// ms: a moment at which as many flashes as ever are to be seen; the first one when there are no spikes.
+  double busiest(const ActivityView& view) const;
   /// The step that is shown at a time, the last one not after it; the first or the last for times beyond.
   std::uint64_t step_at(double time) const;
 
@@ -40,6 +44,14 @@ class Playback {
   /// branch or neuron around that; what was not reported, no_value_entry. A report of somata alone colours whole neurons.
   /// Over that, spikes: a flash leaves the soma at the time of the spike, runs along the axon and fades.
   void colour(Cut& cut, const Eye& eye, const ActivityView& view, const PlaybackOptions& options = {});
+
+  /// The spikes that are under way, as marks over the branches that they run along: on axons, and on somata. A new one is
+  /// spike_entry and widest; fading it becomes fading_entry and sinks into its branch. None is thinner than a share of the
+  /// picture's height, so that they are found in a poster as on a screen, and they lie so near to the eye that they are seen
+  /// through the tissue before them. Of neurons that show.
+  /// @param height  of the picture, pixels
+  std::vector<frame::Overlay> flashes(const frame::Camera& camera, float height, const Colouring& colouring,
+                                      const ActivityView& view, const PlaybackOptions& options = {});
 
   /// The level at which a neuron is coloured when 1 µm of it covers so many pixels where it is nearest.
   reports::Level level(std::uint32_t row, float magnification, float pixels = PlaybackOptions().pixels) const;
@@ -49,7 +61,7 @@ class Playback {
   };
   std::optional<Compartment> compartment(std::uint32_t instance, std::uint32_t segment) const;
 
-  /// Of the last call of `colour`.
+  /// Of the last call of `colour` or `flashes`.
   struct Figures {
     std::uint64_t neurons = 0, values = 0, segments = 0,
                   flashes = 0;       // neurons reported and in the cut; values read
@@ -97,5 +109,11 @@ class Playback {
   std::vector<reports::Spike> spikes_;  // of neurons in sight, by neuron
   Figures figures_;
 };
+
+/// Capsules of flashes in a picture, at most; those of the latest spikes come first.
+inline constexpr std::size_t most_flash_marks = 100'000;
+
+/// The colours behind flashes: every branch in a quiet tint of its own.
+void make_quiet(frame::Palette& palette, Background background);
 
 }  // namespace forest::scene

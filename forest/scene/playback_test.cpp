@@ -382,6 +382,66 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
   for (const std::uint32_t entry : all_entries(cut)) EXPECT_LT(entry, flash_entry);
 }
 
+TEST(Playback, SpikesAloneRunAsMarksThatAreWideAtAnySizeOfPicture) {
+  const Cable cable;
+  const Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
+  const auto nodes = reports::nodes_of(cable.circuit);
+  const std::vector<reports::Spikes> spikes{
+      {"spikes", nodes.populations[0], {5.}, {nodes.of_instance[0].id}}};
+  Playback playback(forest, Activity::from_bytes(packed_activity(reports::without_values(spikes, nodes),
+                                                                 cable.circuit, cable.neurons, spikes)));
+  EXPECT_FALSE(playback.has_values());
+  frame::Camera camera;
+  camera.eye = {900.f, 0.f, 0.f}, camera.target = Vec3::Zero(), camera.field_of_view = 90.f;
+  ActivityView view = playback.view();
+  view.speed = 100.f, view.fade = .5f;  // µm/ms, ms
+  EXPECT_NEAR(playback.busiest(view), 5., .25);
+  const Targets targets(forest);
+  Colouring colouring = colour(forest, ColourBy::type, Background::dark);
+  for (const float height : {200.f, 1080.f, 8000.f})
+    for (const double time : {4.9, 5., 6., 8., 20.}) {
+      view.time = time;
+      const auto marks = playback.flashes(camera, height, colouring, view);
+      EXPECT_EQ(marks.empty(), time < 5. || time > 19.) << time;
+      for (const frame::Overlay& mark : marks) {
+        // It lies nearer to the eye than what it marks, in the same place of the picture; the cable lies at x = 0.
+        const float nearer = (camera.eye.x() - .5f * (mark.a.x() + mark.b.x())) / camera.eye.x();
+        EXPECT_LT(nearer, .5f);
+        const float y = .5f * (mark.a.y() + mark.b.y()) / nearer;
+        EXPECT_LT(y, 10.f);  // no dendrite
+        const double way = std::max(0., (-8. - double(y)) * std::sqrt(1.01)), age = time - 5. - way / 100.;
+        EXPECT_GT(age, -.2) << "it is not there yet";
+        EXPECT_LT(age, 1.7) << "it has faded";
+        if (age < 0. || age > .25) continue;
+        EXPECT_EQ(mark.colour, spike_entry);
+        const float depth = (camera.eye - .5f * (mark.a + mark.b)).x();
+        // Of the picture's height, whatever that is.
+        EXPECT_GT(2.f * mark.radius / camera.pixel_size(height, depth), .0015f * height);
+      }
+    }
+  // What is hidden does not flash.
+  view.time = 6.;
+  for (frame::State& state : colouring.states) state.flags = 0;
+  EXPECT_TRUE(playback.flashes(camera, 200.f, colouring, view).empty());
+  EXPECT_EQ(playback.figures().flashes, 0u);
+}
+
+TEST(Playback, BehindFlashesColoursAreQuietAndStillDiffer) {
+  for (const Background background : {Background::dark, Background::light}) {
+    frame::Palette palette = frame::black_palette();
+    for (std::uint32_t i = 0; i < 112; ++i) palette[i] = light_of(i % 2 ? 0xF28E2B : 0x4A9DE6);
+    const frame::Palette loud = palette;
+    make_quiet(palette, background);
+    const float ground = background == Background::dark ? 0.f : 96.f;
+    const float spike = lightness(palette[spike_entry]);
+    for (std::uint32_t i = 0; i < 112; ++i) {
+      EXPECT_LT(std::abs(lightness(palette[i]) - ground), std::abs(lightness(loud[i]) - ground));
+      EXPECT_GT(std::abs(lightness(palette[i]) - spike), 35.f);
+    }
+    EXPECT_GT((palette[0] - palette[1]).norm(), .02f);
+  }
+}
+
 TEST(Playback, APictureOfALongWhileShowsTheGreatest) {
   const Sample sample;
   const Activity activity = sample.activity();

@@ -14,6 +14,7 @@ namespace {
 constexpr double rim_pixels = 1.1;  // how much darker line a profile has around it, where it is large enough
 constexpr int lines = 4;            // a pixel's scan lines
 constexpr std::size_t rows_at_once = 16;
+constexpr float plate_opacity = .85f;  // behind the scale bar
 
 struct Ground {
   Vec3 paper, ink;  // linear light
@@ -126,13 +127,19 @@ ScaleBar scale_bar_of(const SlicePicture& picture) {
           length < 1000. ? fmt::format("{:.0f} µm", length) : fmt::format("{:.0f} mm", length / 1000.)};
 }
 
-void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Vec3& ink) {
+void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Ground& ground) {
   const ScaleBar bar = scale_bar_of(picture);
   const float height = std::max(7.f, std::round(float(image.height) / 60.f)), margin = 1.7f * height,
               bottom = float(image.height) - margin, top = bottom - .4f * height;
-  const Vec3 colour = ink.unaryExpr(&srgb);
+  const Vec3 colour = ground.ink.unaryExpr(&srgb);
+  // On a plate, so that no profile runs through it.
+  const Lettering letters{.height = height, .colour = colour};
+  const float pad = .7f * height,
+              wide = std::max(float(bar.length / picture.pixel()), letters.width(bar.label));
+  fill(image, {margin - pad, top - 1.7f * height - pad, margin + wide + pad, bottom + pad},
+       ground.paper.unaryExpr(&srgb), plate_opacity);
   fill(image, {margin, top, margin + float(bar.length / picture.pixel()), bottom}, colour);
-  Lettering{.height = height, .colour = colour}.write(image, bar.label, margin, top - .7f * height);
+  letters.write(image, bar.label, margin, top - .7f * height);
 }
 
 }  // namespace
@@ -190,7 +197,7 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
         image.pixels[4 * (first * width + i) + std::size_t(c)] =
             std::uint8_t(std::lround(255.f * srgb(paper.pixels()[i][c])));
   });
-  if (picture.scale_bar) paint_scale_bar(image, picture, ground.ink);
+  if (picture.scale_bar) paint_scale_bar(image, picture, ground);
   return image;
 }
 
@@ -230,6 +237,11 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
   if (picture.scale_bar) {
     const ScaleBar bar = scale_bar_of(picture);
     const double margin = .035 * picture.height, bottom = picture.height - margin;
+    const double plate = std::max(bar.length, .55 * margin * double(bar.label.size()));
+    svg += fmt::format(
+        "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
+        "fill-opacity=\"{}\"/>\n",
+        .5 * margin, bottom - 1.7 * margin, plate + margin, 2.2 * margin, hex(ground.paper), plate_opacity);
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
         "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "

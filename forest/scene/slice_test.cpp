@@ -133,6 +133,17 @@ TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {
 
   picture.scale_bar = true;
   EXPECT_NE(paint(found, colouring, picture).pixels, image.pixels);
+  // It stands on a plate: over profiles that fill the picture one still sees paper around it.
+  SlicePicture inside = picture;
+  const auto around = found.profiles[0].shape.outline();
+  Place middle = Place::Zero();
+  for (const Place& p : around) middle += p / double(around.size());
+  inside.centre = middle, inside.height = .1;
+  const frame::Image full = paint(slice(forest, plane, inside.sheet()), colouring, inside);
+  const auto red = [&](std::size_t x, std::size_t y) { return int(full.pixels[4 * (y * 800 + x)]); };
+  const int profile = red(700, 100), ground = paper.pixels[0];
+  EXPECT_LT(profile, ground * 2 / 3);
+  EXPECT_GT(red(22, 862), profile + (ground - profile) * 3 / 5);  // left of the label
   const std::string svg = to_svg(found, colouring, picture);
   EXPECT_NE(svg.find("<text"), std::string::npos);
   EXPECT_NE(svg.find("id=\"neuron-" + std::to_string(found.profiles[0].instance)), std::string::npos);

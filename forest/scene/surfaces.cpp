@@ -19,6 +19,7 @@ namespace {
 constexpr float smoothing = .055f;  // of the extent of a hemisphere: about the width of a sulcus
 constexpr int most_steps = 240;
 constexpr std::size_t map_colours = 64;
+constexpr double share_of_zeros = .01;  // of vertices: from there on they stand for "none"
 const Vec3 plain = light_of(0xD9CDBF);
 
 // The neighbours of every vertex: those of i are list[starts[i]] up to list[starts[i + 1]].
@@ -176,12 +177,21 @@ frame::Camera Surfaces::camera(Side side, float aspect) const {
   return camera;
 }
 
+bool zero_means_none(std::span<const float> values) {
+  if (std::ranges::any_of(values, [](float value) { return value < 0.f; })) return false;
+  const auto zeros = std::ranges::count(values, 0.f);
+  return double(zeros) >= share_of_zeros * double(values.size()) && zeros > 0 &&
+         std::ranges::any_of(values, [](float value) { return value > 0.f; });
+}
+
 std::pair<float, float> Surfaces::shown_range() const {
   if (range) return *range;
   std::vector<float> values;
-  for (const One& one : list_)
+  for (const One& one : list_) {
+    const bool without_zero = zero_means_none(one.values);
     for (const float value : one.values)
-      if (std::isfinite(value)) values.push_back(value);
+      if (std::isfinite(value) && !(without_zero && value == 0.f)) values.push_back(value);
+  }
   if (values.empty()) return {0.f, 1.f};
   const auto at = [&](double share) {
     const auto place = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));

@@ -32,6 +32,10 @@ struct AreaColour {
 /// movement during one (Fischl, Sereno & Dale 1999, NeuroImage 9:195).
 std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width);
 
+/// Whether zeros among the values on a surface stand for "none": FreeSurfer writes 0 for the thickness, area or volume of what is
+/// no cortex, such as the medial wall. So where nothing is negative and at least every hundredth vertex is exactly 0.
+bool zero_means_none(std::span<const float> values);
+
 /// Of arrays that a frame::Surface is made of: a number that none had before.
 std::uint64_t next_version();
 
@@ -57,7 +61,8 @@ class Surfaces {
   float visibility = 1.f;  // times the opacity of each, 0–1; 0: none is shown
 
   const ColourMap* map = &colour_maps().front();
-  /// Values at the ends of the map; none: all but the lowest and highest two hundredths.
+  /// Values at the ends of the map; none: all but the lowest and highest two hundredths of those that are values
+  /// (zero_means_none).
   std::optional<std::pair<float, float>> range;
   std::pair<float, float> shown_range() const;
 

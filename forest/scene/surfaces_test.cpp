@@ -107,6 +107,38 @@ TEST(Surfaces, AreasHaveTheirColours) {
   EXPECT_THROW(surfaces.show(frame, Colouring{}, false), Error);
 }
 
+TEST(Surfaces, TheRangeLeavesOutWhatHasNoValue) {
+  Surfaces surfaces;
+  surfaces.add(icosphere(Vec3::Zero(), 1.f, 3, 0));
+  const std::size_t count = 642;
+  const auto range_of = [&](auto value) {
+    std::vector<float> values;
+    for (std::size_t i = 0; i < count; ++i) values.push_back(value(i));
+    surfaces.colour(values);
+    return surfaces.shown_range();
+  };
+  const auto thickness = [](std::size_t i) { return 1.5f + 2.f * float(i % 101) / 100.f; };
+  const auto whole = range_of(thickness);
+  EXPECT_NEAR(whole.first, 1.54f, .03f);
+  EXPECT_NEAR(whole.second, 3.46f, .03f);
+  // The medial wall, a tenth of it, as FreeSurfer writes it, or as a file without values there does.
+  for (const float none : {0.f, float(NAN)}) {
+    const auto range = range_of([&](std::size_t i) { return i % 10 ? thickness(i) : none; });
+    EXPECT_NEAR(range.first, whole.first, .05f);
+    EXPECT_NEAR(range.second, whole.second, .05f);
+  }
+  // Where values lie on both sides of it, zero is a value; so is that of a few vertices among many.
+  EXPECT_LT(range_of([&](std::size_t i) { return i % 10 ? thickness(i) - 2.f : 0.f; }).first, -.4f);
+  EXPECT_FALSE(zero_means_none(std::vector<float>{0.f, 0.f}));
+  std::vector<float> distances(1000, 1.f);
+  distances[7] = 0.f;
+  EXPECT_FALSE(zero_means_none(distances));
+  EXPECT_EQ(range_of([](std::size_t i) { return i % 3 ? 4.f : 0.f; }).first, 4.f);
+  // What a person says holds.
+  surfaces.range = {0.f, 3.f};
+  EXPECT_EQ(surfaces.shown_range(), std::pair(0.f, 3.f));
+}
+
 TEST(Surfaces, RefuseValuesOfAnotherSurface) {
   Surfaces surfaces;
   surfaces.add(icosphere(Vec3::Zero(), 1.f, 1, 0));

@@ -125,9 +125,17 @@ bool has_word(const Attribute& a, std::string_view word) {
 
 circuit::NodeTable node_table(const Forest& forest) {
   std::string known;
-  for (const Row& row : attributes) known += (known.empty() ? "" : ", ") + std::string(row.name);
+  const auto add = [&](std::string_view name) { known += (known.empty() ? "" : ", ") + std::string(name); };
+  for (const Row& row : attributes) add(row.name);
+  for (const circuit::NodeAttribute& told : forest.nodes().attributes)
+    if (std::ranges::find(attributes, told.name, &Row::name) == attributes.end()) add(told.name);
   return {forest.instances().size(),
           [forest](std::string_view name) -> std::optional<Attribute> {
+            // What the circuit's files say goes before what we would conclude.
+            const auto& told = forest.nodes().attributes;
+            if (const auto own = std::ranges::find(told, name, &circuit::NodeAttribute::name);
+                own != told.end())
+              return own->of;
             const auto row = std::ranges::find(attributes, name, &Row::name);
             return row == attributes.end() ? std::nullopt : std::optional(row->of(forest));
           },

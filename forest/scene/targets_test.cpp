@@ -2,11 +2,15 @@
 #include "forest/scene/targets.h"
 
 #include <algorithm>
+#include <cmath>
+#include <cstring>
 #include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "forest/core/hash.h"
+#include "forest/scene/forest_layout.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/view.h"
 
@@ -46,6 +50,62 @@ TEST(Targets, NodeSetsOfACircuitStayWithTheForest) {
     EXPECT_EQ(f.nodes().runs.front().first_node, named ? 7u : 0u);
   }
   EXPECT_EQ(sample().nodes().sets, "");
+}
+
+TEST(Targets, WhatACircuitsFilesTellOfNeuronsStaysWithTheForestAndGoesFirst) {
+  circuit::NodeNames nodes;
+  circuit::Attribute score, name;
+  name.words = {"wide", "narrow"};
+  for (std::uint32_t i = 0; i < 40; ++i) {
+    score.numbers.push_back(i % 4 ? .1 * double(i) : NAN);
+    name.index.push_back(i % 3 < 2 ? i % 3 : circuit::Attribute::unknown);
+  }
+  nodes.attributes = {{"score", score}, {"model_name", name}};
+  auto bytes = pack(testing::sample_circuit(40), testing::sample_neurons(), Progress::none(), nodes);
+  const Forest f = Forest::from_bytes(bytes);
+  circuit::NodeSets sets{.source = "sets.json", .sets = {}};
+  sets.put({.name = "high", .clauses = {{"score", Clause::Test::at_least, {}, {.1 * 7.}}}, .of = {}});
+  sets.put({.name = "wide", .clauses = {{"model_name", Clause::Test::any_of, {"wide"}, {}}}, .of = {}});
+  sets.put({.name = "odd", .clauses = {{"depth", Clause::Test::less, {}, {1.}}}, .of = {}});
+  sets.put({.name = "both", .clauses = {}, .of = {"high", "wide"}, .compound = true});
+  const Targets targets(f, sets);
+  const auto high = [](auto i) { return i % 4 && i >= 7; };
+  EXPECT_EQ(targets.find("high"), where(f, high));
+  EXPECT_EQ(targets.find("wide"), where(f, [](auto i) { return i % 3 == 0; }));
+  EXPECT_EQ(targets.find("both"), where(f, [&](auto i) { return i % 3 == 0 || high(i); }));
+  // One that cannot be resolved says so with its name, and leaves the others as they are.
+  EXPECT_THAT(refused([&] { targets.find("odd"); }),
+              ::testing::AllOf(HasSubstr("'odd' asks for 'depth'"), HasSubstr("model_type, x, y, z, score")));
+  std::size_t odd = 0;
+  for (const TargetFacts& t : targets.list()) odd += !t.problem.empty();
+  EXPECT_EQ(odd, 1u);
+  // Attributes that are not of all neurons are refused, and so is a file whose last one is cut off.
+  nodes.attributes[0].of.numbers.pop_back();
+  EXPECT_THAT(forest::refused([&] {
+                pack(testing::sample_circuit(40), testing::sample_neurons(), Progress::none(), nodes);
+              }),
+              HasSubstr("score"));
+}
+
+TEST(Targets, AForestFileOfTheVersionBeforeAttributesIsRead) {
+  auto bytes = pack(testing::sample_circuit(40), testing::sample_neurons());
+  layout::Header header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const layout::Entry& last = header.table[layout::owners];
+  bytes.resize(last.offset + last.count * last.element_size);
+  header.version = layout::without_attributes, header.parts = layout::part_count - 1;
+  header.table[layout::attributes] = {};
+  header.file_size = bytes.size();
+  header.table_hash = hash64(std::as_bytes(std::span(header.table).first(header.parts)), header.file_size);
+  std::memcpy(bytes.data(), &header, sizeof header);
+  const Forest f = Forest::from_bytes(bytes);
+  EXPECT_TRUE(f.nodes().attributes.empty());
+  EXPECT_EQ(Targets(f).find("all").size(), 40u);
+  for (std::size_t size = 0; size < bytes.size(); size += size < 2000 ? 1 : 9973)
+    EXPECT_FALSE(forest::refused([&] {
+                   Forest::from_bytes({bytes.begin(), bytes.begin() + std::ptrdiff_t(size)});
+                 }).empty())
+        << size;
 }
 
 TEST(Targets, AForestHasThemByItself) {

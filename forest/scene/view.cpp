@@ -437,10 +437,15 @@ float thinnest_of(const View& view) {
   return view.samples == 1 ? std::max(view.detail.thinnest, 1.f) : view.detail.thinnest;
 }
 
+float fog_strength(const View& view) {
+  constexpr float on_light = .3f;
+  return view.background == Background::light ? on_light * view.fog : view.fog;
+}
+
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height) {
   Detail detail = view.detail;
   detail.thinnest = thinnest_of(view);
-  detail.fog = view.fog;
+  detail.fog = fog_strength(view);
   if (detail.gaze) detail.gaze = Vec2(detail.gaze->x() * float(width), detail.gaze->y() * float(height));
   return detail;
 }
@@ -465,7 +470,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
     s.background_top = light_of(0x0E1420), s.background_bottom = light_of(0x05070C),
     s.fog_colour = light_of(0x0A0F1A);
   }
-  if (const Fog fog = fog_of(forest, view.camera, view.fog); std::isfinite(fog.length))
+  if (const Fog fog = fog_of(forest, view.camera, fog_strength(view)); std::isfinite(fog.length))
     s.fog_start = fog.start, s.fog_length = fog.length;
   return f;
 }

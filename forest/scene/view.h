@@ -64,6 +64,9 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
                      std::uint32_t width, std::uint32_t height,
                      std::span<const frame::Overlay> overlays = {});
 
+/// How strong the fog of its picture is: light is added where the background is light, and little of it bleaches dark branches as
+/// much as much darkness dims bright ones.
+float fog_strength(const View& view);
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).

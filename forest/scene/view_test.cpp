@@ -1,6 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/view.h"
 
+#include <array>
+#include <cmath>
+
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -45,6 +48,36 @@ TEST(View, SaysWhichKeyIsWrong) {
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":"mood"})").find("layer"),
             std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"fovv":4})").find("fovv"), std::string::npos);
+}
+
+TEST(View, FogTakesAsMuchContrastOnLightGroundAsOnDark) {
+  const Forest forest = sample();
+  const Cut nothing;
+  std::array<float, 2>
+      kept{};  // of the contrast of a colour with the ground, where fog on dark ground leaves 1/e of light
+  float depth = 0.f;
+  for (const Background background : {Background::dark, Background::light}) {
+    View view = overview(forest);
+    view.background = background;
+    const Colouring colouring = colour(forest, view.colour_by, background);
+    const frame::Frame frame = compose(forest, view, colouring, nothing, 320, 200);
+    if (background == Background::dark) depth = frame.style.fog_length;
+    const float fog = 1.f - std::exp(-depth / frame.style.fog_length);
+    const float ground = lightness(frame.style.fog_colour);
+    float clear = 0.f, foggy = 0.f;
+    for (const frame::State& state : colouring.states) {
+      const Vec3& base = frame.palette[8u * state.colour_class + 4u];
+      clear += std::abs(lightness(base) - ground);
+      foggy += std::abs(lightness(Vec3(base + fog * (frame.style.fog_colour - base))) - ground);
+    }
+    kept[std::size_t(background)] = foggy / clear;
+    // What is chosen knows the same fog.
+    EXPECT_EQ(detail_for(view, 320, 200).fog, fog_strength(view));
+  }
+  EXPECT_NEAR(kept[1], kept[0], .12f);
+  View without;
+  without.fog = 0.f, without.background = Background::light;
+  EXPECT_EQ(fog_strength(without), 0.f);
 }
 
 TEST(View, TheOverviewHoldsBranchesAndFillsThePicture) {

@@ -71,7 +71,7 @@ with h5py.File(path, "w") as file:
 PY
 $python report.py run.h5
 "$program" activity run.h5 --circuit column --spikes run.h5 --out run.activity --json >packed.json
-"$program" clamp run.activity --neuron 0 6 3 --section 0 3 5 --position 0.5 1 0.3 --csv traces.csv --json >clamped.json
+"$program" clamp run.activity --neuron 0 6 3 --section soma 0 2 --position 0.5 1 0.3 --csv traces.csv --json >clamped.json
 "$program" raster run.activity --out raster.png --size 300x70 --from 10 --to 140 --plain --json >raster.json
 $python - <<'PY'
 import csv, h5py, json, struct
@@ -80,7 +80,8 @@ assert packed["neurons"] == 7 and packed["compartments"] == 77 and packed["steps
 assert packed["error"] <= .3 and packed["clamped"] == packed["not_numbers"] == 0, packed
 data = h5py.File("run.h5")["report/few_cells/data"][:]
 rows = list(csv.reader(open("traces.csv")))
-assert rows[0][0] == "time (ms)" and rows[0][2].startswith("node 6 section 3 at 0.8333 (mV)"), rows[0]
+assert rows[0][0] == "time (ms)" and rows[0][1:3] == ["node 0 soma (mV)", "node 6 section 0 at 0.8333 (mV)"], rows[0]
+assert [t["section"] for t in clamped["traces"]] == ["soma", 0, 2], clamped
 assert len(rows) == 301 and float(rows[300][0]) == 149.5
 columns = [6 * 11 + 0, 0 * 11 + 7, 3 * 11 + 9]  # the report lists node 6 first
 for trace, column in enumerate(columns):
@@ -95,7 +96,7 @@ cmp run.activity again.activity
 "$program" clamp run.activity --neuron 2 --csv /dev/stdout --json >out.txt
 grep -q '^149.5,' out.txt
 "$program" clamp run.activity --neuron 2 >out.txt
-grep -q '^ *2 *0' out.txt
+grep -q '^ *2 *soma' out.txt
 
 refuses 'traces.csv' "$program" clamp run.activity --neuron 2 --csv traces.csv  # another table is not replaced unasked
 "$program" clamp run.activity --neuron 2 --csv traces.csv --force >/dev/null
@@ -113,11 +114,11 @@ refuses 'a picture of 120x50 leaves no room for axes; give a larger --size, or -
 $python report.py odd.h5 40 nan=1 high=70
 "$program" activity odd.h5 --circuit column --out odd.activity >out.txt 2>err.txt
 grep -q '1 of 3080 values are no numbers' err.txt && grep -q '1 of 3080 values lie beyond -100 to 50 mV' err.txt
-"$program" clamp odd.activity --neuron 6 --section 3 --position 0 --csv odd.csv >/dev/null
+"$program" clamp odd.activity --neuron 6 --section 0 --position 0 --csv odd.csv >/dev/null
 grep -q '^3.5,$' odd.csv
 "$program" activity odd.h5 --circuit column --out odd.activity --range -100 100 >/dev/null 2>err.txt
 [ "$(grep -c beyond err.txt)" = 0 ]
-"$program" clamp odd.activity --neuron 6 --section 3 --position 0.5 >out.txt
+"$program" clamp odd.activity --neuron 6 --section 0 --position 0.5 >out.txt
 grep -qE ' (69.[6-9]|70.[0-4]) ' out.txt
 
 # Mismatches are named, and leave what was there.
@@ -135,6 +136,41 @@ told spikes.json "d['spikes'] == 3 and d['neurons'] == 7 and d['compartments'] =
 "$program" pack column -o spikes.forest >/dev/null
 "$program" render spikes.forest --activity spikes.activity --time 30.5 --size 160x120 -o flash.png --json >flash.json
 told flash.json "d['activity']['flashes'] >= 1"
+# Large enough for a legend: of flashes, without the colours of values; they are seen, on dark ground and on light.
+for ground in dark light; do
+  view="{\"eye\":[0,150,700],\"target\":[0,150,0],\"background\":\"$ground\",\"samples\":4}"
+  "$program" render spikes.forest --activity spikes.activity --view "$view" --size 640x480 -o $ground.png --json >$ground.json
+  "$program" render spikes.forest --activity spikes.activity --view "$view" --time 15.5 --size 640x480 -o $ground-before.png >/dev/null
+done
+told dark.json "d['activity']['flashes'] >= 1 and 20 <= d['view']['activity']['time'] <= 41 and d['surfaces'] is None"
+$python - <<'PY'
+import struct, zlib
+def pixels(name):
+    data, at, packed = open(name, "rb").read(), 8, b""
+    while at < len(data):
+        size, kind = struct.unpack(">I4s", data[at:at + 8])
+        if kind == b"IHDR": width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
+        if kind == b"IDAT": packed += data[at + 8:at + 8 + size]
+        at += 12 + size
+    raw, each = zlib.decompress(packed), {2: 3, 6: 4}[colour]
+    rows, before = [], bytearray(width * each)
+    for y in range(height):
+        kind, row = raw[y * (width * each + 1)], bytearray(raw[y * (width * each + 1) + 1:(y + 1) * (width * each + 1)])
+        for x in range(len(row)):
+            a, b, c = row[x - each] if x >= each else 0, before[x], before[x - each] if x >= each else 0
+            p = a + b - c
+            near = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
+            row[x] = (row[x] + (0, a, b, (a + b) // 2, near)[kind]) & 255
+        rows.append(row)
+        before = row
+    return [tuple(row[x:x + 3]) for row in rows for x in range(0, len(row), each)]
+dark, before, light = pixels("dark.png"), pixels("dark-before.png"), pixels("light.png")
+bright = lambda picture: sum(min(p) > 190 for p in picture)
+assert bright(dark) > bright(before) + 60, (bright(dark), bright(before))
+assert sum(p[0] > 150 and max(p[1:]) < 90 for p in light) > 60
+# No bar of the colour map: its purple is nowhere.
+assert not sum(p[2] > 1.6 * max(p[1], 20) and p[0] > 60 for p in dark), "there are colours of values"
+PY
 refuses "nothing to pack" "$program" activity --circuit column --out x.activity
 $python - <<'PY'
 import h5py, shutil
@@ -184,8 +220,9 @@ refuses 'is not an activity file' "$program" clamp run.h5 --neuron 0
 [ ! -e no.png ]
 
 refuses 'node 7 was not reported; there are 7 neurons' "$program" clamp run.activity --neuron 7
-refuses 'section 9 of node 0 was not reported; 6 of its sections were, the last of them 5' "$program" clamp run.activity --neuron 0 --section 9
-refuses '--section has 2 values and 3 traces are asked for' "$program" clamp run.activity --neuron 0 1 2 --section 0 1
+refuses "'x' is no section" "$program" clamp run.activity --neuron 0 --section x
+refuses 'section 9 of node 0 was not reported; 5 of its sections were, the last of them 4' "$program" clamp run.activity --neuron 0 --section 9
+refuses '--section has 2 values and 3 traces are asked for' "$program" clamp run.activity --neuron 0 1 2 --section soma 1
 refuses 'holds no step' "$program" raster run.activity --out no.png --from 1000
 refuses 'give the lower end first' "$program" raster run.activity --out no.png --range 5 5
 fails_with 2 '--neuron' "$program" clamp run.activity

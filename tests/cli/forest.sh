@@ -24,6 +24,18 @@ echo "$view" >view.json
 "$program" render a.forest --view view.json --size 320x200 -o c.png >/dev/null
 cmp a.png c.png || fail "a view from a file is not the same view"
 
+# What is not there is not told: no surfaces, no colour map of theirs.
+"$program" render a.forest --view view.json --size 64x64 -o c.png --json >c.json
+told c.json 'd["surfaces"] is None and d["activity"] is None'
+# The studio takes what render takes; without a display it says so, not that it knows no such word.
+for words in '--size 900x700' '--synapses a.synapses' '--size 900x700 --activity a.forest --synapses a.forest'; do
+  [[ $words != *a.synapses* ]] || cp a.forest a.synapses
+  refuses "no display" env -u DISPLAY -u WAYLAND_DISPLAY "$program" view a.forest $words
+done
+rm a.synapses
+refuses "'big' is no size" env -u DISPLAY -u WAYLAND_DISPLAY "$program" view a.forest --size big
+"$program" view --help | grep -q -e '--synapses' || fail "view does not tell of --synapses"
+
 "$program" movie a.forest --seconds 0.2 --size 160x90 --samples 1 -o walk.mp4 >/dev/null
 [[ $(head -c 8 walk.mp4 | tail -c 4) == ftyp ]] || fail "walk.mp4 is no MP4 file"
 

@@ -104,6 +104,48 @@ for odd in 7 '"$NOWHERE\/sets.json"'; do
   grep -q '"node_sets_file".*; the circuit has no node sets' err.txt || fail "nothing is said of $odd"
   cmp without.forest a.forest || fail "sets without a file change the forest file"
 done
+# Whatever the circuit's files tell of its neurons can be asked for: arrays of the nodes file, with a library or without, and
+# columns of the types; a set that asks for what nobody tells is named, the others work.
+cp -r circuit rich
+/usr/bin/python3 - <<'PY' || fail "the circuit cannot be enriched"
+import h5py, json, numpy
+with h5py.File("rich/nodes.h5", "a") as file:
+    group = file["nodes/column-1000/0"]
+    group["minicolumn"] = numpy.arange(1000) % 40
+    group["score"] = numpy.where(numpy.arange(1000) % 5, numpy.arange(1000) / 1000, numpy.nan)
+    group["region"] = numpy.arange(1000) % 3
+    group.create_dataset("@library/region", data=["S1FL", "S1HL", "V1"], dtype=h5py.string_dtype())
+    group.create_dataset("tag", data=[f"t{i % 7}" for i in range(1000)], dtype=h5py.string_dtype())
+rows = open("rich/node_types.csv").read().splitlines()
+rows = [row + (" etype" if i == 0 else " bAC" if i % 2 else " cNAC") for i, row in enumerate(rows)]
+open("rich/node_types.csv", "w").write("\n".join(rows) + "\n")
+json.dump({"mini": {"minicolumn": {"$gte": 10, "$lt": 12}}, "one": {"minicolumn": 7}, "some": {"score": {"$gt": .5}},
+           "hand": {"region": {"$regex": "^S1"}}, "tags": {"tag": ["t1", "t2"]}, "etype": {"etype": "bAC"},
+           "every": ["mini", "one"], "both": {"population": "column-1000", "region": "V1", "minicolumn": [3, 4]},
+           "none": {"hemisphere": "left"}}, open("rich/sets.json", "w"))
+PY
+sed -i '0,/{/s//{ "node_sets_file": "$BASE_DIR\/sets.json",/' rich/circuit_config.json
+"$program" pack rich -o rich.forest >/dev/null 2>err.txt
+[[ ! -s err.txt ]] || fail "packing said $(cat err.txt)"
+"$program" targets rich.forest --json >rich.json 2>err.txt
+grep -q "the node set 'none' asks for 'hemisphere', which is not known" err.txt || fail "it is not said what a set lacks: $(cat err.txt)"
+told rich.json '[t["name"] for t in d["targets"] if "problem" in t] == ["none"]'
+for set in mini one some hand tags every both; do
+  "$program" targets rich.forest --members $set --json >members-$set.json
+done
+/usr/bin/python3 - <<'PY' || fail "sets by other attributes have other members"
+import json
+wanted = {"mini": lambda i: i % 40 in (10, 11), "one": lambda i: i % 40 == 7, "some": lambda i: i % 5 and i > 500,
+          "hand": lambda i: i % 3 < 2, "tags": lambda i: i % 7 in (1, 2), "every": lambda i: i % 40 in (7, 10, 11),
+          "both": lambda i: i % 3 == 2 and i % 40 in (3, 4)}
+for name, holds in wanted.items():
+    assert json.load(open(f"members-{name}.json"))["members"]["column-1000"] == [i for i in range(1000) if holds(i)], name
+targets = {t["name"]: t.get("neurons") for t in json.load(open("rich.json"))["targets"]}
+assert 0 < targets["etype"] < 1000, targets
+PY
+"$program" render rich.forest --only "mini and hand" --size 64x64 -o rich.png >/dev/null
+rm rich.png
+
 refuses "no target 'deep'" "$program" targets without.forest --members deep
 
 refuses "defines nothing" "$program" targets a.forest --define L2

@@ -10,6 +10,7 @@
 #include <filesystem>
 #include <fstream>
 #include <poll.h>
+#include <set>
 #include <unistd.h>
 
 #include <fmt/format.h>
@@ -112,6 +113,7 @@ class Studio {
       if (line.at("event") == event) return line;
     }
   }
+  void send(int signal) { kill(pid_, signal); }
   /// What it said in the end, and its exit status.
   std::pair<std::string, int> end() {
     std::string said;
@@ -181,6 +183,7 @@ class Window : public ::testing::Test {
     activity_ = report.at("activity");
     synapses_ = report.at("synapses");
     skin_ = report.at("skin_triangles");
+    cut_off_ = report.at("cut_off");
   }
   // The same after everything that the hand did so far: events are worked off in order, and Escape (which leaves
   // nothing selected) is answered at once. What was finished before, between two moves of a slow mouse, is passed over.
@@ -225,7 +228,7 @@ class Window : public ::testing::Test {
 
   std::unique_ptr<Studio> studio_;
   scene::View view_;
-  Json picture_, activity_;
+  Json picture_, activity_, cut_off_;
   std::size_t synapses_ = 0, skin_ = 0;
 };
 
@@ -237,6 +240,26 @@ class Contacts : public Window {
 class Near : public Window {
  protected:
   float nearness() const override { return .06f; }
+};
+
+// Drawn by OpenGL, of which the driver can be made to say that the card was reset.
+class OnACard : public Window {
+ protected:
+  std::vector<std::string> more() const override { return {"--renderer", "opengl"}; }
+  void SetUp() override {
+    setenv("LD_PRELOAD", STUDIO_LOST_CARD, 1);
+    Window::SetUp();
+    unsetenv("LD_PRELOAD");
+  }
+  // Resets it, and moves; what the studio says of it.
+  Json reset() {
+    studio_->send(SIGUSR1);
+    key("Left");
+    const Json said = studio_->wait_for("recovered");
+    finish();
+    xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
+    return said;
+  }
 };
 
 class Playing : public Window {
@@ -490,6 +513,12 @@ TEST_F(Window, AnExpressionBecomesATarget) {
   ASSERT_EQ(view_.targets.size(), 1u);
   EXPECT_EQ(view_.targets[0].name, "first and not upper");
   EXPECT_EQ(view_.targets[0].visible, true);
+  // It is chosen, so that what is said next is meant of it.
+  key("alt+c");
+  key("Down");
+  settle();
+  ASSERT_EQ(view_.targets.size(), 1u);
+  EXPECT_EQ(view_.targets[0].colour, 0xE69F00u);
   key("alt+n");
   xdotool("type --delay 5 'nobody of this name'");
   key("Return");
@@ -519,6 +548,8 @@ TEST_F(Window, GazeFollowsTheMouse) {
   EXPECT_NEAR(view_.detail.gaze->y() * viewport().height, 250.f, 1.f);
 }
 
+TEST_F(Window, NoFieldOfThePanelsIsCutOff) { EXPECT_EQ(cut_off_, Json::array()); }
+
 TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
   key("F1");
   const auto list = folder / "keys.txt";
@@ -532,6 +563,31 @@ TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
   EXPECT_GT(height, 300);
   EXPECT_LE(x + width, 1280);
   EXPECT_LE(y + height, 800);  // the button at its lower end can be clicked
+}
+
+TEST_F(OnACard, ThatIsLostTheForestIsLoadedAnewAndThenDrawnByTheProcessor) {
+  const Json first = reset();
+  EXPECT_NE(first.at("renderer").get<std::string>().find("card was lost"), std::string::npos) << first;
+  EXPECT_NE(first.at("why").get<std::string>().find("was reset by its driver"), std::string::npos) << first;
+  const io::Picture again = saved("card_again.png");
+  // The hand is answered as before, in the window that was made anew.
+  const scene::View old = view_;
+  key("Home");
+  settle();
+  key("ctrl+1");
+  key("ctrl+1");
+  drag(1, {100, 150}, {160, 160});
+  EXPECT_NE(view_.camera.eye, old.camera.eye);
+  const Json second = reset();
+  EXPECT_NE(second.at("why").get<std::string>().find("The processor draws"), std::string::npos) << second;
+  EXPECT_NE(second.at("renderer"), first.at("renderer"));
+  const io::Picture by_processor = saved("card_processor.png");
+  // Both show the forest: neither is black, nor one colour.
+  for (const io::Picture& picture : {again, by_processor}) {
+    std::set<std::uint8_t> reds;
+    for (std::size_t i = 0; i < picture.pixels.size(); i += 4) reds.insert(picture.pixels[i]);
+    EXPECT_GT(reds.size(), 40u);
+  }
 }
 
 TEST_F(Playing, SpacePlaysAndStopsAndStepsGoBothWays) {
@@ -581,6 +637,9 @@ TEST_F(Playing, AClickShowsTheWholeHistoryOfTheCompartmentAndTracesAreSaved) {
     const Json clamped = studio_->wait_for("clamped");
     ASSERT_EQ(clamped.at("traces").size(), wanted.size());
     EXPECT_EQ(clamped.at("traces").back(), trace.name());
+    // Under the number that the selection has.
+    const Json section = studio_->wait_for("selected").at("facts").at("section");
+    EXPECT_EQ(section, target.pick->section == scene::soma_section ? Json("soma") : Json(trace.section));
     finish();
   }
   const auto path = folder / "traces.csv";
