@@ -43,7 +43,7 @@ scene::View default_view(const scene::Forest& forest, const scene::Surfaces& sur
     view.fog = 0.f;
     return view;
   }
-  return scene::overview(forest);
+  return scene::overview(forest, aspect);
 }
 
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.

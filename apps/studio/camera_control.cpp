@@ -7,9 +7,11 @@
 namespace forest::studio {
 namespace {
 
-// From directions where y is up to directions where the camera's `up` is.
+// From directions where y is up to directions where the camera's `up` is. Between directions that are nearly opposite
+// FromTwoVectors is not of unit length to the last digits.
 Quat upright(const frame::Camera& camera) {
-  return camera.up.squaredNorm() > 0.f ? Quat::FromTwoVectors(Vec3::UnitY(), camera.up) : Quat::Identity();
+  return camera.up.squaredNorm() > 0.f ? Quat::FromTwoVectors(Vec3::UnitY(), camera.up).normalized()
+                                       : Quat::Identity();
 }
 
 Vec3 direction(const frame::Camera& camera, const Bearing& b) {

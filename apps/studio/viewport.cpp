@@ -138,10 +138,10 @@ void Viewport::centre() {
 }
 
 frame::Camera Viewport::whole() const {
+  const float aspect = float(width()) / float(std::max(1, height()));
   if (forest_.instances().empty() && !dressing_.surfaces.empty())
-    return dressing_.surfaces.camera(dressing_.surfaces.outside(),
-                                     float(width()) / float(std::max(1, height())));
-  frame::Camera camera = scene::overview(forest_).camera;
+    return dressing_.surfaces.camera(dressing_.surfaces.outside(), aspect);
+  frame::Camera camera = scene::overview(forest_, aspect).camera;
   camera.near = settings_.view.camera.near;
   return camera;
 }

@@ -214,24 +214,28 @@ ScratchFile::ScratchFile(const NewFile& of) : of_(of), file_(open_nameless(of.fo
 }
 
 ScratchFile::~ScratchFile() {
+  unmap();
   if (file_ >= 0) ::close(file_);
 }
 
 void ScratchFile::write(std::span<const std::byte> bytes) {
+  unmap();
   if (!write_all(file_, bytes)) of_.fail("written");
+  size_ += bytes.size();
 }
 
-void ScratchFile::read(std::uint64_t at, std::span<std::byte> into) const {
-  while (!into.empty()) {
-    const ssize_t got = ::pread(file_, into.data(), into.size(), off_t(at));
-    if (got < 0 && errno == EINTR) continue;
-    if (got <= 0) {
-      if (got == 0) errno = EIO;
-      of_.fail("written");
-    }
-    into = into.subspan(std::size_t(got));
-    at += std::uint64_t(got);
+std::span<const std::byte> ScratchFile::bytes() {
+  if (mapped_.size() != size_) {
+    void* const begin = ::mmap(nullptr, std::size_t(size_), PROT_READ, MAP_SHARED | MAP_POPULATE, file_, 0);
+    if (begin == MAP_FAILED) of_.fail("written");
+    mapped_ = {static_cast<const std::byte*>(begin), std::size_t(size_)};
   }
+  return mapped_;
+}
+
+void ScratchFile::unmap() {
+  if (!mapped_.empty()) ::munmap(const_cast<std::byte*>(mapped_.data()), mapped_.size());
+  mapped_ = {};
 }
 
 PartFile::PartFile(const std::filesystem::path& wanted) : place_(followed(wanted)), part_(place_) {

@@ -66,12 +66,16 @@ class ScratchFile {
   ScratchFile(const ScratchFile&) = delete;
   ScratchFile& operator=(const ScratchFile&) = delete;
 
-  void write(std::span<const std::byte> bytes);                  // appends
-  void read(std::uint64_t at, std::span<std::byte> into) const;  // what was written
+  void write(std::span<const std::byte> bytes);  // appends
+  /// All that was written, where it lies; until the object is gone or is written again.
+  std::span<const std::byte> bytes();
 
  private:
+  void unmap();
   const NewFile& of_;
   int file_ = -1;
+  std::uint64_t size_ = 0;
+  std::span<const std::byte> mapped_;
 };
 
 /// A file that is made over hours. Until commit() it lies beside its place, with .part behind its name; a program that was

@@ -44,6 +44,7 @@ enum class Odd : std::uint8_t {
   stale_diameters,
   open_comment,
   several_cells,
+  names_not_kept,
   count
 };
 
@@ -76,6 +77,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(Odd::count)> table{{
      "see whether compartments are missing"},
     {"several-cells", false, "the first one is read; convert and import take them all",
      "nothing, or split the file"},
+    {"names-not-kept", false, "left out: a section has a number and no name", keep_the_file, true},
 }};
 
 using Oddities = OddityList<Odd>;
@@ -97,7 +99,7 @@ enum class Option : std::uint8_t {
   parameter,
   prototype,
   spines,
-  harmless
+  symmetry  // where the axial resistance lies, not where the compartment does
 };
 
 constexpr std::array<std::pair<std::string_view, Option>, 28> options{{
@@ -109,10 +111,10 @@ constexpr std::array<std::pair<std::string_view, Option>, 28> options{{
     {"*double_endpoint_off", Option::one_end},
     {"*spherical", Option::spherical},
     {"*cylindrical", Option::cylindrical},
-    {"*symmetric", Option::harmless},  // where the axial resistance lies, not where the compartment does
-    {"*asymmetric", Option::harmless},
-    {"*lambda_warn", Option::harmless},
-    {"*lambda_unwarn", Option::harmless},
+    {"*symmetric", Option::symmetry},
+    {"*asymmetric", Option::symmetry},
+    {"*lambda_warn", Option::parameter},
+    {"*lambda_unwarn", Option::parameter},
     {"*start_cell", Option::start_cell},
     {"*append_to_cell", Option::start_cell},
     {"*makeproto", Option::make_prototype},
@@ -247,7 +249,7 @@ class Scanner {
       rest += text.substr(0, slash);
       if (slash == text.npos) break;
       if (text[slash + 1] == '/') {
-        if (trimmed(rest).empty()) comment(text.substr(slash + 2));
+        comment(text.substr(slash + 2));
         break;
       }
       in_comment_ = true;
@@ -310,7 +312,8 @@ class Scanner {
       case Option::spines:
         keep(Odd::spine_options);
         break;
-      case Option::harmless:
+      case Option::symmetry:
+        if (!scan_.ours) keep(Odd::parameters);
         break;
     }
   }
@@ -361,6 +364,10 @@ class Scanner {
     Compartment c;
     c.line = line_;
     c.name = scan_.ours ? own_genesis_name(words[0]) : genesis_name(words[0]);
+    if (!scan_.ours)
+      oddities_.add(Odd::names_not_kept, line_, [&] {
+        return fmt::format("compartments have names of their own, the first \"{}\"", shown(words[0]));
+      });
     c.parent = parent(group, words[1]);
     const Compartment* const above = c.parent < 0 ? nullptr : &group.compartments[std::size_t(c.parent)];
     const Place origin = above ? above->to : Place{};

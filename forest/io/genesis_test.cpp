@@ -124,6 +124,7 @@ const Oddly oddly[] = {
     {"byte-order-mark", 1, "\xef\xbb\xbfsoma none 0 0 0 9\n"},
     {"padding", 0, "soma none 0 0 0 9\n\x1a"},
     {"several-cells", 0, "soma none 0 0 0 9\n*start_cell /b\nsoma none 0 0 0 5\n"},
+    {"names-not-kept", 2, "*relative\nsoma none 0 0 0 9\n"},
 };
 
 TEST(Genesis, DeviationsAreReadAndToldWithTheirLine) {
@@ -138,6 +139,15 @@ TEST(Genesis, DeviationsAreReadAndToldWithTheirLine) {
     EXPECT_TRUE(row.code == "no-length" ||
                 std::ranges::find(oddly, row.code, &Oddly::code) != std::end(oddly))
         << row.code;
+}
+
+TEST(Genesis, CommentsBehindCompartmentsAndOptionsWithoutShapeAreKept) {
+  const Annotations expected{
+      {"genesis", "*symmetric"}, {"comment", "the cell body"}, {"genesis", "*lambda_warn 0.01 0.2"}};
+  EXPECT_EQ(cell("*symmetric\nsoma none 0 0 0 9 // the cell body\n*lambda_warn 0.01 0.2\n").annotations(),
+            expected);
+  const Morphology ours = cell("soma none 0 0 0 9\n");
+  EXPECT_TRUE(read_genesis(write_genesis(ours), "ours").warnings.empty());
 }
 
 TEST(Genesis, WhatHasNoReadingIsRefusedWithItsLine) {

@@ -650,9 +650,22 @@ class CellReader {
     constexpr std::array<std::string_view, 7> known{"points",     "structure",    "metadata", "perimeters",
                                                     "organelles", "brain_forest", "neuron1"};
     std::string others;
+    const auto left_out = [&](std::string_view what) {
+      others += fmt::format("{}{}", others.empty() ? "" : ", ", what);
+    };
     for (const Image::Link& link : members_.links())
-      if (std::ranges::find(known, link.name) == known.end())
-        others += (others.empty() ? "" : ", ") + link.name;
+      if (std::ranges::find(known, link.name) == known.end()) left_out(link.name);
+    const auto attributes_of = [&](const Image::Object& object) {
+      for (std::string& name : image_.attributes(object)) {
+        if (name == comment_key || name == family_key || name == "version") continue;
+        if (auto text = image_.text(object, name))
+          builder_.annotate(std::move(name), std::move(*text));
+        else
+          left_out("attribute " + name);
+      }
+    };
+    attributes_of(group_);
+    if (const auto metadata = members_.find("metadata")) attributes_of(*metadata);
     if (!others.empty()) {
       constexpr std::size_t enough = 200;
       if (others.size() > enough) others = others.substr(0, enough) + "…";

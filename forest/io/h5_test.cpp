@@ -141,6 +141,39 @@ TEST(H5, DeviationsAreReadAndTold) {
   }
 }
 
+TEST(H5, AttributesThatAreTextsAreKeptAndOthersTold) {
+  const auto sample = [](auto more) {
+    hdf5::NewFile file;
+    const Sample usual;
+    file.write("/points", usual.points, 4);
+    file.write("/structure", usual.structure, 3);
+    file.group("/metadata");
+    file.attribute("/metadata", "version", usual.version);
+    more(file);
+    return read_h5(file.bytes(), "sample");
+  };
+  const ReadResult kept = sample([](hdf5::NewFile& file) {
+    file.attribute("/", "software", "a tracer");
+    file.attribute("/metadata", "creator", "a hand");
+  });
+  EXPECT_TRUE(kept.warnings.empty());
+  EXPECT_EQ(annotation(kept.morphology, "software"), "a tracer");
+  EXPECT_EQ(annotation(kept.morphology, "creator"), "a hand");
+  EXPECT_EQ(read_h5(write_h5(kept.morphology), "again").morphology.annotations(),
+            kept.morphology.annotations());
+  const ReadResult lost = sample([](hdf5::NewFile& file) {
+    file.attribute("/metadata", "voxel", std::array<std::uint32_t, 2>{1, 2});
+  });
+  ASSERT_TRUE(told(lost, "not-kept"));
+  EXPECT_TRUE(contains(lost.warnings[0].sentence, "attribute voxel"));
+  EXPECT_TRUE(lost.warnings[0].lost);
+  const ReadResult many = sample([](hdf5::NewFile& file) {
+    for (int i = 0; i < 40; ++i)
+      file.attribute("/", "x" + std::to_string(i), std::array<std::uint32_t, 1>{1});
+  });
+  EXPECT_TRUE(told(many, "not-kept"));
+}
+
 TEST(H5, GliaAndSpinesKeepTheirNumbersAndFamilies) {
   Sample glia;
   glia.family = 1, glia.perimeters = {0, 0, 0, 6, 6, 6, 3, 3, 3};

@@ -32,7 +32,8 @@ enum : std::uint16_t {
   filter_message = 11,
   attribute_message = 12,
   continuation_message = 16,
-  symbols_message = 17
+  symbols_message = 17,
+  attribute_info_message = 21
 };
 
 std::size_t padded(std::size_t size) { return (size + 7) & ~std::size_t(7); }
@@ -584,24 +585,52 @@ Array Image::array(const Object& object, std::string_view path) const {
   return result;
 }
 
-std::optional<Image::Attribute> Image::attribute(const Object& object, std::string_view name) const {
+struct Image::AttributeParts {
+  std::string_view name, type, shape, data;
+  bool shares_type = false;  // with other objects
+};
+
+Image::AttributeParts Image::parts(const Message& message) const {
   constexpr std::string_view what = "an attribute";
+  Cursor fields(*this, message.data, what);
+  const std::uint8_t version = fields.byte(), flags = fields.byte();
+  if (version < 1 || version > 3) damaged(what);
+  const std::size_t name_size = fields.two(), type_size = fields.two(), shape_size = fields.two();
+  if (version == 3) fields.skip(1);
+  const auto part = [&](std::size_t size) {
+    return fields.take(version == 1 ? std::min(padded(size), fields.left()) : size).substr(0, size);
+  };
+  AttributeParts result;
+  result.name = part(name_size);
+  result.name = result.name.substr(0, result.name.find('\0'));
+  result.type = part(type_size);
+  result.shape = part(shape_size);
+  result.data = fields.rest();
+  result.shares_type = version > 1 && (flags & 3);
+  return result;
+}
+
+std::vector<std::string> Image::attributes(const Object& object) const {
+  std::vector<std::string> names;
+  for (const Message& message : object.messages) {
+    if (message.type == attribute_message && !message.shared) names.emplace_back(parts(message).name);
+    if (message.type == attribute_info_message) {  // many attributes lie in a heap of their own
+      Cursor fields(*this, message.data, "the place of attributes");
+      fields.skip(1);
+      if (fields.byte() & 1) fields.skip(2);
+      if (fields.eight() != nowhere) names.emplace_back("…");
+    }
+  }
+  return names;
+}
+
+std::optional<Image::Attribute> Image::attribute(const Object& object, std::string_view name) const {
   for (const Message& message : object.messages) {
     if (message.type != attribute_message || message.shared) continue;
-    Cursor fields(*this, message.data, what);
-    const std::uint8_t version = fields.byte(), flags = fields.byte();
-    if (version < 1 || version > 3) damaged(what);
-    const std::size_t name_size = fields.two(), type_size = fields.two(), shape_size = fields.two();
-    if (version == 3) fields.skip(1);
-    const auto part = [&](std::size_t size) {
-      return fields.take(version == 1 ? std::min(padded(size), fields.left()) : size).substr(0, size);
-    };
-    const std::string_view own_name = part(name_size);
-    if (own_name.substr(0, own_name.find('\0')) != name) continue;
-    const std::string_view type_data = part(type_size), shape_data = part(shape_size);
-    if (version > 1 && (flags & 3))
-      return std::nullopt;  // a type that others share: never of what is asked here
-    return Attribute{type(type_data), shape(shape_data), fields.rest()};
+    const AttributeParts found = parts(message);
+    if (found.name != name) continue;
+    if (found.shares_type) return std::nullopt;  // never of what is asked here
+    return Attribute{type(found.type), shape(found.shape), found.data};
   }
   return std::nullopt;
 }

@@ -62,6 +62,8 @@ class Image {
 
   /// Throws also when it holds anything but numbers.
   Array array(const Object& object, std::string_view path) const;
+  std::vector<std::string> attributes(
+      const Object& object) const;  // their names, as far as they lie in its header
   std::vector<std::int64_t> integers(const Object& object, std::string_view attribute) const;  // empty: none
   std::optional<std::string> text(const Object& object, std::string_view attribute) const;
 
@@ -72,6 +74,7 @@ class Image {
   friend class Cursor;
   struct Type;
   struct Attribute;
+  struct AttributeParts;
   struct FractalHeap;
   std::string_view bytes_;
   const std::string& name_;
@@ -82,6 +85,7 @@ class Image {
   std::string_view resolved(const Message& message) const;
   Type type(std::string_view message) const;
   std::vector<std::uint64_t> shape(std::string_view message) const;
+  AttributeParts parts(const Message& message) const;
   std::optional<Attribute> attribute(const Object& object, std::string_view name) const;
   void symbols(std::string_view message, std::vector<Link>& links) const;
   std::optional<Link> link(std::string_view message) const;

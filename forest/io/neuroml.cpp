@@ -45,6 +45,7 @@ enum class NeuromlOddity : std::uint8_t {
   several_somata,
   soma_inside_neurite,
   group,
+  names_not_kept,
   count
 };
 
@@ -75,6 +76,7 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NeuromlOddity::count)> tab
     {"several-somata", true, "joined to the first point of the soma", "split the cell if it is several"},
     {"soma-inside-neurite", true, "read as a neurite of undefined kind"},
     {"group", true, "the reference is skipped"},
+    {"names-not-kept", false, "left out: a section has a number and no name", keep_the_file, true},
 }};
 
 using Oddities = OddityList<NeuromlOddity>;
@@ -357,8 +359,21 @@ class Assembler {
                       [&] { return fmt::format("another segment has the id {}", s.id); });
     }
     if (segments_.empty()) refuse(morphology, "the morphology has no segment; a cell has at least one");
+    if (!to_the_letter_) count_names();
     if (segments_.size() > std::size_t(std::numeric_limits<std::int32_t>::max()))
       refuse(morphology, "has more than 2147483647 segments; split the file");
+  }
+
+  /// Written anew, segments are numbered from 0 and named by their section.
+  void count_names() {
+    std::size_t named = 0;
+    for (std::size_t i = 0; i < segments_.size(); ++i)
+      named += segments_[i].id != std::int64_t(i) || !attribute(segments_[i].node, "name").empty();
+    if (named)
+      oddities_.add(NeuromlOddity::names_not_kept, line(segments_[0]), [&] {
+        return fmt::format("{} segments have names or numbers of their own, and so may groups of them",
+                           named);
+      });
   }
 
   std::size_t find(std::string_view id) const {

@@ -46,6 +46,7 @@ enum class NmfOddity : std::uint8_t {
   spine_before_points,
   skipped_element,
   several_documents,
+  not_kept,
   count
 };
 
@@ -73,12 +74,13 @@ constexpr std::array<Oddity, static_cast<std::size_t>(NmfOddity::count)> table{{
     {"spine-before-points", true, "put on that point", "put it behind the point it sits on"},
     {"skipped-element", true, "skipped", "keep the file beside what is made of it", true},
     {"several-documents", false, "the first one is read", "split the file"},
+    {"not-kept", false, "left out", "keep the file beside what is made of it", true},
 }};
 
-// Of the file, not of the cell; and what is said in other ways.
-constexpr std::array<std::string_view, 9> silent_elements{"filefacts", "thumbnail",  "property",
-                                                          "images",    "sparcdata",  "scalebar",
-                                                          "zsmear",    "resolution", "description"};
+// Known, and told together in one sentence where nothing is made of them.
+constexpr std::array<std::string_view, 9> known_elements{"filefacts", "thumbnail",  "property",
+                                                         "images",    "sparcdata",  "scalebar",
+                                                         "zsmear",    "resolution", "description"};
 constexpr int circle_points = 16;
 
 std::string lower(std::string_view text) {
@@ -96,6 +98,39 @@ struct TakePrefixes : pugi::xml_tree_walker {
     if (const auto colon = name.find(':'); colon != name.npos)
       element.set_name(std::string(name.substr(colon + 1)).c_str());
     return true;
+  }
+};
+
+/// The names of known elements of which nothing is made, in the order they come in.
+struct LeftOut : pugi::xml_tree_walker {
+  std::vector<std::string> names;
+  pugi::xml_node first;
+
+  bool for_each(pugi::xml_node& element) override {
+    const std::string_view what = element.name();
+    if (element.type() != pugi::node_element || !left_out(what, element)) return true;
+    if (names.empty()) first = element;
+    std::string name(what);
+    if (what == "property") name += fmt::format(" {}", std::string_view(element.attribute("name").value()));
+    if (std::ranges::find(names, name) == names.end() && names.size() < most_names) names.push_back(name);
+    return true;
+  }
+
+ private:
+  static constexpr std::size_t most_names = 12;
+
+  static bool left_out(std::string_view what, const pugi::xml_node& element) {
+    const std::string_view in = element.parent().name(), name = element.attribute("name").value();
+    if (what == "property")
+      return !(in == "tree" && name == "Set") && !(in == "spine" && used_of_spine(name));
+    if (in == "spine") return what != "point";
+    if (in == "image") return what != "filename";
+    if (in == "sparcdata") return what != "subject";
+    return what == "filefacts" || what == "scalebar" || what == "zsmear" || what == "resolution" ||
+           (what == "thumbnail" && in != "thumbnail");
+  }
+  static bool used_of_spine(std::string_view property) {
+    return property == "Class" || property == "GeneratedMetrics";
   }
 };
 
@@ -169,6 +204,12 @@ class Reader {
       if (next.type() == pugi::node_element)
         oddities_.add(NmfOddity::several_documents, line_of(next), "another document follows the first");
     about_the_file(root);
+    LeftOut left_out;
+    document.traverse(left_out);
+    if (!left_out.names.empty())
+      oddities_.add(NmfOddity::not_kept, line_of(left_out.first), [&] {
+        return fmt::format("there is more than the shape ({})", fmt::join(left_out.names, ", "));
+      });
     bool outlines = false;  // of layers, or markers
     for (const pugi::xml_node element : root.children()) {
       const std::string_view what = name_of(element);
@@ -241,7 +282,7 @@ class Reader {
   void skip(const pugi::xml_node& element) {
     const std::string_view what = name_of(element);
     if (element.type() == pugi::node_element &&
-        std::ranges::find(silent_elements, what) == silent_elements.end())
+        std::ranges::find(known_elements, what) == known_elements.end())
       oddities_.add(NmfOddity::skipped_element, line_of(element),
                     [&] { return fmt::format("there is an element <{}>", what.substr(0, 40)); });
   }

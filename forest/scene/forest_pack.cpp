@@ -110,20 +110,13 @@ class Waiting {
     memory_.clear();
   }
   std::uint64_t size() const { return size_; }
-  /// Calls body(at, bytes) for all of it, piece by piece and on all cores, and forgets it.
+  /// Calls body(at, bytes) for all of it, piece by piece, and forgets it.
   template <class Body>
   void pour(Body&& body) {
-    const std::uint64_t on_disk = size_ - memory_.size();
-    parallel_ranges(std::size_t((on_disk + piece - 1) / piece), 1, [&](std::size_t begin, std::size_t end) {
-      std::vector<std::byte> buffer;
-      for (std::uint64_t at = begin * piece; at < std::min<std::uint64_t>(end * piece, on_disk);
-           at += piece) {
-        buffer.resize(std::size_t(std::min<std::uint64_t>(piece, on_disk - at)));
-        scratch_->read(at, buffer);
-        body(at, Bytes(buffer));
-      }
-    });
-    body(on_disk, Bytes(memory_));
+    const Bytes on_disk = scratch_ ? scratch_->bytes() : Bytes();
+    for (std::size_t at = 0; at < on_disk.size(); at += piece)
+      body(at, on_disk.subspan(at, std::min(piece, on_disk.size() - at)));
+    body(on_disk.size(), Bytes(memory_));
     scratch_.reset();
     memory_ = {};
   }

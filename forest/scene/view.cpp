@@ -5,6 +5,9 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <limits>
+#include <numbers>
+#include <utility>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
@@ -213,6 +216,76 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
     palette[flash_entry + i] = dim + (bright - dim) * (float(i + 1) / float(flash_steps));
 }
 
+constexpr int outline_corners = 16;
+
+/// Places on branches, spread evenly over their area: the straws of one level of bricks.
+std::vector<Vec3> sampled_branches(const Forest& forest) {
+  constexpr std::size_t enough = 4096;
+  const auto bricks = forest.bricks();
+  if (bricks.empty()) return {};
+  const auto straws_from = [&](std::size_t brick) {
+    const Brick& first = bricks[brick];
+    const std::size_t end =
+        first.child_count ? bricks[first.first_child].first_segment : forest.segments().size();
+    return forest.segments().subspan(first.first_segment, end - first.first_segment);
+  };
+  std::size_t level = 0;
+  while (bricks[level].child_count && straws_from(level).size() < enough) level = bricks[level].first_child;
+  std::vector<Vec3> places;
+  for (const frame::Segment& s : straws_from(level))
+    places.emplace_back(.5f * (s.ax + s.bx), .5f * (s.ay + s.by), .5f * (s.az + s.bz));
+  return places;
+}
+
+/// Where an eye must be so that a pyramid of view of given directions and slopes encloses points. With axes r (right) and d
+/// (backward), an eye at c r + D d sees p where ±(r·p − c) ≤ slope (D − d·p): the extremes of ±r·p + slope d·p decide.
+class Enclosing {
+ public:
+  Enclosing(const Mat3& axes, float slope_across, float slope_up) : axes_(axes) {
+    for (const int side : {0, 1})
+      for (const float sign : {1.f, -1.f}) {
+        const float slope = side ? slope_up : slope_across;
+        normals_[std::size_t(2 * side) + (sign < 0.f)] = sign * axes.col(side) + slope * axes.col(2);
+        slopes_[std::size_t(side)] = slope;
+      }
+    reach_.fill(-std::numeric_limits<float>::infinity());
+  }
+
+  void add(const Vec3& p) {
+    for (std::size_t n = 0; n < 4; ++n) reach_[n] = std::max(reach_[n], normals_[n].dot(p));
+  }
+  /// All but a few that reach far beyond the others.
+  void add_most(std::span<const Vec3> points) {
+    if (points.empty()) return;
+    std::vector<float> reaches(points.size());
+    for (std::size_t n = 0; n < 4; ++n) {
+      std::ranges::transform(points, reaches.begin(), [&](const Vec3& p) { return normals_[n].dot(p); });
+      const auto last = reaches.end() - 1 - std::ptrdiff_t(points.size() / few);
+      std::ranges::nth_element(reaches, last);
+      reach_[n] = std::max(reach_[n], *last);
+    }
+  }
+  /// The eye, with a little room on all sides, and what it looks at, as far away as `depth_of`.
+  std::pair<Vec3, Vec3> camera(const Vec3& depth_of) const {
+    constexpr float room = 1.06f;
+    const float distance = std::max(
+        {(reach_[0] + reach_[1]) / (2.f * slopes_[0]), (reach_[2] + reach_[3]) / (2.f * slopes_[1])});
+    const Vec3 across =
+        .5f * (reach_[0] - reach_[1]) * axes_.col(0) + .5f * (reach_[2] - reach_[3]) * axes_.col(1);
+    const float depth = axes_.col(2).dot(depth_of);
+    const float away = std::max(room * (distance - depth), least_distance);
+    return {across + (depth + away) * axes_.col(2), across + depth * axes_.col(2)};
+  }
+
+ private:
+  static constexpr std::size_t few = 4000;        // points for each that is left out
+  static constexpr float least_distance = 100.f;  // µm
+  Mat3 axes_;
+  std::array<Vec3, 4> normals_;  // right, left, up, down
+  std::array<float, 2> slopes_{};
+  std::array<float, 4> reach_{};
+};
+
 }  // namespace
 
 View parse_view(std::string_view text, const std::string& name) {
@@ -316,23 +389,32 @@ std::string to_json(const View& v) {
   return json.dump();
 }
 
-View overview(const Forest& forest) {
+View overview(const Forest& forest, float aspect) {
   View view;
-  Bounds bounds = forest.soma_bounds();
-  const bool column = forest.circuit().radius > 0.f || bounds.empty();  // it stands at the origin
-  const Vec3 middle = column ? Vec3(Vec3::Zero()) : bounds.centre();
-  for (const auto& layer : forest.circuit().layers) {
-    bounds.add({middle.x(), layer.bottom, middle.z()});
-    bounds.add({middle.x(), layer.top, middle.z()});
-  }
-  if (bounds.empty()) return view;
-  const float radius = std::max(forest.circuit().radius, .5f * bounds.extent().norm() * .5f);
-  const float height = std::max(bounds.extent().y(), radius) + 120.f;
-  const float distance =
-      std::max(.5f * height, radius) / std::tan(.5f * radians(view.camera.field_of_view)) * 1.08f + radius;
-  view.camera.target = bounds.centre();
-  view.camera.eye = bounds.centre() + distance * Vec3(.42f, .16f, 1.f).normalized();
   view.camera.near = 2.f;
+  const Vec3 backward = Vec3(.42f, .16f, 1.f).normalized();
+  frame::Camera looking = view.camera;
+  looking.eye = backward, looking.target = Vec3::Zero();
+  const float slope = std::tan(.5f * radians(view.camera.field_of_view));
+  Enclosing enclosing(looking.axes(), slope * aspect, slope);
+
+  const Bounds& somata = forest.soma_bounds();
+  for (const frame::Instance& i : forest.instances()) enclosing.add({i.x, i.y, i.z});
+  Bounds bounds = somata;
+  const float radius = forest.circuit().radius;
+  const Vec3 axis = radius > 0.f || somata.empty() ? Vec3(Vec3::Zero()) : somata.centre();
+  for (const auto& layer : forest.circuit().layers)
+    for (const float y : {layer.bottom, layer.top}) {
+      bounds.add({axis.x(), y, axis.z()});
+      for (int i = 0; i < outline_corners; ++i) {
+        const float turn = 2.f * std::numbers::pi_v<float> * float(i) / float(outline_corners);
+        enclosing.add({axis.x() + radius * std::cos(turn), y, axis.z() + radius * std::sin(turn)});
+      }
+    }
+  if (bounds.empty()) return view;
+  enclosing.add_most(sampled_branches(forest));
+  const auto [eye, middle] = enclosing.camera(bounds.centre());
+  view.camera.eye = eye, view.camera.target = middle;
   return view;
 }
 

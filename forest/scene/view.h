@@ -47,8 +47,9 @@ struct View {
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);
 
-/// The view that shows the whole forest from outside, a little from above.
-View overview(const Forest& forest);
+/// The view that shows the whole forest, branches and all, from outside, a little from above.
+/// @param aspect  width over height of the picture
+View overview(const Forest& forest, float aspect = 16.f / 9.f);
 
 /// A picture to hang on a wall: near enough to follow single dendrites, far enough to see the layers.
 View portrait(const Forest& forest);

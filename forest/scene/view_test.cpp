@@ -47,6 +47,31 @@ TEST(View, SaysWhichKeyIsWrong) {
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"fovv":4})").find("fovv"), std::string::npos);
 }
 
+TEST(View, TheOverviewHoldsBranchesAndFillsThePicture) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(200), testing::sample_neurons()));
+  for (const float aspect : {.5f, 1.f, 16.f / 9.f, 3.f}) {
+    SCOPED_TRACE(aspect);
+    const frame::Camera camera = overview(forest, aspect).camera;
+    const frame::Viewport viewport{600.f * aspect, 600.f};
+    std::size_t ends = 0, outside = 0;
+    float farthest = 0.f;  // from the middle, 1 at the edges
+    for (const frame::Instance& i : forest.instances()) {
+      const Neuron& neuron = forest.neurons()[i.morphology];
+      for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count)) {
+        const Vec3 end = Vec3(i.x, i.y, i.z) + Quat(i.qw, i.qx, i.qy, i.qz) * Vec3(s.bx, s.by, s.bz);
+        const Vec3 at = project(camera, viewport, end);
+        ASSERT_GT(at.z(), 0.f);
+        const float out = std::max(std::abs(2.f * at.x() / viewport.width - 1.f),
+                                   std::abs(2.f * at.y() / viewport.height - 1.f));
+        ++ends, outside += out > 1.f;
+        if (out <= 1.f) farthest = std::max(farthest, out);
+      }
+    }
+    EXPECT_LT(double(outside), .002 * double(ends));
+    EXPECT_GT(farthest, .85f);
+  }
+}
+
 TEST(View, EveryFrameKeepsTheContract) {
   const Forest forest = sample();
   const auto lines = outline(forest);
