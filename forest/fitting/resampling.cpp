@@ -126,9 +126,9 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
     wx = if(main, ax, gx), wy = if(main, ay, gy), wz = if(main, az, max(cells.low(me), min(cells.high(me), gz))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
-    d = max(thin, thick * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
+    d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz))
+       part * (wx - gx), part * (wy - gy), part * (wz - gz), 1)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";

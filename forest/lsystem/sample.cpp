@@ -43,12 +43,43 @@ Vec3 heading_at_end(const Vec3& from, std::span<const Trace::Stop> stops) {
   return length > 0.f ? Vec3(way / length) : Vec3(Vec3::Zero());
 }
 
-float Trace::diameter_at(float part) const {
-  const float wanted = part * length();
-  const auto i = std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin());
-  if (i == 0) return stops.front().diameter;
-  if (i == stops.size()) return stops.back().diameter;
-  return stops[wanted - lengths[i - 1] < lengths[i] - wanted ? i - 1 : i].diameter;
+Course::Course(const Trace& t, float scale) {
+  constexpr long few = 4;  // of so few steps each tells too much
+  const auto count = long(t.stops.size());
+  const long wanted = count < few ? count : std::clamp(std::lround(float(count) * scale), 1l, 2 * count);
+  const auto place = [&](long i) { return i ? t.stops[std::size_t(i - 1)].at : Vec3(Vec3::Zero()); };
+  const auto way = [&](long i) { return i ? t.lengths[std::size_t(i - 1)] : 0.f; };
+  // The first steps, and then those from `skip` steps later, or earlier, on.
+  long first = count, skip = 0;
+  float least = INFINITY;
+  for (long f = std::max(0l, wanted - count); wanted != count && f <= std::min(wanted, count); ++f) {
+    const long next = f + count - wanted;
+    const float whole = way(f) + t.length() - way(next);
+    if (!(whole > 0.f)) continue;
+    const Vec3 end = (place(f) + t.end() - place(next)) * (t.length() / whole);
+    if (const float off = (end - t.end()).squaredNorm(); off < least)
+      least = off, first = f, skip = count - wanted;
+  }
+  for (long i = 1; i <= first; ++i) places.push_back(place(i)), lengths.push_back(way(i));
+  const Vec3 aside = place(first) - place(first + skip);
+  const float longer = way(first) - way(first + skip);
+  for (long i = first + skip + 1; i <= count; ++i)
+    places.push_back(place(i) + aside), lengths.push_back(way(i) + longer);
+  if (!skip) return;
+  const float times = t.length() / length();
+  const Vec3 rest = (t.end() - times * places.back()) / length();
+  for (std::size_t i = 0; i < places.size(); ++i) places[i] = times * places[i] + rest * lengths[i];
+}
+
+float Calibre::next(float part, bool long_step) {
+  const auto& lengths = of_.lengths;
+  const float wanted = part * of_.length();
+  const std::size_t end = lengths.size() - 1;
+  auto at = std::min(end, std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin()));
+  if (at > 0 && wanted - lengths[at - 1] < lengths[at] - wanted) --at;
+  if (at == last_ && at < end && long_step) ++at;
+  last_ = at;
+  return of_.stops[at].diameter;
 }
 
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,

@@ -35,9 +35,31 @@ struct Trace {
 
   const Vec3& end() const { return stops.back().at; }
   float length() const { return lengths.back(); }
-  /// At the place nearest to this share of its length: a tracer sets diameters in steps. The first place of all is not asked,
-  /// for what leads there belongs to the branch before.
-  float diameter_at(float part) const;
+};
+
+/// The places of a traced branch that is to be drawn `scale` times as long, before it is so scaled. Its steps are not stretched:
+/// how far apart points are, and how far z leaps between them, is a tracer's habit. Some that follow one another are left out, or
+/// made twice, where the end then lies nearest to where it should; what is still missing all of them take up.
+struct Course {
+  std::vector<Vec3> places;
+  std::vector<float> lengths;  // from its beginning to each place, µm
+
+  Course(const Trace& t, float scale);
+  float length() const { return lengths.back(); }
+};
+
+/// Tells the diameters of one traced branch along another, place by place. A tracer sets them in steps, rather in long ones:
+/// each is that of the nearest place, but a long step does not end with the diameter that it begins with when the branch goes on.
+/// The first place of all is not asked, for what leads there belongs to the branch before.
+class Calibre {
+ public:
+  explicit Calibre(const Trace& of) : of_(of) {}
+  /// @param part  share of the way, not less than the last time
+  float next(float part, bool long_step);
+
+ private:
+  const Trace& of_;
+  std::size_t last_ = std::size_t(-1);
 };
 
 /// Where a path heads that ends with these places: the unit vector over its last `reach` µm, or over all of it when it is

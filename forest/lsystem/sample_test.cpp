@@ -178,14 +178,53 @@ TEST(Trace, IsDrawnAsideInProportionToTheWay) {
   expect_near(aside, (straight + Vec3(1, 0, -2)).normalized());
 }
 
-TEST(Trace, TellsItsDiameterAnywhere) {
-  const Grammar g = grammar("axiom: A\ngrow: A -> B\n");
-  const Trace& t = twigs(g).branches(0)[0];  // 1 after 3 µm, 1.5 after 8
-  EXPECT_FLOAT_EQ(t.diameter_at(0.f), 1.f);
-  EXPECT_FLOAT_EQ(t.diameter_at(3.f / 8.f), 1.f);
-  EXPECT_FLOAT_EQ(t.diameter_at(5.f / 8.f), 1.f);  // in steps, as tracers set them
-  EXPECT_FLOAT_EQ(t.diameter_at(6.f / 8.f), 1.5f);
-  EXPECT_FLOAT_EQ(t.diameter_at(1.f), 1.5f);
+Trace traced(std::vector<Trace::Stop> stops) {
+  Sample sample;
+  sample.add({}, {}, {{.heading = Vec3::UnitX(), .diameter = 1.f, .stops = std::move(stops)}});
+  return sample.branches(0)[0];
+}
+
+TEST(Calibre, IsThatOfTheNearestPlaceAndLongStepsGoOn) {
+  const Trace t = traced({{{1, 0, 0}, 4}, {{2, 0, 0}, 3}, {{3, 0, 0}, 2}, {{4, 0, 0}, 1}});
+  Calibre calibre(t);
+  EXPECT_EQ(calibre.next(.2f, true), 4.f);
+  EXPECT_EQ(calibre.next(.3f, false), 4.f);
+  EXPECT_EQ(calibre.next(.35f, true), 3.f);  // though the first is nearer
+  EXPECT_EQ(calibre.next(.7f, true), 2.f);
+  EXPECT_EQ(calibre.next(1.f, true), 1.f);
+  EXPECT_EQ(calibre.next(1.f, true), 1.f);
+}
+
+TEST(Course, IsLongerOrShorterByWholeStepsAndEndsWhereItShould) {
+  std::vector<Trace::Stop> stops;
+  Vec3 at = Vec3::Zero();
+  for (int i = 0; i < 40; ++i) {
+    at += Vec3(1.f + .5f * std::sin(float(7 * i)), std::cos(float(3 * i)), i % 5 ? 0.f : .8f);
+    stops.push_back({at, 1.f});
+  }
+  const Trace t = traced(stops);
+  const auto steps_of = [](const Course& course) {
+    std::vector<float> steps;
+    float before = 0.f;
+    for (const float length : course.lengths) steps.push_back(length - std::exchange(before, length));
+    return steps;
+  };
+  const std::vector<float> traced_steps = steps_of(Course(t, 1.f));
+  for (const float scale : {.6f, .9f, 1.f, 1.1f, 1.6f, 2.f}) {
+    SCOPED_TRACE(scale);
+    const Course course(t, scale);
+    EXPECT_EQ(course.places.size(), std::size_t(std::lround(40.f * scale)));
+    EXPECT_LT((course.places.back() - t.end()).norm(), 1e-3f);
+    for (const float step : steps_of(course)) {  // each was traced
+      const auto nearest =
+          std::ranges::min_element(traced_steps, {}, [&](float s) { return std::abs(s - step); });
+      EXPECT_LT(std::abs(*nearest - step), 1e-4f);
+    }
+  }
+  const Course few(traced({{{3, 0, 0}, 1}, {{8, 6, 0}, 1}}), 1.5f);
+  EXPECT_EQ(few.places.size(), 2u);
+  const Course still(traced(std::vector<Trace::Stop>(6, {{0, 0, 0}, 1})), .5f);
+  EXPECT_EQ(still.places.size(), 6u);
 }
 
 TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {

@@ -45,14 +45,15 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z",
+    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
-     "times `thickness`, and no thinner than `thinnest`; its end drawn aside by (x, y, z), all of it in "
+     "times `thickness`, at its end `last`, and no thinner than `thinnest`; its end drawn aside by (x, y, "
+     "z), all of it in "
      "proportion",
-     Action::trace, 3, 13},
+     Action::trace, 3, 14},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -414,20 +415,32 @@ class Turtle {
         Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
     const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
-    const auto thick = [&](float diameter) { return std::max(thinnest, thickness * double(diameter)); };
+    const double thickness_end = value(13, thickness);
+    // How many times as thick, from one share to the other by equal factors.
+    const auto thick = [&](float diameter, float part) {
+      const double times = thickness_end == thickness || !(thickness > 0.)
+                               ? thickness
+                               : thickness * std::pow(thickness_end / thickness, double(part));
+      return std::max(thinnest, times * double(diameter));
+    };
     const bool free = state_.avoid < 0.;
     Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // by what it avoided
     if (answers_ && free) {
       line_to(place(t.end()) + aside, 0.f);
     } else {
-      const float whole = t.length();
-      auto start = float(0.5 * thick(calibre.diameter));
-      for (std::size_t i = 0; i < t.stops.size(); ++i) {
-        const lsystem::Trace::Stop& stop = t.stops[i];
-        const float part = whole > 0.f ? t.lengths[i] / whole : 1.f;
-        state_.diameter = thick(&calibre == &t ? stop.diameter : calibre.diameter_at(part));
+      const Course course(t, float(scale));
+      const float whole = course.length(), mean_step = whole / float(course.places.size());
+      const bool own = &calibre == &t && course.places.size() == t.stops.size();
+      Calibre diameters(calibre);
+      auto start = float(0.5 * thick(calibre.diameter, 0.f));
+      float way = 0.f;
+      for (std::size_t i = 0; i < course.places.size(); ++i) {
+        const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
+        const bool long_step = course.lengths[i] - std::exchange(way, course.lengths[i]) >= mean_step;
+        state_.diameter = thick(own ? t.stops[i].diameter : diameters.next(part, long_step), part);
         const Vec3 on_chord = t.end() * part;
-        Eigen::Vector3d next = place(on_chord + float(bent) * (stop.at - on_chord)) + double(part) * aside;
+        Eigen::Vector3d next =
+            place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
@@ -439,7 +452,7 @@ class Turtle {
         start = float(0.5 * state_.diameter);
       }
     }
-    state_.diameter = thick(calibre.stops.back().diameter);
+    state_.diameter = thick(calibre.stops.back().diameter, 1.f);
     const double length = scale * double(t.length());
     if (!t.ahead.isZero(0.f) && length > 0.)
       head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
