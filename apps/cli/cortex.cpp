@@ -25,6 +25,7 @@
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
+#include "apps/cli/layer_maps.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
@@ -36,7 +37,7 @@ using Json = nlohmann::ordered_json;
 
 Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).text(), path.string()); }
 
-// What is measured only when a file is looked at again.
+// What is measured beside the report: of the elements alone, or with what else is given.
 struct Deeper {
   struct Border {
     std::string name;
@@ -47,7 +48,10 @@ struct Deeper {
   std::vector<Border> borders;  // the last one: all of them
   cortex::Symmetry symmetry;
   cortex::Bok bok;
+  std::optional<cortex::MeasuredBok> layers;
 };
+
+Json json_of(const cortex::Bok& bok) { return {{"l1", bok.l1}, {"l6", bok.l6}}; }
 
 // How much of the borders lies within 2 mm of a valley. They are drawn on the two surfaces' vertices, and taken half way
 // between them, where the lines are.
@@ -84,9 +88,29 @@ std::vector<Deeper::Border> measure_borders(const std::vector<fs::path>& files, 
   return result;
 }
 
+// Layers as they were measured at the vertices of both surfaces.
+cortex::MeasuredBok measure_layers(const std::vector<fs::path>& files, const Mesh& outer, const Mesh& inner) {
+  if (outer.triangles != inner.triangles)
+    throw Error(
+        "the outer and the inner surface have other triangles; layers are measured at vertices that "
+        "correspond, "
+        "give the two surfaces of one reconstruction");
+  const auto layers = read_layer_maps(files, outer.positions.size());
+  const auto places = [](const Mesh& mesh) {
+    std::vector<cortex::Place> result;
+    for (const Vec3& p : mesh.positions) result.push_back(p.cast<double>());
+    return result;
+  };
+  cortex::MeasuredBok found = cortex::bok(places(outer), places(inner), outer.triangles, layers);
+  if (found.vertices == 0)
+    throw InputError(files.front().string(), 0, "measures no layer at any vertex; give maps of thickness");
+  return found;
+}
+
 // What is measured, in one list for people and for machines.
-void tell(const cortex::Cortex& cortex, const cortex::Report& r, double volume, double seconds,
-          Console& console, const std::optional<Deeper>& deeper = std::nullopt) {
+void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& deeper, double volume,
+          double seconds, Console& console) {
+  const cortex::Symmetry& s = deeper.symmetry;
   Json json{
       {"elements", r.elements},
       {"uncertified", r.uncertified},
@@ -100,17 +124,19 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, double volume, 
       {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
       {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
       {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
+      {"border_within_2mm", nullptr},
+      {"symmetry", {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}}},
+      {"bok", json_of(deeper.bok)},
       {"seconds", seconds},
       {"peak_bytes", peak_bytes()}};
-  if (deeper) {
-    const cortex::Symmetry& s = deeper->symmetry;
-    json["symmetry"] = {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}};
-    json["bok"] = {{"l1", deeper->bok.l1}, {"l6", deeper->bok.l6}};
-    if (!deeper->borders.empty()) {
-      json["border_within_2mm"] = deeper->borders.back().share();
-      for (const auto& b : deeper->borders) json["borders"][b.name] = b.share();
-      json["borders"].erase("all");
-    }
+  if (deeper.layers) {
+    json["bok"]["measured"] = json_of(deeper.layers->measured);
+    json["bok"]["of_volume"] = json_of(deeper.layers->of_volume);
+  }
+  if (!deeper.borders.empty()) {
+    json["border_within_2mm"] = deeper.borders.back().share();
+    for (const auto& b : deeper.borders) json["borders"][b.name] = b.share();
+    json["borders"].erase("all");
   }
   console.print(json);
   const auto row = [](const char* what, const std::string& value, const char* how) {
@@ -137,20 +163,24 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, double volume, 
           "degrees between v-isolines and the right angle to crests, median"),
       row("faces", fmt::format("{:.3f} / {:.3f}", r.outer_distance_p99 / 1e3, r.inner_distance_p99 / 1e3),
           "mm from the outer / inner surface, 99th percentile; 0 where no surfaces are given")};
-  if (deeper) {
-    const cortex::Symmetry& s = deeper->symmetry;
-    rows.push_back(
-        row("symmetry", fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
-            fmt::format("difference of successive v-sections / of the best planar ones, over {} stretches",
-                        s.stretches)
-                .c_str()));
-    rows.push_back(row("Bok", fmt::format("{:.2f} / {:.2f}", deeper->bok.l1, deeper->bok.l6),
-                       "share of thickness on crowns over that in fundi, layer 1 / layer 6"));
-    for (const auto& b : deeper->borders)
-      rows.push_back(
-          row("border", fmt::format("{:.2f}", b.share()),
-              fmt::format("share of the {} points of {} within 2 mm of a valley", b.points, b.name).c_str()));
+  rows.push_back(
+      row("symmetry", fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
+          fmt::format("difference of successive v-sections / of the best planar ones, over {} stretches",
+                      s.stretches)
+              .c_str()));
+  const auto ratios = [](const cortex::Bok& bok) { return fmt::format("{:.2f} / {:.2f}", bok.l1, bok.l6); };
+  rows.push_back(row("Bok", ratios(deeper.bok),
+                     "share of thickness on crowns over that in fundi, layer 1 / layer 6, of the elements"));
+  if (deeper.layers) {
+    rows.push_back(row("Bok, measured", ratios(deeper.layers->measured),
+                       fmt::format("of the layers given, at {} vertices", deeper.layers->vertices).c_str()));
+    rows.push_back(row("Bok, by volume", ratios(deeper.layers->of_volume),
+                       "of layers of constant volume there, folds seen at 6 mm"));
   }
+  for (const auto& b : deeper.borders)
+    rows.push_back(
+        row("border", fmt::format("{:.2f}", b.share()),
+            fmt::format("share of the {} points of {} within 2 mm of a valley", b.points, b.name).c_str()));
   console.table({"measure", "value", "what it is"}, rows);
 }
 
@@ -161,7 +191,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
     bool force = false;
   };
   const auto o = std::make_shared<Options>();
-  command.add_option("outer", o->outer, "Outer surface (pia): GIFTI or FreeSurfer, in mm")
+  command.add_option("outer", o->outer, "Outer surface (pia): GIFTI, FreeSurfer, PLY, STL or OBJ, in mm")
       ->required()
       ->type_name("OUTER");
   command.add_option("inner", o->inner, "Inner surface (white matter)")->required()->type_name("INNER");
@@ -188,14 +218,17 @@ std::function<void()> build(CLI::App& command, Console& console) {
     const TriangleTree outer_tree(outer), inner_tree(inner);
     const cortex::Report r =
         cortex::report(built, o->volume * 1e9, &outer_tree, &inner_tree, console.progress());
-    tell(built, r, o->volume * 1e9, seconds_since(begin), console);
+    Deeper deeper;
+    deeper.symmetry = cortex::symmetry(built.elements, built.lines);
+    deeper.bok = cortex::bok(built.elements);
+    tell(built, r, deeper, o->volume * 1e9, seconds_since(begin), console);
   };
 }
 
 std::function<void()> report(CLI::App& command, Console& console) {
   struct Options {
     fs::path file, outer, inner;
-    std::vector<fs::path> borders;
+    std::vector<fs::path> borders, layers;
   };
   const auto o = std::make_shared<Options>();
   command.add_option("file", o->file, "A file of elements")->required()->type_name("FILE.h5");
@@ -208,6 +241,15 @@ std::function<void()> report(CLI::App& command, Console& console) {
       ->type_name("FILE.border...")
       ->needs("--outer")
       ->needs(inner_option);
+  command
+      .add_option(
+          "--layers", o->layers,
+          "Thickness of each layer at the vertices of both surfaces, from the pia inwards, six files: "
+          "how they differ between crowns and fundi")
+      ->type_name("FILE...")
+      ->expected(6)
+      ->needs("--outer")
+      ->needs(inner_option);
   return [o, &console] {
     const auto begin = Clock::now();
     const io::ElementsFile file = io::read_elements(o->file);
@@ -218,11 +260,12 @@ std::function<void()> report(CLI::App& command, Console& console) {
     Deeper deeper;
     if (!o->borders.empty())
       deeper.borders = measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex);
+    if (!o->layers.empty()) deeper.layers = measure_layers(o->layers, outer_mesh, inner_mesh);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
     deeper.symmetry = cortex::symmetry(file.cortex.elements, file.cortex.lines);
     deeper.bok = cortex::bok(file.cortex.elements);
-    tell(file.cortex, r, file.volume, seconds_since(begin), console, deeper);
+    tell(file.cortex, r, deeper, file.volume, seconds_since(begin), console);
   };
 }
 

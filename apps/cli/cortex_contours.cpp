@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <cmath>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <utility>
 
 #include <CLI/CLI.hpp>
 #include <fmt/format.h>
@@ -99,6 +101,38 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
   return cortex::contours_of(volume, name, axis, planes, options.threshold);
 }
 
+// Where contours cross: one sentence for each two boundaries, and how often as a list.
+nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console& console) {
+  struct Two {
+    std::size_t count = 0, sections = 0;
+    cortex::ContourCrossing first, last;
+  };
+  std::map<std::pair<std::uint32_t, std::uint32_t>, Two> twos;
+  for (const cortex::ContourCrossing& crossing : cortex::crossings(stack)) {
+    Two& two = twos[{crossing.object, crossing.other}];
+    if (!two.count) two.first = crossing;
+    two.sections += !two.count || two.last.section != crossing.section;
+    ++two.count, two.last = crossing;
+  }
+  nlohmann::ordered_json list = nlohmann::ordered_json::array();
+  for (const auto& [objects, two] : twos) {
+    const std::string &one = stack.objects[objects.first], &other = stack.objects[objects.second];
+    const double at = stack.sections[two.first.section].at / 1e3, x = two.first.place.x() / 1e3,
+                 y = two.first.place.y() / 1e3;
+    list.push_back({{"objects", {one, other}},
+                    {"places", two.count},
+                    {"sections", two.sections},
+                    {"first", {{"at", at}, {"place", {x, y}}}}});
+    console.warn(
+        fmt::format("{} cross at {} in {}, first in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; {}",
+                    one == other ? fmt::format("contours of '{}'", one)
+                                 : fmt::format("contours of '{}' and '{}'", one, other),
+                    counted(two.count, "place"), counted(two.sections, "section"), two.first.section + 1, at,
+                    x, y, one == other ? "draw them apart" : "there is no tissue between them there"));
+  }
+  return list;
+}
+
 void run(const Options& options, Console& console) {
   if (!options.force) refuse_existing({options.out});
   std::vector<cortex::ContourStack> stacks;
@@ -157,7 +191,8 @@ void run(const Options& options, Console& console) {
                  {"corners", summary.corners},
                  {"rms", summary.rms / 1e3},
                  {"greatest", summary.greatest / 1e3},
-                 {"length_per_cubic", summary.pieces ? summary.length / 1e3 / double(summary.pieces) : 0.}});
+                 {"length_per_cubic", summary.pieces ? summary.length / 1e3 / double(summary.pieces) : 0.},
+                 {"crossings", tell_crossings(stack, console)}});
   console.table(
       {"file", "sections", "contours", "length mm", "cubics", "mm a cubic", "rms mm", "greatest mm"},
       {{options.out.string(), std::to_string(stack.sections.size()), std::to_string(loops),
@@ -173,7 +208,8 @@ std::function<void()> cortex_contours(CLI::App& command, Console& console) {
   command
       .add_option(
           "input", o->inputs,
-          "Surfaces (GIFTI, FreeSurfer), volumes (.nii, .nii.gz), folders of .png sections, or contours of "
+          "Surfaces (GIFTI, FreeSurfer, PLY, STL, OBJ), volumes (.nii, .nii.gz), folders of .png sections, "
+          "or contours of "
           "other "
           "programs (.jser, .slc, .svg): of two the first is the outer boundary, the second the inner one")
       ->required()
@@ -243,7 +279,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
                        fmt::format("{:.3f}", change.greatest / 1e3), fmt::format("{:.3f}", change.overlap)});
     }
     if (!o->svg.empty()) write_contour_files(stack, o->svg, true);
-    console.print({{"pairs", rows}});
+    console.print({{"pairs", rows}, {"crossings", tell_crossings(stack, console)}});
     console.table({"from mm", "to mm", "object", "mean mm", "p95 mm", "Hausdorff mm", "overlap"}, table);
   };
 }

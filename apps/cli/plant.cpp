@@ -36,8 +36,11 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
     elements.push_back({{"element", all.elements[e]},
                         {"first", all.first[e]},
                         {"neurons", all.first[e + 1] - all.first[e]}});
-  nlohmann::ordered_json json{
-      {"elements", elements}, {"volume", all.volume * 1e-9}, {"seconds", all.seconds}, {"bending", nullptr}};
+  nlohmann::ordered_json json{{"elements", elements},
+                              {"volume", all.volume * 1e-9},
+                              {"layers", all.measured ? "measured" : "by volume"},
+                              {"seconds", all.seconds},
+                              {"bending", nullptr}};
   if (all.bending) {
     const Bending& b = *all.bending;
     json["bending"] = {{"length", b.length},
@@ -109,8 +112,9 @@ void run(const Options& options, Console& console) {
   console.say(fmt::format("\n{} neurons of {} shapes are planted in {}", circuit.instances.size(),
                           circuit.morphologies.size(), options.out.string()));
   if (curved)
-    console.say(fmt::format("{} of {:.3f} mm³; places in {:.2f} s", counted(all.elements.size(), "element"),
-                            all.volume * 1e-9, all.seconds));
+    console.say(fmt::format("{} of {:.3f} mm³, layers {}; places in {:.2f} s",
+                            counted(all.elements.size(), "element"), all.volume * 1e-9,
+                            all.measured ? "as measured" : "by volume", all.seconds));
   if (all.bending) console.say(sentence_of(*all.bending));
   if (synapses)
     console.say(fmt::format("{} synapses are made up: nobody measured them, they are there to be looked at",

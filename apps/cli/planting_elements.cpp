@@ -11,16 +11,21 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include "forest/circuit/measured_layers.h"
 #include "forest/circuit/plant_elements.h"
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/borders.h"
 #include "forest/cortex/warp.h"
 #include "forest/io/elements_file.h"
+#include "forest/io/surface.h"
 #include "forest/morphology/transform.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/layer_maps.h"
 #include "apps/cli/options.h"
 
 namespace forest::cli {
@@ -190,6 +195,17 @@ Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, c
   return b;
 }
 
+// The measured ends of the recipe's layers; nothing where no maps are given.
+std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& options,
+                                                        const circuit::Recipe& recipe,
+                                                        const cortex::Elements& elements) {
+  if (options.layers.empty()) return std::nullopt;
+  const Mesh surface = io::read_surface(MappedFile(options.layers_on).text(), options.layers_on.string());
+  const auto maps =
+      circuit::maps_of_layers(recipe, read_layer_maps(options.layers, surface.positions.size()));
+  return cortex::MeasuredBorders(elements, surface, cortex::shares_of(surface, maps));
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
@@ -266,14 +282,25 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
           fmt::format("{} with somata too wide for the density of layer {} are not planted there; those that "
                       "are have radii of up to {:.3g} µm",
                       counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
+  const auto measured = measured_borders(options, recipe, file.cortex.elements);
+  all.measured = measured.has_value();
+  const auto borders_of = [&](std::uint32_t e) {
+    return measured ? measured->of(file.cortex.elements, e)
+                    : planter.by_volume(cortex::Layers(file.cortex.elements, e));
+  };
+  if (measured)
+    if (const auto guessed = std::ranges::count_if(
+            all.elements, [&](std::uint32_t e) { return !measured->measured(file.cortex.elements, e); }))
+      all.left_out.push_back(fmt::format("{} where no layer was measured have those of the nearest place",
+                                         counted(std::size_t(guessed), "element")));
   double wanted = 0.;
   all.layer_volumes.resize(recipe.layers.size());
   for (const std::uint32_t e : all.elements) {
-    for (const auto& layer : planter.counts(elements[e], cortex::Layers(file.cortex.elements, e)))
+    const cortex::Borders borders = borders_of(e);
+    for (const auto& layer : planter.counts(elements[e], borders))
       wanted += std::accumulate(layer.begin(), layer.end(), 0.);
     for (std::size_t l = 0; l < recipe.layers.size(); ++l)
-      all.layer_volumes[l] += cortex::Layers(file.cortex.elements, e)
-                                  .volume(elements[e], l ? planter.depths()[l - 1] : 0., planter.depths()[l]);
+      all.layer_volumes[l] += borders.volume(elements[e], l);
   }
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
   constexpr double most = 50e6, most_bent = 200'000;
@@ -288,7 +315,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   progress.begin("planting", all.elements.size());
   for (const std::uint32_t e : all.elements) {
     all.first.push_back(rooted.size());
-    const auto here = planter.plant(elements[e], e, cortex::Layers(file.cortex.elements, e));
+    const auto here = planter.plant(elements[e], e, borders_of(e));
     rooted.insert(rooted.end(), here.begin(), here.end());
     progress.advance();
   }
@@ -313,6 +340,9 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
     auto& [low, high] = reach[r.layer];
     low = std::min(low, r.position.y()), high = std::max(high, r.position.y());
   }
+  for (std::size_t e = 0; e < all.elements.size(); ++e)
+    for (std::size_t i = all.first[e]; i < all.first[e + 1]; ++i)
+      circuit.in_elements.push_back({all.elements[e], rooted[i].uvw.cast<float>()});
   for (std::size_t l = 0; l < reach.size();
        ++l)  // layers are curved; a circuit says how far their somata reach
     if (reach[l].first <= reach[l].second)
@@ -361,6 +391,18 @@ CLI::Option* add_elements(CLI::App& command, ElementOptions& o) {
            ->needs(elements)
            ->excludes(scale),
       1e-3, 1e8);
+  CLI::Option* const layers =
+      command
+          .add_option(
+              "--layers", o.layers,
+              "Thickness of each layer at the vertices of a surface, from the pia inwards: layers end where "
+              "they were measured, not by shares of volume")
+          ->type_name("FILE...");
+  CLI::Option* const on = command
+                              .add_option("--layers-on", o.layers_on,
+                                          "… that surface: the outer one that the elements were built from")
+                              ->type_name("OUTER");
+  one_of_them(layers)->needs(on), on->needs(layers);
   command
       .add_option("--bend", o.bend,
                   "grid: neurons are bent as their element is, each a shape of its own; rigid: they are only "

@@ -27,6 +27,8 @@ struct ElementOptions {
   double scale = 1.,
          density = 0.;         // density: neurons/mm³ in the mean, instead of scale; 0: as the recipe says
   std::string bend = "rigid";  // or "grid"
+  std::vector<std::filesystem::path> layers;  // maps of measured thickness; none: layers by volume
+  std::filesystem::path layers_on;            // the surface on whose vertices they are
 };
 
 /// --elements and those that need it.
@@ -60,7 +62,9 @@ struct PlantedElements {
   std::vector<double> layer_volumes;  // of it
   double seconds = 0.;                // for places and orientations
   std::optional<Bending> bending;
-  std::vector<std::string> left_out;  // sentences on neurons that were not planted in a layer
+  std::vector<std::string>
+      left_out;  // sentences on neurons that were not planted in a layer, and layers that were not measured
+  bool measured = false;  // layers end where they were measured
 };
 
 /// Elements of a file that has so many: "7,12,20-29", or "all". Throws Error for what is no such list, and for numbers it has not.

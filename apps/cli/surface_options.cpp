@@ -46,7 +46,7 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
   const auto each = [](CLI::Option* option) { return option->allow_extra_args(false); };  // one at a time
   each(command.add_option(
       "--surface", options.files,
-      "Surface of a cortex to show, too: GIFTI (.surf.gii) or FreeSurfer (lh.pial), in mm"));
+      "Surface of a cortex to show, too: GIFTI (.surf.gii), FreeSurfer (lh.pial), PLY, STL or OBJ, in mm"));
   each(command.add_option(
            "--surface-opacity", options.opacities,
            "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow"))

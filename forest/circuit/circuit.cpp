@@ -35,6 +35,16 @@ void check(const Circuit& circuit) {
         "the radius of the circuit is {} µm; it must be positive, or 0 for a tissue that is no column",
         circuit.radius));
 
+  const auto& seats = circuit.in_elements;
+  if (!seats.empty() && seats.size() != circuit.instances.size())
+    throw Error(fmt::format(
+        "the circuit says of {} neurons in which element they stand, and has {}; say it of all or none",
+        seats.size(), circuit.instances.size()));
+  for (std::size_t i = 0; i < seats.size(); ++i)
+    if (!((seats[i].uvw.array() >= 0.f) && (seats[i].uvw.array() <= 1.f)).all())
+      throw Error(
+          fmt::format("neuron {} stands at (u, v, w) = ({}, {}, {}) of its element; they must lie in 0 to 1",
+                      i, seats[i].uvw.x(), seats[i].uvw.y(), seats[i].uvw.z()));
   for (std::size_t i = 0; i < circuit.instances.size(); ++i) {
     const Instance& instance = circuit.instances[i];
     const auto within = [&](std::uint32_t index, std::size_t count, const char* what) {

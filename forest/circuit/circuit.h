@@ -40,6 +40,14 @@ struct Instance {
   bool operator==(const Instance&) const = default;
 };
 
+/// Where in the finite elements of a cortex (cortex/elements.h) a soma has its centre.
+struct InElement {
+  std::uint32_t element = 0;  // its number in the file of elements
+  Vec3 uvw = Vec3::Zero();    // 0 to 1
+
+  bool operator==(const InElement&) const = default;
+};
+
 struct Circuit {
   std::string name = "column";
   std::vector<Layer> layers;
@@ -47,6 +55,7 @@ struct Circuit {
   std::vector<std::string> morphologies;  // names; the neurons themselves travel beside the circuit
   std::vector<Instance> instances;
   float radius = 0.f;  // of the column about the y axis, µm; 0 when the tissue is no column
+  std::vector<InElement> in_elements = {};  // of each instance; empty: the tissue has no elements
 
   bool operator==(const Circuit&) const = default;
 };

@@ -124,12 +124,10 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
 }
 
 std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hexahedron& element,
-                                                               const cortex::Layers& layers) const {
+                                                               const cortex::Borders& borders) const {
   std::vector<double> wanted(depths_.size());
   for (std::size_t l = 0; l < depths_.size(); ++l)
-    if (densities_[l] > 0.)
-      wanted[l] =
-          std::max(0., densities_[l] * 1e-9 * layers.volume(element, l ? depths_[l - 1] : 0., depths_[l]));
+    if (densities_[l] > 0.) wanted[l] = std::max(0., densities_[l] * 1e-9 * borders.volume(element, l));
   const double sum = std::accumulate(wanted.begin(), wanted.end(), 0.);
   if (!(sum < 4e9))
     throw Error(fmt::format("an element of {:.3g} neurons is too large; lower the densities", sum));
@@ -143,12 +141,11 @@ std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hex
 // How wide a soma may be at a place: below 0 where none may stand. By the borders of layers somata are narrow and keep clear of
 // the narrow ones beyond; wide ones stay away from a border by as much as those may reach across it.
 double ElementPlanter::room_for_soma(std::size_t layer, const Eigen::Vector3d& uvw,
-                                     const cortex::Linear& here, const cortex::Layers& layers) const {
+                                     const cortex::Linear& here, const cortex::Borders& borders) const {
   const double w = uvw[2];
-  const auto border = [&](double depth) { return layers.w(uvw[0], uvw[1], depth); };
   const double steepness =  // of w, a µm
       here.jacobian.col(0).cross(here.jacobian.col(1)).norm() / here.jacobian.determinant();
-  const double begin = border(layer ? depths_[layer - 1] : 0.), end = border(depths_[layer]),
+  const double begin = borders.begin(uvw[0], uvw[1], layer), end = borders.end(uvw[0], uvw[1], layer),
                narrow = narrow_[layer];
   const double below_pia = w * here.jacobian.col(2).norm();
   if (below_pia < narrow) return -1.;
@@ -160,7 +157,8 @@ double ElementPlanter::room_for_soma(std::size_t layer, const Eigen::Vector3d& u
   if (layer + 1 < depths_.size()) room = std::min(room, straight * (end - w) / steepness - reach);
   for (const std::uint32_t other : sparser_[layer]) {
     const double contact = narrow + narrow_[other] + double(recipe_.soma_gap) + rounding;
-    const double beyond = std::max(border(other ? depths_[other - 1] : 0.) - w, w - border(depths_[other]));
+    const double beyond =
+        std::max(borders.begin(uvw[0], uvw[1], other) - w, w - borders.end(uvw[0], uvw[1], other));
     if (straight * beyond < contact * steepness && packings_[other]->any_within(here.at, contact)) return -1.;
   }
   return std::max(room, narrow);
@@ -179,18 +177,17 @@ std::uint32_t ElementPlanter::choose(std::span<const std::uint32_t> choice, doub
 }
 
 std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number,
-                                          const cortex::Layers& layers) const {
-  const auto wanted = counts(element, layers);
+                                          const cortex::Borders& borders) const {
+  const auto wanted = counts(element, borders);
   std::vector<Rooted> rooted;
   for (std::size_t l = 0; l < wanted.size(); ++l) {
     const std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
     if (!count) continue;
-    const double from = l ? depths_[l - 1] : 0., to = depths_[l];
-    const auto [first_w, last_w] = layers.range(from, to);
+    const auto [first_w, last_w] = borders.range(l);
     auto places = cortex::places_in(*packings_[l], element, first_w, last_w);
     std::erase_if(places, [&](const cortex::Packed& p) {
       const double u = p.uvw[0], v = p.uvw[1], w = p.uvw[2];
-      return w < layers.w(u, v, from) || w >= layers.w(u, v, to);
+      return w < borders.begin(u, v, l) || w >= borders.end(u, v, l);
     });
     // Places by lot; what is too near to the pia or to another layer is not in it.
     constexpr std::uint64_t blank = ~std::uint64_t(0);
@@ -199,7 +196,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       const cortex::Linear here = linear(element, places[i].uvw);
       Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
       const std::uint64_t high = random();
-      const bool free = room_for_soma(l, places[i].uvw, here, layers) >= 0.;
+      const bool free = room_for_soma(l, places[i].uvw, here, borders) >= 0.;
       lots[i] = {free ? high << 31 | random() >> 1 : blank, i};
     });
     parallel_sort(lots);
@@ -224,7 +221,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
       const double height = place.uvw[2] * here.jacobian.col(2).norm();
       neuron.candidate =
-          choose(choices_[l][neuron.type], height, room_for_soma(l, place.uvw, here, layers), random);
+          choose(choices_[l][neuron.type], height, room_for_soma(l, place.uvw, here, borders), random);
     });
   }
   return rooted;

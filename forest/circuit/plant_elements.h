@@ -3,7 +3,7 @@
 // candidates, seed) alone, whichever others are asked for and in whatever order.
 //
 // Layers are slices of the element: a layer of a tenth of the recipe's thickness takes a tenth of the depth, which is a share
-// of volume (cortex/depth.h). A recipe's densities hold per mm³ of tissue; in a recipe with counts they are those of its column.
+// of volume (cortex/depth.h); or they end where they were measured (cortex/borders.h). A recipe's densities hold per mm³ of tissue; in a recipe with counts they are those of its column.
 //
 // Places come from packings (cortex/packing.h), one for each layer, that fill all space whether there is tissue or not: an element
 // has those that lie in it, a few more than it needs, and takes as many as are wanted by lot. So somata do not overlap in an
@@ -22,6 +22,7 @@
 #include "forest/circuit/plant.h"
 #include "forest/circuit/recipe.h"
 #include "forest/core/random.h"
+#include "forest/cortex/borders.h"
 #include "forest/cortex/depth.h"
 #include "forest/cortex/hexahedron.h"
 #include "forest/cortex/packing.h"
@@ -64,16 +65,27 @@ class ElementPlanter {
   /// How many neurons an element has, [layer][type]: all of them are the nearest whole number, shared out by largest remainders
   /// among the layers, then among the types of a layer.
   std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element,
-                                                 const cortex::Layers& layers = {}) const;
+                                                 const cortex::Borders& borders) const;
+  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element,
+                                                 const cortex::Layers& layers = {}) const {
+    return counts(element, by_volume(layers));
+  }
 
   /// In the order of layers, then types. A neuron is one of its type's that end under the pia at its place, or the lowest one.
   /// @param number  of the element, for what is thrown: Error when its layer has no room for all somata
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,
-                            const cortex::Layers& layers = {}) const;
+                            const cortex::Borders& borders) const;
+  std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,
+                            const cortex::Layers& layers = {}) const {
+    return plant(element, number, by_volume(layers));
+  }
+
+  /// The recipe's layers by shares of volume.
+  cortex::Borders by_volume(const cortex::Layers& layers) const { return {layers, depths_}; }
 
  private:
   double room_for_soma(std::size_t layer, const Eigen::Vector3d& uvw, const cortex::Linear& here,
-                       const cortex::Layers& layers) const;
+                       const cortex::Borders& borders) const;
   std::uint32_t choose(std::span<const std::uint32_t> choice, double height, double radius,
                        Random& random) const;
 

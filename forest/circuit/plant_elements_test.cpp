@@ -202,6 +202,33 @@ TEST(PlantElements, LayersShareTheVolumeAlsoWhereWDoesNotAndDoNotTouch) {
   EXPECT_GT(least_gap(all), .5);
 }
 
+// Layers that were measured: the second one begins at .1 of the way on one side of the element and at .5 on the other.
+TEST(PlantElements, LayersEndWhereTheyWereMeasured) {
+  const ElementPlanter planter(layered(), candidates, 3);
+  const Hexahedron element = cortex::folded_sheet(8, 1)[5];
+  const cortex::Borders borders(std::array<std::vector<double>, 4>{
+      std::vector{.1, .6, 1.}, std::vector{.5, .6, 1.}, std::vector{.1, .6, 1.}, std::vector{.5, .6, 1.}});
+  const auto wanted = planter.counts(element, borders);
+  std::array<std::size_t, 3> seen{};
+  const auto rooted = planter.plant(element, 0, borders);
+  for (const Rooted& r : rooted) {
+    ++seen[r.layer];
+    EXPECT_GE(r.uvw[2], borders.begin(r.uvw[0], r.uvw[1], r.layer));
+    EXPECT_LT(r.uvw[2], borders.end(r.uvw[0], r.uvw[1], r.layer));
+  }
+  for (std::size_t l = 0; l < 3; ++l) {
+    EXPECT_EQ(seen[l], wanted[l][0] + wanted[l][1]);
+    EXPECT_NEAR(double(seen[l]), planter.density(l) * 1e-9 * borders.volume(element, l), 1.);
+  }
+  EXPECT_GT(least_gap(rooted), .5);
+  // The negative control: by volume they would not.
+  std::size_t elsewhere = 0;
+  for (const Rooted& r : planter.plant(element, 0))
+    elsewhere += r.uvw[2] < borders.begin(r.uvw[0], r.uvw[1], r.layer) ||
+                 r.uvw[2] >= borders.end(r.uvw[0], r.uvw[1], r.layer);
+  EXPECT_GT(elsewhere, 1000u);
+}
+
 TEST(PlantElements, NeuronsPointToThePiaAlongW) {
   const ElementPlanter planter(layered(), candidates, 4);
   const Hexahedron element = cortex::folded_sheet(8, 1)[5];

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 
+#include "tests/refused.h"
 #include "tests/replaced.h"
 
 namespace forest::circuit {
@@ -159,6 +160,25 @@ TEST(Recipe, TruncatedAnywhereIsAnErrorOrAValueNeverACrash) {
       EXPECT_EQ(error.file(), "short.toml");
     }
   }
+}
+
+// In strings the parser itself read beyond them.
+TEST(Recipe, WhatIsNotUtf8IsRefusedWithItsLine) {
+  using namespace std::string_literals;
+  for (const std::string& bytes :
+       {"\x80"s, "\xc1\x81"s, "\xc3("s, "\xe0\x9f\x80"s, "\xed\xa0\x80"s, "\xe2\x82"s, "\xf0\x8f\x80\x80"s,
+        "\xf4\x90\x80\x80"s, "\xf5\x80\x80\x80"s, "\xff"s})
+    for (const std::string& quote : {"'"s, "\""s, "'''"s, "#"s, ""s}) {
+      const std::string error =
+          refused([&] { parse_recipe("rotate = true\n" + quote + bytes + quote + " = 1\n", "r.toml"); });
+      EXPECT_NE(error.find("r.toml:2: this is not TOML: a byte belongs to no character of UTF-8"),
+                std::string::npos)
+          << error;
+    }
+  // What is, goes on to what the recipe says.
+  for (const std::string& text : {"é"s, "\xef\xbf\xbf"s, "\xf4\x8f\xbf\xbf"s, "\xed\x9f\xbf"s})
+    EXPECT_EQ(refused([&] { parse_recipe("name = '" + text + "'\n", "r.toml"); }).find("UTF-8"),
+              std::string::npos);
 }
 
 TEST(Recipe, EndlessBracketsAreRefused) {

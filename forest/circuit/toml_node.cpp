@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/circuit/toml_node.h"
 
+#include <algorithm>
+#include <cstddef>
 #include <exception>
 #include <sstream>
 
@@ -31,9 +33,43 @@ void refuse_deep_nesting(std::string_view text, const std::string& file) {
   }
 }
 
+// Of a text the first byte that belongs to no character of UTF-8 (RFC 3629: shortest forms, no surrogates, up to 10FFFF).
+std::size_t valid_utf8(std::string_view text) {
+  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
+  std::size_t i = 0;
+  while (i < text.size()) {
+    const unsigned lead = byte(i);
+    const std::size_t more = lead < 0x80                    ? 0
+                             : lead >= 0xc2 && lead <= 0xdf ? 1
+                             : lead >= 0xe0 && lead <= 0xef ? 2
+                                                            : 3;
+    if (more == 3 && (lead < 0xf0 || lead > 0xf4)) return i;
+    const unsigned low = lead == 0xe0   ? 0xa0
+                         : lead == 0xf0 ? 0x90
+                                        : 0x80,
+                   high = lead == 0xed   ? 0x9f
+                          : lead == 0xf4 ? 0x8f
+                                         : 0xbf;  // of the second byte
+    for (std::size_t k = 1; k <= more; ++k)
+      if (byte(i + k) < (k == 1 ? low : 0x80) || byte(i + k) > (k == 1 ? high : 0xbf)) return i;
+    i += more + 1;
+  }
+  return i;
+}
+
+// The parser, when it tells where a text is not UTF-8, reads beyond it (toml11 3.7, parse_literal_string).
+void refuse_other_than_utf8(std::string_view text, const std::string& file) {
+  const std::size_t end = valid_utf8(text);
+  if (end == text.size()) return;
+  const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(end), '\n');
+  throw InputError(file, std::size_t(line),
+                   "this is not TOML: a byte belongs to no character of UTF-8; save it as UTF-8");
+}
+
 }  // namespace
 
 toml::value parse_toml(std::string_view text, const std::string& file) {
+  refuse_other_than_utf8(text, file);
   refuse_deep_nesting(text, file);
   try {
     std::istringstream stream{std::string(text)};

@@ -81,6 +81,20 @@ Bok bok(std::span<const double> folds, Shares shares) {
   return {crown_over_fundus(folds, l1), crown_over_fundus(folds, l6)};
 }
 
+MeasuredBok bok(std::span<const Place> outer, std::span<const Place> inner,
+                std::span<const Triangle> triangles, std::span<const std::vector<float>> layers) {
+  const std::vector<double> all = folds(outer, inner, triangles);
+  std::vector<double> fold, l1, l6;
+  for (std::size_t v = 0; v < all.size(); ++v) {
+    double sum = 0.;
+    for (const auto& layer : layers) sum += double(layer[v]);
+    if (!(sum > 0.)) continue;  // the wall
+    fold.push_back(all[v]);
+    l1.push_back(double(layers.front()[v]) / sum), l6.push_back(double(layers.back()[v]) / sum);
+  }
+  return {{crown_over_fundus(fold, l1), crown_over_fundus(fold, l6)}, bok(fold), fold.size()};
+}
+
 Bok bok(const Elements& elements, Shares shares) {
   std::vector<Place> outer, inner;
   std::vector<Triangle> triangles;

@@ -47,4 +47,14 @@ Bok bok(const Elements& elements, Shares shares = Shares::of_volume);
 /// By way_of_volume at each vertex.
 Bok bok(std::span<const double> folds, Shares shares = Shares::of_volume);
 
+/// Measured thicknesses against constant volumes, at the same vertices.
+struct MeasuredBok {
+  Bok measured, of_volume;
+  std::size_t vertices = 0;  // where layers are measured: the sum of their thicknesses is positive
+};
+/// @param layers  from the pia inwards, six; of each the thickness at every vertex, in any unit; not a number: not measured
+/// Both surfaces have the same triangles.
+MeasuredBok bok(std::span<const Place> outer, std::span<const Place> inner,
+                std::span<const Triangle> triangles, std::span<const std::vector<float>> layers);
+
 }  // namespace forest::cortex

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/cortex/bok.h"
 
+#include <array>
 #include <cmath>
 #include <numbers>
 
@@ -77,6 +78,39 @@ TEST(Bok, DepthByLengthIsReportedAsFailing) {
   EXPECT_NEAR(found.l1, 1., .005);
   EXPECT_NEAR(found.l6, 1., .005);
   EXPECT_EQ(bok(wave(Shares::of_volume), Shares::of_length).l1, 1.);
+}
+
+TEST(Bok, MeasuredLayersAreHeldAgainstConstantVolumesAtTheSameVertices) {
+  // A ball with a thick side, that is like a crown there; nothing is measured at one vertex of nine.
+  const Mesh mesh = icosphere(Vec3::Zero(), 1.f, 4, 0);
+  std::vector<Place> outer, inner;
+  for (const Vec3& p : mesh.positions) {
+    const Place at = p.cast<double>();
+    outer.push_back(30e3 * at), inner.push_back((27e3 - 8e3 * at.x()) * at);
+  }
+  const std::vector<double> fold = folds(outer, inner, mesh.triangles);
+  std::array<std::vector<float>, 6> by_volume, by_length, half;
+  std::size_t measured = 0;
+  for (std::size_t v = 0; v < outer.size(); ++v) {
+    const double mm = v % 9 ? 2.5 : 0.;
+    measured += mm > 0.;
+    for (std::size_t k = 0; k < 6; ++k) {
+      const double volume = way_of_volume(fold[v], layer_top(k + 1)) - way_of_volume(fold[v], layer_top(k));
+      by_volume[k].push_back(float(mm * volume)), by_length[k].push_back(float(mm * human_layers[k]));
+      half[k].push_back(float(mm * .5 * (volume + human_layers[k])));
+    }
+  }
+  const MeasuredBok same = bok(outer, inner, mesh.triangles, by_volume);
+  EXPECT_EQ(same.vertices, measured);
+  EXPECT_LT(same.of_volume.l1, .8);
+  EXPECT_NEAR(same.measured.l1, same.of_volume.l1, 1e-5);
+  EXPECT_NEAR(same.measured.l6, same.of_volume.l6, 1e-5);
+  const MeasuredBok flat = bok(outer, inner, mesh.triangles, by_length);
+  EXPECT_NEAR(flat.measured.l1, 1., 1e-5);
+  EXPECT_NEAR(flat.measured.l6, 1., 1e-5);
+  const MeasuredBok between = bok(outer, inner, mesh.triangles, half);
+  EXPECT_GT(between.measured.l1, same.measured.l1 + .05);
+  EXPECT_LT(between.measured.l6, same.measured.l6 - .05);
 }
 
 TEST(Folds, OfNestedBallsAreTheRatioOfTheirAreas) {

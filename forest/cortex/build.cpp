@@ -200,6 +200,19 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   fit_faces(cortex.elements, outer_tree, inner_tree);
+  // The few that are badly shaped still may take room from others and leave a creased surface farther.
+  improve_shapes(cortex.elements, outer_tree, inner_tree,
+                 {.enough = .36,
+                  .wanted = .5,
+                  .volume = options.volume,
+                  .least = .6,
+                  .most = 1.6,
+                  .even = 1.,
+                  .along = 1600.,
+                  .off = 100.,
+                  .rounds = 4,
+                  .iterations = 400},
+                 progress);
   constexpr double least_jacobian = .2;
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;

@@ -91,7 +91,9 @@ struct Crossing {
   Place place;
   std::size_t first, second;  // contours
 };
-std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons) {
+std::vector<Crossing> crossings_in(std::span<const std::vector<Place>> polygons,
+                                   std::size_t most = ~std::size_t(0)) {
+  std::vector<Crossing> found;
   struct Side {
     Place a, b;
     std::size_t polygon, index;
@@ -118,12 +120,17 @@ std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons
       const double a = cross(u, other.a - one.a), b = cross(u, other.b - one.a);
       const double c = cross(v, one.a - other.a), d = cross(v, one.b - other.a);
       if (a * b < 0. && c * d < 0.)
-        return Crossing{one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
-                        std::max(one.polygon, other.polygon)};
+        found.push_back({one.a + c / (c - d) * u, std::min(one.polygon, other.polygon),
+                         std::max(one.polygon, other.polygon)});
+      if (found.size() == most) return found;
     }
     open.push_back(k);
   }
-  return {};
+  return found;
+}
+std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons) {
+  const auto found = crossings_in(polygons, 1);
+  return found.empty() ? std::nullopt : std::optional(found.front());
 }
 
 }  // namespace
@@ -167,6 +174,24 @@ std::string fault_of(const ContourStack& stack) {
   for (const std::string& fault : faults)
     if (!fault.empty()) return fault;
   return {};
+}
+
+std::vector<ContourCrossing> crossings(const ContourStack& stack) {
+  std::vector<std::vector<ContourCrossing>> of_section(stack.sections.size());
+  parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
+    const Section& section = stack.sections[i];
+    std::vector<std::vector<Place>> polygons;
+    for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, 2.));
+    for (const Crossing& crossing : crossings_in(polygons)) {
+      const auto [object, other] =
+          std::minmax(section.contours[crossing.first].object, section.contours[crossing.second].object);
+      of_section[i].push_back({i, object, other, crossing.place});
+    }
+    std::ranges::stable_sort(of_section[i], {}, [](const auto& c) { return c.place.x(); });
+  });
+  std::vector<ContourCrossing> all;
+  for (const auto& some : of_section) all.insert(all.end(), some.begin(), some.end());
+  return all;
 }
 
 Place flat(const Eigen::Vector3d& point, Axis axis) {

@@ -52,6 +52,16 @@ struct ContourStack {
 /// that numbers are finite, sections ascend, and no contour of an object crosses itself or another one of it.
 std::string fault_of(const ContourStack& stack);
 
+/// A place where two contours of a section cross, or one itself.
+struct ContourCrossing {
+  std::size_t section = 0;
+  std::uint32_t object = 0, other = 0;  // object <= other
+  Place place = Place::Zero();          // µm, in the section
+};
+/// All of them, also those of different objects: there the tissue between the two has no thickness. By sections, then by place
+/// from left to right. On all cores.
+std::vector<ContourCrossing> crossings(const ContourStack& stack);
+
 /// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
 std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);
 

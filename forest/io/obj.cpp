@@ -1,53 +1,26 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/obj.h"
 
-#include <algorithm>
-#include <charconv>
-#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/io/mesh_words.h"
 #include "forest/io/surface.h"
 
 namespace forest::io {
 namespace {
 
-constexpr std::string_view blanks = " \t\r";
-
-// The next word of a line, which loses it; empty at its end.
-std::string_view next_word(std::string_view& line) {
-  line.remove_prefix(std::min(line.find_first_not_of(blanks), line.size()));
-  const std::string_view word = line.substr(0, line.find_first_of(blanks));
-  line.remove_prefix(word.size());
-  return word;
-}
-
-std::string_view next_line(std::string_view& text) {
-  const std::string_view line = text.substr(0, text.find('\n'));
-  text.remove_prefix(std::min(line.size() + 1, text.size()));
-  return line;
-}
-
 // The text from its first word on that is no comment.
 std::string_view first_words(std::string_view bytes) {
   while (!bytes.empty()) {
     std::string_view rest = bytes, line = next_line(rest);
-    const std::size_t begin = line.find_first_not_of(blanks);
+    const std::size_t begin = line.find_first_not_of(between_words);
     if (begin != std::string_view::npos && line[begin] != '#') return bytes.substr(begin);
     bytes = rest;
   }
   return bytes;
-}
-
-template <class Number>
-std::optional<Number> number(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  Number value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) return {};
-  return value;
 }
 
 void add_face(Mesh& mesh, const std::vector<std::uint32_t>& corners) {
@@ -58,15 +31,15 @@ void add_face(Mesh& mesh, const std::vector<std::uint32_t>& corners) {
 Mesh read_wavefront(std::string_view text, const std::string& name) {
   Mesh mesh;
   std::vector<std::uint32_t> corners;
-  for (std::size_t number_of = 1; !text.empty(); ++number_of) {
+  for (std::size_t line_number = 1; !text.empty(); ++line_number) {
     std::string_view line = next_line(text);
-    const auto fail = [&](const std::string& sentence) { throw InputError(name, number_of, sentence); };
+    const auto fail = [&](const std::string& sentence) { throw InputError(name, line_number, sentence); };
     const std::string_view kind = next_word(line);
     if (kind == "v") {
       Vec3 at;
       for (float& x : at) {
         const std::string_view word = next_word(line);
-        const auto value = number<float>(word);
+        const auto value = number_of<float>(word);
         if (!value) fail(fmt::format("'{}' is no coordinate; mend the vertex", printable(word)));
         x = *value;
       }
@@ -74,7 +47,7 @@ Mesh read_wavefront(std::string_view text, const std::string& name) {
     } else if (kind == "f") {
       corners.clear();
       for (std::string_view word = next_word(line); !word.empty(); word = next_word(line)) {
-        const auto corner = number<std::int64_t>(word.substr(0, word.find('/')));
+        const auto corner = number_of<std::int64_t>(word.substr(0, word.find('/')));
         const auto count = std::int64_t(mesh.positions.size());
         const std::int64_t index = !corner ? -1 : *corner < 0 ? count + *corner : *corner - 1;
         if (index < 0 || index >= count)
@@ -95,13 +68,13 @@ class Numbers {
 
   template <class Number>
   Number next(const char* of) {
-    while (line_.find_first_not_of(blanks) == std::string_view::npos) {
+    while (line_.find_first_not_of(between_words) == std::string_view::npos) {
       if (text_.empty())
         throw InputError(name_, line_number_, fmt::format("ends within its {}; get the whole file", of));
       line_ = next_line(text_), ++line_number_;
     }
     const std::string_view word = next_word(line_);
-    const auto value = number<Number>(word);
+    const auto value = number_of<Number>(word);
     if (!value)
       throw InputError(name_, line_number_,
                        fmt::format("'{}' is no number of its {}; get the file again", printable(word), of));
@@ -159,7 +132,7 @@ bool is_obj(std::string_view bytes) {
   std::string_view words = first_words(bytes);
   words = words.substr(0, words.find('\n'));
   const std::string_view first = next_word(words);
-  if (first == "v" || first == "P") return number<float>(next_word(words)).has_value();
+  if (first == "v" || first == "P") return number_of<float>(next_word(words)).has_value();
   return first == "mtllib" || first == "o" || first == "g";
 }
 

@@ -155,6 +155,12 @@ void write_nodes(const fs::path& path, const Circuit& circuit) {
   column(group + "/morphology", [](const Instance& n, std::size_t) { return n.morphology; });
   column(group + "/layer", [](const Instance& n, std::size_t) { return n.layer; });
 
+  if (const auto& seats = circuit.in_elements; !seats.empty()) {
+    column(group + "/element", [&](const Instance&, std::size_t i) { return seats[i].element; });
+    for (const auto& [name, axis] : {std::pair{"/u", 0}, {"/v", 1}, {"/w", 2}})
+      column(group + name, [&, axis = axis](const Instance&, std::size_t i) { return seats[i].uvw[axis]; });
+  }
+
   std::vector<std::string> layers;
   for (const auto& layer : circuit.layers) layers.push_back(layer.name);
   file.write(group + "/@library/morphology", std::span(circuit.morphologies));

@@ -206,6 +206,19 @@ std::optional<std::vector<double>> NodePopulation::numbers(const std::string& at
   return values;
 }
 
+std::optional<std::vector<std::int64_t>> NodePopulation::integers(const std::string& attribute) const {
+  std::vector<std::vector<std::int64_t>> of_group;
+  for (const Group& group : groups_) {
+    const std::string path = group.path + "/" + attribute;
+    if (file_.kind(path) != hdf5::Kind::integers) return std::nullopt;
+    of_group.push_back(file_.integers(path));
+    check_size(path, of_group.back().size(), group);
+  }
+  std::vector<std::int64_t> values(size());
+  for (std::size_t i = 0; i < size(); ++i) values[i] = of_group[group_of_[i]][index_in_group_[i]];
+  return values;
+}
+
 Categories NodePopulation::texts(const std::string& attribute) const {
   Categories result;
   result.index.assign(size(), Categories::none);

@@ -39,6 +39,9 @@ class NodePopulation {
   /// None when no node has the attribute; missing ones of some nodes are `otherwise`.
   std::optional<std::vector<float>> reals(const std::string& attribute, float otherwise) const;
 
+  /// The whole numbers of an attribute that all nodes have in their groups; none when some have not, or have other than numbers.
+  std::optional<std::vector<std::int64_t>> integers(const std::string& attribute) const;
+
   /// All indices none when no node has the attribute. Whole numbers are read as their digits, or by their library.
   Categories texts(const std::string& attribute) const;
 

@@ -81,6 +81,7 @@ class Assembler {
           "no neuron of the circuit has a shape and a place, so there is nothing to plant; name a circuit "
           "with morphologies");
     if (!ours_) bound_layers();
+    if (!all_in_elements_) circuit_.in_elements.clear();
     place_not_centred();
     try {
       circuit::check(circuit_);
@@ -120,12 +121,15 @@ class Assembler {
     const auto orientations = orientations_of(nodes);
     const auto recentre = nodes.reals("recenter", 1.f);
     note_attributes(nodes, shaped);
+    const auto seats = ours_ ? seats_of(nodes) : std::nullopt;  // others may mean other things by these names
+    if (!seats) all_in_elements_ = false;
     const auto cached = [](std::uint32_t& index, auto&& make) {
       return index == unknown ? index = make() : index;
     };
     for (const std::size_t i : shaped) {
       const std::uint32_t s = shape.index[i], l = layer.index[i];
       nodes_.of_instance.push_back({population, ids[i]});
+      if (seats) circuit_.in_elements.push_back((*seats)[i]);
       if (recentre && (*recentre)[i] == 0.f) not_centred_.push_back(std::uint32_t(circuit_.instances.size()));
       circuit_.instances.push_back(
           {.position = positions[i],
@@ -236,6 +240,25 @@ class Assembler {
       for (std::size_t i = 0; i < nodes.size(); ++i) positions[i][axis] = (*values)[i];
     }
     return positions;
+  }
+
+  /// The element of each neuron and its place there, where all of them are in one (docs/formats/sonata.md).
+  std::optional<std::vector<circuit::InElement>> seats_of(const NodePopulation& nodes) const {
+    const auto element = nodes.integers("element");
+    if (!element) return std::nullopt;
+    std::vector<circuit::InElement> seats(nodes.size());
+    for (std::size_t i = 0; i < seats.size(); ++i) {
+      if ((*element)[i] < 0 || (*element)[i] > std::int64_t(unknown))
+        config_.refuse(fmt::format("neuron {} stands in element {}, which cannot be; get the whole circuit",
+                                   i, (*element)[i]));
+      seats[i].element = std::uint32_t((*element)[i]);
+    }
+    for (const auto& [attribute, axis] : {std::pair{"u", 0}, {"v", 1}, {"w", 2}}) {
+      const auto values = nodes.reals(attribute, std::numeric_limits<float>::quiet_NaN());
+      if (!values) return std::nullopt;
+      for (std::size_t i = 0; i < seats.size(); ++i) seats[i].uvw[axis] = (*values)[i];
+    }
+    return seats;
   }
 
   /// A quaternion, or else angles about the fixed axes: first z, then y, then x (SONATA developer guide).
@@ -413,6 +436,7 @@ class Assembler {
   std::unordered_set<std::string> names_;   // of morphologies
   std::vector<std::uint32_t> not_centred_;  // instances whose morphology stays where its file has it
   std::uint32_t last_type_ = 0;
+  bool all_in_elements_ = true;
 };
 
 }  // namespace

@@ -108,6 +108,28 @@ TEST_F(Sonata, ACircuitComesBackEqual) {
     EXPECT_EQ(back.morphologies[i], centred(morphologies_[i]));
 }
 
+TEST_F(Sonata, SomataKeepTheirPlacesInElements) {
+  for (std::size_t i = 0; i < circuit_.instances.size(); ++i)
+    circuit_.in_elements.push_back(
+        {std::uint32_t(i % 3 ? i : 4'000'000'000u + i), Vec3(float(i) / 40.f, 1.f, 1.f / float(i + 3))});
+  write();
+  const circuit::Circuit back = read_sonata(folder()).circuit;
+  EXPECT_EQ(back.in_elements, circuit_.in_elements);
+  EXPECT_EQ(back, circuit_);
+  const hdf5::File file(folder() / "nodes.h5");
+  EXPECT_EQ(file.integers("/nodes/two_layers/0/element")[3], 4'000'000'003);
+  EXPECT_EQ(file.reals("/nodes/two_layers/0/v")[3], 1.f);
+
+  circuit_.in_elements[7].uvw.y() = 1.5f;
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("neuron 7 stands at (u, v, w)"));
+  circuit_.in_elements.pop_back();
+  EXPECT_THAT(complaint([&] { write(); }),
+              HasSubstr("of 30 neurons in which element they stand, and has 31"));
+  circuit_.in_elements.clear();
+  write();
+  EXPECT_EQ(hdf5::File(folder() / "nodes.h5").kind("/nodes/two_layers/0/u"), hdf5::Kind::none);
+}
+
 TEST_F(Sonata, WhatNoNeuronUsesAndTiltedNeuronsComeBackToo) {
   circuit_.morphologies.insert(circuit_.morphologies.begin(), "unused");
   morphologies_.insert(morphologies_.begin(), neuron(1.f));

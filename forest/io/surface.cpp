@@ -14,6 +14,8 @@
 #include "forest/io/inflate.h"
 #include "forest/io/obj.h"
 #include "forest/io/plain_text.h"
+#include "forest/io/ply.h"
+#include "forest/io/stl.h"
 
 namespace forest::io {
 namespace {
@@ -65,7 +67,7 @@ SurfaceValues read_lines(std::string_view text, const std::string& name) {
 
 bool may_be_surface(std::string_view bytes) {
   return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) || is_gifti(bytes) ||
-         is_obj(bytes);
+         is_ply(bytes) || is_stl(bytes) || is_obj(bytes);
 }
 
 Mesh read_surface(std::string_view bytes, const std::string& name) {
@@ -73,10 +75,14 @@ Mesh read_surface(std::string_view bytes, const std::string& name) {
   const std::string_view content = unpacked(bytes, place, name);
   if (is_freesurfer_surface(content)) return read_freesurfer_surface(content, name);
   if (is_gifti(content)) return read_gifti_surface(content, name);
+  if (is_ply(content)) return read_ply_surface(content, name);
+  if (is_stl(content)) return read_stl_surface(content, name);
   if (is_obj(content)) return read_obj_surface(content, name);
+  if (name.ends_with(".stl") || name.ends_with(".stl.gz"))
+    throw InputError(name, 0, "is not as long as an STL file of its triangles must be; get the whole file");
   throw InputError(name, 0,
                    "is no surface that is known; give a GIFTI file (.surf.gii), FreeSurfer's triangles "
-                   "(lh.pial) or OBJ; mris_convert makes either of many others");
+                   "(lh.pial), PLY, STL or OBJ; mris_convert makes some of them of many others");
 }
 
 SurfaceValues read_surface_values(std::string_view bytes, const std::string& name) {

@@ -4,6 +4,7 @@
 //
 //   GIFTI (gifti.h)           lh.pial.surf.gii, lh.thickness.shape.gii, lh.aparc.label.gii, …
 //   OBJ (obj.h)               surfaces only, of Wavefront and of the Montreal Neurological Institute
+//   PLY (ply.h), STL (stl.h)  surfaces only, as text or as bytes
 //   FreeSurfer (freesurfer.h) lh.pial, lh.white, lh.inflated; lh.curv, lh.thickness, lh.sulc, lh.area
 //   text                      values only, one a line
 //

@@ -229,7 +229,7 @@ TEST(Course, IsLongerOrShorterByWholeStepsAndEndsWhereItShould) {
 
 TEST(Trace, TurnsTheEndOfTheBranchBeforeAsItsForkWas) {
   const std::string text = R"(steps: 1
-sample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 10 0 1, 0 15 0 1, 0 18 0 1, 0 20 0 1
+sample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 8 0 1, 0 25 0 1, 0 28 0 1, 0 30 0 1
 sample forks(-> x) = 0 | 0 1 0 1, 0.6 0.8 0: 5 0 0 1, 10 0 0 1 | 0 1 0 1, 0.6 0.8 0: -5 0 0 1, -10 0 0 1
 axiom: Soma(1) Trace(stems, 0, 0) [ Trace(forks, 0, 0) ] [ Trace(forks, 0, 1) ]
 nothing: z -> z
@@ -238,11 +238,11 @@ nothing: z -> z
   const Morphology m = interpret(derive(g, 0, 0, 0), g);
   const auto stem = m.points(SectionId(0));
   const Vec3 end = stem.back().position(), last = end - stem[stem.size() - 2].position();
-  EXPECT_LT((end - Vec3(0, 20, 0)).norm(), 1e-4f);
+  EXPECT_LT((end - Vec3(0, 30, 0)).norm(), 1e-4f);
   EXPECT_LT((last.normalized() - Vec3(.6f, .8f, 0)).norm(), 1e-4f);
   EXPECT_NEAR(last.norm(), 2.f, 1e-4f);
-  EXPECT_EQ(stem[1].position(), Vec3(0, 5, 0));   // how it leaves the soma is its own
-  EXPECT_EQ(stem[2].position(), Vec3(0, 10, 0));  // farther than the turn reaches
+  EXPECT_EQ(stem[1].position(), Vec3(0, 5, 0));  // how it leaves the soma is its own
+  EXPECT_EQ(stem[2].position(), Vec3(0, 8, 0));  // farther than the turn reaches
   EXPECT_EQ(m.points(SectionId(1))[1].position(), end + Vec3(5, 0, 0));
 }
 

@@ -6,7 +6,7 @@ source "$FOREST_SOURCE_DIR/tests/words.sh"
 
 # Two nested, slightly dented balls as FreeSurfer writes surfaces, and some that cannot be.
 python3 - <<'PY'
-import math, os, sys
+import math, os, struct, sys
 sys.dont_write_bytecode = True
 sys.path.append(os.environ["FOREST_SOURCE_DIR"] + "/tests")
 from balls import ball, write
@@ -31,6 +31,14 @@ with open("inner.obj", "w") as o:
     p, f = ball(7, dent=1.2)
     for q in p: o.write("v %.9g %.9g %.9g\n" % q)
     for q in f: o.write("f %d %d %d\n" % tuple(c + 1 for c in q))
+with open("inner.ply", "wb") as o:
+    o.write(b"ply\nformat binary_little_endian 1.0\nelement vertex %d\nproperty float x\nproperty float y\nproperty float z\n"
+            b"element face %d\nproperty list uchar int vertex_indices\nend_header\n" % (len(p), len(f)))
+    for q in p: o.write(struct.pack("<fff", *q))
+    for q in f: o.write(struct.pack("<Biii", 3, *q))
+with open("inner.stl", "wb") as o:
+    o.write(bytes(80) + struct.pack("<I", len(f)))
+    for q in f: o.write(struct.pack("<12fH", 0, 0, 0, *p[q[0]], *p[q[1]], *p[q[2]], 0))
 PY
 
 $BRAINFOREST cortex build outer inner -o e.h5 --json >built.json
@@ -45,8 +53,40 @@ assert built["elements"] > 1000 and built["uncertified"] == 0, built
 assert built["volume_error"] < .005 and abs(built["volume_mean"] - 1) < .03 and built["volume_within"] > .95, built
 assert built["w_reached"] == 1 and built["w_angle"]["median"] < 3, built
 assert report["bok"]["l1"] < 1 < report["bok"]["l6"], report  # the dent is a fundus
-assert set(report["symmetry"]) == {"elements", "best_planar", "stretches"} and "border_within_2mm" not in report, report
+for found in built, report:
+    assert {"elements", "uncertified", "volume_error", "volume_mean", "volume_within", "w_angle", "w_reached",
+            "equivolume_error", "scaled_jacobian", "border_within_2mm", "symmetry", "seconds", "peak_bytes"} <= set(found), found
+    assert set(found["symmetry"]) == {"elements", "best_planar", "stretches"} and found["border_within_2mm"] is None, found
+    assert set(found["scaled_jacobian"]) == {"min", "p1"} and set(found["w_angle"]) == {"median", "p99"}, found
+    assert found["bok"] == report["bok"] and found["symmetry"] == report["symmetry"], found
 PY
+
+# Layers that follow the fold, and ones that do not.
+python3 - <<'PY'
+import os, sys
+sys.dont_write_bytecode = True
+sys.path.append(os.environ["FOREST_SOURCE_DIR"] + "/tests")
+from balls import ball
+outer = ball(9, dent=1.2)[0]
+for k, share in enumerate((.118, .101, .271, .088, .190, .232)):
+    open(f"flat{k + 1}.txt", "w").write("".join(f"{2 * share}\n" for _ in outer))
+    more = (.1, 0, 0, 0, 0, -.1)[k]  # in the dent, a fundus: L1 thick, L6 thin
+    open(f"fold{k + 1}.txt", "w").write("".join("%g\n" % (2 * share + more * (abs(x) < .9)) for x, y, z in outer))
+    open(f"none{k + 1}.txt", "w").write("0\n" * len(outer))
+PY
+report() { $BRAINFOREST cortex report e.h5 --outer outer --inner inner "$@"; }
+report --layers flat?.txt --json >flat.json
+report --layers fold?.txt --json >fold.json
+told flat.json 'abs(d["bok"]["measured"]["l1"] - 1) < 1e-4 and abs(d["bok"]["measured"]["l6"] - 1) < 1e-4'
+told fold.json 'd["bok"]["measured"]["l1"] < .9 and d["bok"]["measured"]["l6"] > 1.1 and d["bok"]["of_volume"]["l1"] < 1'
+report --layers fold?.txt >told.txt
+grep -q '^Bok, measured' told.txt
+refuses 'none1.txt: measures no layer' report --layers none?.txt
+head -5 flat3.txt >short.txt
+refuses 'short.txt: has 5 values and the surface 2562 vertices' report --layers flat1.txt flat2.txt short.txt flat4.txt flat5.txt flat6.txt
+refuses 'have other triangles' $BRAINFOREST cortex report e.h5 --outer outer --inner open --layers flat?.txt
+fails_with 2 'layers' report --layers flat1.txt flat2.txt
+fails_with 2 'inner' $BRAINFOREST cortex report e.h5 --outer outer --layers flat?.txt
 $BRAINFOREST cortex build outer inner -o fine.h5 --scale 1 >/dev/null
 $BRAINFOREST cortex report fine.h5 --outer outer --inner inner --borders dent.border pole.border --json >borders.json
 python3 - <<'PY'
@@ -59,6 +99,11 @@ refuses '7 vertices' $BRAINFOREST cortex report e.h5 --outer outer --inner inner
 fails_with 2 'inner' $BRAINFOREST cortex report e.h5 --outer outer --borders dent.border
 $BRAINFOREST cortex build outer inner -o again.h5 --threads 1 >/dev/null
 cmp e.h5 again.h5
+$BRAINFOREST cortex build outer inner.ply -o of_ply.h5 >/dev/null
+cmp e.h5 of_ply.h5
+$BRAINFOREST cortex build outer inner.stl -o of_stl.h5 >/dev/null
+head -c 60000 inner.stl >cut.stl
+refuses 'cut.stl: is not as long as' $BRAINFOREST cortex build outer cut.stl -o no.h5
 
 # Nothing is written where something is wrong.
 refuses 'swapped' $BRAINFOREST cortex build inner outer -o no.h5
@@ -89,6 +134,25 @@ told all.json 'd["triangles_before"] == sum(s["triangles"] for s in d["surfaces"
 told surfaces.json 'all(s["euler"] == 2 for s in d["surfaces"])'
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
+
+# Successive sections over one another, as drawings; contours that cross are told with a place.
+$BRAINFOREST cortex compare s.contours --svg overlays --json >overlays.json
+told overlays.json 'len(d["pairs"]) > 20 and all(p["hausdorff"] >= p["p95"] >= p["mean"] >= 0 for p in d["pairs"] if p["mean"] is not None)'
+told overlays.json 'd["crossings"] == []'
+[ "$(ls overlays | wc -l)" -ge 15 ] && grep -q 'data-behind="outer"' overlays/section_0005.svg
+python3 - <<'PY2'
+import json
+d = json.load(open("s.contours"))
+section = d["sections"][5]
+for c in section["contours"]:
+    if c["object"] == "inner":
+        for key in ("curve", "polygon"):
+            if key in c: c[key] = [[x + 3000, y] for x, y in c[key]]
+json.dump(d, open("shifted.contours", "w"))
+PY2
+$BRAINFOREST cortex compare shifted.contours --json >shifted.json 2>told.txt
+grep -q "contours of 'outer' and 'inner' cross at 2 places in 1 section, first in section 6 (" told.txt
+told shifted.json 'd["crossings"][0]["objects"] == ["outer", "inner"] and d["crossings"][0]["places"] == 2 and d["crossings"][0]["sections"] == 1'
 
 # Contours that cross, and objects that were swapped.
 python3 - <<'PY2'

@@ -12,6 +12,12 @@ sys.path.append(os.environ["FOREST_SOURCE_DIR"] + "/tests")
 from balls import ball, write
 write("outer", ball(8))
 write("inner", ball(6))
+# Six measured layers: the fourth is thick in front and thin behind.
+for k, share in enumerate((.1, .1, .3, 0, .15, .15)):
+    with open(f"layer{k + 1}.txt", "w") as o:
+        for x, y, z in ball(8)[0]:
+            front = .2 + .012 * y
+            o.write("%g\n" % (2.5 * (front if k == 3 else share * (1 - front) / .8)))
 PY
 $BRAINFOREST cortex build outer inner -o e.h5 >/dev/null
 
@@ -39,6 +45,24 @@ assert np.array_equal(one, two[-len(one):])            # an element is the same 
 assert np.all((np.linalg.norm(one, axis=1) > 5900) & (np.linalg.norm(one, axis=1) < 8100))
 PY
 
+# Every soma is found again in its element, by the file of elements alone: the polynomial through 4×4×4 places.
+/usr/bin/python3 - <<'PY'
+import h5py, numpy as np
+elements = h5py.File("e.h5")
+places = elements["curves/places"][:].reshape(-1, 4, 3)
+curves = elements["elements/curves"][:].reshape(-1, 16)
+nodes = h5py.File("two/nodes.h5")["nodes"]
+group = nodes[list(nodes)[0]]["0"]
+assert set(group["element"][:]) == {3, 7}
+def weights(t):
+    at = np.arange(4) / 3
+    return np.stack([np.prod([(t - at[j]) / (at[i] - at[j]) for j in range(4) if j != i], 0) for i in range(4)], 1)
+lattice = places[curves[group["element"][:]]].reshape(-1, 4, 4, 4, 3)  # v, u, w
+u, v, w = (weights(group[k][:].astype(float)) for k in "uvw")
+found = np.einsum("ni,nj,nk,njikx->nx", u, v, w, lattice)
+assert np.abs(found - np.stack([group[k][:] for k in "xyz"], 1)).max() < .01
+PY
+
 plant --near 0 0 8000 --row 3 --scale .002 --bend grid --out bent --json >bent.json
 python3 - <<'PY'
 import json
@@ -50,6 +74,39 @@ PY
 $BRAINFOREST pack bent -o bent.forest >/dev/null
 $BRAINFOREST cortex faces e.h5 --edges 3,7 -o cage.gii >/dev/null
 $BRAINFOREST render bent.forest --surface cage.gii --size 64x48 -o bent.png >/dev/null
+
+# Layers where they were measured: IV is a third of the thickness in front, a tenth behind; by volume it is the same everywhere.
+measured="--layers layer1.txt layer2.txt layer3.txt layer4.txt layer5.txt layer6.txt --layers-on outer"
+for side in front back; do
+  [ $side = front ] && y=8000 || y=-8000
+  plant --near 0 $y 0 --seed 2 --scale .1 --out $side --json $measured >$side.json
+  plant --near 0 $y 0 --seed 2 --scale .1 --out volume_$side --json >volume_$side.json
+done
+told front.json 'd["tissue"]["layers"] == "measured"'
+told volume_front.json 'd["tissue"]["layers"] == "by volume"'
+/usr/bin/python3 - <<'PY'
+import h5py, numpy as np
+def of_four(folder):
+    group = h5py.File(folder + "/nodes.h5")["nodes"]
+    group = group[list(group)[0]]["0"]
+    names = group["@library/layer"].asstr()[:]
+    r = np.linalg.norm(np.stack([group[k][:] for k in "xyz"], 1), axis=1)
+    r = r[names[group["layer"][:]] == "IV"]
+    return (8000 - r.max()) / 2000, (8000 - r.min()) / 2000  # shares of the way inwards
+def near(found, *expected): assert np.abs(np.array(found) - expected).max() < .02, (found, expected)
+near(of_four("front"), .44, .736)  # .296 thick, .5 of .88 above it
+near(of_four("back"), .56, .664)
+assert np.abs(np.array(of_four("volume_front")) - of_four("volume_back")).max() < .02
+PY
+sed 's/"IV"/"fourth"/' "$FOREST_SOURCE_DIR/data/recipes/human-frontal.toml" >odd.toml
+fails_with 1 'layer fourth of the recipe is none of the 6 measured ones' \
+  $BRAINFOREST plant --elements e.h5 --recipe odd.toml --repo cells.db --element 1 $measured --out no
+fails_with 1 'none of the 5 measured ones' plant --element 1 --layers layer1.txt layer2.txt layer3.txt layer4.txt layer5.txt --layers-on outer --out no
+fails_with 1 'lie more than .3 mm from the surface of the maps' plant --element 1 ${measured/-on outer/-on inner} --out no
+sed '3s/.*/-2/' layer2.txt >below.txt
+fails_with 1 'below.txt: has -2 at vertex 2' plant --element 1 ${measured/layer2/below} --out no
+fails_with 1 'two.json' plant --element 1 ${measured/layer2.txt/two.json} --out no
+fails_with 2 'layers-on' plant --element 1 --layers layer1.txt --out no
 
 # What is wrong is said in a sentence with what to do, and nothing is left behind.
 fails_with 1 'e.h5 has elements 0 to' plant --element 1000000 --out no
