@@ -219,18 +219,15 @@ ScratchFile::~ScratchFile() {
 }
 
 void ScratchFile::write(std::span<const std::byte> bytes) {
-  unmap();
   if (!write_all(file_, bytes)) of_.fail("written");
-  size_ += bytes.size();
 }
 
-std::span<const std::byte> ScratchFile::bytes() {
-  if (mapped_.size() != size_) {
-    void* const begin = ::mmap(nullptr, std::size_t(size_), PROT_READ, MAP_SHARED | MAP_POPULATE, file_, 0);
-    if (begin == MAP_FAILED) of_.fail("written");
-    mapped_ = {static_cast<const std::byte*>(begin), std::size_t(size_)};
-  }
-  return mapped_;
+std::span<const std::byte> ScratchFile::bytes(std::uint64_t at, std::size_t count) {
+  unmap();
+  if (!count) return {};
+  void* const begin = ::mmap(nullptr, count, PROT_READ, MAP_SHARED | MAP_POPULATE, file_, off_t(at));
+  if (begin == MAP_FAILED) of_.fail("written");
+  return mapped_ = {static_cast<const std::byte*>(begin), count};
 }
 
 void ScratchFile::unmap() {

@@ -67,14 +67,14 @@ class ScratchFile {
   ScratchFile& operator=(const ScratchFile&) = delete;
 
   void write(std::span<const std::byte> bytes);  // appends
-  /// All that was written, where it lies; until the object is gone or is written again.
-  std::span<const std::byte> bytes();
+  /// Some of what was written, where it lies; until the next call. Together no more than there is room in memory for.
+  /// @param at  a multiple of 1 MiB
+  std::span<const std::byte> bytes(std::uint64_t at, std::size_t count);
 
  private:
   void unmap();
   const NewFile& of_;
   int file_ = -1;
-  std::uint64_t size_ = 0;
   std::span<const std::byte> mapped_;
 };
 

@@ -146,16 +146,19 @@ TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
 TEST_F(FileInAFolder, AScratchFileHasNoNameAndGivesBackWhatWasWritten) {
   const NewFile file(folder_ / "x");
   ScratchFile scratch(file);
-  const auto text = [&] {
-    const auto bytes = scratch.bytes();
+  const auto text = [&](std::uint64_t at, std::size_t count) {
+    const auto bytes = scratch.bytes(at, count);
     return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
   };
-  EXPECT_EQ(text(), "");
+  EXPECT_EQ(text(0, 0), "");
   scratch.write(std::as_bytes(std::span("one two ", 8)));
-  EXPECT_EQ(text(), "one two ");
+  EXPECT_EQ(text(0, 8), "one two ");
   scratch.write(std::as_bytes(std::span("three", 5)));
   EXPECT_EQ(entries(folder_), 0);
-  EXPECT_EQ(text(), "one two three");
+  EXPECT_EQ(text(0, 13), "one two three");
+  scratch.write(std::vector<std::byte>((1 << 20) - 13));
+  scratch.write(std::as_bytes(std::span("four", 4)));
+  EXPECT_EQ(text(1 << 20, 4), "four");
 }
 
 TEST(File, TheHashOfBlocksIsTheSameHoweverTheyCome) {

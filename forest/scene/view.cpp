@@ -265,21 +265,20 @@ class Enclosing {
       reach_[n] = std::max(reach_[n], *last);
     }
   }
-  /// The eye, with a little room on all sides, and what it looks at, as far away as `depth_of`.
-  std::pair<Vec3, Vec3> camera(const Vec3& depth_of) const {
+  /// The eye, with a little room on all sides and no nearer than `least` µm, and what it looks at, as far away as `depth_of`.
+  std::pair<Vec3, Vec3> camera(const Vec3& depth_of, float least) const {
     constexpr float room = 1.06f;
     const float distance = std::max(
         {(reach_[0] + reach_[1]) / (2.f * slopes_[0]), (reach_[2] + reach_[3]) / (2.f * slopes_[1])});
     const Vec3 across =
         .5f * (reach_[0] - reach_[1]) * axes_.col(0) + .5f * (reach_[2] - reach_[3]) * axes_.col(1);
     const float depth = axes_.col(2).dot(depth_of);
-    const float away = std::max(room * (distance - depth), least_distance);
+    const float away = std::max(room * (distance - depth), least);
     return {across + (depth + away) * axes_.col(2), across + depth * axes_.col(2)};
   }
 
  private:
-  static constexpr std::size_t few = 4000;        // points for each that is left out
-  static constexpr float least_distance = 100.f;  // µm
+  static constexpr std::size_t few = 4000;  // points for each that is left out
   Mat3 axes_;
   std::array<Vec3, 4> normals_;  // right, left, up, down
   std::array<float, 2> slopes_{};
@@ -413,7 +412,11 @@ View overview(const Forest& forest, float aspect) {
     }
   if (bounds.empty()) return view;
   enclosing.add_most(sampled_branches(forest));
-  const auto [eye, middle] = enclosing.camera(bounds.centre());
+  // The near side of a wide forest shall not hide what lies behind it.
+  const float wide = std::max(radius, .25f * bounds.extent().norm()),
+              high = std::max(bounds.extent().y(), wide) + 120.f;
+  const auto [eye, middle] =
+      enclosing.camera(bounds.centre(), 1.08f * std::max(.5f * high, wide) / slope + wide);
   view.camera.eye = eye, view.camera.target = middle;
   return view;
 }
