@@ -1103,6 +1103,13 @@ std::vector<Cell> read_all_h5(std::string_view bytes, const std::string& name) {
     return true;
   });
   if (all.empty()) refuse_without_cells(image);
+  // What the file says of all cells together belongs to none of them.
+  auto names = image.attributes(image.open(image.root()));
+  std::erase(names, "version");
+  if (!all[0].name.empty() && !names.empty())
+    all[0].read.warnings.push_back(
+        {0, "not-kept", fmt::format("the container has attributes ({}); left out", fmt::join(names, ", ")),
+         keep_the_file, true});
   return all;
 }
 

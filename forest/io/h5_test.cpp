@@ -222,6 +222,24 @@ TEST(H5, AContainerHoldsManyNeurons) {
   EXPECT_THROW(write_h5(cells), Error);
 }
 
+TEST(H5, WhatAContainerSaysOfAllCellsIsTold) {
+  hdf5::NewFile file;
+  const Sample sample;
+  for (const char* cell : {"/a", "/b"}) {
+    file.group(cell);
+    file.write(std::string(cell) + "/points", sample.points, 4);
+    file.write(std::string(cell) + "/structure", sample.structure, 3);
+    file.group(std::string(cell) + "/metadata");
+    file.attribute(std::string(cell) + "/metadata", "version", sample.version);
+  }
+  file.attribute("/", "laboratory", "of cells");
+  const std::vector<Cell> cells = read_all_h5(file.bytes(), "container");
+  ASSERT_EQ(cells.size(), 2u);
+  ASSERT_TRUE(told(cells[0].read, "not-kept"));
+  EXPECT_TRUE(contains(cells[0].read.warnings.back().sentence, "laboratory"));
+  EXPECT_FALSE(told(cells[1].read, "not-kept"));
+}
+
 TEST(H5, CellsOfAContainerMayBeCalledAsThePartsOfOne) {
   std::vector<NamedMorphology> cells;
   for (const char* name :
