@@ -1,5 +1,9 @@
 # SPDX-License-Identifier: Apache-2.0
 # Words that the scripts of tests/cli share: source "$FOREST_SOURCE_DIR/tests/words.sh"
+
+# What Python in a script may import: tests/*.py, without leaving files beside them.
+export PYTHONPATH="$FOREST_SOURCE_DIR/tests" PYTHONDONTWRITEBYTECODE=1
+
 program=$BRAINFOREST
 
 fail() { echo "$(basename "$0"): $*" >&2; exit 1; }

@@ -144,26 +144,7 @@ for ground in dark light; do
 done
 told dark.json "d['activity']['flashes'] >= 1 and 20 <= d['view']['activity']['time'] <= 41 and d['surfaces'] is None"
 $python - <<'PY'
-import struct, zlib
-def pixels(name):
-    data, at, packed = open(name, "rb").read(), 8, b""
-    while at < len(data):
-        size, kind = struct.unpack(">I4s", data[at:at + 8])
-        if kind == b"IHDR": width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
-        if kind == b"IDAT": packed += data[at + 8:at + 8 + size]
-        at += 12 + size
-    raw, each = zlib.decompress(packed), {2: 3, 6: 4}[colour]
-    rows, before = [], bytearray(width * each)
-    for y in range(height):
-        kind, row = raw[y * (width * each + 1)], bytearray(raw[y * (width * each + 1) + 1:(y + 1) * (width * each + 1)])
-        for x in range(len(row)):
-            a, b, c = row[x - each] if x >= each else 0, before[x], before[x - each] if x >= each else 0
-            p = a + b - c
-            near = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            row[x] = (row[x] + (0, a, b, (a + b) // 2, near)[kind]) & 255
-        rows.append(row)
-        before = row
-    return [tuple(row[x:x + 3]) for row in rows for x in range(0, len(row), each)]
+from png_pixels import pixels
 dark, before, light = pixels("dark.png"), pixels("dark-before.png"), pixels("light.png")
 bright = lambda picture: sum(min(p) > 190 for p in picture)
 assert bright(dark) > bright(before) + 60, (bright(dark), bright(before))
@@ -252,28 +233,8 @@ cmp dim.png still.png
 "$program" render few.forest --view "$view}}" --activity odd.activity --time 3.5 --size 240x200 -o odd.png --json >nan.json
 "$program" movie few.forest --view "$view}}" --activity run.activity --rate 20 --from 10 --seconds 1 --fps 4 --samples 1 --size 160x120 --pictures film -o film.mp4 >/dev/null
 $python - <<'PY'
-import json, struct, zlib
-def pixels(name):
-    data, at, packed, size = open(name, "rb").read(), 8, b"", None
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        if kind == b"IHDR": size = struct.unpack(">II", data[at + 8:at + 16])
-        if kind == b"IDAT": packed += data[at + 8:at + 8 + length]
-        at += length + 12
-    rows, (width, height) = zlib.decompress(packed), size
-    channels = len(rows) // height // width
-    out, before = [], bytes(width * channels)
-    for y in range(height):
-        kind, line = rows[y * (width * channels + 1)], bytearray(rows[y * (width * channels + 1) + 1:(y + 1) * (width * channels + 1)])
-        for x in range(len(line)):
-            a = line[x - channels] if x >= channels else 0
-            b, c = before[x], before[x - channels] if x >= channels else 0
-            p = a + b - c
-            paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            line[x] = (line[x] + (0, a, b, (a + b) // 2, paeth)[kind]) & 255
-        out += [bytes(line[i:i + 3]) for i in range(0, len(line), channels)]
-        before = line
-    return out
+import json
+from png_pixels import pixels
 def saturation(picture):
     return sum(max(p) - min(p) for p in picture)
 first, later, dim, plain, opengl, gazed = (pixels(n + ".png") for n in ("at10", "at30", "dim", "plain", "opengl", "gazed"))

@@ -69,27 +69,7 @@ done
 told hidden.json "d['neurons'] <= 12"
 # Its colour by kind is one that no neuron has: the bluish green of kind 7, brighter in green than in red.
 /usr/bin/python3 - <<'PY'
-import struct, zlib
-def pixels(path):
-    data, at, rows, packed = open(path, "rb").read(), 8, [], b""
-    while at < len(data):
-        size, word = struct.unpack(">I4s", data[at:at + 8])
-        if word == b"IHDR": width, height, depth, colour = struct.unpack(">IIBB", data[at + 8:at + 18])
-        if word == b"IDAT": packed += data[at + 8:at + 8 + size]
-        at += 12 + size
-    raw, channels = zlib.decompress(packed), {2: 3, 6: 4}[colour]
-    before, stride = bytearray(width * channels), width * channels
-    for y in range(height):
-        line = raw[y * (stride + 1):(y + 1) * (stride + 1)]
-        row = bytearray(line[1:])
-        for i in range(stride):
-            a, b, c = (row[i - channels] if i >= channels else 0), before[i], (before[i - channels] if i >= channels else 0)
-            p = a + b - c
-            paeth = min((abs(p - a), 0, a), (abs(p - b), 1, b), (abs(p - c), 2, c))[2]
-            row[i] = (row[i] + (0, a, b, (a + b) // 2, paeth)[line[0]]) & 255
-        rows.append(row)
-        before = row
-    return [tuple(r[i:i + 3]) for r in rows for i in range(0, stride, channels)]
+from png_pixels import pixels
 green = sum(g > 60 and g > 1.15 * r for r, g, b in pixels("kind.glia.png"))
 assert green > 300, green
 PY
