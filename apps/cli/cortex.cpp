@@ -17,6 +17,7 @@
 #include "forest/core/file.h"
 #include "forest/cortex/bok.h"
 #include "forest/cortex/build.h"
+#include "forest/cortex/sulci.h"
 #include "forest/cortex/symmetry.h"
 #include "forest/io/border_file.h"
 #include "forest/io/elements_file.h"
@@ -41,11 +42,13 @@ Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).
 struct Deeper {
   struct Border {
     std::string name;
-    std::size_t points = 0, within = 0;
+    std::size_t points = 0, within = 0, half_way = 0;
 
     double share() const { return double(within) / double(points); }
+    double share_half_way() const { return double(half_way) / double(points); }
   };
   std::vector<Border> borders;  // the last one: all of them
+  double by_chance = 0.;        // what points anywhere on the outer surface would have within 2 mm
   cortex::Symmetry symmetry;
   cortex::Bok bok;
   std::optional<cortex::MeasuredBok> layers;
@@ -53,15 +56,16 @@ struct Deeper {
 
 Json json_of(const cortex::Bok& bok) { return {{"l1", bok.l1}, {"l6", bok.l6}}; }
 
-// How much of the borders lies within 2 mm of a valley. They are drawn on the two surfaces' vertices, and taken half way
-// between them, where the lines are.
-std::vector<Deeper::Border> measure_borders(const std::vector<fs::path>& files, const Mesh& outer,
-                                            const Mesh& inner, const cortex::Cortex& cortex) {
-  constexpr double near = 2000.;  // µm
-  const Mesh valleys = cortex::pieces(cortex.lines, cortex::Line::Kind::valley);
-  const TriangleTree tree(valleys);
-  std::vector<Deeper::Border> result;
-  Deeper::Border all{"all", 0, 0};
+// How much of the borders lies within 2 mm of the floor of a sulcus, where they are put on the outer surface, and of a valley
+// half way between the two surfaces, on whose vertices they are drawn.
+void measure_borders(const std::vector<fs::path>& files, const Mesh& outer, const Mesh& inner,
+                     const cortex::Cortex& cortex, Deeper& found) {
+  using Kind = cortex::Line::Kind;
+  constexpr double near = 2000., thin = 500.;  // µm; where cortex is as thin is the wall
+  const TriangleTree floors(cortex::pieces(cortex.lines, Kind::sulcus)),
+      valleys(cortex::pieces(cortex.lines, Kind::valley));
+  std::vector<Deeper::Border>& result = found.borders;
+  Deeper::Border all{"all", 0, 0, 0};
   for (const fs::path& path : files) {
     const io::Borders read = io::read_borders(MappedFile(path).text(), path.string());
     for (const Mesh* mesh : {&outer, &inner})
@@ -73,19 +77,34 @@ std::vector<Deeper::Border> measure_borders(const std::vector<fs::path>& files, 
     for (const io::Border& border : read.borders) {
       auto row =
           std::find_if(result.begin(), result.end(), [&](const auto& r) { return r.name == border.name; });
-      if (row == result.end()) row = result.insert(result.end(), {border.name, 0, 0});
+      if (row == result.end()) row = result.insert(result.end(), {border.name, 0, 0, 0});
       for (const io::BorderPoint& point : border.points) {
-        cortex::Place place = cortex::Place::Zero();
-        for (std::size_t k = 0; k < 3; ++k)
-          place += .5 * point.weights[k] *
-                   (outer.positions[point.vertices[k]] + inner.positions[point.vertices[k]]).cast<double>();
-        const bool within = !valleys.triangles.empty() && tree.nearest(place, near).has_value();
-        ++row->points, ++all.points, row->within += within, all.within += within;
+        cortex::Place out = cortex::Place::Zero(), in = out;
+        for (std::size_t k = 0; k < 3; ++k) {
+          out += point.weights[k] * outer.positions[point.vertices[k]].cast<double>();
+          in += point.weights[k] * inner.positions[point.vertices[k]].cast<double>();
+        }
+        for (Deeper::Border* sum : {&*row, &all}) {
+          ++sum->points;
+          sum->within += floors.nearest(out, near).has_value();
+          sum->half_way += valleys.nearest(.5 * (out + in), near).has_value();
+        }
       }
     }
   }
   result.push_back(all);
-  return result;
+  std::vector<std::uint8_t> wall(outer.positions.size());
+  for (std::size_t v = 0; v < wall.size(); ++v)
+    wall[v] = double((outer.positions[v] - inner.positions[v]).norm()) < thin;
+  found.by_chance = cortex::share_near(outer, wall, floors, near);
+}
+
+double length_of(const std::vector<cortex::Line>& lines, cortex::Line::Kind kind) {
+  double sum = 0.;
+  for (const cortex::Line& line : lines)
+    for (std::size_t i = 1; line.kind == kind && i < line.points.size(); ++i)
+      sum += (line.points[i] - line.points[i - 1]).norm();
+  return sum;
 }
 
 // Layers as they were measured at the vertices of both surfaces.
@@ -111,6 +130,11 @@ cortex::MeasuredBok measure_layers(const std::vector<fs::path>& files, const Mes
 void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& deeper, double volume,
           double seconds, Console& console) {
   const cortex::Symmetry& s = deeper.symmetry;
+  using Kind = cortex::Line::Kind;
+  Json lengths;
+  for (const auto& [name, kind] :
+       {std::pair{"crests", Kind::crest}, {"valleys", Kind::valley}, {"sulci", Kind::sulcus}})
+    lengths[name] = length_of(cortex.lines, kind) / 1e3;
   Json json{
       {"elements", r.elements},
       {"uncertified", r.uncertified},
@@ -124,6 +148,7 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
       {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
       {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
       {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
+      {"lines_mm", lengths},
       {"border_within_2mm", nullptr},
       {"symmetry", {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}}},
       {"bok", json_of(deeper.bok)},
@@ -135,6 +160,8 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
   }
   if (!deeper.borders.empty()) {
     json["border_within_2mm"] = deeper.borders.back().share();
+    json["border_by_chance"] = deeper.by_chance;
+    json["border_half_way"] = deeper.borders.back().share_half_way();
     for (const auto& b : deeper.borders) json["borders"][b.name] = b.share();
     json["borders"].erase("all");
   }
@@ -177,10 +204,20 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
     rows.push_back(row("Bok, by volume", ratios(deeper.layers->of_volume),
                        "of layers of constant volume there, folds seen at 6 mm"));
   }
+  rows.push_back(row("lines",
+                     fmt::format("{:.0f} / {:.0f} / {:.0f}", lengths["crests"].get<double>(),
+                                 lengths["valleys"].get<double>(), lengths["sulci"].get<double>()),
+                     "mm of crests / valleys / floors of sulci"));
   for (const auto& b : deeper.borders)
     rows.push_back(
-        row("border", fmt::format("{:.2f}", b.share()),
-            fmt::format("share of the {} points of {} within 2 mm of a valley", b.points, b.name).c_str()));
+        row("border", fmt::format("{:.2f} / {:.2f}", b.share(), b.share_half_way()),
+            fmt::format("share of the {} points of {} within 2 mm of a sulcus' floor on the outer surface / "
+                        "of a valley half way down",
+                        b.points, b.name)
+                .c_str()));
+  if (!deeper.borders.empty())
+    rows.push_back(row("by chance", fmt::format("{:.2f}", deeper.by_chance),
+                       "share of the outer surface within 2 mm of a sulcus' floor"));
   console.table({"measure", "value", "what it is"}, rows);
 }
 
@@ -258,8 +295,7 @@ std::function<void()> report(CLI::App& command, Console& console) {
     if (!o->outer.empty()) outer_mesh = read_mesh(o->outer), outer.emplace(outer_mesh);
     if (!o->inner.empty()) inner_mesh = read_mesh(o->inner), inner.emplace(inner_mesh);
     Deeper deeper;
-    if (!o->borders.empty())
-      deeper.borders = measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex);
+    if (!o->borders.empty()) measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex, deeper);
     if (!o->layers.empty()) deeper.layers = measure_layers(o->layers, outer_mesh, inner_mesh);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/shape.h"
+#include "forest/cortex/sulci.h"
 #include "forest/geometry/isosurface.h"
 #include "forest/geometry/self_intersection.h"
 
@@ -172,6 +173,9 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.lines = crests_and_valleys(ribbon, bent, {.scale = options.line_scale});
   progress.end();
   const Quads quads = lay_quads(ribbon, bent, cortex.lines, {.volume = options.volume}, progress);
+  progress.begin("looking for the floors of sulci", 0);
+  for (Line& line : sulci(coarser(ribbon), {})) cortex.lines.push_back(std::move(line));
+  progress.end();
   cortex.elements = make_elements(ribbon, quads, bent, curves, progress);
   cortex.w_reached = 1. - double(cortex.elements.not_arrived) / double(cortex.elements.curves.size());
 

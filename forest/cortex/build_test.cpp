@@ -100,6 +100,20 @@ TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {
   EXPECT_EQ(std::count(ribbon.wall.begin(), ribbon.wall.end(), 1), 0);
 }
 
+TEST_F(Shell, ACoarserRibbonIsTheOneOfTheTrianglesBeforeTheyWereHalved) {
+  const Ribbon once = make_ribbon(outer, curves, {.edge = 200.}, Progress::none());
+  ASSERT_EQ(once.halvings, 1);
+  const Ribbon before = coarser(once);
+  EXPECT_EQ(before.halvings, 0);
+  EXPECT_EQ(before.triangles, outer.triangles);
+  ASSERT_EQ(before.size(), outer.positions.size());
+  for (std::size_t v = 0; v < before.size(); v += 97)
+    EXPECT_EQ(before.outer[v], outer.positions[v].cast<double>());
+  EXPECT_EQ(before.inner.size(), before.size());
+  EXPECT_EQ(before.wall.size(), before.size());
+  EXPECT_EQ(coarser(before).triangles, before.triangles);
+}
+
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   const Cortex& cortex = made().cortex;
   const TriangleTree outer_tree(outer);

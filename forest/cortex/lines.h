@@ -29,7 +29,7 @@ std::vector<Curvature> curvatures(std::span<const Place> places, std::span<const
                                   const Neighbours& near, double scale);
 
 struct Line {
-  enum class Kind : std::uint8_t { crest, valley, border };  // border: of the wall
+  enum class Kind : std::uint8_t { crest, valley, border, sulcus };  // border: of the wall; sulcus: sulci.h
   Kind kind = Kind::crest;
   std::vector<Place> points;             // on the surface, at least two
   std::vector<std::uint32_t> triangles;  // in which each piece lies: one fewer than points

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <numeric>
 #include <span>
+#include <type_traits>
 #include <utility>
 
 #include <fmt/format.h>
@@ -94,6 +95,26 @@ Mesh halved(const Mesh& mesh) {
   return fine;
 }
 
+Ribbon coarser(const Ribbon& ribbon) {
+  if (ribbon.halvings == 0) return ribbon;
+  Ribbon result;
+  result.halvings = ribbon.halvings - 1;
+  // As `halved` leaves them: of each four triangles the first three begin at the old one's corners, which come first of all.
+  std::uint32_t last = 0;
+  for (std::size_t i = 0; i + 3 < ribbon.triangles.size(); i += 4) {
+    const auto* four = &ribbon.triangles[i];
+    result.triangles.push_back({four[0][0], four[1][0], four[2][0]});
+    for (const std::uint32_t v : result.triangles.back()) last = std::max(last, v);
+  }
+  const auto first_of = [&](const auto& all) {
+    return std::decay_t<decltype(all)>(all.begin(), all.begin() + last + 1);
+  };
+  result.outer = first_of(ribbon.outer), result.middle = first_of(ribbon.middle),
+  result.inner = first_of(ribbon.inner);
+  result.thickness = first_of(ribbon.thickness), result.wall = first_of(ribbon.wall);
+  return result;
+}
+
 Place on(const std::vector<Place>& level, const Ribbon& ribbon, const RibbonPoint& point) {
   const Triangle& t = ribbon.triangles[point.triangle];
   return point.weights[0] * level[t[0]] + point.weights[1] * level[t[1]] + point.weights[2] * level[t[2]];
@@ -146,9 +167,8 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
         sum += double((mesh.positions[t[e]] - mesh.positions[t[(e + 1) % 3]]).norm());
     return sum / (3. * double(mesh.triangles.size()));
   };
-  while (mean_edge(fine) > options.edge) fine = halved(fine);
-
   Ribbon ribbon;
+  for (; mean_edge(fine) > options.edge; ++ribbon.halvings) fine = halved(fine);
   const std::size_t n = fine.positions.size();
   ribbon.triangles = fine.triangles;
   ribbon.outer.resize(n), ribbon.middle.resize(n), ribbon.inner.resize(n), ribbon.thickness.resize(n);

@@ -30,10 +30,14 @@ struct Ribbon {
   std::vector<float> thickness;    // the lesser of its w-curve and the straight way to the inner surface, µm
   std::vector<std::uint8_t> wall;  // 1: the medial wall, where there is no cortex
   std::vector<Triangle> triangles;
+  int halvings = 0;  // of the surface's own triangles
 
   std::size_t size() const { return middle.size(); }
   bool is_wall(const Triangle& t) const { return wall[t[0]] || wall[t[1]] || wall[t[2]]; }
 };
+
+/// The ribbon before its triangles were halved the last time; as it is when they never were.
+Ribbon coarser(const Ribbon& ribbon);
 
 /// A place of a ribbon, the same one on its outer surface, middle and inner surface.
 struct RibbonPoint {

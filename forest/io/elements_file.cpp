@@ -3,6 +3,7 @@
 
 #include <array>
 #include <cmath>
+#include <set>
 
 #include "forest/core/file.h"
 #include "forest/io/hdf5.h"
@@ -122,10 +123,12 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   const auto starts = file.integers("/lines/starts"), kinds = file.integers("/lines/kind");
   if (points.size() % 3 || starts.size() != kinds.size() || starts.size() != strength.size())
     file.refuse("/lines has arrays of different lengths");
+  using Kind = Line::Kind;
+  const std::set<std::int64_t> known{int(Kind::crest), int(Kind::valley), int(Kind::sulcus)};
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const std::int64_t end = i + 1 < starts.size() ? starts[i + 1] : std::int64_t(points.size() / 3);
-    if (starts[i] < 0 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) || kinds[i] < 0 ||
-        kinds[i] > 1 || !std::isfinite(strength[i]))
+    if (starts[i] < 0 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) ||
+        !known.contains(kinds[i]) || !std::isfinite(strength[i]))
       file.refuse("/lines has a line that cannot be");
     Line line{.kind = Line::Kind(kinds[i]),
               .points = {},

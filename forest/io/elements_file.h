@@ -6,7 +6,8 @@
 //   /elements/curves     elements × 16 curves; u runs fastest, then v
 //   /corners/on_valley   corners: 1 on a valley line
 //   /corners/depths, /elements/depths   19 each: w at depths 1/20, 2/20, … (forest/cortex/depth.h); absent: depth is w
-//   /lines/{points, starts, kind, strength}   crests (0) and valleys (1): line i has the points from starts[i] on
+//   /lines/{points, starts, kind, strength}   crests (0) and valleys (1) half way down, floors of sulci (3) on the
+//                        outer surface: line i has the points from starts[i] on
 //   /facts               volume of an element asked for; volumes between the surfaces and under the wall; w-angles, …
 #pragma once
 

@@ -40,6 +40,11 @@ cortex::Cortex one_block() {
                           .triangles = {},
                           .strength = 2.5,
                           .closed = false});
+  cortex.lines.push_back({.kind = cortex::Line::Kind::sulcus,
+                          .points = {Place(7, 0, 0), Place(8, 1, 0)},
+                          .triangles = {},
+                          .strength = 900.,
+                          .closed = false});
   cortex.between = 3e9, cortex.wall = 1e8, cortex.w_angle = {1., 9.}, cortex.w_reached = .999;
   cortex.mending.before = 17;
   return cortex;
@@ -54,9 +59,11 @@ TEST_F(ElementsOnDisk, ComeBackAsTheyWere) {
   EXPECT_EQ(back.cortex.elements.curves, cortex.elements.curves);
   EXPECT_EQ(back.cortex.elements.on_valley, cortex.elements.on_valley);
   EXPECT_EQ(back.cortex.elements.corners, 4u);
-  ASSERT_EQ(back.cortex.lines.size(), 1u);
+  ASSERT_EQ(back.cortex.lines.size(), 2u);
   EXPECT_EQ(back.cortex.lines[0].points, cortex.lines[0].points);
   EXPECT_EQ(back.cortex.lines[0].kind, cortex::Line::Kind::valley);
+  EXPECT_EQ(back.cortex.lines[1].points, cortex.lines[1].points);
+  EXPECT_EQ(back.cortex.lines[1].kind, cortex::Line::Kind::sulcus);
   EXPECT_EQ(back.cortex.wall, 1e8);
   EXPECT_EQ(back.cortex.mending.before, 17u);
 }

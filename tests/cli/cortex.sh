@@ -94,6 +94,8 @@ import json
 report = json.load(open("borders.json"))
 dent, pole = report["borders"]["dent"], report["borders"]["pole"]
 assert dent > .8 and pole == 0 and abs(report["border_within_2mm"] - dent / 2) < 1e-9, report
+assert .4 <= report["border_half_way"] <= .5, report
+assert 0 < report["border_by_chance"] < .5 and 30 < report["lines_mm"]["sulci"] < 150, report  # once around is 49 mm
 PY
 refuses '7 vertices' $BRAINFOREST cortex report e.h5 --outer outer --inner inner --borders other.border
 fails_with 2 'inner' $BRAINFOREST cortex report e.h5 --outer outer --borders dent.border
