@@ -30,6 +30,12 @@ Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes) {
   return subframes == 1 ? Vec2(0.f, 0.f) : Vec2(halton(subframe, 2) - .5f, halton(subframe, 3) - .5f);
 }
 
+StateBits bits_of(std::span<const State> states) {
+  std::uint32_t any = 0, all = ~0u;
+  for (const State& state : states) any |= packed(state), all &= packed(state);
+  return {unpacked(any), unpacked(all)};
+}
+
 void check(const Frame& frame, const Geometry& geometry) {
   const Camera& c = frame.camera;
   require(c.eye.allFinite() && c.target.allFinite() && c.up.allFinite(), "the camera must be finite");
@@ -51,9 +57,7 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const Vec3& colour : frame.palette)
     require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");
   require(frame.states.size() == geometry.instances.size(), "every instance needs a state");
-  std::uint8_t colours = 0;
-  for (const State& state : frame.states) colours |= state.colour_class;
-  require(colours < 16, "a colour class must be below 16");
+  require(bits_of(frame.states).any.colour_class < 16, "a colour class must be below 16");
   check(static_cast<const Lists&>(frame), geometry);
   if (const auto& g = frame.glass)
     require(g->plane.origin.allFinite() && g->plane.normal.allFinite() && g->colour.allFinite() &&
@@ -101,10 +105,10 @@ void check(const Surface& s, const Geometry& geometry) {
 
 bool transparent(const Frame& frame) {
   // Lists that come later, by `rest`, hold no item whose state is not announced by its neuron's being parted.
-  std::uint8_t least = 255, flags = 0;
-  for (const State& state : frame.states) least = std::min(least, state.opacity), flags |= state.flags;
+  const auto [any, all] = bits_of(frame.states);
+  std::uint8_t least = all.opacity;
   for (const Ball& b : frame.balls) least = std::min(least, b.opacity);
-  return least < 255 || (flags & State::parted) || frame.opacities != opaque();
+  return least < 255 || any.is(State::parted) || frame.opacities != opaque();
 }
 
 void check(const Lists& lists, const Geometry& geometry) {

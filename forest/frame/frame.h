@@ -54,6 +54,13 @@ static_assert(sizeof(State) == 4);
 inline std::uint32_t packed(const State& s) { return std::bit_cast<std::uint32_t>(s); }
 inline State unpacked(std::uint32_t bits) { return std::bit_cast<State>(bits); }
 
+/// The bits that any of some states has, and those that all have: what can be said of a million at once.
+struct StateBits {
+  State any, all;
+};
+/// Of none: no bit, and all bits.
+StateBits bits_of(std::span<const State> states);
+
 /// Colours are linear light, 0–1. An instance of colour class c (0–15) shows its sections of kind k as entry 8 c + k.
 using Palette = std::array<Vec3, 128>;
 /// Of every palette entry, 0–255.
