@@ -48,6 +48,11 @@ void check(const Frame& frame, const Geometry& geometry) {
   if (const auto& a = frame.area)
     require(a->left < a->right && a->top < a->bottom && a->right <= frame.width && a->bottom <= frame.height,
             "the wanted part of a picture must lie in it and not be empty");
+  const auto squares = [](std::uint32_t pixels) {
+    return std::size_t(pixels + FOREST_TILE - 1) / FOREST_TILE;
+  };
+  require(frame.unwanted.empty() || frame.unwanted.size() == squares(frame.width) * squares(frame.height),
+          "every square of a picture is wanted or not");
   require(frame.thinnest >= 0.f && frame.thinnest <= 64.f, "the thinnest lines must be 0 to 64 pixels wide");
   require(frame.gaps >= 0.f && frame.gaps < 1.f, "the share of gaps must be at least 0 and less than 1");
   require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");

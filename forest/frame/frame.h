@@ -173,7 +173,9 @@ struct Frame : Lists {
   // the mean; pixels, and 1 for a picture of a single subframe.
   float thinnest = 0.f;
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
-  std::optional<Area> hole;  // of them these are not wanted either
+  // Of them, 1 for each square of FOREST_TILE pixels of which nothing is wanted either, in rows from the upper left corner of the
+  // picture; none: every square is.
+  std::span<const std::uint8_t> unwanted;
   // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.
   float gaps = 0.f;
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,

@@ -58,7 +58,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
-    s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.hole.value_or(frame::Area{}), f.gaps);
+    s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.unwanted, f.gaps);
     if (!f.surfaces.empty()) {  // first, for they hide much
       parallel_for(s.canvas.squares(), 1, [&](std::size_t n) { s.canvas.clear(s.canvas.square(n)); });
       s.surfaces.draw(s.picture, f.surfaces, s.canvas);
