@@ -82,8 +82,13 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
 }
 
 frame::Image CpuRenderer::read() {
-  frame::Image image = state_->image;
-  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
+  const frame::Image& from = state_->image;
+  frame::Image image{from.width, from.height, std::vector<std::uint8_t>(from.pixels.size()), from.covered};
+  const std::size_t row = 4 * std::size_t(from.width);
+  parallel_for(from.height, 32, [&](std::size_t y) {
+    std::copy_n(&from.pixels[y * row], row, &image.pixels[y * row]);
+    for (std::size_t i = 3; i < row; i += 4) image.pixels[y * row + i] = 255;
+  });
   return image;
 }
 
