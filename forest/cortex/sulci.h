@@ -24,7 +24,7 @@ std::vector<double> sulcal_depth(const Ribbon& ribbon, double scale);
 
 struct SulcusOptions {
   double scale = 13e3;        // µm, of the depth: the standard deviation of the smoothing
-  double persistence = 100.;  // µm: a pass lies lower than both crowns that it parts by so much
+  double persistence = 300.;  // µm: a pass lies lower than both crowns that it parts by so much
   double shallowest =
       .5;  // share of the vertices outside the wall; a line ends where it is less deep than these
   double shortest_spur = 4e3;  // µm: shorter ways that end freely are left out
