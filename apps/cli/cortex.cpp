@@ -274,7 +274,8 @@ std::function<void()> report(CLI::App& command, Console& console) {
   CLI::Option* inner_option = command.add_option("--inner", o->inner, "The inner one")->type_name("INNER");
   command
       .add_option("--borders", o->borders,
-                  "Sulci drawn on both surfaces (Connectome Workbench): how much of them lies by a valley")
+                  "Sulci drawn on both surfaces (Connectome Workbench): how much of them lies by the floor "
+                  "of a sulcus, and by chance")
       ->type_name("FILE.border...")
       ->needs("--outer")
       ->needs(inner_option);
