@@ -202,47 +202,6 @@ std::vector<std::uint32_t> uncertified(const Elements& elements) {
   return uncertified(elements, all);
 }
 
-namespace {
-
-// Places on a face (Gauss and Legendre, four along u and v), and how much of each of its 16 places they are.
-struct FaceSamples {
-  struct Sample {
-    double weight = 0.;
-    std::array<double, 16> share{};
-  };
-  std::vector<Sample> all;
-  std::array<double, 16>
-      carried{};  // of each place, over all samples, by size and with what else these carry
-};
-const FaceSamples& face_samples() {
-  static const FaceSamples result = [] {
-    constexpr std::array at{.0694318442029737, .3300094782075719, .6699905217924281, .9305681557970263};
-    constexpr std::array weight{.1739274225687269, .3260725774312731, .3260725774312731, .1739274225687269};
-    const auto shares = [](double t) {  // of the cubic through places at 0, 1/3, 2/3 and 1
-      const double s = 3. * t;
-      return std::array{-(s - 1.) * (s - 2.) * (s - 3.) / 6., s * (s - 2.) * (s - 3.) / 2.,
-                        -s * (s - 1.) * (s - 3.) / 2., s * (s - 1.) * (s - 2.) / 6.};
-    };
-    FaceSamples samples;
-    for (std::size_t j = 0; j < 4; ++j)
-      for (std::size_t i = 0; i < 4; ++i) {
-        FaceSamples::Sample sample{weight[i] * weight[j], {}};
-        double size = 0.;
-        for (std::size_t c = 0; c < 16; ++c) {
-          sample.share[c] = shares(at[i])[c % 4] * shares(at[j])[c / 4];
-          size += std::abs(sample.share[c]);
-        }
-        for (std::size_t c = 0; c < 16; ++c)
-          samples.carried[c] += sample.weight * std::abs(sample.share[c]) * size;
-        samples.all.push_back(sample);
-      }
-    return samples;
-  }();
-  return result;
-}
-
-}  // namespace
-
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner) {
   constexpr double reach = 300.;  // µm
   const std::vector<Depths> before = elements.curves;
@@ -253,44 +212,35 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
     const Hexahedron h = elements.hexahedron(e);
     if (certify(h).positive()) least[e] = std::min(good, scaled_jacobian(h));
   });
-  // Least squares by simultaneous corrections (SIRT): each place of a face moves by what the samples lack that it carries. After
-  // the first round only faces go on that are off by more than a little.
-  constexpr int rounds = 5;
-  constexpr double little = 8.;  // µm
-  const FaceSamples& samples = face_samples();
+  constexpr std::array<double, 3> at{1. / 6., .5, 5. / 6.};
   for (const std::size_t d : {std::size_t(0), std::size_t(3)}) {
     const TriangleTree& surface = d == 0 ? outer : inner;
-    std::vector<std::uint8_t> goes_on(elements.size(), 1);
-    for (int round = 0; round < rounds; ++round) {
-      std::vector<std::array<Place, 16>> off(elements.size());
-      const std::vector<std::uint8_t> took_part = goes_on;
+    for (int round = 0; round < 2; ++round) {
+      std::vector<Place> off(elements.size());  // the mean way from the face to the surface
       parallel_for(elements.size(), 64, [&](std::size_t e) {
-        if (!goes_on[e]) return;
-        const auto& curves = elements.elements[e];
-        const Place outwards = elements.curves[curves[5]][0] - elements.curves[curves[5]][3];
-        off[e].fill(Place::Zero());
-        double most = 0.;
-        for (const auto& sample : samples.all) {
-          Place p = Place::Zero();
-          for (std::size_t c = 0; c < 16; ++c) p += sample.share[c] * elements.curves[curves[c]][d];
-          const auto hit = surface.nearest(p, reach);
-          if (!hit) continue;
-          const Place n = surface.normal(hit->triangle);
-          if (n.dot(outwards) <= 0.) continue;  // the other bank
-          const double way = n.dot(hit->at - p);
-          const Place lack = sample.weight * way * n;
-          for (std::size_t c = 0; c < 16; ++c) off[e][c] += sample.share[c] * lack;
-          most = std::max(most, std::abs(way));
-        }
-        goes_on[e] = most > little;
+        std::array<Place, 16> places;
+        for (std::size_t c = 0; c < 16; ++c) places[c] = elements.curves[elements.elements[e][c]][d];
+        const Patch patch = through_lattice(places);
+        const Place outwards =
+            elements.curves[elements.elements[e][5]][0] - elements.curves[elements.elements[e][5]][3];
+        Place sum = Place::Zero();
+        for (const double u : at)
+          for (const double v : at) {
+            const Place p = patch.at(u, v);
+            const auto hit = surface.nearest(p, reach);
+            if (!hit) continue;
+            const Place n = surface.normal(hit->triangle);
+            if (n.dot(outwards) > 0.) sum += n * n.dot(hit->at - p);
+          }
+        off[e] = sum / 9.;
       });
       std::vector<Place> move(elements.curves.size(), Place::Zero());
-      std::vector<double> carried(elements.curves.size(), 0.);
+      std::vector<std::uint8_t> times(elements.curves.size(), 0);
       for (std::size_t e = 0; e < elements.size(); ++e)
-        for (std::size_t c = 0; took_part[e] && c < 16; ++c)
-          move[elements.elements[e][c]] += off[e][c], carried[elements.elements[e][c]] += samples.carried[c];
-      for (std::size_t c = 0; c < move.size(); ++c)
-        if (carried[c] > 0.) elements.curves[c][d] += move[c] / carried[c];
+        for (const std::uint32_t c : elements.elements[e])
+          if (c >= elements.corners) move[c] += off[e], ++times[c];
+      for (std::size_t c = elements.corners; c < move.size(); ++c)
+        if (times[c]) elements.curves[c][d] += move[c] / double(times[c]);
     }
   }
   for (bool all = false; !all;) {

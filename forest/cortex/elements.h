@@ -47,9 +47,9 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
 std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of);
 std::vector<std::uint32_t> uncertified(const Elements& elements);
 
-/// Moves the faces on both surfaces, corners too, until they lie as near to these as a cubic can in the mean square: patches
-/// through places on a creased surface swing beside its creases. An element that would lose its validity or a good shape by that
-/// stays as it was.
+/// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
+/// on a creased surface cut its convex creases off. An element that would lose its validity or a good
+/// shape by that stays as it was.
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
 
 struct Mending {
