@@ -6,6 +6,7 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numbers>
 #include <utility>
 #include <vector>
 
@@ -41,16 +42,28 @@ function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
 function bending(kind, s, u, v, donor) = max(0.5, min(2, sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
-# The cosine of the angle between a direction and that to the farthest tip where a fork was traced.
+# The middle of a fork's tips where it was traced, from the fork; the cosine of the angle between a direction and the way there.
+function middle(r, a, b, c) = (forks.n1(r) * a + forks.n2(r) * b + (forks.tips(r) - forks.n1(r) - forks.n2(r)) * c) / forks.tips(r)
+function middle_x(r) = middle(r, forks.t1x(r), forks.t2x(r), forks.t3x(r))
+function middle_y(r) = middle(r, forks.t1y(r), forks.t2y(r), forks.t3y(r))
+function middle_z(r) = middle(r, forks.t1z(r), forks.t2z(r), forks.t3z(r))
+# The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
+# together take the whole.
+function rest(r) = forks.tips(r) - forks.n1(r) - forks.n2(r)
+function borne(r, i) = forks.tips(r) * nth(i, forks.n1(r), forks.n2(r), rest(r)) / (forks.n1(r)^2 + forks.n2(r)^2 + rest(r)^2)
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
-function along(r, x, y, z) = cosine(x, y, z, nth(forks.main(r), forks.t1x(r), forks.t2x(r), forks.t3x(r)),
-  nth(forks.main(r), forks.t1y(r), forks.t2y(r), forks.t3y(r)), nth(forks.main(r), forks.t1z(r), forks.t2z(r), forks.t3z(r)))
+function along(r, x, y, z) = cosine(x, y, z, middle_x(r), middle_y(r), middle_z(r))
 # By which angle about z a fork is turned, of that between the headings where it was traced and here (Trace turns as much).
 function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 + y^2)) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
 # The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
 function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
   min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
+# A stem's direction turned about z.
+function swayed_x(angle, x, y) = cos(angle) * x - sin(angle) * y
+function swayed_y(angle, x, y) = sin(angle) * x + cos(angle) * y
+# How many times thicker this neuron is than the one whose stems it has, as the neuron is whose diameters it has.
+distribution thicker(kind) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(me, kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
@@ -64,23 +77,26 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
-    away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), thick = thicker(kind), d = thick * plans.d(p),
+    sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
+    bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
+    ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
+    r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r),
-    ez = away * plans.tz(p) - plans.z(p) - scale * stems.tz(r), part = steer * drawn(length, beyond, ex, ey, ez) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), q, 1, 0, part * ex, part * ey, part * ez)
-       Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d,
-         away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+    ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - scale * stems.tz(r),
+    part = steer * drawn(length, beyond, ex, ey, ez) }
+  -> [ Kind(kind) At(bx, by, plans.z(p)) Head(x, y, z)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez)
+       Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
     ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
-    away = ahead / max(1, plans.ahead(p)), d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
-       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind) * plans.d(p), sway = normal(0, sways(kind)) }
+  -> [ Kind(kind) At(swayed_x(sway, plans.x(p), plans.y(p)), swayed_y(sway, plans.x(p), plans.y(p)), plans.z(p))
+       Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
+       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * swayed_x(sway, plans.tx(p), plans.ty(p)), away * swayed_y(sway, plans.tx(p), plans.ty(p)), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
 
@@ -120,11 +136,13 @@ three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az
 limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
   { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
-    m = if(mirror, -1, 1), main = i == forks.main(r),
-    tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
+    m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
     gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
-    wx = if(main, ax, gx), wy = if(main, ay, gy), wz = if(main, az, max(cells.low(me), min(cells.high(me), gz))),
+    mx = m * middle_x(r), my = middle_y(r), bears = borne(r, i),
+    wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
+    wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
+    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - scale * middle_z(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
@@ -150,7 +168,6 @@ class Writer {
     alike();
     plans();
     stems();
-    footings();
     forks();
     calibres();
     productions();
@@ -294,7 +311,7 @@ class Writer {
         "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
-        "  -> donor, ux, uy, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
+        "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
         "next2, "
         "next3, "
         "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
@@ -310,8 +327,8 @@ class Writer {
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
-          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.main, f.tips,
+      put(" -> {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
+          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.tips,
           rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
@@ -328,18 +345,6 @@ class Writer {
       }
       for (const Fork::Daughter& d : f.daughters) trace(f.heading, f.last_step, d.points);
     }
-  }
-
-  void footings() {
-    put("\n\n# The same stems, row by row, asked by how thick they are: the diameter where they end, µm.\n"
-        "sample footings(kind =, cell ~ 0.1, tips ~ 0.25, length ~ 0.5 -> d) =");
-    bool first = true;
-    for (const Cell& c : traced_.cells)
-      for (const Stem& s : c.stems) {
-        row(std::exchange(first, false));
-        put("{} {} {} {} -> {}", s.kind, s.cell, logarithm(s.tips), logarithm(s.length),
-            rounded(s.end_diameter, 1e3));
-      }
   }
 
   void calibres() {
@@ -369,12 +374,18 @@ class Writer {
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), options_.smoothing, kept());
-    for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}}) {
+    for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
         bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
+    put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
+        "their headings differ in the plane of the slice.\n");
+    std::vector<std::string> bins;
+    for (const auto& [kind, spread] : headings())
+      bins.push_back(fmt::format("{}: {:.3g}", kind, options_.sway * spread));
+    put("table sways = {}\n", fmt::join(bins, ", "));
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
       style += fmt::format(
@@ -388,10 +399,10 @@ class Writer {
         "#define steer 0.5   # how far branches are drawn to where their farthest tip should be\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
-        "#define jitter 0.05  # of the logarithms of a stem's tips and of the path to its farthest\n"
+        "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
-        options_.familiar);
+        options_.familiar, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
@@ -399,6 +410,22 @@ class Writer {
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
     text_ += rest;
+  }
+
+  // How much stems of each kind differ in where they head in the plane of the slice: degrees, the circular standard deviation.
+  std::map<int, double> headings() const {
+    std::map<int, std::pair<double, Vec2>> sums;
+    for (const Cell& c : traced_.cells)
+      for (const Stem& s : c.stems) {
+        auto& [count, sum] = sums[s.kind];
+        count += 1., sum += Vec2(s.heading.x(), s.heading.y());
+      }
+    std::map<int, double> spread;
+    for (const auto& [kind, of] : sums) {
+      const double mean = std::clamp(double(of.second.norm()) / of.first, .2, 1.);  // headings all around: some 100°
+      spread[kind] = std::sqrt(-2. * std::log(mean)) * 180. / std::numbers::pi;
+    }
+    return spread;
   }
 
   // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.

@@ -33,6 +33,8 @@ struct Resampling {
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
   double familiar = .5;    // how often a fork may come from the neuron whose stems these are
   double smoothing = 1.2;  // of a neuron's style: 0 takes that of a traced neuron as it is
+  double sway = .15;     // of a stem's direction, in shares of how much directions differ in the plane of the slice
+  double jitter = .05;   // of the logarithms of a stem's tips and reach
   std::size_t kin = 4;     // neurons alike, by whose differences it is changed
 };
 
