@@ -7,6 +7,7 @@
 #include <iterator>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -15,6 +16,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/traced.h"
 #include "forest/statistics/summary.h"
+#include "forest/statistics/two_samples.h"
 
 namespace forest::fitting {
 namespace {
@@ -36,23 +38,19 @@ constexpr std::string_view growth = R"(
 # stays single.
 function share(part, whole, n, others) =
   if(part == 1, 1, max(min(2, n - others), min(n - others, round(n * part / whole))))
-# How many times longer a branch is drawn than it was traced, so that its farthest tip is as far as it should be.
+# How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
-function bending(kind, s, u, v, donor) = max(0.5, min(2, sqrt(
+function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
-# The middle of a fork's tips where it was traced, from the fork; the cosine of the angle between a direction and the way there.
-function middle(r, a, b, c) = (forks.n1(r) * a + forks.n2(r) * b + (forks.tips(r) - forks.n1(r) - forks.n2(r)) * c) / forks.tips(r)
-function middle_x(r) = middle(r, forks.t1x(r), forks.t2x(r), forks.t3x(r))
-function middle_y(r) = middle(r, forks.t1y(r), forks.t2y(r), forks.t3y(r))
-function middle_z(r) = middle(r, forks.t1z(r), forks.t2z(r), forks.t3z(r))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
 # together take the whole.
 function rest(r) = forks.tips(r) - forks.n1(r) - forks.n2(r)
 function borne(r, i) = forks.tips(r) * nth(i, forks.n1(r), forks.n2(r), rest(r)) / (forks.n1(r)^2 + forks.n2(r)^2 + rest(r)^2)
+# The cosine of the angle between a direction and that to the middle of the tips where a fork was traced.
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
-function along(r, x, y, z) = cosine(x, y, z, middle_x(r), middle_y(r), middle_z(r))
+function along(r, x, y, z) = cosine(x, y, z, forks.tx(r), forks.ty(r), forks.tz(r))
 # By which angle about z a fork is turned, of that between the headings where it was traced and here (Trace turns as much).
 function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 + y^2)) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
@@ -139,10 +137,10 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
     gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
-    mx = m * middle_x(r), my = middle_y(r), bears = borne(r, i),
+    mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
-    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - scale * middle_z(r)))),
+    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - scale * forks.tz(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
@@ -305,7 +303,7 @@ class Writer {
     put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the "
         "diameter are logarithms; heading and\n"
         "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
-        "lengths, paths beyond their ends.\n"
+        "lengths, paths beyond their ends, and whither the middle of their tips is, and of all.\n"
         "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
         "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
@@ -314,7 +312,7 @@ class Writer {
         "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
         "next2, "
         "next3, "
-        "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
+        "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
         options_.lean, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
@@ -343,6 +341,8 @@ class Writer {
         put(" ");
         vector(i < f.daughters.size() ? f.daughters[i].aim : Vec3(Vec3::Zero()), 10.);
       }
+      put(" ");
+      vector(f.middle(), 10.);
       for (const Fork::Daughter& d : f.daughters) trace(f.heading, f.last_step, d.points);
     }
   }
@@ -352,7 +352,7 @@ class Writer {
         "and its daughters end, µm.\n"
         "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.25, first ~ 0.15, ahead ~ 0.4, l1 ~ 0.5, "
         "l2 ~ 0.5, d "
-        "~ 0.08\n"
+        "~ 0.14\n"
         "  -> d, d1, d2, d3) =");
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
@@ -374,16 +374,17 @@ class Writer {
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), options_.smoothing, kept());
-    for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}}) {
+    for (const auto& [name, style] :
+         {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
         bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
     put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
-        "their headings differ in the plane of the slice.\n");
+        "the ways to the middle of their tips differ in the plane of the slice.\n");
     std::vector<std::string> bins;
-    for (const auto& [kind, spread] : headings())
+    for (const auto& [kind, spread] : directions())
       bins.push_back(fmt::format("{}: {:.3g}", kind, options_.sway * spread));
     put("table sways = {}\n", fmt::join(bins, ", "));
     std::string style;
@@ -392,11 +393,12 @@ class Writer {
           fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
                                                    : ", own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
           style_names[i]);
-    put("#define agreed 0.85  # the least cosine between the ways to their farthest tips, for that\n"
+    put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
         "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
-        "#define steer 0.5   # how far branches are drawn to where their farthest tip should be\n"
+        "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
+        "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
@@ -412,18 +414,20 @@ class Writer {
     text_ += rest;
   }
 
-  // How much stems of each kind differ in where they head in the plane of the slice: degrees, the circular standard deviation.
-  std::map<int, double> headings() const {
-    std::map<int, std::pair<double, Vec2>> sums;
+  // How much stems of each kind differ in where the middle of their tips lies, in the plane of the slice: the angle from the
+  // mean, in degrees, that two of three stay below, and at most 100, where they lie all around.
+  std::map<int, double> directions() const {
+    std::map<int, std::vector<Vec2>> ways;
     for (const Cell& c : traced_.cells)
-      for (const Stem& s : c.stems) {
-        auto& [count, sum] = sums[s.kind];
-        count += 1., sum += Vec2(s.heading.x(), s.heading.y());
-      }
+      for (const Stem& s : c.stems) ways[s.kind].push_back(s.aim.stableNormalized().head<2>());
     std::map<int, double> spread;
-    for (const auto& [kind, of] : sums) {
-      const double mean = std::clamp(double(of.second.norm()) / of.first, .2, 1.);  // headings all around: some 100°
-      spread[kind] = std::sqrt(-2. * std::log(mean)) * 180. / std::numbers::pi;
+    for (const auto& [kind, of] : ways) {
+      const Vec2 mean = std::accumulate(of.begin(), of.end(), Vec2(Vec2::Zero()));
+      std::vector<double> angles;
+      for (const Vec2& way : of)
+        angles.push_back(
+            std::abs(std::atan2(double(mean.x() * way.y() - mean.y() * way.x()), double(mean.dot(way)))));
+      spread[kind] = std::min(100., statistics::quantile(angles, .68) * 180. / std::numbers::pi);
     }
     return spread;
   }

@@ -70,7 +70,7 @@ struct Learner {
   std::span<const Branch> all = arbors.sections();
   std::vector<double> beyond =
       std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
-  std::vector<int> fork_at = std::vector<int>(all.size(), none);  // its number among all forks
+  std::vector<int> fork_at = std::vector<int>(all.size(), none);           // its number among all forks
   std::vector<Vec3> middle = std::vector<Vec3>(all.size(), Vec3::Zero());  // of all its tips
   std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
   std::vector<std::uint32_t> stems = std::vector<std::uint32_t>(all.size());  // that sections grow from

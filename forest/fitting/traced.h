@@ -60,7 +60,14 @@ struct Fork {
     int next = none;  // the fork at its end
   };
   std::vector<Daughter> daughters;  // fewest tips first
-  bool turned = false;              // … though the one with more came first
+  // Of all its tips, from the fork.
+  Vec3 middle() const {
+    Vec3 sum = Vec3::Zero();
+    double count = 0.;
+    for (const Daughter& d : daughters) sum += float(d.tips) * d.aim, count += d.tips;
+    return sum / float(count);
+  }
+  bool turned = false;  // … though the one with more came first
 };
 
 // What is true of one kind of section of a neuron.
