@@ -9,7 +9,10 @@ namespace {
 bool has_skin(const frame::State& state) { return state.kind == frame::Kind::skin; }
 
 bool forced(const scene::Colouring& colouring) {
-  return std::ranges::any_of(colouring.states, has_skin) ||
+  constexpr auto skin = std::uint8_t(frame::Kind::skin);
+  // Most have no bit of it.
+  return ((std::uint8_t(frame::bits_of(colouring.states).any.kind) & skin) == skin &&
+          std::ranges::any_of(colouring.states, has_skin)) ||
          std::ranges::any_of(colouring.parts, has_skin, &scene::Part::state);
 }
 

@@ -49,7 +49,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     frame::Frame& frame = frames.emplace_back(
         scene::compose(forest_, shown, colouring, choosers[i]->cut(), layer.width, layer.height,
                        i == 0 ? overlays : std::span<const frame::Overlay>(others)));
-    frame.area = layer.area, frame.hole = layer.hole, frame.gaps = layer.gaps;
+    frame.area = layer.area, frame.unwanted = layer.unwanted, frame.gaps = layer.gaps;
     frame.glass = glass;
     if (view.samples > 1) frame.first_subframe = first, frame.last_subframe = last;
     choosers[i]->complete(frame);

@@ -681,6 +681,23 @@ TEST_P(RendererLaws, WhatIsWantedOfAPictureIsThatOfTheWholePicture) {
         for (std::size_t c = 0; c < 3; ++c)
           ASSERT_EQ(part.pixels[4 * (y * 200 + x) + c], whole.pixels[4 * (y * 200 + x) + c]) << x << " " << y;
   }
+  // Of squares that are not wanted, none.
+  std::vector<std::uint8_t> unwanted(25 * 25, 0);
+  for (std::size_t i = 0; i < unwanted.size(); ++i) unwanted[i] = i % 25 < 9 || i / 25 > 15;
+  for (const std::uint32_t subframes : {1u, 4u}) {
+    f.frame.subframes = subframes;
+    f.frame.area.reset(), f.frame.unwanted = {};
+    const frame::Image whole = f.draw();
+    f.frame.unwanted = unwanted;
+    const frame::Image part = f.draw();
+    for (std::uint32_t y = 0; y < 126; ++y)
+      for (std::uint32_t x = 74; x < 200; ++x)
+        for (std::size_t c = 0; c < 3; ++c)
+          ASSERT_EQ(part.pixels[4 * (y * 200 + x) + c], whole.pixels[4 * (y * 200 + x) + c]) << x << " " << y;
+  }
+  f.frame.unwanted = std::span(unwanted).first(600);
+  EXPECT_THROW(f.renderer->draw(f.frame), Error);
+  f.frame.unwanted = {};
   f.frame.area = frame::Area{0, 0, 201, 10};
   EXPECT_THROW(f.renderer->draw(f.frame), Error);
 }

@@ -37,9 +37,8 @@ struct Options {
   std::filesystem::path out;  // none: no picture is kept
 };
 
-/// Once around the column, at the distance from which all of it is seen, rising and sinking a little.
-scene::View around(const scene::Forest& forest, float turn) {
-  scene::View view = scene::overview(forest);
+/// Once around what a view looks at, rising and sinking a little.
+scene::View around(scene::View view, float turn) {
   const Vec3 from = view.camera.eye - view.camera.target;
   view.camera.eye = view.camera.target + Eigen::AngleAxisf(2.f * pi * turn, Vec3::UnitY()) * from +
                     Vec3(0.f, .15f * from.norm() * std::sin(4.f * pi * turn), 0.f);
@@ -142,7 +141,8 @@ void run(const Options& options, Console& console) {
   const auto start = Clock::now();
   Artist artist(forest, options.drawer);
   const auto [width, height] = parse_size(options.size);
-  scene::View first = around(forest, 0.f);
+  const scene::View overview = scene::overview(forest);
+  scene::View first = around(overview, 0.f);
   first.samples = 1;
   artist.draw(first, width, height);
   const double first_picture = seconds_since(start);
@@ -153,7 +153,7 @@ void run(const Options& options, Console& console) {
     changes = changing(artist, options, first);
   }
   const Part outside = measure(
-      artist, options, [&](float t) { return around(forest, t); }, "around", console);
+      artist, options, [&](float t) { return around(overview, t); }, "around", console);
   const scene::CameraPath path = scene::walk(forest);
   const Part inside = measure(
       artist, options, [&](float t) { return path.at(.5f + .5f * t); }, "inside", console);

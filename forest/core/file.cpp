@@ -214,7 +214,7 @@ ScratchFile::ScratchFile(const NewFile& of) : of_(of), file_(open_nameless(of.fo
 }
 
 ScratchFile::~ScratchFile() {
-  unmap();
+  forget();
   if (file_ >= 0) ::close(file_);
 }
 
@@ -222,16 +222,20 @@ void ScratchFile::write(std::span<const std::byte> bytes) {
   if (!write_all(file_, bytes)) of_.fail("written");
 }
 
-std::span<const std::byte> ScratchFile::bytes(std::uint64_t at, std::size_t count) {
-  unmap();
+std::span<const std::byte> ScratchFile::take(std::uint64_t at, std::size_t count) {
+  forget();
   if (!count) return {};
   void* const begin = ::mmap(nullptr, count, PROT_READ, MAP_SHARED | MAP_POPULATE, file_, off_t(at));
   if (begin == MAP_FAILED) of_.fail("written");
+  at_ = at;
   return mapped_ = {static_cast<const std::byte*>(begin), count};
 }
 
-void ScratchFile::unmap() {
-  if (!mapped_.empty()) ::munmap(const_cast<std::byte*>(mapped_.data()), mapped_.size());
+void ScratchFile::forget() {
+  if (mapped_.empty()) return;
+  ::munmap(const_cast<std::byte*>(mapped_.data()), mapped_.size());
+  // What is written next finds these pages of memory, and they need not go to the disk. It may fail: nothing depends on it.
+  ::fallocate(file_, FALLOC_FL_PUNCH_HOLE | FALLOC_FL_KEEP_SIZE, off_t(at_), off_t(mapped_.size()));
   mapped_ = {};
 }
 

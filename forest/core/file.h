@@ -67,14 +67,15 @@ class ScratchFile {
   ScratchFile& operator=(const ScratchFile&) = delete;
 
   void write(std::span<const std::byte> bytes);  // appends
-  /// Some of what was written, where it lies; until the next call. Together no more than there is room in memory for.
+  /// Some of what was written, where it lies; until the next call, which gives its room back to the disk and to the memory.
   /// @param at  a multiple of 1 MiB
-  std::span<const std::byte> bytes(std::uint64_t at, std::size_t count);
+  std::span<const std::byte> take(std::uint64_t at, std::size_t count);
 
  private:
-  void unmap();
+  void forget();
   const NewFile& of_;
   int file_ = -1;
+  std::uint64_t at_ = 0;  // of what is mapped
   std::span<const std::byte> mapped_;
 };
 

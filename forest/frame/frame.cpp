@@ -30,6 +30,12 @@ Vec2 sample_place(std::uint32_t subframe, std::uint32_t subframes) {
   return subframes == 1 ? Vec2(0.f, 0.f) : Vec2(halton(subframe, 2) - .5f, halton(subframe, 3) - .5f);
 }
 
+StateBits bits_of(std::span<const State> states) {
+  std::uint32_t any = 0, all = ~0u;
+  for (const State& state : states) any |= packed(state), all &= packed(state);
+  return {unpacked(any), unpacked(all)};
+}
+
 void check(const Frame& frame, const Geometry& geometry) {
   const Camera& c = frame.camera;
   require(c.eye.allFinite() && c.target.allFinite() && c.up.allFinite(), "the camera must be finite");
@@ -42,6 +48,11 @@ void check(const Frame& frame, const Geometry& geometry) {
   if (const auto& a = frame.area)
     require(a->left < a->right && a->top < a->bottom && a->right <= frame.width && a->bottom <= frame.height,
             "the wanted part of a picture must lie in it and not be empty");
+  const auto squares = [](std::uint32_t pixels) {
+    return std::size_t(pixels + FOREST_TILE - 1) / FOREST_TILE;
+  };
+  require(frame.unwanted.empty() || frame.unwanted.size() == squares(frame.width) * squares(frame.height),
+          "every square of a picture is wanted or not");
   require(frame.thinnest >= 0.f && frame.thinnest <= 64.f, "the thinnest lines must be 0 to 64 pixels wide");
   require(frame.gaps >= 0.f && frame.gaps < 1.f, "the share of gaps must be at least 0 and less than 1");
   require(frame.subframes > 0 && frame.subframes <= 1024, "there must be 1 to 1024 subframes");
@@ -51,9 +62,7 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const Vec3& colour : frame.palette)
     require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");
   require(frame.states.size() == geometry.instances.size(), "every instance needs a state");
-  std::uint8_t colours = 0;
-  for (const State& state : frame.states) colours |= state.colour_class;
-  require(colours < 16, "a colour class must be below 16");
+  require(bits_of(frame.states).any.colour_class < 16, "a colour class must be below 16");
   check(static_cast<const Lists&>(frame), geometry);
   if (const auto& g = frame.glass)
     require(g->plane.origin.allFinite() && g->plane.normal.allFinite() && g->colour.allFinite() &&
@@ -101,10 +110,10 @@ void check(const Surface& s, const Geometry& geometry) {
 
 bool transparent(const Frame& frame) {
   // Lists that come later, by `rest`, hold no item whose state is not announced by its neuron's being parted.
-  std::uint8_t least = 255, flags = 0;
-  for (const State& state : frame.states) least = std::min(least, state.opacity), flags |= state.flags;
+  const auto [any, all] = bits_of(frame.states);
+  std::uint8_t least = all.opacity;
   for (const Ball& b : frame.balls) least = std::min(least, b.opacity);
-  return least < 255 || (flags & State::parted) || frame.opacities != opaque();
+  return least < 255 || any.is(State::parted) || frame.opacities != opaque();
 }
 
 void check(const Lists& lists, const Geometry& geometry) {

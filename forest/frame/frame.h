@@ -54,6 +54,13 @@ static_assert(sizeof(State) == 4);
 inline std::uint32_t packed(const State& s) { return std::bit_cast<std::uint32_t>(s); }
 inline State unpacked(std::uint32_t bits) { return std::bit_cast<State>(bits); }
 
+/// The bits that any of some states has, and those that all have: what can be said of a million at once.
+struct StateBits {
+  State any, all;
+};
+/// Of none: no bit, and all bits.
+StateBits bits_of(std::span<const State> states);
+
 /// Colours are linear light, 0–1. An instance of colour class c (0–15) shows its sections of kind k as entry 8 c + k.
 using Palette = std::array<Vec3, 128>;
 /// Of every palette entry, 0–255.
@@ -166,7 +173,9 @@ struct Frame : Lists {
   // the mean; pixels, and 1 for a picture of a single subframe.
   float thinnest = 0.f;
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
-  std::optional<Area> hole;  // of them these are not wanted either
+  // Of them, 1 for each square of FOREST_TILE pixels of which nothing is wanted either, in rows from the upper left corner of the
+  // picture; none: every square is.
+  std::span<const std::uint8_t> unwanted;
   // What shows only through gaps of this share of a square of FOREST_TILE pixels need not be drawn; 0: all must be.
   float gaps = 0.f;
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,

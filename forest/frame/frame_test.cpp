@@ -73,5 +73,21 @@ TEST(Frame, ContractRefusesWhatIsOutOfRange) {
   EXPECT_THROW(check(frame, geometry), Error);
 }
 
+TEST(Frame, TheBitsOfManyStatesAreThoseOfEach) {
+  EXPECT_EQ(packed(bits_of({}).any), 0u);
+  EXPECT_EQ(packed(bits_of({}).all), ~0u);
+  std::vector<State> states(1000);
+  EXPECT_EQ(bits_of(states).any, State{});
+  EXPECT_EQ(bits_of(states).all, State{});
+  states[777] = {3, Kind::lines, 254, State::visible | State::parted};
+  const auto [any, all] = bits_of(states);
+  EXPECT_EQ(any.colour_class, 3);
+  EXPECT_EQ(any.kind, Kind::lines);
+  EXPECT_TRUE(any.is(State::parted));
+  EXPECT_LT(all.opacity, 255);
+  EXPECT_TRUE(all.is(State::visible));
+  EXPECT_FALSE(all.is(State::simulated));
+}
+
 }  // namespace
 }  // namespace forest::frame

@@ -117,10 +117,8 @@ struct Look {
 
  private:
   bool plainly() const {
-    std::uint32_t kinds = 0, flags = frame::State::visible, parted = 0;
-    for (const frame::State& s : shown.states)
-      kinds |= std::uint32_t(s.kind), flags &= s.flags, parted |= s.flags;
-    return !kinds && flags && !(parted & frame::State::parted);
+    const auto [any, all] = frame::bits_of(shown.states);
+    return any.kind == frame::Kind::any && all.is(frame::State::visible) && !any.is(frame::State::parted);
   }
 };
 

@@ -117,10 +117,10 @@ class Waiting {
   /// Calls body(at, bytes) for all of it, piece by piece, and forgets it.
   template <class Body>
   void pour(Body&& body) {
-    constexpr std::uint64_t window = 16 * piece;
+    constexpr std::uint64_t window = 4 * piece;
     const std::uint64_t on_disk = size_ - memory_.size();
     for (std::uint64_t begin = 0; begin < on_disk; begin += window) {
-      const Bytes here = scratch_->bytes(begin, std::size_t(std::min(window, on_disk - begin)));
+      const Bytes here = scratch_->take(begin, std::size_t(std::min(window, on_disk - begin)));
       for (std::size_t at = 0; at < here.size(); at += piece)
         body(begin + at, here.subspan(at, std::min(piece, here.size() - at)));
     }

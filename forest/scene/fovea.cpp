@@ -15,7 +15,7 @@ constexpr std::uint32_t coarsest = 8;
 constexpr std::uint32_t coarse_samples = 4;
 constexpr float fade = .2f;  // of the eccentricity at which a layer ends: how far it reaches into the next
 constexpr float least_fade = .5f;  // degrees
-constexpr float margin = 6.f;      // pixels of a layer around what is shown of it: rims look two pixels far
+constexpr float margin = 4.f;      // pixels of a layer around what is shown of it: rims look two pixels far
 constexpr std::size_t rows_at_once = 8;
 
 // The thinnest lines of the coarser layers, in those of the picture without a gaze: fewer, and as bright together.
@@ -73,6 +73,32 @@ frame::Area hole_of(const Gaze& gaze, float eccentricity, const Layer& layer, fl
   const Vec2 low = gaze.pixel() - Vec2(half, half), high = gaze.pixel() + Vec2(half, half);
   return {bound(low.x(), width, layer.width), bound(low.y(), height, layer.height),
           bound(high.x(), width, layer.width), bound(high.y(), height, layer.height)};
+}
+
+// Of every square of a layer's pixels whether nothing of it is shown: all within `inner` degrees of the gaze is in a finer layer,
+// and all beyond `outer` in a coarser one.
+std::vector<std::uint8_t> unwanted_of(const Gaze& gaze, float inner, float outer, const Layer& layer,
+                                      float width, float height) {
+  constexpr auto side = std::uint32_t(FOREST_TILE);
+  const std::uint32_t wide = (layer.width + side - 1) / side, high = (layer.height + side - 1) / side;
+  std::vector<std::uint8_t> unwanted(std::size_t(wide) * high, 1);
+  // From the middle of a square to its farthest pixel, and what is looked at around that.
+  const float reach = gaze.angle((.5f * float(side) + margin) * std::numbers::sqrt2_v<float> * layer.scale);
+  const auto cosine = [](float degrees) { return std::cos(radians(std::clamp(degrees, 0.f, 180.f))); };
+  const float within = inner > reach ? cosine(inner - reach) : 2.f,
+              beyond = std::isinf(outer) ? -2.f : cosine(outer + reach);
+  const Vec3 ahead = gaze.direction();
+  const std::uint32_t left = layer.area.left / side, right = (layer.area.right + side - 1) / side;
+  for (std::uint32_t y = layer.area.top / side; y < (layer.area.bottom + side - 1) / side; ++y)
+    for (std::uint32_t x = left; x < right; ++x) {
+      const auto in_picture = [&](std::uint32_t square, float size, std::uint32_t layer_size) {
+        return ((float(square) + .5f) * float(side) - .5f * float(layer_size)) * layer.scale + .5f * size;
+      };
+      const Vec3 way = gaze.way_to({in_picture(x, width, layer.width), in_picture(y, height, layer.height)});
+      const float along = way.dot(ahead), distance = way.norm();
+      unwanted[std::size_t(y) * wide + x] = along > within * distance || along < beyond * distance;
+    }
+  return unwanted;
 }
 
 constexpr std::uint8_t whole_share = 128;  // of what is mixed
@@ -169,7 +195,11 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
       layer.gaps = seldom;
       layer.hole = hole_of(gaze, (&layer - 1)->until, layer, w, h);
     }
-    if (std::isinf(layer.gone)) continue;
+    const float inner = &layer == layers.data() ? 0.f : (&layer - 1)->until;
+    if (std::isinf(layer.gone)) {
+      layer.unwanted = unwanted_of(gaze, inner, INFINITY, layer, w, h);
+      continue;
+    }
     const frame::Area part = within(gaze, layer.gone, w, h);
     const auto low = [&](std::uint32_t at, float size, std::uint32_t layer_size) {
       const float place = in_layer(float(at), size, float(layer_size), layer.scale) - margin;
@@ -184,6 +214,7 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
     // A gaze far beside the picture leaves a strip of it.
     layer.area.right = std::max(layer.area.right, layer.area.left + 1);
     layer.area.bottom = std::max(layer.area.bottom, layer.area.top + 1);
+    layer.unwanted = unwanted_of(gaze, inner, layer.gone, layer, w, h);
   }
   return layers;
 }

@@ -16,7 +16,9 @@ struct Layer {
   std::uint32_t width = 0, height = 0;  // of the whole view at this layer's resolution, pixels
   float scale = 1.f;                    // pixels of the picture as wide as one of the layer
   frame::Area area = {};                // what of it is needed
-  frame::Area hole = {};                // … and what of that finer layers show
+  frame::Area hole = {};                // … and what of that finer layers show, as far as it is a rectangle
+  std::vector<std::uint8_t> unwanted =
+      {};             // as frame::Frame has it: squares of pixels of which nothing is needed
   float gaps = 0.f;   // as frame::Frame has it: what is seen through them is too small to be resolved
   float until = 0.f;  // eccentricity where it begins to fade into the next, degrees
   float gone = 0.f;   // … and where it is gone; the last layer never is

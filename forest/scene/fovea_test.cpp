@@ -79,18 +79,45 @@ TEST(Layers, HoldAllPixelsThatAreShownOfThemWhereverTheGazeIs) {
       ASSERT_LT(layer.area.top, layer.area.bottom);
       ASSERT_LE(layer.area.right, layer.width);
       ASSERT_LE(layer.area.bottom, layer.height);
-      if (std::isinf(layer.gone)) continue;
+      const float inner = &layer == layers.data() ? 0.f : (&layer - 1)->until;
       for (int k = 0; k < 300; ++k) {
         const Vec2 pixel(float(random.uniform(0., double(w))), float(random.uniform(0., double(h))));
-        if (gaze.eccentricity(pixel) > layer.gone) continue;
+        const float eccentricity = gaze.eccentricity(pixel);
+        if (eccentricity > layer.gone) continue;
         const float x = (pixel.x() - .5f * float(w)) / layer.scale + .5f * float(layer.width),
                     y = (pixel.y() - .5f * float(h)) / layer.scale + .5f * float(layer.height);
         EXPECT_GE(x + .01f, float(layer.area.left));
         EXPECT_LE(x - .01f, float(layer.area.right));
         EXPECT_GE(y + .01f, float(layer.area.top));
         EXPECT_LE(y - .01f, float(layer.area.bottom));
+        if (eccentricity < inner || layers.size() == 1) continue;
+        // It and its neighbours, whose rims are two pixels wide, lie in squares that are wanted.
+        const std::uint32_t wide = (layer.width + FOREST_TILE - 1) / FOREST_TILE;
+        ASSERT_EQ(layer.unwanted.size(), wide * ((layer.height + FOREST_TILE - 1) / FOREST_TILE));
+        for (const float beside : {-3.f, 3.f})
+          for (const float above : {-3.f, 3.f}) {
+            const float sx = std::clamp(x + beside, float(layer.area.left), float(layer.area.right) - 1.f),
+                        sy = std::clamp(y + above, float(layer.area.top), float(layer.area.bottom) - 1.f);
+            EXPECT_EQ(
+                layer.unwanted[std::uint32_t(sy) / FOREST_TILE * wide + std::uint32_t(sx) / FOREST_TILE], 0)
+                << eccentricity << " of " << inner << " to " << layer.gone;
+          }
       }
     }
+  }
+}
+
+TEST(Layers, WantNothingOfWhatOthersShow) {
+  const View view = view_with_gaze({.5f, .5f});
+  for (const Layer& layer : layers_of(view, width, height)) {
+    std::size_t unwanted = 0, all = 0;
+    const std::uint32_t wide = (layer.width + FOREST_TILE - 1) / FOREST_TILE;
+    for (std::uint32_t y = layer.area.top; y < layer.area.bottom; y += FOREST_TILE)
+      for (std::uint32_t x = layer.area.left; x < layer.area.right; x += FOREST_TILE, ++all)
+        unwanted += layer.unwanted[y / FOREST_TILE * wide + x / FOREST_TILE];
+    // Of a disc's square, its corners; of a disc in a disc, that too.
+    EXPECT_GT(unwanted, all / 20) << layer.scale;
+    EXPECT_LT(unwanted, all / 2) << layer.scale;
   }
 }
 

@@ -11,7 +11,7 @@ namespace forest::render::cpu {
 namespace {
 
 constexpr std::int32_t tile = std::int32_t(FOREST_TILE), tile_of_tiles = tile * tile;
-constexpr std::int32_t most = 6;  // tiles of a level that a rectangle may cover
+constexpr std::int32_t most = 64;  // tiles of a level that a rectangle may cover
 
 std::int32_t parts(std::int32_t pixels, std::int32_t of) { return (pixels + of - 1) / of; }
 
@@ -57,8 +57,8 @@ std::uint32_t farthest_but(const std::uint32_t* keys, std::size_t count, std::si
 }  // namespace
 
 void Canvas::resize(std::uint32_t width, std::uint32_t height, int samples, std::uint32_t wanted,
-                    const frame::Area& area, const frame::Area& hole, float gaps) {
-  area_ = area, hole_ = hole, gaps_ = gaps;
+                    const frame::Area& area, std::span<const std::uint8_t> unwanted, float gaps) {
+  area_ = area, unwanted_ = unwanted, gaps_ = gaps;
   samples_ = samples, wanted_ = wanted;
   width_ = std::int32_t(width), height_ = std::int32_t(height);
   fine_.width = parts(width_, tile), fine_.height = parts(height_, tile);
@@ -115,7 +115,7 @@ void Canvas::clear(const Square& s) {
   }
   for (std::int32_t ty = s.top / tile; ty < parts(s.bottom, tile); ++ty)
     for (std::int32_t tx = s.left / tile; tx < parts(s.right, tile); ++tx)
-      fine_.farthest[std::size_t(ty * fine_.width + tx)] = FOREST_KEY_EMPTY;
+      if (const auto n = std::size_t(ty * fine_.width + tx); wanted(n)) fine_.farthest[n] = FOREST_KEY_EMPTY;
   for (std::int32_t y = s.top / tile_of_tiles; y < parts(s.bottom, tile_of_tiles); ++y)
     for (std::int32_t x = s.left / tile_of_tiles; x < parts(s.right, tile_of_tiles); ++x)
       coarse_.farthest[std::size_t(y * coarse_.width + x)] = FOREST_KEY_EMPTY;
@@ -130,19 +130,15 @@ void Canvas::read_row(std::int32_t y, std::int32_t from, std::int32_t to, std::u
   }
 }
 
-// Whether all pixels of a rectangle of tiles are wanted.
+// Whether all pixels of a rectangle of tiles lie in the area, and the farthest of a tile's decides.
 bool Canvas::whole(const Square& tiles) const {
   const std::int32_t left = tiles.left * tile, top = tiles.top * tile, right = tiles.right * tile,
                      bottom = tiles.bottom * tile;
   const auto reaches = [](std::int32_t to, std::uint32_t edge, std::int32_t end) {
     return to <= std::int32_t(edge) || std::int32_t(edge) == end;
   };
-  const bool in_area = left >= std::int32_t(area_.left) && top >= std::int32_t(area_.top) &&
-                       reaches(right, area_.right, width_) && reaches(bottom, area_.bottom, height_);
-  const bool beside_hole = hole_.left >= hole_.right || hole_.top >= hole_.bottom ||
-                           left >= std::int32_t(hole_.right) || right <= std::int32_t(hole_.left) ||
-                           top >= std::int32_t(hole_.bottom) || bottom <= std::int32_t(hole_.top);
-  return in_area && beside_hole && gaps_ == 0.f;
+  return gaps_ == 0.f && left >= std::int32_t(area_.left) && top >= std::int32_t(area_.top) &&
+         reaches(right, area_.right, width_) && reaches(bottom, area_.bottom, height_);
 }
 
 // The farthest key of a tile's wanted samples but for the share of gaps; 0 when there are none.
@@ -153,9 +149,6 @@ std::uint32_t Canvas::far_in_tile(std::int32_t tx, std::int32_t ty) const {
   const auto [left, right] = within(tx * tile, area_.left, area_.right);
   const auto [top, bottom] = within(ty * tile, area_.top, area_.bottom);
   if (left >= right || top >= bottom) return 0;
-  if (left >= std::int32_t(hole_.left) && right <= std::int32_t(hole_.right) &&
-      top >= std::int32_t(hole_.top) && bottom <= std::int32_t(hole_.bottom))
-    return 0;
   const std::size_t all = std::size_t(tile * tile) * std::size_t(samples_);
   if (right - left == tile && bottom - top == tile && wanted_ == (1ull << samples_) - 1)
     return farthest_but(at(left, top), all, all - std::size_t(float(all) * gaps_));
@@ -174,14 +167,16 @@ void Canvas::look(const Square& s) {
   const std::int32_t left = s.left / tile, right = parts(s.right, tile), top = s.top / tile,
                      bottom = parts(s.bottom, tile);
   const std::size_t keys_a_tile = std::size_t(tile * tile) * std::size_t(samples_);
-  const bool every = whole({left, top, right, bottom});
+  const bool every = unwanted_.empty() && whole({left, top, right, bottom});
   for (std::int32_t ty = top; ty < bottom; ++ty) {
     std::uint32_t* far = &fine_.farthest[std::size_t(ty * fine_.width)];
     if (every)
       find_farthest(at(left * tile, ty * tile), std::size_t(right - left), keys_a_tile, far + left);
     else
       for (std::int32_t tx = left; tx < right; ++tx)
-        if (whole({tx, ty, tx + 1, ty + 1}))
+        if (!wanted(std::size_t(ty * fine_.width + tx)))
+          far[tx] = 0;
+        else if (whole({tx, ty, tx + 1, ty + 1}))
           find_farthest(at(tx * tile, ty * tile), 1, keys_a_tile, far + tx);
         else
           far[tx] = far_in_tile(tx, ty);

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "forest/frame/frame.h"
@@ -36,12 +37,13 @@ struct Square {
 class Canvas {
  public:
   /// Sets the size; what the squares hold is undefined until each is cleared.
-  /// Pixels beside the area may hold anything, and with those of the hole count as hidden.
+  /// Pixels beside the area may hold anything, and with those of unwanted tiles count as hidden.
   /// @param samples  of a pixel
   /// @param wanted   bit k: sample k is drawn; the others count as hidden
+  /// @param unwanted  1 for each tile of which nothing is wanted, in rows; stays valid as long as it is drawn; none: all are
   /// @param gaps     share of a tile's samples that may be farther than what `hidden` goes by
   void resize(std::uint32_t width, std::uint32_t height, int samples, std::uint32_t wanted,
-              const frame::Area& area, const frame::Area& hole = {}, float gaps = 0.f);
+              const frame::Area& area, std::span<const std::uint8_t> unwanted = {}, float gaps = 0.f);
 
   std::int32_t width() const { return width_; }
   std::int32_t height() const { return height_; }
@@ -87,13 +89,15 @@ class Canvas {
   std::int32_t width_ = 0, height_ = 0;
   int samples_ = 1;
   std::uint32_t wanted_ = 1;
-  frame::Area area_, hole_;
+  frame::Area area_;
+  std::span<const std::uint8_t> unwanted_;
   float gaps_ = 0.f;
   std::int32_t side_ = 64, squares_left_ = 0, squares_top_ = 0, squares_wide_ = 0, squares_high_ = 0;
   std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
   Level fine_, coarse_;              // tiles, and tiles of tiles
 
   bool whole(const Square& tiles) const;
+  bool wanted(std::size_t tile) const { return unwanted_.empty() || !unwanted_[tile]; }
   std::uint32_t far_in_tile(std::int32_t tx, std::int32_t ty) const;
 };
 

@@ -56,8 +56,8 @@ void meet(const frame::Constants& c, const Vec3& light, const Body& body, const 
 class Silhouette {
  public:
   /// Whether the eye is far enough away and beside the axis for it.
-  static bool fits(const frame::Constants& c, const Body& body, float nearest_code) {
-    if (c.parallel > 0.f || !(nearest_code > 0.f)) return false;
+  static bool fits(const frame::Constants& c, const Body& body) {
+    if (c.parallel > 0.f) return false;
     const auto beside = [&](const Vec3& at, float radius) {
       const float distance2 = at.squaredNorm(), along = at.dot(body.u);
       return along * along < (.94f - 3.f * radius * radius / distance2) * distance2;  // 14 degrees and more
@@ -121,7 +121,7 @@ class Silhouette {
         const float root = root_(dx, dy), du = along_(dx, dy), A = c2 * square_(dx, dy) - du * du;
         const float t = (half_(dx, dy) - std::sqrt(larger(root, 0.f))) / larger(A, 1e-9f),
                     along = t * du - at_axis_;
-        const bool in = root >= 0.f, on_cone = in & (along >= begin) & (along <= end);
+        const bool in = root >= 0.f, on_cone = in & (along >= begin) & (along <= end) & (t > 0.f);
         z[k] = t;
         // Of the normal across the axis, whose length there is that of the taper.
         facing[k] = c2 * (t * lit_(dx, dy) - at_light_ - along * lit_axis_) / larger(ra - s * along, 1e-9f) +
@@ -146,7 +146,7 @@ class Silhouette {
         const bool cone = hits.hit[k] != 0;
         z[k] = cone ? z[k] : t;
         facing[k] = cone ? facing[k] : (t * lit_(dx, dy) - at_light) * per_radius;
-        hits.hit[k] |= (within[k] != 0) & (root >= 0.f) ? 1u : 0u;
+        hits.hit[k] |= (within[k] != 0) & (root >= 0.f) & (t > 0.f) ? 1u : 0u;
       }
     }
     FOREST_LANES
@@ -300,6 +300,54 @@ struct Reach {
     a = of(at_a, ra), b = of(at_b, rb);
   }
 };
+/// What a picture shows of a capsule: its axis without what lies so far beside the picture that no sphere around it reaches in.
+class Crop {
+ public:
+  /// @param spread  pixels that samples lie beside the middle of theirs at most
+  Crop(const frame::Constants& c, float spread)
+      : needed_(c.parallel == 0.f),
+        left_(plane(c, c.centre_x + spread)),
+        right_(plane(c, float(c.width) - c.centre_x + spread)),
+        above_(plane(c, c.centre_y + spread)),
+        below_(plane(c, float(c.height) - c.centre_y + spread)) {}
+
+  /// Cuts a capsule before the eye of a camera in perspective; the cut ends are as wide as it is there.
+  /// @returns false where nothing is left
+  bool operator()(Vec3& a, Vec3& b, float& ra, float& rb) const {
+    if (!needed_) return true;
+    const float radius = std::max(ra, rb);
+    float from = 0.f, to = 1.f;
+    const auto cut = [&](const Side& side, float beside_a, float beside_b) {
+      const float at_a = side.forward * a.z() + side.across * beside_a + radius,
+                  at_b = side.forward * b.z() + side.across * beside_b + radius;
+      if (at_a < 0.f && at_b < 0.f) to = -1.f;
+      if (at_a < 0.f) from = std::max(from, at_a / (at_a - at_b));
+      if (at_b < 0.f) to = std::min(to, at_a / (at_a - at_b));
+    };
+    cut(left_, a.x(), b.x()), cut(right_, -a.x(), -b.x());
+    cut(above_, -a.y(), -b.y()), cut(below_, a.y(), b.y());
+    if (!(from <= to)) return false;
+    const Vec3 axis = b - a;
+    const float taper = rb - ra;
+    if (to < 1.f) b = a + to * axis, rb = ra + to * taper;
+    if (from > 0.f) a += from * axis, ra += from * taper;
+    return true;
+  }
+
+ private:
+  // A plane through the eye and an edge of the picture: its unit normal, into the picture.
+  struct Side {
+    float forward, across;
+  };
+  static Side plane(const frame::Constants& c, float pixels) {
+    const float per_length = 1.f / std::hypot(pixels, c.focal);
+    return {pixels * per_length, c.focal * per_length};
+  }
+
+  bool needed_;
+  Side left_, right_, above_, below_;
+};
+
 inline float margin_of(float spread) { return 1.f + 1.4143f * spread; }
 
 /// Where a capsule, whose ends lie at p and q on the picture, may be seen by any sample of a pixel, by its middle.

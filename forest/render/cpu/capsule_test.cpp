@@ -49,7 +49,7 @@ TEST(Capsule, ItsSilhouetteIsWhatItsRaysMeet) {
   for (int i = 0; i < 4000; ++i) {
     const Case k(c, random);
     const Body body(k.a, k.b, k.ra, k.rb);
-    if (!Silhouette::fits(c, body, k.nearest_code(c))) continue;
+    if (!Silhouette::fits(c, body)) continue;
     ++fitting;
     const Vec2 p = pixel_of(c, k.a), q = pixel_of(c, k.b);
     const Silhouette silhouette(c, light, body, p, q);
@@ -115,6 +115,54 @@ TEST(Capsule, ItsOutlineHoldsWhatItsRaysMeet) {
   }
   EXPECT_EQ(beside, 0);
   EXPECT_GT(inside, 50000);
+}
+
+// Of capsules around and behind the edges of the picture, some of which begin right before the eye.
+TEST(Capsule, WhatIsCutOffBesideThePictureIsNotSeen) {
+  const frame::Constants c = picture();
+  const Crop crop(c, 0.f);
+  const Vec3 light(0, 0, -1);
+  Random random(7);
+  int cut = 0, gone = 0, hit = 0, differing = 0, fitting = 0;
+  for (int i = 0; i < 20000; ++i) {
+    const auto place = [&] {
+      const float depth = c.near + float(std::exp(random.uniform(std::log(.01), std::log(300.))));
+      return Vec3(float(random.uniform(-60., 60.)), float(random.uniform(-60., 60.)), depth);
+    };
+    const Vec3 a = place(), b = place();
+    const float ra = float(random.uniform(.1, 3.)), rb = float(random.uniform(.1, 3.));
+    Vec3 from = a, to = b;
+    float r_from = ra, r_to = rb;
+    const bool left = crop(from, to, r_from, r_to);
+    if (left && from == a && to == b) continue;
+    ++(left ? cut : gone);
+    const Body whole(a, b, ra, rb), part(from, to, r_from, r_to);
+    const bool fits = left && Silhouette::fits(c, part);
+    fitting += fits;
+    for (int row = 0; row < 8; ++row) {
+      float x[lanes], y[lanes];
+      for (int lane = 0; lane < lanes; ++lane)
+        x[lane] = float(random.uniform(0., 1280.)), y[lane] = float(random.uniform(0., 720.));
+      Hits<lanes> all, seen{};
+      meet(c, light, whole, x, y, all);
+      if (fits)
+        Silhouette(c, light, part, pixel_of(c, from), pixel_of(c, to))
+            .meet<lanes>(x, static_cast<const float*>(y), c.near, seen);
+      else if (left)
+        meet(c, light, part, x, y, seen);
+      for (int lane = 0; lane < lanes; ++lane) {
+        hit += all.hit[lane] != 0;
+        differing += all.hit[lane] != seen.hit[lane] ||
+                     (all.hit[lane] && std::abs(all.code[lane] - seen.code[lane]) >
+                                           30.f + 600.f * std::max(ra, rb) / std::min(a.z(), b.z()));
+      }
+    }
+  }
+  EXPECT_GT(cut, 2000);
+  EXPECT_GT(fitting, 1500);
+  EXPECT_GT(gone, 2000);
+  EXPECT_GT(hit, 20000);
+  EXPECT_LT(differing, hit / 300);  // at the very rim
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
     s.picture.light = {c.light_x, c.light_y, c.light_z};
-    s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.hole.value_or(frame::Area{}), f.gaps);
+    s.canvas.resize(f.width, f.height, int(at_once), wanted, area, f.unwanted, f.gaps);
     if (!f.surfaces.empty()) {  // first, for they hide much
       parallel_for(s.canvas.squares(), 1, [&](std::size_t n) { s.canvas.clear(s.canvas.square(n)); });
       s.surfaces.draw(s.picture, f.surfaces, s.canvas);
@@ -82,8 +82,13 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
 }
 
 frame::Image CpuRenderer::read() {
-  frame::Image image = state_->image;
-  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
+  const frame::Image& from = state_->image;
+  frame::Image image{from.width, from.height, std::vector<std::uint8_t>(from.pixels.size()), from.covered};
+  const std::size_t row = 4 * std::size_t(from.width);
+  parallel_for(from.height, 32, [&](std::size_t y) {
+    std::copy_n(&from.pixels[y * row], row, &image.pixels[y * row]);
+    for (std::size_t i = 3; i < row; i += 4) image.pixels[y * row + i] = 255;
+  });
   return image;
 }
 

@@ -22,7 +22,9 @@ TEST(Canvas, SeesPastGapsAsFarAsItIsAllowed) {
   for (const int samples : {1, 4, 16})
     for (const float gaps : {0.f, .2f}) {
       cpu::Canvas canvas;
-      canvas.resize(64, 40, samples, (1u << samples) - 1u, {8, 0, 64, 40}, {40, 0, 64, 16}, gaps);
+      std::vector<std::uint8_t> unwanted(8 * 5, 0);
+      for (std::size_t y = 0; y < 2; ++y) std::fill_n(&unwanted[8 * y + 5], 3, 1);
+      canvas.resize(64, 40, samples, (1u << samples) - 1u, {8, 0, 64, 40}, unwanted, gaps);
       std::vector<float> depths;
       for (std::size_t n = 0; n < canvas.squares(); ++n) {
         canvas.clear(canvas.square(n));
@@ -43,7 +45,7 @@ TEST(Canvas, SeesPastGapsAsFarAsItIsAllowed) {
       EXPECT_TRUE(hidden(10.f, 18.f, far * 1.005f));
       EXPECT_FALSE(hidden(10.f, 18.f, far * .99f));
       EXPECT_FALSE(hidden(20.f, 18.f, 5000.f));  // empty
-      EXPECT_TRUE(hidden(50.f, 8.f, 1.f));       // in the hole
+      EXPECT_TRUE(hidden(50.f, 8.f, 1.f));       // unwanted
       const frame::DepthMap map = canvas.depth_map();
       EXPECT_EQ(map.left, 1u);
       EXPECT_EQ(map.width, 7u);

@@ -303,7 +303,7 @@ template <int S>
   const frame::Constants& c = picture.constants;
   const Body body(r.a, r.b, r.ra, r.rb);
   const Vec2 p(r.px, r.py), q(r.qx, r.qy);
-  const bool whole = Silhouette::fits(c, body, r.nearest);
+  const bool whole = Silhouette::fits(c, body);
   std::optional<Silhouette> silhouette;
   if (whole) silhouette.emplace(c, picture.light, body, p, q);
   const auto meet_row = [&](const float* x, float y, Hits<lanes>& hits) __attribute__((always_inline)) {

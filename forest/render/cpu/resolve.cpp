@@ -82,6 +82,16 @@ FOREST_CLONES void show(const Exposed& e, const std::uint32_t* table, const Plan
   }
 }
 
+// The same of pixels that show nothing but a sky of one light, whose codes are told.
+FOREST_CLONES void show_sky(const Exposed& e, std::int32_t red, std::int32_t green, std::int32_t blue,
+                            std::uint32_t* __restrict shown) {
+  for (std::size_t i = 0; i < e.pixels; ++i) {
+    const auto noise = std::int32_t(whole_code * noise_at(e.x + std::int32_t(i), e.y, e.subframe));
+    shown[i] = std::uint32_t(byte_of(red + noise)) | std::uint32_t(byte_of(green + noise)) << 8 |
+               std::uint32_t(byte_of(blue + noise)) << 16;
+  }
+}
+
 // Which pixels have nothing at any sample that is wanted.
 template <int S>
 [[gnu::always_inline]] inline void find_empty_of(const std::uint32_t* keys, std::size_t pixels,
@@ -228,6 +238,14 @@ void tint(const frame::Constants& c, const std::uint32_t* keys, std::uint32_t wa
   }
 }
 
+// What a block of pixels is worked out in; each thread keeps its own from picture to picture.
+struct Scratch {
+  std::vector<float> octaves, lit, fog;
+  std::vector<std::uint32_t> keys, shown;
+  std::vector<std::int32_t> row_sums;
+  std::vector<std::uint8_t> empty;
+};
+
 }  // namespace
 
 void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette& palette,
@@ -262,10 +280,11 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
                        end_x = std::min(right, begin_x + columns);
     const auto S = std::size_t(samples), pixels = std::size_t(end_x - begin_x),
                row_size = (pixels + 2 * beside) * S;
-    std::vector<float> octaves((rows_at_once + 2 * beside) * row_size), lit(pixels * S), fog(pixels * S);
-    std::vector<std::uint32_t> keys((rows_at_once + 2 * beside) * row_size), shown(pixels);
-    std::vector<std::int32_t> row_sums(4 * pixels);
-    std::vector<std::uint8_t> empty(pixels);
+    thread_local Scratch scratch;
+    auto& [octaves, lit, fog, keys, shown, row_sums, empty] = scratch;
+    octaves.resize((rows_at_once + 2 * beside) * row_size), keys.resize(octaves.size());
+    lit.resize(pixels * S), fog.resize(pixels * S);
+    shown.resize(pixels), row_sums.resize(4 * pixels), empty.resize(pixels);
     // Rows and columns around the block; the picture's edges are repeated.
     const std::int32_t low = std::max(begin_x - beside, 0), up = std::min(end_x + beside, width);
     for (std::int32_t k = 0; k < end_y - begin_y + 2 * beside; ++k) {
@@ -300,12 +319,9 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
         else
           for (; x < pixels && gap < 16; ++x) gap = empty[x] ? gap + 1 : 0;
         if (nothing && at_once && !tinted) {
-          for (std::size_t i = from; i < x; ++i) {
-            std::uint8_t* pixel = &image.pixels[4 * (row_at + i)];
-            const auto noise = std::int32_t(whole_code * noise_at(begin_x + std::int32_t(i), y, so_far - 1));
-            for (std::size_t j = 0; j < 3; ++j) pixel[j] = std::uint8_t(byte_of(sky_code[j] + noise));
-            pixel[3] = 0;
-          }
+          show_sky({x - from, begin_x + std::int32_t(from), y, so_far - 1, exposure, share}, sky_code[0],
+                   sky_code[1], sky_code[2], shown.data());
+          std::memcpy(&image.pixels[4 * (row_at + from)], shown.data(), 4 * (x - from));
           continue;
         }
         const std::size_t count = x - from;

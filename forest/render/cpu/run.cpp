@@ -10,6 +10,7 @@
 #include "forest/frame/constants.h"
 #include "forest/render/cpu/arithmetic.h"
 #include "forest/render/cpu/canvas.h"
+#include "forest/render/cpu/capsule.h"
 
 namespace forest::render::cpu {
 namespace {
@@ -132,6 +133,22 @@ FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Ve
     r.lit_side[i] = downwards < 0.f ? -lit_side : lit_side;
     r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
   }
+}
+
+bool trim(const frame::Constants& c, const Crop& crop, Run& r, std::size_t i) {
+  const float wide = float(c.width), high = float(c.height);
+  const auto far = [&](float x, float y) {
+    return !(x > -.5f * wide && x < 1.5f * wide && y > -.5f * high && y < 1.5f * high);
+  };
+  if (!far(r.px[i], r.py[i]) && !far(r.qx[i], r.qy[i])) return true;
+  Vec3 a(r.ax[i], r.ay[i], r.az[i]), b(r.bx[i], r.by[i], r.bz[i]);
+  if (!crop(a, b, r.ra[i], r.rb[i])) return false;
+  const float fa = c.focal / lens(c, a.z()), fb = c.focal / lens(c, b.z());
+  r.ax[i] = a.x(), r.ay[i] = a.y(), r.az[i] = a.z(), r.bx[i] = b.x(), r.by[i] = b.y(), r.bz[i] = b.z();
+  r.px[i] = c.centre_x + fa * a.x(), r.py[i] = c.centre_y - fa * a.y();
+  r.qx[i] = c.centre_x + fb * b.x(), r.qy[i] = c.centre_y - fb * b.y();
+  r.code_a[i] = depth_code(a.z()), r.code_b[i] = depth_code(b.z());
+  return true;
 }
 
 FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {

@@ -39,6 +39,8 @@ struct Picture {
 
 inline constexpr std::size_t run = FOREST_CLUSTER_SIZE;
 
+class Crop;
+
 /// The segments of an item in camera coordinates (x right, y up, z depth), cut at the near distance, and in pixels.
 struct Run {
   std::size_t count = 0;
@@ -69,6 +71,10 @@ void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
 
 /// From the coordinates of their neuron to pixels: camera = turn · p + at.
 void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light, Run& r);
+
+/// Cuts segment `i`, as a capsule, at the edges of the picture where it reaches far beyond them (capsule.h).
+/// @returns false where nothing is left
+bool trim(const frame::Constants& c, const Crop& crop, Run& r, std::size_t i);
 
 /// Straws shorter than FOREST_STRAW_LENGTH times what the thinnest line is wide get as long, and fewer of them are drawn.
 void lengthen(const frame::Constants& c, Run& r);

@@ -139,7 +139,10 @@ void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
 class Gatherer {
  public:
   Gatherer(const Picture& picture, const Canvas& canvas)
-      : picture_(picture), canvas_(canvas), whole_{0, 0, canvas.width(), canvas.height()} {}
+      : picture_(picture),
+        canvas_(canvas),
+        whole_{0, 0, canvas.width(), canvas.height()},
+        crop_(picture.constants, picture.spread) {}
 
   enum class Kind { capsules, dots, lines };
   // Returns how many of the segments are to be drawn.
@@ -175,6 +178,7 @@ class Gatherer {
   const Picture& picture_;
   const Canvas& canvas_;
   Square whole_;
+  Crop crop_;
   Run r_{};
 
   bool hidden(const Box& b, float nearest_code) const {
@@ -205,12 +209,12 @@ class Gatherer {
   bool any_thin() const {
     return std::any_of(r_.width, r_.width + r_.count, [](float width) { return width < 2.f * thin; });
   }
-  bool add_near(std::size_t i, Chunk& chunk) const {
+  bool add_near(std::size_t i, Chunk& chunk) {
     if (r_.width[i] < 0.f) return false;
     const frame::Constants& c = picture_.constants;
     const float width = c.focal * std::max(r_.ra[i] / lens(c, r_.az[i]), r_.rb[i] / lens(c, r_.bz[i]));
     if (width < thin) return add_stroke(i, chunk);
-    return put(Solid(c, r_, i), chunk.solids, chunk.ranges_of_solids);
+    return trim(c, crop_, r_, i) && put(Solid(c, r_, i), chunk.solids, chunk.ranges_of_solids);
   }
   // The one segment of a dot.
   std::uint64_t add_beads(const frame::Item& item, const Mat3& turn, const Vec3& at, Chunk& chunk) {
