@@ -86,7 +86,7 @@ class Walk {
 
   /// Stands still until the budget knows what the first picture costs.
   void settle() {
-    for (int i = 0; i < 16; ++i) draw_quick(0);
+    for (int i = 0; i < 32; ++i) draw_quick(0);
   }
   /// To be called for every picture in turn: the budget learns from each.
   Quick draw_quick(std::uint32_t picture) {

@@ -84,7 +84,7 @@ TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
 
 TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   Budget budget(50.);
-  EXPECT_EQ(watch(budget, 4., 60), 1u);
+  EXPECT_EQ(watch(budget, 4., 80), 1u);
   EXPECT_EQ(budget.samples(), 16u);
   EXPECT_NEAR(budget.error(), .5f, .02f);
   EXPECT_EQ(budget.thinnest(), 0.f);
@@ -94,6 +94,14 @@ TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   EXPECT_EQ(watch(budget, 40., 60), 1u);
   EXPECT_EQ(budget.samples(), 1u);
   EXPECT_EQ(watch(budget, 20., 60), 0u);  // many would take too long again
+}
+
+// Beside the forest there is time for anything, and a second later there is none.
+TEST(Budget, AGazeThatJumpsDoesNotChangeTheSamples) {
+  Budget budget(Budget::with_gaze);
+  for (int fixation = 0; fixation < 20; ++fixation)
+    EXPECT_EQ(watch(budget, fixation % 3 == 2 ? 30. : 2., 27), 0u) << fixation;
+  EXPECT_EQ(watch(budget, 2., 150), 1u);
 }
 
 TEST(Cut, DrawsEverySegmentInSightOnce) {

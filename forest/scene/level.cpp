@@ -92,14 +92,16 @@ static float most_of_many(float worst) { return std::min(3.f, worst); }
 
 void Budget::took(double milliseconds) {
   // Many samples at their largest error still show more than one at its smallest, in about twice the time. Changing back and
-  // forth would be seen, so several pictures must agree, and what was in vain is not tried again so soon.
-  constexpr std::uint32_t many = 16;
+  // forth would be seen, so several pictures must agree, for more samples those of a second and a half: a gaze that jumps
+  // rests beside the forest for less. What was in vain is not tried again so soon.
+  constexpr std::uint32_t many = 16, several = 3;
+  constexpr double long_enough = 1500.;  // milliseconds
   const bool one = samples_ == 1;
   const float least = one ? 1.f : .5f, most = one ? worst_ : most_of_many(worst_);
   const bool other = one ? error_ <= least && longer_ * milliseconds < milliseconds_
                          : error_ >= most && milliseconds > 1.1 * milliseconds_;
   agreed_ = other ? agreed_ + 1 : 0;
-  if (agreed_ == 3) {
+  if (agreed_ >= several && (!one || agreed_ * milliseconds_ >= long_enough)) {
     if (!one) longer_ *= 2.;
     samples_ = one ? many : 1, error_ = one ? most_of_many(worst_) : 1.f, agreed_ = 0;
     return;
