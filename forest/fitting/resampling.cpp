@@ -6,6 +6,8 @@
 #include <cmath>
 #include <iterator>
 #include <map>
+#include <numbers>
+#include <numeric>
 #include <utility>
 #include <vector>
 
@@ -14,6 +16,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/traced.h"
 #include "forest/statistics/summary.h"
+#include "forest/statistics/two_samples.h"
 
 namespace forest::fitting {
 namespace {
@@ -35,22 +38,30 @@ constexpr std::string_view growth = R"(
 # stays single.
 function share(part, whole, n, others) =
   if(part == 1, 1, max(min(2, n - others), min(n - others, round(n * part / whole))))
-# How many times longer a branch is drawn than it was traced, so that its farthest tip is as far as it should be.
+# How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
-function bending(kind, s, u, v, donor) = max(0.5, min(2, sqrt(
+function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
-# The cosine of the angle between a direction and that to the farthest tip where a fork was traced.
+# The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
+# together take the whole.
+function rest(r) = forks.tips(r) - forks.n1(r) - forks.n2(r)
+function borne(r, i) = forks.tips(r) * nth(i, forks.n1(r), forks.n2(r), rest(r)) / (forks.n1(r)^2 + forks.n2(r)^2 + rest(r)^2)
+# The cosine of the angle between a direction and that to the middle of the tips where a fork was traced.
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
-function along(r, x, y, z) = cosine(x, y, z, nth(forks.main(r), forks.t1x(r), forks.t2x(r), forks.t3x(r)),
-  nth(forks.main(r), forks.t1y(r), forks.t2y(r), forks.t3y(r)), nth(forks.main(r), forks.t1z(r), forks.t2z(r), forks.t3z(r)))
+function along(r, x, y, z) = cosine(x, y, z, forks.tx(r), forks.ty(r), forks.tz(r))
 # By which angle about z a fork is turned, of that between the headings where it was traced and here (Trace turns as much).
 function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 + y^2)) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
 # The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
 function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
   min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
+# A stem's direction turned about z.
+function swayed_x(angle, x, y) = cos(angle) * x - sin(angle) * y
+function swayed_y(angle, x, y) = sin(angle) * x + cos(angle) * y
+# How many times thicker this neuron is than the one whose stems it has, as the neuron is whose diameters it has.
+distribution thicker(kind) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(me, kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
@@ -64,23 +75,26 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), q = footings(kind, thin_as, log(tips), log(max(0.05, plans.length(p)))), d = footings.d(q), x = plans.hx(p), y = plans.hy(p), z = plans.hz(p),
-    away = ahead / max(1, plans.ahead(p)), r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), thick = thicker(kind), d = thick * plans.d(p),
+    sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
+    bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
+    ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
+    r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
     scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = away * plans.tx(p) - plans.x(p) - scale * stems.tx(r), ey = away * plans.ty(p) - plans.y(p) - scale * stems.ty(r),
-    ez = away * plans.tz(p) - plans.z(p) - scale * stems.tz(r), part = steer * drawn(length, beyond, ex, ey, ez) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), q, 1, 0, part * ex, part * ey, part * ez)
-       Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d,
-         away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+    ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - scale * stems.tz(r),
+    part = steer * drawn(length, beyond, ex, ey, ez) }
+  -> [ Kind(kind) At(bx, by, plans.z(p)) Head(x, y, z)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez)
+       Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
   { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
     ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
-    away = ahead / max(1, plans.ahead(p)), d = footings.d(footings(kind, thin_as, log(tips), log(0.05))) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
-       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind) * plans.d(p), sway = normal(0, sways(kind)) }
+  -> [ Kind(kind) At(swayed_x(sway, plans.x(p), plans.y(p)), swayed_y(sway, plans.x(p), plans.y(p)), plans.z(p))
+       Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
+       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * swayed_x(sway, plans.tx(p), plans.ty(p)), away * swayed_y(sway, plans.tx(p), plans.ty(p)), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 planned: Plan(i) ->
 
@@ -120,11 +134,13 @@ three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az
 limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
   { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
-    m = if(mirror, -1, 1), main = i == forks.main(r),
-    tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
+    m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
     gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
-    wx = if(main, ax, gx), wy = if(main, ay, gy), wz = if(main, az, max(cells.low(me), min(cells.high(me), gz))),
+    mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
+    wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
+    wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
+    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - scale * forks.tz(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
@@ -150,7 +166,6 @@ class Writer {
     alike();
     plans();
     stems();
-    footings();
     forks();
     calibres();
     productions();
@@ -288,16 +303,16 @@ class Writer {
     put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the "
         "diameter are logarithms; heading and\n"
         "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
-        "lengths, paths beyond their ends.\n"
+        "lengths, paths beyond their ends, and whither the middle of their tips is, and of all.\n"
         "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
         "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
-        "  -> donor, ux, uy, daughters, turned, main, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
+        "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
         "next2, "
         "next3, "
-        "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z) =",
+        "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
         options_.lean, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
@@ -310,8 +325,8 @@ class Writer {
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
-          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.main, f.tips,
+      put(" -> {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
+          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.tips,
           rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
@@ -326,20 +341,10 @@ class Writer {
         put(" ");
         vector(i < f.daughters.size() ? f.daughters[i].aim : Vec3(Vec3::Zero()), 10.);
       }
+      put(" ");
+      vector(f.middle(), 10.);
       for (const Fork::Daughter& d : f.daughters) trace(f.heading, f.last_step, d.points);
     }
-  }
-
-  void footings() {
-    put("\n\n# The same stems, row by row, asked by how thick they are: the diameter where they end, µm.\n"
-        "sample footings(kind =, cell ~ 0.1, tips ~ 0.25, length ~ 0.5 -> d) =");
-    bool first = true;
-    for (const Cell& c : traced_.cells)
-      for (const Stem& s : c.stems) {
-        row(std::exchange(first, false));
-        put("{} {} {} {} -> {}", s.kind, s.cell, logarithm(s.tips), logarithm(s.length),
-            rounded(s.end_diameter, 1e3));
-      }
   }
 
   void calibres() {
@@ -347,7 +352,7 @@ class Writer {
         "and its daughters end, µm.\n"
         "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.25, first ~ 0.15, ahead ~ 0.4, l1 ~ 0.5, "
         "l2 ~ 0.5, d "
-        "~ 0.08\n"
+        "~ 0.14\n"
         "  -> d, d1, d2, d3) =");
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
@@ -369,29 +374,37 @@ class Writer {
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), options_.smoothing, kept());
-    for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}}) {
+    for (const auto& [name, style] :
+         {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
         bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
+    put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
+        "the ways to the middle of their tips differ in the plane of the slice.\n");
+    std::vector<std::string> bins;
+    for (const auto& [kind, spread] : directions())
+      bins.push_back(fmt::format("{}: {:.3g}", kind, options_.sway * spread));
+    put("table sways = {}\n", fmt::join(bins, ", "));
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
       style += fmt::format(
           fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
                                                    : ", own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
           style_names[i]);
-    put("#define agreed 0.85  # the least cosine between the ways to their farthest tips, for that\n"
+    put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
         "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
-        "#define steer 0.5   # how far branches are drawn to where their farthest tip should be\n"
+        "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
+        "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
-        "#define jitter 0.05  # of the logarithms of a stem's tips and of the path to its farthest\n"
+        "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
-        options_.familiar);
+        options_.familiar, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
@@ -399,6 +412,24 @@ class Writer {
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
     text_ += rest;
+  }
+
+  // How much stems of each kind differ in where the middle of their tips lies, in the plane of the slice: the angle from the
+  // mean, in degrees, that two of three stay below, and at most 100, where they lie all around.
+  std::map<int, double> directions() const {
+    std::map<int, std::vector<Vec2>> ways;
+    for (const Cell& c : traced_.cells)
+      for (const Stem& s : c.stems) ways[s.kind].push_back(s.aim.stableNormalized().head<2>());
+    std::map<int, double> spread;
+    for (const auto& [kind, of] : ways) {
+      const Vec2 mean = std::accumulate(of.begin(), of.end(), Vec2(Vec2::Zero()));
+      std::vector<double> angles;
+      for (const Vec2& way : of)
+        angles.push_back(
+            std::abs(std::atan2(double(mean.x() * way.y() - mean.y() * way.x()), double(mean.dot(way)))));
+      spread[kind] = std::min(100., statistics::quantile(angles, .68) * 180. / std::numbers::pi);
+    }
+    return spread;
   }
 
   // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.

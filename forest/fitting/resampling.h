@@ -5,9 +5,10 @@
 //
 // - a branch carries the tips that it is still to have, which its daughters share (Samsonovich & Ascoli 2005, Hippocampus
 //   15:166): a tree neither dies out nor explodes;
-// - a fork is drawn with its daughters, by kind, tips, path distance, order, diameter, heading and the way to its farthest
-//   tip; after three branches of one neuron the next fork comes from another;
-// - branches are drawn a little aside to where their farthest tip should be, within the faces of the slice;
+// - a fork is drawn with its daughters, by kind, tips, path distance, order, diameter, heading and the way to the middle of
+//   its tips; after three branches of one neuron the next fork comes from another;
+// - branches are drawn a little aside, so that the middle of their tips comes to where it should be, within the faces of the
+//   slice; daughters bear this together, so that a tuft stays over its trunk;
 // - a neuron has a style of its own, how long, winding, thick, finely and steeply traced its branches are, and forks of
 //   neurons of a like style are drawn for it: else neurons would be more alike than traced ones.
 #pragma once
@@ -27,13 +28,16 @@ struct Resampling {
   double path = 1., order = 2., diameter = .5, height = .6,
          depth = .2;                          // in standard deviations among the forks of a kind
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
-  double aim = .25, aim_across = .15;         // of the unit vector to the farthest tip: likewise
+  double aim = .25, aim_across = .15;         // of the unit vector to the middle of the tips: likewise
   double lean = .12;                          // of how far aside of the way out it heads
   double style = .45;                         // in standard deviations among the neurons
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
   double familiar = .5;    // how often a fork may come from the neuron whose stems these are
   double smoothing = 1.2;  // of a neuron's style: 0 takes that of a traced neuron as it is
-  std::size_t kin = 4;     // neurons alike, by whose differences it is changed
+  double sway =
+      .2;  // of a stem's direction, in shares of how much directions differ in the plane of the slice
+  double jitter = .1;   // of the logarithms of a stem's tips and reach
+  std::size_t kin = 4;  // neurons alike, by whose differences it is changed
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.

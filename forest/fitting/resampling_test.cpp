@@ -100,23 +100,136 @@ TEST(Resampling, TakesThreeBranchesInARowFromOneNeuronAtMost) {
   }
 }
 
+// Where the first stem leaves, from the soma.
+std::vector<Vec3> first_stems(std::span<const Morphology> neurons) {
+  std::vector<Vec3> places;
+  for (const Morphology& n : neurons) {
+    const Point first = n.points(n.roots()[0]).front(), soma = n.soma().sphere();
+    places.push_back(first.position() - soma.position());
+  }
+  return places;
+}
+
 TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
   const std::vector<Morphology> models = traced(12);
-  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
-  const auto stems = [](std::span<const Morphology> neurons) {
-    std::vector<Vec3> places;
-    for (const Morphology& n : neurons) {
-      const Point first = n.points(n.roots()[0]).front(), soma = n.soma().sphere();
-      places.push_back(first.position() - soma.position());
-    }
-    return places;
-  };
-  const std::vector<Vec3> theirs = stems(models), grown = stems(lsystem::grow_population(grammar, 24, 5));
+  const lsystem::Grammar grammar =
+      lsystem::parse(resampling_grammar(models, "t", Resampling{.sway = 0.}), "t");
+  const std::vector<Vec3> theirs = first_stems(models),
+                          grown = first_stems(lsystem::grow_population(grammar, 24, 5));
   for (const Vec3& place : theirs)
     for (std::size_t half : {0, 12})
       EXPECT_EQ(std::ranges::count_if(std::span(grown).subspan(half, 12),
                                       [&](const Vec3& g) { return (g - place).norm() < .02f; }),
                 1);
+}
+
+// Neurons of one stem each, which heads up, right or left, at another height.
+TEST(Resampling, StemsTurnAboutTheLineAcrossTheSliceByAShareOfHowMuchTheyDiffer) {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 9; ++i) {
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const double angle = (double(i % 3) - 1.) * .7;
+    const auto at = [&](double way, double turn) {
+      return Point{float(way * std::sin(angle + turn)), float(way * std::cos(angle + turn)), float(i), .5f};
+    };
+    const SectionId root =
+        builder.add_section({}, SectionKind::basal, std::array{at(5., 0.), at(30. + double(i), 0.)});
+    for (const double side : {-.3, .4})
+      builder.add_section(root, SectionKind::basal,
+                          std::array{at(30. + double(i), 0.), at(70. + double(i), side)});
+    models.push_back(builder.build());
+  }
+  const double spread = .7;  // two of three differ as much from the mean of all
+  for (const double sway : {.1, .3}) {
+    const lsystem::Grammar grammar =
+        lsystem::parse(resampling_grammar(models, "t", Resampling{.sway = sway}), "t");
+    const std::vector<Vec3> grown = first_stems(lsystem::grow_population(grammar, 900, 5));
+    double squares = 0.;
+    for (const Vec3& g : grown) {
+      EXPECT_NEAR(g.head<2>().norm(), 5., .02);
+      const double was = (double(std::lround(g.z()) % 3) - 1.) * .7;
+      squares += std::pow(std::atan2(double(g.x()), double(g.y())) - was, 2);
+    }
+    EXPECT_NEAR(std::sqrt(squares / 900.), sway * spread, .12 * sway * spread);
+  }
+}
+
+// A trunk with twigs and a tuft, which lean to one side, another in each; the longest branch of the tuft goes to any side.
+std::vector<Morphology> tufted(std::size_t count) {
+  const lsystem::Grammar grammar = lsystem::parse(R"(
+steps: 40
+module Trunk(n), Long(n)
+cell side = if(chance(0.5), 1, -1)
+cell far = uniform(4, 8)
+cell lean = uniform(-25, 25)
+axiom: Soma(uniform(10, 20)) Apical f(10) !(2) +(lean) Trunk(0)
+up: Trunk(n) : n < 10 -> &(normal(0, 3)) +(normal(0, 8)) F(20) [ +(if(chance(0.5), 60, -60)) F(uniform(20, 40)) ] +(normal(0, 8)) Trunk(n + 1)
+top: Trunk(n) -> [ +(50 * side) Long(0) ] -(uniform(15, 35) * side) F(20) [ -(30 * side) F(40) ] [ +(5) F(60) ] -(10 * side) F(20) [ +(15) F(30) ] -(20 * side) F(50)
+out: Long(n) : n < far -> +(normal(0, 5)) F(15) Long(n + 1)
+)",
+                                                  "tufted");
+  return lsystem::grow_population(grammar, count, 4);
+}
+
+// How far aside of the soma the tips are in the mean.
+double aside(const Morphology& n) {
+  double sum = 0., count = 0.;
+  for (std::uint32_t i = 0; i < n.sections().size(); ++i)
+    if (n.is_terminal(SectionId(i)))
+      sum += double(n.points(SectionId(i)).back().x - n.soma().sphere().x), count += 1.;
+  return sum / count;
+}
+
+TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) {
+  const std::vector<Morphology> models = tufted(40);
+  const std::string text = resampling_grammar(models, "t", Resampling{.sway = 0.});
+  // How far grown neurons miss: the root of the mean square.
+  const auto missed = [&](const std::string& grammar) {
+    double sum = 0.;
+    for (const Morphology& grown : lsystem::grow_population(lsystem::parse(grammar, "t"), 200, 3)) {
+      const auto same = std::ranges::min_element(models, {}, [&](const Morphology& m) {
+        return std::abs(m.soma().sphere().radius - grown.soma().sphere().radius);
+      });
+      sum += std::pow(aside(grown) - aside(*same), 2);
+    }
+    return std::sqrt(sum / 200.);
+  };
+  std::string astray = text;
+  astray.replace(astray.find("#define steer 0.35"), 18, "#define steer 0   ");
+  EXPECT_LT(missed(text), .7 * missed(astray));
+}
+
+// Stems of one neuron are thick and thin, and some neurons are thicker all over.
+TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 10; ++i) {
+    Random random(5, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const double thick = random.uniform(.5, 1.5);
+    for (int stem = 0; stem < 4; ++stem) {
+      const double angle = 1.5 * stem + .1 * random.normal();
+      const auto at = [&](double way, double turn) {
+        return Point{float(way * std::cos(angle + turn)), float(way * std::sin(angle + turn)),
+                     float(random.normal()), float(thick * (stem % 2 ? 1.5 : .5))};
+      };
+      const Point fork = at(40. + 5. * random.normal(), 0.);
+      const SectionId root =
+          builder.add_section({}, SectionKind::basal, std::array{at(5., 0.), at(20., .1), fork});
+      for (const double side : {-.3, .4})
+        builder.add_section(root, SectionKind::basal, std::array{fork, at(90. + 5. * random.normal(), side)});
+    }
+    models.push_back(builder.build());
+  }
+  const auto differ = [](std::span<const Morphology> neurons) {
+    const statistics::Metric& radii = *statistics::find_metric("trunk_origin_radii");
+    double sum = 0.;
+    for (const Morphology& n : neurons) sum += statistics::summarize(radii.values(Arbors(n))).sd;
+    return sum / double(neurons.size());
+  };
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  EXPECT_NEAR(differ(lsystem::grow_population(grammar, 100, 1)), differ(models), .1 * differ(models));
 }
 
 // Two arbors that fork in their first point, where they leave the soma, and one that does not.

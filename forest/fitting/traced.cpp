@@ -70,8 +70,8 @@ struct Learner {
   std::span<const Branch> all = arbors.sections();
   std::vector<double> beyond =
       std::vector<double>(all.size(), 0.);  // path from a section's end to its farthest tip
-  std::vector<int> fork_at = std::vector<int>(all.size(), none);  // its number among all forks
-  std::vector<Vec3> farthest = std::vector<Vec3>(all.size());     // that tip
+  std::vector<int> fork_at = std::vector<int>(all.size(), none);           // its number among all forks
+  std::vector<Vec3> middle = std::vector<Vec3>(all.size(), Vec3::Zero());  // of all its tips
   std::vector<std::vector<std::uint32_t>> daughters = std::vector<std::vector<std::uint32_t>>(all.size());
   std::vector<std::uint32_t> stems = std::vector<std::uint32_t>(all.size());  // that sections grow from
   std::vector<double> tips = std::vector<double>(all.size(), 0.);
@@ -97,18 +97,15 @@ struct Learner {
     return !daughters[i].empty() && daughters[i].size() <= most_daughters &&
            std::ranges::all_of(daughters[i], [&](std::uint32_t d) { return drawn(d); });
   }
-  // From its end to the farthest tip.
-  Vec3 ahead_of(std::uint32_t i) const { return (farthest[i] - points(i).back().position()).normalized(); }
+  // From its end to the middle of its tips.
+  Vec3 ahead_of(std::uint32_t i) const { return (middle[i] - points(i).back().position()).normalized(); }
   std::vector<Point> copy(std::uint32_t i) const { return {points(i).begin(), points(i).end()}; }
 
   void learn() {
-    for (std::uint32_t i = 0; i < all.size(); ++i) farthest[i] = points(i).back().position();
     for (std::size_t i = all.size(); i-- > 0;)
       if (above(i) >= 0) {
-        const auto before = std::size_t(above(i));
-        if (all[i].length + beyond[i] < beyond[before]) continue;
-        beyond[before] = all[i].length + beyond[i];
-        farthest[before] = farthest[i];
+        double& before = beyond[std::size_t(above(i))];
+        before = std::max(before, all[i].length + beyond[i]);
       }
     for (std::uint32_t i = 0; i < all.size(); ++i)
       if (above(i) >= 0) daughters[std::size_t(above(i))].push_back(i);
@@ -116,8 +113,12 @@ struct Learner {
       if (learned(i)) fork_at[i] = int(row++);
     for (std::uint32_t i = 0; i < all.size(); ++i) stems[i] = above(i) < 0 ? i : stems[std::size_t(above(i))];
     for (std::size_t i = all.size(); i-- > 0;) {
-      if (daughters[i].empty()) tips[i] = 1.;
-      if (above(i) >= 0) tips[std::size_t(above(i))] += tips[i];
+      if (daughters[i].empty()) tips[i] = 1., middle[i] = points(std::uint32_t(i)).back().position();
+      if (above(i) >= 0) {
+        const auto before = std::size_t(above(i));
+        tips[before] += tips[i];
+        middle[before] += float(tips[i] / tips[before]) * (middle[i] - middle[before]);
+      }
     }
     Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
     if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
@@ -144,7 +145,7 @@ struct Learner {
             .end_diameter = diameter_of(points(i).back()),
             .place = points(i).front().position() - soma,
             .heading = bud(i) ? ahead_of(i) : start_heading(points(i)),
-            .aim = farthest[i] - soma,
+            .aim = middle[i] - soma,
             .points = bud(i) ? std::vector<Point>(2, points(i).front()) : copy(i),
             .next = fork_at[i]};
   }
@@ -171,14 +172,11 @@ struct Learner {
                                 .ahead = beyond[d],
                                 .length = all[d].length,
                                 .end_diameter = diameter_of(points(d).back()),
-                                .aim = farthest[d] - points(i).back().position(),
+                                .aim = middle[d] - points(i).back().position(),
                                 .points = copy(d),
                                 .next = fork_at[d]});
     fork.turned = fork.daughters.front().tips > fork.daughters.back().tips;
     std::ranges::stable_sort(fork.daughters, {}, &Fork::Daughter::tips);
-    fork.main = std::size_t(
-        std::ranges::max_element(fork.daughters, {}, [](const auto& d) { return d.length + d.ahead; }) -
-        fork.daughters.begin());
     return fork;
   }
 

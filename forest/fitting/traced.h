@@ -36,7 +36,7 @@ struct Stem {
   int kind;
   double tips, ahead, length, end_diameter;  // ahead: path from its beginning to the farthest tip, µm
   Vec3 place, heading;                       // of its beginning, from the soma's centre
-  Vec3 aim;                                  // its farthest tip, from there
+  Vec3 aim;                                  // the middle of its tips, from there
   std::vector<Point> points;
   int next = none;  // the fork at its end
 };
@@ -46,7 +46,7 @@ struct Fork {
   int kind;
   double tips, ahead, path, order, diameter;  // of the branch that ends here; ahead: to its farthest tip, µm
   double side, height, depth;                 // from the soma: across, above and before it, µm
-  Vec3 heading, aim;                          // aim: unit, towards the farthest tip
+  Vec3 heading, aim;                          // aim: unit, towards the middle of its tips
   Vec3 last_step;                             // unit: of the branch that ends here
   // How far to the right of the way out from the soma it heads, in the plane of the slice.
   double lean() const {
@@ -55,13 +55,19 @@ struct Fork {
   }
   struct Daughter {
     double tips, ahead, length, end_diameter;
-    Vec3 aim;  // its farthest tip, from the fork
+    Vec3 aim;  // the middle of its tips, from the fork
     std::vector<Point> points;
     int next = none;  // the fork at its end
   };
   std::vector<Daughter> daughters;  // fewest tips first
-  std::size_t main = 0;             // the daughter with the farthest tip
-  bool turned = false;              // … though the one with more came first
+  // Of all its tips, from the fork.
+  Vec3 middle() const {
+    Vec3 sum = Vec3::Zero();
+    double count = 0.;
+    for (const Daughter& d : daughters) sum += float(d.tips) * d.aim, count += d.tips;
+    return sum / float(count);
+  }
+  bool turned = false;  // … though the one with more came first
 };
 
 // What is true of one kind of section of a neuron.
