@@ -205,18 +205,26 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   fit_faces(cortex.elements, outer_tree, inner_tree);
   // The few that are badly shaped still may take room from others and leave a creased surface farther.
-  improve_shapes(cortex.elements, outer_tree, inner_tree,
-                 {.enough = .36,
-                  .wanted = .5,
-                  .volume = options.volume,
-                  .least = .6,
-                  .most = 1.6,
-                  .even = 1.,
-                  .along = 1600.,
-                  .off = 100.,
-                  .rounds = 4,
-                  .iterations = 400},
-                 progress);
+  const Shaping last{.enough = .36,
+                     .wanted = .5,
+                     .volume = options.volume,
+                     .least = .6,
+                     .most = 1.6,
+                     .even = 1.,
+                     .along = 1600.,
+                     .off = 100.,
+                     .rounds = 4,
+                     .iterations = 400};
+  improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
+  // A heap that is tangled still begins anew, where that leaves less of it.
+  for (const int rings : {2, 1, 3}) {
+    const auto tangled = uncertified(cortex.elements);
+    if (tangled.empty()) break;
+    const std::vector<Depths> before = cortex.elements.curves;
+    even_out(cortex.elements, tangled, rings);
+    improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
+    if (uncertified(cortex.elements).size() >= tangled.size()) cortex.elements.curves = before;
+  }
   constexpr double least_jacobian = .2;
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;

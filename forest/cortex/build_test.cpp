@@ -114,6 +114,26 @@ TEST_F(Shell, ACoarserRibbonIsTheOneOfTheTrianglesBeforeTheyWereHalved) {
   EXPECT_EQ(coarser(before).triangles, before.triangles);
 }
 
+TEST_F(Shell, WhatIsTangledBeginsAnewAndTheRestStays) {
+  Elements elements = made().cortex.elements;
+  const std::vector<Depths> before = elements.curves;
+  even_out(elements, {}, 2);
+  EXPECT_EQ(elements.curves, before);
+  for (const std::uint32_t e : {7u, 450u}) {
+    elements.curves = before;
+    const auto corners = elements.corners_of(e);
+    std::swap(elements.curves[corners[0]], elements.curves[corners[3]]);
+    const auto tangled = uncertified(elements);
+    ASSERT_GT(tangled.size(), 2u);
+    even_out(elements, tangled, 2);
+    EXPECT_TRUE(uncertified(elements).empty()) << e;
+    std::size_t moved = 0;
+    for (std::size_t c = 0; c < before.size(); ++c) moved += elements.curves[c] != before[c];
+    EXPECT_GT(moved, 100u);
+    EXPECT_LT(moved, before.size() / 3);
+  }
+}
+
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   const Cortex& cortex = made().cortex;
   const TriangleTree outer_tree(outer);

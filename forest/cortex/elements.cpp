@@ -426,6 +426,64 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
   return result;
 }
 
+void even_out(Elements& elements, std::span<const std::uint32_t> tangled, int rings) {
+  constexpr int rounds = 300;
+  std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
+  for (std::uint32_t e = 0; e < elements.size(); ++e)
+    for (const std::uint32_t c : elements.elements[e]) of[c].push_back(e);
+  std::vector<std::uint32_t> heap(tangled.begin(), tangled.end());
+  std::vector<std::uint8_t> in_heap(elements.size(), 0);
+  for (int ring = 0; ring < rings; ++ring) {
+    std::vector<std::uint32_t> wide;
+    for (const std::uint32_t e : heap)
+      for (const std::uint32_t c : elements.corners_of(e))
+        wide.insert(wide.end(), of[c].begin(), of[c].end());
+    heap = distinct(std::move(wide));
+  }
+  for (const std::uint32_t e : heap) in_heap[e] = 1;
+  const std::vector<std::uint8_t> rim = by_the_wall(elements);
+  const auto inside = [&](std::uint32_t c) {
+    return std::ranges::all_of(of[c], [&](std::uint32_t e) { return in_heap[e] != 0; });
+  };
+  std::vector<std::uint32_t> corners;
+  for (const std::uint32_t e : heap)
+    for (const std::uint32_t c : elements.corners_of(e))
+      if (!rim[c] && inside(c)) corners.push_back(c);
+  corners = distinct(std::move(corners));
+  std::vector<std::vector<std::uint32_t>> near(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (const std::uint32_t e : of[corners[i]])
+      for (const auto& side : sides) {
+        const std::uint32_t a = elements.elements[e][side[0]], b = elements.elements[e][side[3]];
+        if (a == corners[i]) near[i].push_back(b);
+        if (b == corners[i]) near[i].push_back(a);
+      }
+    near[i] = distinct(std::move(near[i]));
+  }
+  for (int round = 0; round < rounds; ++round)
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      for (std::size_t d = 0; d < 4; ++d) {
+        Place sum = Place::Zero();
+        for (const std::uint32_t c : near[i]) sum += elements.curves[c][d];
+        elements.curves[corners[i]][d] = sum / double(near[i].size());
+      }
+  for (const std::uint32_t e : heap) {
+    const auto& own = elements.elements[e];
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const std::uint32_t c = own[slot(i, j)];
+        const bool corner = i % 3 == 0 && j % 3 == 0, middle = i % 3 != 0 && j % 3 != 0;
+        if (corner || (!middle && (of[c].size() < 2 || !inside(c)))) continue;
+        const double u = i / 3., v = j / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          elements.curves[c][d] =
+              (1. - v) *
+                  ((1. - u) * elements.curves[own[slot(0, 0)]][d] + u * elements.curves[own[slot(3, 0)]][d]) +
+              v * ((1. - u) * elements.curves[own[slot(0, 3)]][d] + u * elements.curves[own[slot(3, 3)]][d]);
+      }
+  }
+}
+
 LeftOut leave_out(Elements& elements, double least) {
   constexpr double no_tissue = 400.;  // µm: cortex is nowhere so thin
   LeftOut result;

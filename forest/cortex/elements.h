@@ -65,6 +65,10 @@ struct LeftOut {
   std::size_t elements = 0;
   double volume = 0.;  // µm³
 };
+/// What stays tangled although it was mended begins anew: within so many rings of elements around it, every corner lies in the
+/// middle of its neighbours, off the surfaces, and sides are straight; the rim stays. A start for shaping.
+void even_out(Elements& elements, std::span<const std::uint32_t> tangled, int rings);
+
 /// By the wall, where the surfaces meet at an edge, there may be no room for an element, and none where they touch: elements
 /// there that are not valid, or whose scaled Jacobian is less than `least` somewhere, go to the wall.
 LeftOut leave_out(Elements& elements, double least);
