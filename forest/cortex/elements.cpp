@@ -23,6 +23,24 @@ std::vector<std::uint32_t> distinct(std::vector<std::uint32_t> list) {
   return list;
 }
 
+// Of every curve the elements that it belongs to.
+using Owners = std::vector<std::vector<std::uint32_t>>;
+Owners owners_of(const Elements& elements) {
+  Owners of(elements.curves.size());
+  for (std::uint32_t e = 0; e < elements.size(); ++e)
+    for (const std::uint32_t c : elements.elements[e]) of[c].push_back(e);
+  return of;
+}
+
+// Some elements, with all that share a corner with them.
+std::vector<std::uint32_t> widened(const Elements& elements, const Owners& of,
+                                   std::span<const std::uint32_t> list) {
+  std::vector<std::uint32_t> wide;
+  for (const std::uint32_t e : list)
+    for (const std::uint32_t c : elements.corners_of(e)) wide.insert(wide.end(), of[c].begin(), of[c].end());
+  return distinct(std::move(wide));
+}
+
 // A cubic through four places swings widely where they zigzag: what the two inner ones deviate from the straight way in
 // opposite directions comes out four and a half times as large in its control points, three times as much as what they deviate
 // alike. A third of it is kept, which makes no difference on a smooth surface and some µm at a crease.
@@ -263,9 +281,7 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
   constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
   constexpr double farthest_way = 1e3;  // µm
   Mending result;
-  std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
-  for (std::uint32_t e = 0; e < elements.size(); ++e)
-    for (const std::uint32_t c : elements.elements[e]) of[c].push_back(e);
+  const Owners of = owners_of(elements);
   const std::vector<Depths> before = elements.curves;
   std::vector<std::uint8_t> moved(elements.curves.size(), 0);
   progress.begin("untangling", 0);
@@ -308,13 +324,7 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
         moved[e[slot(i, j)]] = 1;
       }
   };
-  const auto spread = [&](const std::vector<std::uint32_t>& list) {  // with all that shares a corner
-    std::vector<std::uint32_t> wide;
-    for (const std::uint32_t e : list)
-      for (const std::uint32_t c : elements.corners_of(e))
-        wide.insert(wide.end(), of[c].begin(), of[c].end());
-    return distinct(std::move(wide));
-  };
+  const auto spread = [&](std::span<const std::uint32_t> list) { return widened(elements, of, list); };
   for (int round = 0; round < rounds_of_sides && !bad.empty(); ++round) {
     for (const std::uint32_t e : bad) straighten(e);
     bad = uncertified(elements, spread(bad));
@@ -428,18 +438,10 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
 
 void even_out(Elements& elements, std::span<const std::uint32_t> tangled, int rings) {
   constexpr int rounds = 300;
-  std::vector<std::vector<std::uint32_t>> of(elements.curves.size());  // elements of a curve
-  for (std::uint32_t e = 0; e < elements.size(); ++e)
-    for (const std::uint32_t c : elements.elements[e]) of[c].push_back(e);
+  const Owners of = owners_of(elements);
   std::vector<std::uint32_t> heap(tangled.begin(), tangled.end());
   std::vector<std::uint8_t> in_heap(elements.size(), 0);
-  for (int ring = 0; ring < rings; ++ring) {
-    std::vector<std::uint32_t> wide;
-    for (const std::uint32_t e : heap)
-      for (const std::uint32_t c : elements.corners_of(e))
-        wide.insert(wide.end(), of[c].begin(), of[c].end());
-    heap = distinct(std::move(wide));
-  }
+  for (int ring = 0; ring < rings; ++ring) heap = widened(elements, of, heap);
   for (const std::uint32_t e : heap) in_heap[e] = 1;
   const std::vector<std::uint8_t> rim = by_the_wall(elements);
   const auto inside = [&](std::uint32_t c) {

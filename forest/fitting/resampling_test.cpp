@@ -200,6 +200,11 @@ TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) 
   EXPECT_LT(missed(text), .7 * missed(astray));
 }
 
+// A point so far from the soma in a direction around z, a little above or below.
+Point away(double way, double angle, double radius, Random& random) {
+  return {float(way * std::cos(angle)), float(way * std::sin(angle)), float(random.normal()), float(radius)};
+}
+
 // Stems of one neuron are thick and thin, and some neurons are thicker all over.
 TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
   std::vector<Morphology> models;
@@ -211,8 +216,7 @@ TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
     for (int stem = 0; stem < 4; ++stem) {
       const double angle = 1.5 * stem + .1 * random.normal();
       const auto at = [&](double way, double turn) {
-        return Point{float(way * std::cos(angle + turn)), float(way * std::sin(angle + turn)),
-                     float(random.normal()), float(thick * (stem % 2 ? 1.5 : .5))};
+        return away(way, angle + turn, thick * (stem % 2 ? 1.5 : .5), random);
       };
       const Point fork = at(40. + 5. * random.normal(), 0.);
       const SectionId root =
@@ -241,10 +245,7 @@ TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
     builder.set_soma(zoo_parts::sphere(5));
     for (int stem = 0; stem < 3; ++stem) {
       const double angle = 2. * stem + .1 * random.normal();
-      const auto at = [&](double way, double turn) {
-        return Point{float(way * std::cos(angle + turn)), float(way * std::sin(angle + turn)),
-                     float(random.normal()), .5f};
-      };
+      const auto at = [&](double way, double turn) { return away(way, angle + turn, .5, random); };
       const Point first = at(5., 0.), fork = stem ? first : at(25., 0.);
       const SectionId root = stem ? builder.add_section({}, SectionKind::basal, std::array{first})
                                   : builder.add_section({}, SectionKind::basal, std::array{first, fork});
