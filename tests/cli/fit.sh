@@ -12,7 +12,14 @@ import json
 fit = json.load(open("fit.json"))
 assert fit["neurons"] == 12 and fit["samples"]["cells"] == 12, fit
 assert fit["samples"]["forks"] > 100, fit
+calibration = fit["calibration"]
+assert calibration["gap_after"] <= calibration["gap_before"], fit
+assert (calibration["rounds"] > 0) == (calibration["tastes"] > 0) == (calibration["candidates"] == 4), fit
 PY
+# Without a taste the grammar is the same but for what says the taste.
+$BRAINFOREST fit traced -o like_them_plain.lsys --no-calibrate >/dev/null
+! grep -q '^taste' like_them_plain.lsys
+head -c "$(stat -c %s like_them_plain.lsys)" like_them.lsys | cmp - like_them_plain.lsys
 $BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out one --threads 1 >/dev/null
 $BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out two --threads 2 >/dev/null
 diff -r one two
