@@ -27,7 +27,7 @@ struct Options {
   std::filesystem::path out;
   fitting::Resampling resampling;
   fitting::Calibration calibration;
-  bool force = false, uncalibrated = false;
+  bool force = false, calibrate = false;
 };
 
 std::vector<std::uint32_t> slices_of(const Sample& sample, const std::string& expression) {
@@ -48,7 +48,7 @@ void run(const Options& options, Console& console) {
   for (const std::string& word : options.kinds)
     resampling.kinds = resampling.kinds | statistics::kind_set(word);
   fitting::Calibration calibration = options.calibration;
-  if (options.uncalibrated) calibration.candidates = 1;
+  if (!options.calibrate) calibration.candidates = 1;
   const fitting::Calibrated fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices),
                                                                  fmt::format("neurons like those of {}", of),
                                                                  resampling, calibration, console.progress());
@@ -117,14 +117,16 @@ std::function<void()> fit(CLI::App& command, Console& console) {
       .add_option("--smoothing", options->resampling.smoothing,
                   "How far a neuron's style may be from that of the traced one whose stems it has")
       ->capture_default_str();
+  CLI::Option* calibrate =
+      command.add_flag("--calibrate", options->calibrate,
+                       "Learn a taste: of some candidates of each neuron one is drawn, by weights from a "
+                       "discriminator of traced and grown ones");
   command
       .add_option("--candidates", options->calibration.candidates,
-                  "How many candidates are grown for each neuron, of which one is drawn by taste")
+                  "How many candidates are grown for each neuron then")
       ->check(CLI::Range(2, 64))
+      ->needs(calibrate)
       ->capture_default_str();
-  command.add_flag(
-      "--no-calibrate", options->uncalibrated,
-      "Learn no taste: grow one candidate, some times as fast, a little less like the traced ones");
   add_slices(command, options->slices);
   add_force(command, options->force);
   return [options, &console] { run(*options, console); };
