@@ -57,7 +57,7 @@ constexpr std::uint32_t third_stream = 0x74687264;  // "thrd"
 /// tracing in a plane has no slope but what rounding makes.
 struct Scale {
   double mean = 0., sd = 0., square_sd = 1.;
-  bool tasted() const { return sd > 1e-3 * std::abs(mean) && sd > 1e-6; }
+  bool tasted() const { return sd > 1e-3 * std::abs(mean) && sd > 1e-4; }
 };
 std::vector<Scale> scales_of(const MatrixXd& traced) {
   std::vector<Scale> scales;

@@ -377,14 +377,19 @@ class Writer {
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), options_.smoothing, kept());
-    for (const auto& [name, style] : {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}, {"slope", slope}}) {
+    for (const auto& [name, style] : {std::pair{"forks", number},
+                                      {"extent", extent},
+                                      {"wander", wander},
+                                      {"girth", girth},
+                                      {"slope", slope}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
         bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
     std::vector<std::string> slopes;
-    for (const auto& [kind, mean] : traced_.means) slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
+    for (const auto& [kind, mean] : traced_.means)
+      slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
     put("table mean_slope = {}\n", fmt::join(slopes, ", "));
     put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
         "the ways to the middle of their tips differ in the plane of the slice.\n");
@@ -404,7 +409,8 @@ class Writer {
         "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
         "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
         "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
-        "#define steep 1     # how much of the difference between its slope and its donor's a branch makes up for\n"
+        "#define steep 1     # how much of the difference between its slope and its donor's a branch makes "
+        "up for\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"

@@ -45,7 +45,8 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep",
+    {"Trace",
+     "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
