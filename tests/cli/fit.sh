@@ -30,7 +30,10 @@ head -c "$(stat -c %s like_them.lsys)" tasting.lsys | cmp - like_them.lsys
 $BRAINFOREST grow --grammar tasting.lsys --count 8 --seed 1 --out tasted_one --threads 1 >/dev/null
 $BRAINFOREST grow --grammar tasting.lsys --count 8 --seed 1 --out tasted_two --threads 2 >/dev/null
 diff -r tasted_one tasted_two
-refuses '--calibrate' $BRAINFOREST fit traced -o no.lsys --candidates 3
+$BRAINFOREST grow --grammar tasting.lsys --count 300 --seed 1 --out whole.cells >/dev/null
+$BRAINFOREST grow --grammar tasting.lsys --count 300 --seed 1 --out parted.cells --threads 1 >/dev/null
+cmp whole.cells parted.cells
+fails_with 2 '--calibrate' $BRAINFOREST fit traced -o no.lsys --candidates 3
 
 # From a repository, under a name.
 $BRAINFOREST fit --repo cells.db --population traced --model like_traced >/dev/null
