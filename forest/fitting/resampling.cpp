@@ -43,6 +43,9 @@ function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
 function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
+# How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
+function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
+function steeper(kind, s, u, v, donor) = max(0.6, min(1.6, (slope(kind, own(styles.slope(s), styles.slope(u), styles.slope(v))) / slope(kind, styles.slope(donor)))^steep))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
 # together take the whole.
@@ -80,11 +83,11 @@ stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
     bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
     ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
     r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
-    scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - scale * stems.tz(r),
+    sz = steeper(kind, s, u, v, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
+    ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(bx, by, plans.z(p)) Head(x, y, z)
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
@@ -136,15 +139,15 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
-    gz = pz + scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
+    sz = steeper(kind, s, u, v, styles(donor, kind)), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
     mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
-    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - scale * forks.tz(r)))),
+    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - sz * scale * forks.tz(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz), 1)
+       part * (wx - gx), part * (wy - gy), part * (wz - gz), 1, sz)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -374,13 +377,20 @@ class Writer {
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), options_.smoothing, kept());
-    for (const auto& [name, style] :
-         {std::pair{"forks", number}, {"extent", extent}, {"wander", wander}, {"girth", girth}}) {
+    for (const auto& [name, style] : {std::pair{"forks", number},
+                                      {"extent", extent},
+                                      {"wander", wander},
+                                      {"girth", girth},
+                                      {"slope", slope}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
         bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
+    std::vector<std::string> slopes;
+    for (const auto& [kind, mean] : traced_.means)
+      slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
+    put("table mean_slope = {}\n", fmt::join(slopes, ", "));
     put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
         "the ways to the middle of their tips differ in the plane of the slice.\n");
     std::vector<std::string> bins;
@@ -399,6 +409,8 @@ class Writer {
         "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
         "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
         "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
+        "#define steep 1     # how much of the difference between its slope and its donor's a branch makes "
+        "up for\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"

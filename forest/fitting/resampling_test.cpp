@@ -68,6 +68,36 @@ TEST(Resampling, GrowsNeuronsLikeTheTracedOnes) {
   EXPECT_LT(spread(grown), 1.6 * spread(models));
 }
 
+// Branches come from many neurons, flat and steep ones; in each neuron they are made as steep as its style says.
+TEST(Resampling, NeuronsDifferInHowSteepTheyAreAsTracedOnesDo) {
+  const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(
+steps: 60
+module Tip(n), Stems(n)
+cell climb = uniform(2, 40)
+axiom: Soma(14) Basal Stems(0)
+stem: Stems(n) : n < 4 -> [ -(90 * n + uniform(-20, 20)) f(7) !(1) F(8) Tip(0) ] Stems(n + 1)
+fork: Tip(n) : n > 1 -> [ +(30) Tip(n + 1) ] -(30) Tip(n + 1) : 0.2
+grow: Tip(n) : n < 8 -> ^(uniform(-climb, climb)) F(8) Tip(n + 1)
+)",
+                                                                                 "steep"),
+                                                                  30, 4);
+  const std::string text = resampling_grammar(models, "steep");
+  std::string evened = text;
+  evened.replace(evened.find("#define steep 1"), 15, "#define steep 0");
+  const auto spread = [](std::span<const Morphology> neurons) {
+    std::vector<double> slopes;
+    for (const Morphology& n : neurons)
+      slopes.push_back(statistics::find_metric("length_fraction_along_z")->values(Arbors(n))[0]);
+    return statistics::summarize(slopes).sd;
+  };
+  const auto grown = [](const std::string& grammar) {
+    return lsystem::grow_population(lsystem::parse(grammar, "fitted"), 90, 1);
+  };
+  EXPECT_GT(spread(grown(text)), .8 * spread(models));
+  EXPECT_LT(spread(grown(text)), 1.25 * spread(models));
+  EXPECT_LT(spread(grown(evened)), .95 * spread(grown(text)));
+}
+
 TEST(Resampling, TheSameNeuronsGiveTheSameText) {
   const std::vector<Morphology> models = traced(6);
   const std::string text = resampling_grammar(models, "t");

@@ -235,7 +235,7 @@ void standardise(Traced& traced) {
       std::vector<double> values;
       for (const Style* style : of) values.push_back((*style)[s]);
       const double mean = statistics::mean(values), sd = statistics::summarize(values).sd;
-      traced.deviations[kind][s] = sd;
+      traced.means[kind][s] = mean, traced.deviations[kind][s] = sd;
       for (Style* style : of) (*style)[s] = sd > 0. ? ((*style)[s] - mean) / sd : 0.;
     }
 }

@@ -89,7 +89,7 @@ struct Cell {
 struct Traced {
   std::vector<Cell> cells;  // that have such sections
   std::vector<Fork> forks;
-  std::map<int, Style> deviations;  // among cells, by kind
+  std::map<int, Style> means, deviations;  // among cells, by kind
 };
 
 Traced learn(std::span<const Morphology> neurons, statistics::KindSet kinds);

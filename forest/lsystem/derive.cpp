@@ -16,7 +16,8 @@ namespace forest::lsystem {
 namespace {
 
 constexpr std::uint32_t none = 0xffffffffu;
-constexpr Symbol blank = 0xffff;  // where a module has vanished
+constexpr Symbol blank = 0xffff;                        // where a module has vanished
+constexpr std::uint32_t candidate_stream = 0x63616e64;  // "cand"
 constexpr auto push_symbol = Symbol(Action::push), pop_symbol = Symbol(Action::pop);
 
 struct Node {
@@ -82,12 +83,13 @@ struct Deriver::State {
     return true;
   }
 
-  void begin(Random& random) {
+  void begin(Random& random, std::uint32_t candidate) {
     nodes.clear(), parameters.clear(), active.clear();
     std::ranges::fill(written, 0);
     run(grammar.cell, slots.data(), {}, grammar.lookups, random, stack.data());
     std::copy_n(slots.begin(), cell.size(), cell.begin());
     for (const Total& t : grammar.totals) cell[t.place] = 0.;
+    if (candidate > 0) random = Random(random.seed(), random.item(), candidate_stream + candidate);
     evaluate(grammar.axiom_values, random);
     if (!append(grammar.axiom))
       throw InputError(grammar.file, 0,
@@ -330,9 +332,10 @@ Deriver::~Deriver() = default;
 Deriver::Deriver(Deriver&&) noexcept = default;
 const cortex::Site& Deriver::site() const { return state_->site; }
 
-const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::optional<int> steps) {
+const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::optional<int> steps,
+                            std::uint32_t candidate) {
   Random random(seed, index);
-  state_->begin(random);
+  state_->begin(random, candidate);
   const int count = steps.value_or(state_->grammar.steps);
   for (int i = 0; i < count && !state_->active.empty(); ++i) {
     if (state_->grammar.queries) state_->answer();
@@ -340,6 +343,26 @@ const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::option
   }
   state_->flatten();
   return state_->word;
+}
+
+double Deriver::liking(const Morphology& neuron) {
+  const Grammar& grammar = state_->grammar;
+  const std::vector<double> features = grammar.tasted.measure(neuron);
+  Random none(0);
+  double sum = 0.;
+  for (std::size_t i = 0; i < features.size(); ++i) {
+    if (std::isnan(features[i])) continue;
+    state_->slots[0] = features[i];
+    const double value = state_->evaluate(grammar.tastes[i].value, none)[-1];
+    if (!std::isfinite(value))
+      throw InputError(
+          grammar.file, grammar.tastes[i].line,
+          fmt::format("how well {} of {} is liked is not a finite number; keep its expression in its "
+                      "domain",
+                      grammar.tastes[i].feature, features[i]));
+    sum += value;
+  }
+  return sum;
 }
 
 Word derive(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, std::optional<int> steps,

@@ -8,6 +8,7 @@
 
 #include "forest/cortex/environment.h"
 #include "forest/lsystem/grammar.h"
+#include "forest/morphology/morphology.h"
 
 namespace forest::lsystem {
 
@@ -24,7 +25,13 @@ class Deriver {
   /// negative.
   /// @param steps  of derivation; the grammar's own when not given. Ends before when nothing is left to
   /// rewrite.
-  const Word& derive(std::uint64_t seed = 0, std::uint64_t index = 0, std::optional<int> steps = {});
+  /// @param candidate  others of the same neuron have the same values that are drawn once a neuron, but grow otherwise
+  const Word& derive(std::uint64_t seed = 0, std::uint64_t index = 0, std::optional<int> steps = {},
+                     std::uint32_t candidate = 0);
+
+  /// How well a grown neuron is liked: the sum of the grammar's tastes, of those features that are defined. It must have been
+  /// derived last, or another candidate of it. Throws Error when a number is not finite.
+  double liking(const Morphology& neuron);
 
   /// Where its neurons grow.
   const cortex::Site& site() const;

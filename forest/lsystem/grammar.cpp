@@ -22,6 +22,7 @@ namespace {
 constexpr std::string_view symbol_marks = "+-&^\\/|$[]!';,.{}~%@?\"`";  // besides letters and digits
 constexpr int deepest = 100;                                            // nested parentheses
 constexpr std::size_t most_parameters = 64;                             // of one module
+constexpr double most_candidates = 64;                                  // of one neuron
 
 // What a name in an expression stands for.
 struct Meaning {
@@ -384,11 +385,12 @@ class Parser {
         {"module", &Parser::modules},    {"cell", &Parser::cell_value},
         {"function", &Parser::function}, {"distribution", &Parser::distribution},
         {"table", &Parser::table},       {"sample", &Parser::sample},
-        {"total", &Parser::total},
+        {"total", &Parser::total},       {"taste", &Parser::taste},
     };
     static constexpr Row settings[] = {
-        {"axiom", &Parser::axiom}, {"title", &Parser::title}, {"steps", &Parser::steps},
-        {"limit", &Parser::limit}, {"angle", &Parser::angle}, {"step", &Parser::step},
+        {"axiom", &Parser::axiom},           {"title", &Parser::title}, {"steps", &Parser::steps},
+        {"limit", &Parser::limit},           {"angle", &Parser::angle}, {"step", &Parser::step},
+        {"candidates", &Parser::candidates},
     };
     const std::size_t place = text_.at();
     const std::string first =
@@ -426,6 +428,10 @@ class Parser {
   void limit() { grammar_.limit = std::size_t(positive("the limit", 1e8, true)); }
   void angle() { grammar_.angle = positive("the angle", 360., false); }
   void step() { grammar_.step = positive("the step", 1e6, false); }
+
+  void candidates() {
+    grammar_.candidates = std::uint32_t(positive("the number of candidates", most_candidates, true));
+  }
 
   double constant() {
     Compiler compiler(text_, meanings_);
@@ -624,6 +630,32 @@ class Parser {
     grammar_.totals.push_back(std::move(total));
   }
 
+  // taste basal contraction sd(x) = -0.5 * ((x - 0.05) / 0.01)^2
+  void taste() {
+    const std::size_t place = (text_.more(), text_.at());
+    Taste taste{.feature = {}, .line = text_.line(), .value = {}};
+    do
+      taste.feature +=
+          (taste.feature.empty() ? "" : " ") + text_.name("of a feature that neurons are liked for");
+    while (!text_.sees("("));
+    try {
+      grammar_.tasted.add(taste.feature);
+    } catch (const Error& error) {
+      text_.fail_at(place, error.what());
+    }
+    text_.expect("(", "after a feature");
+    Compiler compiler(text_, meanings_);
+    compiler.add_slot(text_.name("of the value of the feature"));
+    text_.expect(")", "after the value of the feature");
+    text_.expect("=", "between a feature and how well its value is liked");
+    compiler.expression(taste.value);
+    if (compiler.draws() || compiler.sums())
+      text_.fail_at(place,
+                    "a taste neither draws nor uses totals; say how well the feature's value is liked");
+    note(taste.value, compiler);
+    grammar_.tastes.push_back(std::move(taste));
+  }
+
   void modules() {
     do {
       const std::size_t place = (text_.more(), text_.at());
@@ -786,6 +818,10 @@ class Parser {
   }
 
   void finish() {
+    if (!grammar_.tastes.empty() && grammar_.candidates < 2)
+      text_.fail(
+          "tastes choose among the candidates of a neuron; say how many are grown, for example candidates: "
+          "4");
     grammar_.productions_of.resize(grammar_.symbols.size());
     for (std::size_t i = 0; i < grammar_.productions.size(); ++i)
       grammar_.productions_of[grammar_.productions[i].predecessor.symbol].push_back(std::uint32_t(i));

@@ -19,6 +19,7 @@
 #include <vector>
 
 #include "forest/lsystem/program.h"
+#include "forest/statistics/few_features.h"
 
 namespace forest::lsystem {
 
@@ -67,6 +68,13 @@ struct Total {
   std::size_t place = 0;  // of the first
 };
 
+/// What a neuron is liked for: its score is the sum of these, and of its candidates it is drawn by it (grow.h).
+struct Taste {
+  std::string feature;  // "basal contraction sd", in Grammar::tasted at the same place
+  std::size_t line = 0;
+  Program value;  // finds the feature in slot 0
+};
+
 /// A statement that gives a name to a value, a function, a distribution, a table or a sample.
 struct Declaration {
   std::string name;
@@ -86,6 +94,9 @@ struct Grammar {
   std::vector<Symbol> drawn_as;  // by symbol: the turtle's that it stands for; F_l and its like are F
   Lookups lookups;
   std::vector<Total> totals;
+  std::vector<Taste> tastes;
+  statistics::FewFeatures tasted;
+  std::uint32_t candidates = 1;           // grown for each neuron, of which one is drawn by the tastes
   std::vector<Declaration> declarations;  // in the order of the text
   Program cell;                           // one store a value that is drawn once a neuron
   std::size_t cell_values = 0;

@@ -1,6 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/lsystem/grow.h"
 
+#include <algorithm>
+#include <cmath>
+#include <numeric>
+#include <utility>
+
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
@@ -20,11 +25,35 @@ Annotations source(const Grammar& grammar, std::uint64_t seed, std::uint64_t ind
   return list;
 }
 
+constexpr std::uint32_t choice_stream = 0x70696368;  // "pick"
+
+// The candidate that is drawn, with what it is numbered.
+std::pair<Morphology, std::uint32_t> chosen(Deriver& deriver, const Grammar& grammar, std::uint64_t seed,
+                                            std::uint64_t index) {
+  const Annotations annotations = source(grammar, seed, index, deriver.site());
+  const auto grown = [&](std::uint32_t candidate) {
+    return interpret(deriver.derive(seed, index, {}, candidate), grammar, annotations, deriver.site());
+  };
+  if (grammar.tastes.empty()) return {grown(0), 0};
+  std::vector<Morphology> candidates;
+  std::vector<double> chances;
+  for (std::uint32_t i = 0; i < grammar.candidates; ++i) {
+    candidates.push_back(grown(i));
+    chances.push_back(deriver.liking(candidates.back()));
+  }
+  const double best = std::ranges::max(chances);
+  for (double& chance : chances) chance = std::exp(chance - best);
+  double left =
+      Random(seed, index, choice_stream).uniform() * std::accumulate(chances.begin(), chances.end(), 0.);
+  std::uint32_t at = 0;
+  while (at + 1 < grammar.candidates && (left -= chances[at]) >= 0.) ++at;
+  return {candidates[at], at};
+}
+
 }  // namespace
 
 Morphology grow(Deriver& deriver, const Grammar& grammar, std::uint64_t seed, std::uint64_t index) {
-  return interpret(deriver.derive(seed, index), grammar, source(grammar, seed, index, deriver.site()),
-                   deriver.site());
+  return chosen(deriver, grammar, seed, index).first;
 }
 
 Morphology grow(const Grammar& grammar, std::uint64_t seed, std::uint64_t index, const cortex::Site& site) {
@@ -36,7 +65,8 @@ Morphology grow_to(Deriver& deriver, const Grammar& grammar, std::uint64_t seed,
                    int steps) {
   Annotations annotations = source(grammar, seed, index, deriver.site());
   annotations.emplace_back("step", std::to_string(steps));
-  return interpret(deriver.derive(seed, index, steps), grammar, annotations, deriver.site());
+  const std::uint32_t candidate = grammar.tastes.empty() ? 0 : chosen(deriver, grammar, seed, index).second;
+  return interpret(deriver.derive(seed, index, steps, candidate), grammar, annotations, deriver.site());
 }
 
 std::vector<Morphology> grow_population(const Grammar& grammar, std::size_t count, std::uint64_t seed,

@@ -1,5 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
-// A synthetic neuron is grammar + seed + index, and the site where it grows, when the grammar asks what is there.
+// A synthetic neuron is grammar + seed + index, and the site where it grows, when the grammar asks what is there. Where the grammar
+// has tastes, several candidates of it are grown, and one is drawn with a chance of exp(the sum of what they say of it):
+// exponential tilting of what the productions grow, by resampling of importance (Rubin 1987). They have the same values that are
+// drawn once a neuron, so that cards stay dealt.
 #pragma once
 
 #include <cstdint>

@@ -45,15 +45,16 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::flat, 1, 4},
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
-    {"Trace", "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last",
+    {"Trace",
+     "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
      "times `thickness`, at its end `last`, and no thinner than `thinnest`; its end drawn aside by (x, y, "
      "z), all of it in "
-     "proportion",
-     Action::trace, 3, 14},
+     "proportion; `steep` times as far along z",
+     Action::trace, 3, 15},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -403,7 +404,7 @@ class Turtle {
     const double scale = value(3, 1.), turn_share = value(5, 1.), bent = value(6, 1.),
                  thickness = value(8, 1.), thinnest = value(9, 0.);
     const auto mirror = int(value(4, 0.));
-    const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., mirror & 2 ? -1. : 1.);
+    const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., (mirror & 2 ? -1. : 1.) * value(14, 1.));
     const auto mirrored = [&](const Vec3& v) {
       return Eigen::Vector3d(sides.cwiseProduct(v.cast<double>()));
     };
@@ -429,7 +430,7 @@ class Turtle {
     if (answers_ && free) {
       line_to(place(t.end()) + aside, 0.f);
     } else {
-      if (free && !t.last_step.isZero(0.f)) approach(turn * mirrored(t.last_step));
+      if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       const Course course(t, float(scale));
       const float whole = course.length(), mean_step = whole / float(course.places.size());

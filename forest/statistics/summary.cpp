@@ -87,14 +87,20 @@ double ranked(std::vector<double>& values, std::size_t rank, double low, double 
 
 }  // namespace
 
-Summary summarize(std::span<const double> values) {
+Moments moments(std::span<const double> values) {
   const Sums sums = over(values, add_defined);
   const auto n = std::size_t(sums.counted());
-  if (n == 0) return {0, nan, nan, nan, nan, nan};
+  if (n == 0) return {0, nan, nan};
   const double mean = sums.total() / double(n);
   const double squares = over(values, [&](const double* v, std::size_t count, Sums& s) {
                            add_squares(v, count, mean, s);
                          }).total();
+  return {n, mean, n > 1 ? std::sqrt(squares / double(n - 1)) : 0.};
+}
+
+Summary summarize(std::span<const double> values) {
+  const auto [n, mean, sd] = moments(values);
+  if (n == 0) return {0, nan, nan, nan, nan, nan};
 
   std::vector<double> defined;
   defined.reserve(n);
@@ -106,12 +112,7 @@ Summary summarize(std::span<const double> values) {
   }
   double median = ranked(defined, n / 2, low, high);
   if (n % 2 == 0) median = 0.5 * (median + ranked(defined, n / 2 - 1, low, high));
-  return {.count = n,
-          .mean = mean,
-          .sd = n > 1 ? std::sqrt(squares / double(n - 1)) : 0.,
-          .min = low,
-          .median = median,
-          .max = high};
+  return {.count = n, .mean = mean, .sd = sd, .min = low, .median = median, .max = high};
 }
 
 double mean(std::span<const double> values) {

@@ -16,6 +16,13 @@ struct Summary {
 
 Summary summarize(std::span<const double> values);
 
+/// The first three of them alone, which need no sorting.
+struct Moments {
+  std::size_t count = 0;
+  double mean, sd;
+};
+Moments moments(std::span<const double> values);
+
 /// Of the values that are defined; NaN when there is none. Takes a tenth of the time of all five numbers.
 double mean(std::span<const double> values);
 

@@ -12,10 +12,28 @@ import json
 fit = json.load(open("fit.json"))
 assert fit["neurons"] == 12 and fit["samples"]["cells"] == 12, fit
 assert fit["samples"]["forks"] > 100, fit
+assert fit["calibration"]["tastes"] == 0, fit
 PY
 $BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out one --threads 1 >/dev/null
 $BRAINFOREST grow --grammar like_them.lsys --count 8 --seed 1 --out two --threads 2 >/dev/null
 diff -r one two
+
+# A taste says behind the same grammar which of some candidates are liked; it grows the same on any number of threads.
+$BRAINFOREST fit traced -o tasting.lsys --calibrate --candidates 3 --json >tasting.json
+python3 - <<'PY'
+import json
+calibration = json.load(open("tasting.json"))["calibration"]
+assert calibration["gap_after"] <= calibration["gap_before"], calibration
+assert calibration["rounds"] > 0 and calibration["tastes"] > 20 and calibration["candidates"] == 3, calibration
+PY
+head -c "$(stat -c %s like_them.lsys)" tasting.lsys | cmp - like_them.lsys
+$BRAINFOREST grow --grammar tasting.lsys --count 8 --seed 1 --out tasted_one --threads 1 >/dev/null
+$BRAINFOREST grow --grammar tasting.lsys --count 8 --seed 1 --out tasted_two --threads 2 >/dev/null
+diff -r tasted_one tasted_two
+$BRAINFOREST grow --grammar tasting.lsys --count 300 --seed 1 --out whole.cells >/dev/null
+$BRAINFOREST grow --grammar tasting.lsys --count 300 --seed 1 --out parted.cells --threads 1 >/dev/null
+cmp whole.cells parted.cells
+fails_with 2 '--calibrate' $BRAINFOREST fit traced -o no.lsys --candidates 3
 
 # From a repository, under a name.
 $BRAINFOREST fit --repo cells.db --population traced --model like_traced >/dev/null
