@@ -138,6 +138,19 @@ TEST_F(Shell, AFoldedMiddleIsUnfoldedAndTheRestStays) {
   EXPECT_LT(radius, 150.);  // along the middle, not off it
 }
 
+TEST_F(Shell, ACrumpledSurfaceHasElementsAsEvenAsASmoothOne) {
+  Mesh crumpled = outer;
+  Random random(1, 2, 3);
+  for (Vec3& p : crumpled.positions)
+    if (p.x() > .5 * outside) p += p.normalized() * float(120. * random.normal());
+  const Cortex cortex = build_cortex(crumpled, inner, {.volume = wanted, .spacing = 400.}, Progress::none());
+  const Report r = report(cortex, wanted, nullptr, nullptr, Progress::none());
+  EXPECT_EQ(r.uncertified, 0u);
+  EXPECT_GT(r.volume_within, .995);
+  EXPECT_LT(r.volume_error, .0015);
+  EXPECT_GT(r.jacobian_least, .5);
+}
+
 TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {
   const Ribbon ribbon = make_ribbon(outer, curves, {.edge = 500.}, Progress::none());
   double sum = 0.;

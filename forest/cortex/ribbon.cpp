@@ -199,7 +199,8 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
 
 WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& curves) {
   const Place outer = on(ribbon.outer, ribbon, point), inward = on(ribbon.inner, ribbon, point) - outer;
-  if (auto curve = curves.through(on(ribbon.middle, ribbon, point), inward)) return *std::move(curve);
+  if (auto curve = curves.through(on(ribbon.middle, ribbon, point), inward); curve && curve->arrived)
+    return *std::move(curve);
   return curves.drop(outer, inward);
 }
 

@@ -52,7 +52,7 @@ struct RibbonPoint {
 };
 Place on(const std::vector<Place>& level, const Ribbon& ribbon, const RibbonPoint& point);
 
-/// The curve through a place of the middle, or where the field has no slope there the one from the outer surface.
+/// The curve through a place of the middle, or where that does not arrive at both surfaces the one from the outer surface.
 WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& curves);
 
 /// Finds places on the middle of a ribbon, outside its wall.
