@@ -25,7 +25,7 @@ namespace forest::cli {
 namespace {
 
 struct Options {
-  std::uint32_t neurons = 10000, frames = 60;
+  std::uint32_t neurons = 10000, shapes = usual_shapes, frames = 60;
   std::uint64_t seed = 1;
   std::optional<std::uint32_t> samples;
   double budget = scene::Budget::usual;
@@ -135,7 +135,7 @@ double changing(Artist& artist, const Options& options, scene::View view) {
 
 void run(const Options& options, Console& console) {
   if (!options.out.empty()) std::filesystem::create_directories(options.out);
-  const GrownColumn column = planted_column(options.neurons, options.seed, console);
+  const GrownColumn column = planted_column(options.neurons, options.seed, console, options.shapes);
   const scene::Forest forest =
       scene::Forest::from_bytes(scene::pack(column.circuit, column.neurons, console.progress()));
   const auto start = Clock::now();
@@ -170,7 +170,9 @@ void run(const Options& options, Console& console) {
                         {"gather_ms", p.gather},  {"colour_ms", p.paint}, {"made_up", true}};
     return of;
   };
-  nlohmann::ordered_json json{{"neurons", forest.instances().size()}, {"segments", forest.segment_total()}};
+  nlohmann::ordered_json json{{"neurons", forest.instances().size()},
+                              {"shapes", forest.neurons().size()},
+                              {"segments", forest.segment_total()}};
   json.update(json_of(outside));
   json.update({{"peak_bytes", peak},
                {"first_picture_seconds", first_picture},
@@ -193,8 +195,8 @@ void run(const Options& options, Console& console) {
                                     fmt::format("{:.0f}", p.samples),
                                     fmt::format("{:.1f}", p.error)};
   };
-  console.say(fmt::format("{} neurons, {} segments, {}, {}", forest.instances().size(),
-                          forest.segment_total(), options.size, artist.renderer()));
+  console.say(fmt::format("{} neurons of {} shapes, {} segments, {}, {}", forest.instances().size(),
+                          forest.neurons().size(), forest.segment_total(), options.size, artist.renderer()));
   console.table({"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "samples", "error px"},
                 {row("around the column", outside), row("inside it", inside)});
   if (options.activity) {
@@ -223,6 +225,7 @@ void run(const Options& options, Console& console) {
 std::function<void()> bench_column(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   add_planted(command, options->neurons);
+  add_whole(command, "--shapes", options->shapes, "Distinct neurons among them", 5, 100'000);
   add_whole(command, "--frames", options->frames, "Pictures drawn outside, and as many inside", 2, 100'000);
   must_be_whole(
       *command.add_option("--samples", options->samples, "Samples a pixel, instead of what the budget says"),

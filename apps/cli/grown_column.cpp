@@ -2,6 +2,7 @@
 #include "apps/cli/grown_column.h"
 
 #include <cmath>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -19,9 +20,9 @@ namespace {
 
 struct Share {
   const char* grammar;
-  std::size_t count;
+  std::uint32_t of_five;
 };
-constexpr Share shares[] = {{"pyramidal", 60}, {"purkinje", 20}, {"motoneuron", 20}};
+constexpr Share shares[] = {{"pyramidal", 3}, {"purkinje", 1}, {"motoneuron", 1}};
 
 }  // namespace
 
@@ -30,12 +31,13 @@ void add_planted(CLI::App& command, std::uint32_t& neurons) {
             10'000'000);
 }
 
-GrownColumn planted_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console) {
+GrownColumn planted_column(std::uint32_t neurons_planted, std::uint64_t seed, Console& console,
+                           std::uint32_t shapes) {
   std::vector<circuit::Candidate> candidates;
   std::vector<Morphology> neurons;
   for (const Share& share : shares)
-    for (const Morphology& m :
-         lsystem::grow_population(find_grammar(share.grammar), share.count, seed, console.progress())) {
+    for (const Morphology& m : lsystem::grow_population(
+             find_grammar(share.grammar), shapes * share.of_five / 5, seed, console.progress())) {
       candidates.push_back({fmt::format("{}-{}", share.grammar, candidates.size()), share.grammar,
                             m.soma().sphere().radius, centred(m).bounds().high.y()});
       neurons.push_back(centred(m));
@@ -44,10 +46,10 @@ GrownColumn planted_column(std::uint32_t neurons_planted, std::uint64_t seed, Co
   recipe.radius *= std::sqrt(float(neurons_planted) / 10000.f);  // the same density
   recipe.neurons = neurons_planted;
   circuit::Circuit circuit = circuit::plant(recipe, candidates, seed, console.progress());
+  std::map<std::string, const Morphology*> by_name;
+  for (std::size_t i = 0; i < candidates.size(); ++i) by_name[candidates[i].name] = &neurons[i];
   std::vector<Morphology> planted;
-  for (const std::string& name : circuit.morphologies)
-    for (std::size_t i = 0; i < candidates.size(); ++i)
-      if (candidates[i].name == name) planted.push_back(neurons[i]);
+  for (const std::string& name : circuit.morphologies) planted.push_back(*by_name.at(name));
   return {std::move(circuit), std::move(planted)};
 }
 

@@ -40,21 +40,29 @@ frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t draw
   return {instance, first, drawn, 0, sphere.centre.x(), sphere.centre.y(), sphere.centre.z(), sphere.radius};
 }
 
+// Into the cache.
+void fetch(const Cluster& cluster) {
+  const auto* bytes = reinterpret_cast<const char*>(&cluster);
+  __builtin_prefetch(bytes), __builtin_prefetch(bytes + sizeof cluster - 1);
+}
+
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
 // The camera of all sights, and that of the pictures before.
 struct Cameras {
   Viewer now, before;
+  bool same;  // nobody moved
 
   explicit Cameras(std::span<const Sight> sights) : now(sights.front().eye.viewer()), before(now) {
     for (const Sight& sight : sights)
       if (sight.before) before = sight.before->viewer();
+    same = now == before;
   }
   // For spheres of a neuron.
   Cameras within(const Placed& placed) const {
     Cameras cameras = *this;
     cameras.now = now.within(placed.position, placed.turn);
-    cameras.before = before.within(placed.position, placed.turn);
+    cameras.before = same ? cameras.now : before.within(placed.position, placed.turn);
     return cameras;
   }
 };
@@ -122,6 +130,16 @@ struct Look {
   }
 };
 
+// A neuron where it stands, and as its own coordinates are seen.
+struct Turned {
+  std::uint32_t index;
+  Placed placed;
+  Cameras cameras;
+
+  Turned(const Look& look, std::uint32_t instance)
+      : index(instance), placed(look.forest.instances()[instance]), cameras(look.cameras.within(placed)) {}
+};
+
 // Adds a run to the list that it belongs to, drawn as `kind` or, for `any`, by its width in pixels.
 void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
   if (!run.drawn) return;
@@ -173,6 +191,7 @@ class Judged {
   const Seen& seen() const { return seen_; }
   bool hidden(const Sight& sight) {
     if (!sight.before) return false;
+    if (cameras_.same) return sight.before->hide(seen_);
     if (!before_) before_ = cameras_.before(sphere_);
     return sight.before->hide(*before_);
   }
@@ -197,9 +216,9 @@ void each_of(std::uint32_t sights, auto&& take) {
 }
 
 // Of a cluster that is good enough, these groups.
-void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, std::uint32_t at,
-                   std::uint32_t groups, const Placed& placed, const Cameras& cameras, const Seen& seen,
-                   Cut& cut) {
+void choose_groups(const Look& look, const Sight& sight, const Turned& neuron, std::uint32_t at,
+                   std::uint32_t groups, const Seen& seen, Cut& cut) {
+  const auto& [index, placed, cameras] = neuron;
   const Cluster& c = look.forest.clusters()[at];
   const frame::Kind kind = look.state(index).kind;
   const auto shown = [&](const Seen& where) {
@@ -229,10 +248,9 @@ void choose_groups(const Look& look, const Sight& sight, std::uint32_t index, st
 }
 
 // For each sight, from one cluster on; returns which of them may see it.
-std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32_t from,
+std::uint32_t choose_clusters(const Look& look, const Turned& neuron, std::uint32_t from,
                               std::uint32_t of_sights, std::span<Cut> cuts) {
-  const Placed placed(look.forest.instances()[index]);
-  const Cameras cameras = look.cameras.within(placed);
+  const auto& [index, placed, cameras] = neuron;
   const auto clusters = look.forest.clusters();
   const frame::State state = look.state(index);
   const bool parted =
@@ -243,12 +261,12 @@ std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32
   struct Open {
     std::uint32_t cluster, sights;  // those for which its parent was too coarse
   };
-  std::array<Open, 64> open;
-  std::size_t depth = 0;
+  // Level by level: until a cluster's turn comes it has been fetched.
+  thread_local std::vector<Open> open;
+  open.assign(1, {from, of_sights});
   std::uint32_t may_see = 0;
-  open[depth++] = {from, of_sights};
-  while (depth) {
-    const auto [at, sights] = open[--depth];
+  for (std::size_t next = 0; next < open.size(); ++next) {
+    const auto [at, sights] = open[next];
     const Cluster& c = clusters[at];
     const Sphere sphere = c.sphere();
     Judged judged(cameras, sphere);
@@ -261,19 +279,19 @@ std::uint32_t choose_clusters(const Look& look, std::uint32_t index, std::uint32
       if (!sight.eye.may_see(seen)) return;
       if (at == from) may_see |= 1u << s;
       if (judged.left_out(look, sight, {LeftOut::cluster, index, at, 0}, cut)) {
-      } else if (!c.is_leaf() && depth + 2 <= open.size() &&
-                 (parted || !look.good_enough(sight, seen, c.error))) {
+      } else if (!c.is_leaf() && (parted || !look.good_enough(sight, seen, c.error))) {
         finer |= 1u << s;
       } else if (parted) {
         add_parts(look, index, c, placed(c), sight.eye.thin(seen, c.thickness), states, cut);
       } else {
-        choose_groups(look, sight, index, at, every_group, placed, cameras, seen, cut);
+        choose_groups(look, sight, neuron, at, every_group, seen, cut);
       }
     });
     if (!finer) continue;
-    __builtin_prefetch(&clusters[c.children[1]]);
-    open[depth++] = {c.children[1], finer};
-    open[depth++] = {c.children[0], finer};
+    for (const std::uint32_t child : c.children) {
+      fetch(clusters[child]);
+      open.push_back({child, finer});
+    }
   }
   return may_see;
 }
@@ -310,7 +328,7 @@ void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, 
     if (!(sights &= ~far)) return;
   }
   // The soma lies within its root.
-  choose_soma(look, index, choose_clusters(look, index, neuron.first_cluster, sights, cuts), cuts);
+  choose_soma(look, index, choose_clusters(look, {look, index}, neuron.first_cluster, sights, cuts), cuts);
 }
 
 struct Open {
@@ -434,12 +452,12 @@ void join(std::vector<Thing>& to, std::vector<Thing> Cut::*member, std::span<con
     to.insert(to.end(), (cuts[p].*member).begin(), (cuts[p].*member).end());
 }
 
-// What `choose_one(i, cuts)` adds to each of so many cuts for each i below `count`, in this order; `chunk` of them at a time.
-std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_one) {
+// What `choose_some(begin, end, cuts)` adds to each of so many cuts for those below `count`, in this order; `chunk` of them at
+// a time.
+std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_some) {
   std::vector<Cut> parts((count + chunk - 1) / chunk * cuts);
   parallel_for(parts.size() / cuts, 1, [&](std::size_t p) {
-    for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i)
-      choose_one(i, std::span(parts).subspan(p * cuts, cuts));
+    choose_some(p * chunk, std::min(count, (p + 1) * chunk), std::span(parts).subspan(p * cuts, cuts));
   });
   std::vector<Cut> whole(cuts);
   parallel_for(cuts, 1, [&](std::size_t c) {
@@ -533,13 +551,13 @@ void NeuronsInSight::add(const Cut& cut) {
 std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown) {
   const Look look{forest, sights, true, shown};
   const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
-  std::vector<Cut> cuts =
-      in_chunks(groves.size() + bricks.size(), 1, sights.size(), [&](std::size_t i, std::span<Cut> parts) {
-        if (i < groves.size())
-          choose_grove(look, {groves[i], look.all()}, parts);
-        else
-          choose_bricks(look, {bricks[i - groves.size()], look.all()}, parts);
-      });
+  std::vector<Cut> cuts = in_chunks(groves.size() + bricks.size(), 1, sights.size(),
+                                    [&](std::size_t i, std::size_t, std::span<Cut> parts) {
+                                      if (i < groves.size())
+                                        choose_grove(look, {groves[i], look.all()}, parts);
+                                      else
+                                        choose_bricks(look, {bricks[i - groves.size()], look.all()}, parts);
+                                    });
   parallel_for(cuts.size(), 1, [&](std::size_t s) { arrange(cuts[s], sights[s].eye); });
   return cuts;
 }
@@ -551,27 +569,35 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const S
 
 Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown) {
   const Look look{forest, std::span(&now, 1), false, shown};
-  const auto reveal = [&](std::size_t n, std::span<Cut> cuts) {
-    const LeftOut& l = left_out[n];
-    switch (l.what) {
-      case LeftOut::grove:
-        return choose_grove(look, {l.number, 1}, cuts);
-      case LeftOut::soma:
-        return choose_soma(look, l.instance, 1, cuts);
-      case LeftOut::brick:
-        return l.groups ? choose_straws(look, 0, l.number, l.groups, cuts.front())
-                        : choose_bricks(look, {l.number, 1}, cuts);
-      case LeftOut::cluster:
-        break;
+  const auto reveal = [&](std::size_t begin, std::size_t end, std::span<Cut> cuts) {
+    std::optional<Turned> turned;  // what was left out of a neuron lies together
+    for (std::size_t n = begin; n < end; ++n) {
+      if (const LeftOut& soon = left_out[std::min(n + 4, left_out.size() - 1)];
+          soon.what == LeftOut::cluster) {
+        look.fetch(soon.instance);
+        fetch(forest.clusters()[soon.number]);
+      }
+      const LeftOut& l = left_out[n];
+      switch (l.what) {
+        case LeftOut::grove:
+          choose_grove(look, {l.number, 1}, cuts);
+          break;
+        case LeftOut::soma:
+          choose_soma(look, l.instance, 1, cuts);
+          break;
+        case LeftOut::brick:
+          l.groups ? choose_straws(look, 0, l.number, l.groups, cuts.front())
+                   : choose_bricks(look, {l.number, 1}, cuts);
+          break;
+        case LeftOut::cluster:
+          if (!turned || turned->index != l.instance) turned.emplace(look, l.instance);
+          if (l.groups)
+            choose_groups(look, now, *turned, l.number, l.groups,
+                          turned->cameras.now(forest.clusters()[l.number].sphere()), cuts.front());
+          else
+            choose_clusters(look, *turned, l.number, 1, cuts);
+      }
     }
-    if (!l.groups) {
-      choose_clusters(look, l.instance, l.number, 1, cuts);
-      return;
-    }
-    const Placed placed(forest.instances()[l.instance]);
-    const Cameras cameras = look.cameras.within(placed);
-    choose_groups(look, now, l.instance, l.number, l.groups, placed, cameras,
-                  cameras.now(forest.clusters()[l.number].sphere()), cuts.front());
   };
   Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
   arrange(cut, now.eye);

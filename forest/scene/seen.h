@@ -38,6 +38,8 @@ class Viewer {
     to_camera_.row(2) *= -1.f;
   }
 
+  bool operator==(const Viewer&) const = default;
+
   /// The same for spheres in the coordinates of something that stands there and is turned so.
   Viewer within(const Vec3& position, const Mat3& turn) const {
     Viewer viewer = *this;

@@ -69,7 +69,7 @@ struct Solid {
   std::uint8_t entry, opacity;
   std::uint32_t key;
 
-  Solid(const frame::Constants& c, const Run& r, std::size_t i)
+  Solid(const Run& r, std::size_t i)
       : a(r.ax[i], r.ay[i], r.az[i]),
         b(r.bx[i], r.by[i], r.bz[i]),
         ra(r.ra[i]),
@@ -80,14 +80,11 @@ struct Solid {
         qy(r.qy[i]),
         code_a(r.code_a[i]),
         code_b(r.code_b[i]),
+        reach(r.reach[i]),
+        nearest(r.front[i]),
         entry(std::uint8_t(r.entry[i])),
         opacity(std::uint8_t(r.opacity[i])),
-        key(r.key[i]) {
-    const Reach beside(c, a, b, ra, rb);
-    reach = std::max(beside.a, beside.b);
-    const float depth = std::min(a.z() - ra, b.z() - rb);
-    nearest = depth > c.near ? depth_code(depth) : 0.f;
-  }
+        key(r.key[i]) {}
   Box box(float spread) const {
     const float all = reach + margin_of(spread);
     return {std::min(px, qx) - all, std::min(py, qy) - all, std::max(px, qx) + all, std::max(py, qy) + all};

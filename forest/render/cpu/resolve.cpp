@@ -205,9 +205,22 @@ template <int S>
   }
 }
 
-FOREST_CLONES void set_1(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
+// Of one sample each: a channel after the other, pixels beside one another.
+FOREST_CLONES void set_1(const Row& row, std::uint32_t, const Channels& palette, const Vec3& mist,
                          const Vec3& sky) {
-  set_row<1>(row, wanted, palette, mist, sky);
+  const std::uint32_t* keys = row.keys;
+  const float *lit = row.lit, *fog = row.fog;
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    std::int32_t* __restrict sums = row.sums[channel];
+    const float* of = palette[channel].data();
+    const float mist_i = mist[Eigen::Index(channel)], sky_i = sky[Eigen::Index(channel)];
+    for (std::size_t x = 0; x < row.pixels; ++x) {
+      const float base = of[keys[x] >> 5 & 127] * lit[x], seen = base + fog[x] * (mist_i - base);
+      sums[x] = fixed(keys[x] != FOREST_KEY_EMPTY ? seen : sky_i);
+    }
+  }
+  std::int32_t* __restrict coverage = row.sums[3];
+  for (std::size_t x = 0; x < row.pixels; ++x) coverage[x] = keys[x] != FOREST_KEY_EMPTY;
 }
 FOREST_CLONES void set_4(const Row& row, std::uint32_t wanted, const Channels& palette, const Vec3& mist,
                          const Vec3& sky) {

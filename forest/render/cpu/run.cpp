@@ -34,6 +34,9 @@ void load_owners(const Picture& picture, const frame::Item& item, Run& r) {
   }
 }
 
+// What lies beyond the last segment up to here is worked out, too, and never read.
+std::size_t whole_vectors(std::size_t count) { return (count + 7) & ~std::size_t(7); }
+
 }  // namespace
 
 void load(const Picture& picture, const frame::Item& item, const std::uint8_t* entries, Run& r) {
@@ -81,14 +84,13 @@ void load(const frame::Overlay& o, const Picture& picture, Run& r) {
   r.ra[0] = least(o.a), r.rb[0] = least(o.b);
 }
 
-FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light,
-                           Run& r) {
+FOREST_CLONES void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, Run& r) {
   const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
               m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
-  const float tx = at.x(), ty = at.y(), tz = at.z(), lx = light.x(), ly = light.y(), lz = light.z();
+  const float tx = at.x(), ty = at.y(), tz = at.z();
   const float near = c.near, focal = c.focal, converge = c.converge, parallel = c.parallel,
               centre_x = c.centre_x, centre_y = c.centre_y;
-  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const std::size_t count = whole_vectors(r.count);
   for (std::size_t i = 0; i < count; ++i) {
     float ax = m00 * r.ax[i] + m01 * r.ay[i] + m02 * r.az[i] + tx;
     float ay = m10 * r.ax[i] + m11 * r.ay[i] + m12 * r.az[i] + ty;
@@ -111,27 +113,77 @@ FOREST_CLONES void project(const frame::Constants& c, const Mat3& turn, const Ve
     r.qx[i] = centre_x + fb * bx, r.qy[i] = centre_y - fb * by;
     r.code_a[i] = depth_code(az), r.code_b[i] = depth_code(bz);
     r.width[i] = seen ? fa * ra + fb * rb : -1.f;
+    r.widest[i] = larger(fa * ra, fb * rb);
     r.mean_width[i] = r.mean_width[i] * (fa + fb);
+    r.rank[i] = fraction(r.rank[i]);
+  }
+}
+
+FOREST_CLONES void surround(const frame::Constants& c, float margin, Run& r) {
+  const float near = c.near, focal = c.focal;
+  const bool even = c.parallel > 0.f;
+  const std::size_t count = whole_vectors(r.count);
+  for (std::size_t i = 0; i < count; ++i) {
+    const float ra = r.ra[i], rb = r.rb[i], az = r.az[i], bz = r.bz[i];
+    const float a2 = r.ax[i] * r.ax[i] + r.ay[i] * r.ay[i] + az * az,
+                b2 = r.bx[i] * r.bx[i] + r.by[i] * r.by[i] + bz * bz;
+    // As Reach.
+    const bool exact = (ra < .25f * az) & (a2 < 2.5f * az * az) & (rb < .25f * bz) & (b2 < 2.5f * bz * bz);
+    const float a_exactly = std::sqrt(a2) / (az * (az - ra)), b_exactly = std::sqrt(b2) / (bz * (bz - rb)),
+                a_roughly = 1.05f / larger(az - .5f * ra, near),
+                b_roughly = 1.05f / larger(bz - .5f * rb, near);
+    const float per_a = even    ? 1.f
+                        : exact ? a_exactly
+                                : a_roughly,
+                per_b = even    ? 1.f
+                        : exact ? b_exactly
+                                : b_roughly;
+    const float reach = focal * larger(ra * per_a, rb * per_b), all = reach + margin;
+    const float depth = smaller(az - ra, bz - rb);
+    r.reach[i] = reach;
+    r.front[i] = depth > near ? depth_code(depth) : 0.f;
+    r.left[i] = smaller(r.px[i], r.qx[i]) - all, r.right[i] = larger(r.px[i], r.qx[i]) + all;
+    r.top[i] = smaller(r.py[i], r.qy[i]) - all, r.bottom[i] = larger(r.py[i], r.qy[i]) + all;
+  }
+}
+
+FOREST_CLONES void light(const frame::Constants& c, const Vec3& towards, std::span<const std::uint8_t> which,
+                         Run& r) {
+  // Of those that are wanted, beside one another: the axis, the way to the eye from twice the middle, and where it runs.
+  float x[run], y[run], z[run], to_x[run], to_y[run], to_z[run], steep[run], shade[run], front[run],
+      side[run];
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const std::size_t i = which[k];
+    x[k] = r.bx[i] - r.ax[i], y[k] = r.by[i] - r.ay[i], z[k] = r.bz[i] - r.az[i];
+    to_x[k] = r.ax[i] + r.bx[i], to_y[k] = r.ay[i] + r.by[i], to_z[k] = r.az[i] + r.bz[i];
+    steep[k] = std::abs(r.qy[i] - r.py[i]) - std::abs(r.qx[i] - r.px[i]);
+  }
+  const float lx = towards.x(), ly = towards.y(), lz = towards.z(), converge = c.converge;
+  const std::size_t count = whole_vectors(which.size());
+  for (std::size_t i = 0; i < count; ++i) {
     // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
-    const float ex = -converge * (ax + bx), ey = -converge * (ay + by), ez = -(az + bz);
+    const float dx = x[i], dy = y[i], dz = z[i];
+    const float ex = -converge * to_x[i], ey = -converge * to_y[i], ez = -to_z[i];
     const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
                 per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
     const float along = (dx * lx + dy * ly + dz * lz) * per_length,
                 end_on = (dx * ex + dy * ey + dz * ez) * per_length * per_distance,
-                towards = (ex * lx + ey * ly + ez * lz) * per_distance;
-    const float b = (towards - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
+                facing = (ex * lx + ey * ly + ez * lz) * per_distance;
+    const float b = (facing - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
     const float a2 = larger(0.f, 1.f - along * along - b * b);
-    const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
-    const float rank = fraction(r.rank[i]);
-    r.rank[i] = rank;
-    r.lit_front[i] = .5f * b;
+    shade[i] = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
+    front[i] = .5f * b;
     // Across its axis and the way to the eye.
     const float sx = dy * ez - dz * ey, sy = dz * ex - dx * ez, sz = dx * ey - dy * ex;
     const float lit_side =
         .5f * (sx * lx + sy * ly + sz * lz) / std::sqrt(larger(sx * sx + sy * sy + sz * sz, 1e-30f));
-    const float downwards = std::abs(r.qy[i] - r.py[i]) > std::abs(r.qx[i] - r.px[i]) ? sx : -sy;
-    r.lit_side[i] = downwards < 0.f ? -lit_side : lit_side;
-    r.payload[i] = payload_of(r.entry[i], shade, fraction(rank * 7.f));
+    const float downwards = steep[i] > 0.f ? sx : -sy;
+    side[i] = downwards < 0.f ? -lit_side : lit_side;
+  }
+  for (std::size_t k = 0; k < which.size(); ++k) {
+    const std::size_t i = which[k];
+    r.lit_front[i] = front[k], r.lit_side[i] = side[k];
+    r.payload[i] = payload_of(r.entry[i], shade[k], fraction(r.rank[i] * 7.f));
   }
 }
 
@@ -148,11 +200,15 @@ bool trim(const frame::Constants& c, const Crop& crop, Run& r, std::size_t i) {
   r.px[i] = c.centre_x + fa * a.x(), r.py[i] = c.centre_y - fa * a.y();
   r.qx[i] = c.centre_x + fb * b.x(), r.qy[i] = c.centre_y - fb * b.y();
   r.code_a[i] = depth_code(a.z()), r.code_b[i] = depth_code(b.z());
+  const Reach reach(c, a, b, r.ra[i], r.rb[i]);
+  const float depth = std::min(a.z() - r.ra[i], b.z() - r.rb[i]);
+  r.reach[i] = std::max(reach.a, reach.b);
+  r.front[i] = depth > c.near ? depth_code(depth) : 0.f;
   return true;
 }
 
 FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
-  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const std::size_t count = whole_vectors(r.count);
   const float shortest = float(FOREST_STRAW_LENGTH) * c.thinnest;
   for (std::size_t i = 0; i < count; ++i) {
     const float dx = r.qx[i] - r.px[i], dy = r.qy[i] - r.py[i], length = std::sqrt(dx * dx + dy * dy);
@@ -167,7 +223,7 @@ FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
 }
 
 FOREST_CLONES void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r) {
-  const std::size_t count = (r.count + 7) & ~std::size_t(7);
+  const std::size_t count = whole_vectors(r.count);
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);

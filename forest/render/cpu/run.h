@@ -57,6 +57,9 @@ struct Run {
   float lit_side[run],
       lit_front[run];  // half the light on what faces across, downwards or to the right, and to the eye
   float width[run];    // pixels; below 0: nothing of it lies before the eye
+  float widest[run];   // half the width of the wider end, pixels
+  float reach[run];    // as a capsule: pixels around both ends of its axis that it is seen in
+  float front[run];  // as a capsule: code of its nearest depth, 0 where it may reach before the near distance
   float mean_width[run], rank[run];  // of its branch; in [0, 1)
   std::uint32_t entry[run];          // of the palette
   std::uint32_t meta[run];           // as frame::Segment's
@@ -70,7 +73,16 @@ void load(const Picture& picture, const frame::Item& item, const std::uint8_t* e
 void load(const frame::Overlay& overlay, const Picture& picture, Run& r);
 
 /// From the coordinates of their neuron to pixels: camera = turn · p + at.
-void project(const frame::Constants& c, const Mat3& turn, const Vec3& at, const Vec3& light, Run& r);
+void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, Run& r);
+
+/// Where they reach as capsules: `reach`, `front` and the box around each.
+/// @param margin  pixels that are added around the box
+void surround(const frame::Constants& c, float margin, Run& r);
+
+/// Light on those that are to be drawn as lines: their payload and what the rims get.
+/// @param towards  the light, in camera coordinates
+/// @param which    numbers of segments
+void light(const frame::Constants& c, const Vec3& towards, std::span<const std::uint8_t> which, Run& r);
 
 /// Cuts segment `i`, as a capsule, at the edges of the picture where it reaches far beyond them (capsule.h).
 /// @returns false where nothing is left

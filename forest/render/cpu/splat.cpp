@@ -5,6 +5,7 @@
 #include <array>
 #include <atomic>
 #include <cmath>
+#include <utility>
 #include <vector>
 
 #include "forest/core/clones.h"
@@ -127,6 +128,19 @@ struct Extent {
   }
 };
 
+// Around all segments of an item that lie before the eye.
+struct Hull {
+  Box box{INFINITY, INFINITY, -INFINITY, -INFINITY};
+  float nearest = INFINITY, widest = 0.f;
+
+  void add(const Box& b, float nearest_code, float width) {
+    box = {smaller(box.left, b.left), smaller(box.top, b.top), larger(box.right, b.right),
+           larger(box.bottom, b.bottom)};
+    nearest = smaller(nearest, nearest_code), widest = larger(widest, width);
+  }
+  Box grown(float by) const { return {box.left - by, box.top - by, box.right + by, box.bottom + by}; }
+};
+
 // Items lie in the order of depth, their segments anywhere.
 constexpr std::size_t ahead = 3, things_ahead = 6;
 void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
@@ -152,21 +166,27 @@ class Gatherer {
     const auto [turn, at] = picture_.standing(item);
     load(picture_, item, entries, r_);
     if (kind == Kind::dots) return add_beads(item, turn, at, chunk);
-    project(c, turn, at, picture_.light, r_);
+    place(c, turn, at, r_);
+    if (kind == Kind::capsules) return add_near(chunk);
     const bool straws = picture_.geometry.straw(item);
     if (straws) lengthen(c, r_);
-    if (kind == Kind::lines || any_thin())
-      prepare_lines(c, (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest, picture_.spread, r_);
-    std::uint64_t added = 0;
+    const float thinnest = (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest;
+    Hull hull;
     for (std::size_t i = 0; i < r_.count; ++i)
-      added += r_.opacity[i] && (kind == Kind::lines ? add_stroke(i, chunk) : add_near(i, chunk));
-    return added;
+      if (r_.width[i] >= 0.f)
+        hull.add({std::min(r_.px[i], r_.qx[i]), std::min(r_.py[i], r_.qy[i]), std::max(r_.px[i], r_.qx[i]),
+                  std::max(r_.py[i], r_.qy[i])},
+                 std::min(r_.code_a[i], r_.code_b[i]), r_.width[i]);
+    if (hidden(hull.grown(reach_of_lines(thinnest, hull.widest)), hull.nearest)) return 0;
+    prepare_lines(c, thinnest, picture_.spread, r_);
+    for (std::size_t i = 0; i < r_.count; ++i)
+      if (r_.opacity[i]) look_at_line(i);
+    return add_lines(chunk);
   }
   void add(const frame::Overlay& overlay, Chunk& chunk) {
     load(overlay, picture_, r_);
-    project(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, picture_.light, r_);
-    prepare_lines(picture_.constants, picture_.constants.thinnest, picture_.spread, r_);
-    add_near(0, chunk);
+    place(picture_.constants, picture_.to_camera, picture_.to_camera * -picture_.eye, r_);
+    add_near(chunk);
   }
   void add(const frame::Ball& ball, std::uint32_t number, Chunk& chunk) const {
     const Vec3 at = picture_.to_camera * (ball.centre - picture_.eye);
@@ -180,14 +200,14 @@ class Gatherer {
   Square whole_;
   Crop crop_;
   Run r_{};
+  std::array<std::uint8_t, run> lines_;  // numbers of those of its segments that are seen as lines
+  std::size_t line_count_ = 0;
 
   bool hidden(const Box& b, float nearest_code) const {
     return canvas_.hidden(whole_, b.left, b.top, b.right, b.bottom, nearest_code);
   }
-  // Adds make() to a list if something may be seen of what lies in a box.
-  bool put(const Box& b, float nearest_code, auto& list, std::vector<Chunk::Range>& ranges,
-           auto&& make) const {
-    if (hidden(b, nearest_code)) return false;
+  // Adds make() to a list and to the squares that its box touches, where it touches one.
+  bool place_in(const Box& b, auto& list, std::vector<Chunk::Range>& ranges, auto&& make) const {
     const Square s = canvas_.touched(b.left, b.top, b.right, b.bottom);
     if (s.left > s.right || s.top > s.bottom) return false;
     list.push_back(make());
@@ -197,24 +217,55 @@ class Gatherer {
   }
   template <class Thing>
   bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
-    return put(thing.box(picture_.spread), thing.nearest_code(), list, ranges, [&] { return thing; });
+    const Box box = thing.box(picture_.spread);
+    return !hidden(box, thing.nearest_code()) && place_in(box, list, ranges, [&] { return thing; });
   }
-  bool add_stroke(std::size_t i, Chunk& chunk) const {
-    return r_.line_width[i] > 0.f &&
-           put({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.nearest[i], chunk.strokes,
-               chunk.ranges_of_strokes, [&] { return Stroke(r_, i); });
+  // How far a line of this width, pixels, is drawn beside its axis at most.
+  float reach_of_lines(float thinnest, float width) const {
+    if (picture_.constants.subframes > 1) return INFINITY;  // few may be drawn for many
+    return .5f * (std::max(thinnest, 1.4143f * width) + 1.f) + picture_.spread;
+  }
+  // Of lines, it is found out which can be seen, and then these are lit and added.
+  void look_at_line(std::size_t i) {
+    if (r_.line_width[i] > 0.f && !hidden({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.nearest[i]))
+      lines_[line_count_++] = std::uint8_t(i);
+  }
+  std::uint64_t add_lines(Chunk& chunk) {
+    const std::span<const std::uint8_t> lines(lines_.data(), std::exchange(line_count_, 0));
+    if (!lines.empty()) light(picture_.constants, picture_.light, lines, r_);
+    std::uint64_t added = 0;
+    for (const std::size_t i : lines)
+      added += place_in({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, chunk.strokes,
+                        chunk.ranges_of_strokes, [&] { return Stroke(r_, i); });
+    return added;
   }
   // Of near ones, what is less than that wide at both ends is a line.
   static constexpr float thin = .75f;
-  bool any_thin() const {
-    return std::any_of(r_.width, r_.width + r_.count, [](float width) { return width < 2.f * thin; });
-  }
-  bool add_near(std::size_t i, Chunk& chunk) {
-    if (r_.width[i] < 0.f) return false;
+  std::uint64_t add_near(Chunk& chunk) {
     const frame::Constants& c = picture_.constants;
-    const float width = c.focal * std::max(r_.ra[i] / lens(c, r_.az[i]), r_.rb[i] / lens(c, r_.bz[i]));
-    if (width < thin) return add_stroke(i, chunk);
-    return trim(c, crop_, r_, i) && put(Solid(c, r_, i), chunk.solids, chunk.ranges_of_solids);
+    const float margin = margin_of(picture_.spread);
+    surround(c, margin, r_);
+    Hull hull;
+    float thinnest = INFINITY;
+    for (std::size_t i = 0; i < r_.count; ++i) {
+      if (r_.width[i] < 0.f) continue;
+      hull.add({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.front[i], r_.widest[i]);
+      thinnest = std::min(thinnest, r_.widest[i]);
+    }
+    const bool any_thin = thinnest < thin;
+    if (hidden(any_thin ? hull.grown(reach_of_lines(c.thinnest, 2.f * thin)) : hull.box, hull.nearest))
+      return 0;
+    std::uint64_t added = 0;
+    for (std::size_t i = 0; i < r_.count; ++i) {
+      if (r_.opacity[i] == 0 || r_.width[i] < 0.f || r_.widest[i] < thin) continue;
+      if (!hidden({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.front[i]) && trim(c, crop_, r_, i))
+        added += put(Solid(r_, i), chunk.solids, chunk.ranges_of_solids);
+    }
+    if (!any_thin) return added;
+    prepare_lines(c, c.thinnest, picture_.spread, r_);
+    for (std::size_t i = 0; i < r_.count; ++i)
+      if (r_.opacity[i] && r_.width[i] >= 0.f && r_.widest[i] < thin) look_at_line(i);
+    return added + add_lines(chunk);
   }
   // The one segment of a dot.
   std::uint64_t add_beads(const frame::Item& item, const Mat3& turn, const Vec3& at, Chunk& chunk) {
@@ -225,7 +276,7 @@ class Gatherer {
     bool any = false;
     for (std::uint32_t k = 0; k < beads.count; ++k) {
       beads.put(k, r_);
-      project(c, turn, at, picture_.light, r_);
+      place(c, turn, at, r_);
       const float rank = fraction(float(item.instance) * .7548777f + of_branch + float(k) * .3819660f +
                                   golden * float(c.subframe));
       if (r_.opacity[0] && r_.width[0] >= 0.f) any |= put(Dot(c, r_, rank), chunk.dots, chunk.ranges_of_dots);
