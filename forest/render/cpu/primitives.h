@@ -186,7 +186,6 @@ template <int S>
       const std::uint32_t depth = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), 0);
       const float past = at - length;
       for (std::int32_t row = low; row < high; ++row) {
-        if (steep ? window.pixel_before(row, x, depth) : window.pixel_before(x, row, depth)) continue;
         const float from_middle = float(row) - y;
         Keys<S> keys;
         FOREST_LANES
@@ -238,26 +237,19 @@ template <int S>
     const float column = float(x) + .5f - px, middle = py + slope * column;
     const std::int32_t low = clipped(std::ceil(middle - reach - .5f), edges.low, edges.high),
                        high = clipped(std::ceil(middle + reach - .5f), edges.low, edges.high);
-    const float z_before = za + share_at(column - spread) * (zb - za),
-                z_after = za + share_at(column + spread) * (zb - za);
-    const std::uint32_t nearest = key_of(larger(smaller(z_before, z_after) - bulge - 1.f, 0.f), 0);
     if constexpr (S == 1) {  // pixels across, beside one another
       constexpr std::int32_t lanes = 8;
-      const float share = share_at(column), inverse = 1.f / ((wp + share * (wq - wp)) * stretch);
+      const float share = share_at(column), inverse = 1.f / ((wp + share * (wq - wp)) * stretch),
+                  z = za + share * (zb - za);
       for (std::int32_t y = low; y < high; y += lanes) {
         const std::int32_t count = std::min(lanes, high - y);
-        std::uint32_t behind = 0;
-        for (std::int32_t k = 0; k < count; ++k)
-          behind |=
-              !(steep ? window.pixel_before(y + k, x, nearest) : window.pixel_before(x, y + k, nearest));
-        if (!behind) continue;
         std::uint32_t keys[lanes];
         FOREST_LANES
         for (int k = 0; k < lanes; ++k) {
           const float t = (float(y + k) + .5f - middle) * inverse, h = std::sqrt(larger(1.f - t * t, 0.f));
           const float noise = noise_at(steep ? y + k : x, steep ? x : y + k, subframe);
           const std::uint32_t payload = payload_of(entry, .5f + t * lit_side + h * lit_front, noise);
-          const std::uint32_t key = key_of(larger(z_before - bulge * h, 0.f), payload);
+          const std::uint32_t key = key_of(larger(z - bulge * h, 0.f), payload);
           keys[k] = (t >= -1.f) & (t < 1.f) ? key : FOREST_KEY_EMPTY;
         }
         for (std::int32_t k = 0; k < count; ++k)
@@ -276,7 +268,6 @@ template <int S>
       }
       for (std::int32_t y = low; y < high; ++y) {
         const std::int32_t at_x = steep ? y : x, at_y = steep ? x : y;
-        if (window.pixel_before(at_x, at_y, nearest)) continue;
         const float noise = noise_at(at_x, at_y, subframe);
         Keys<S> keys;
         FOREST_LANES

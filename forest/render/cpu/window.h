@@ -52,14 +52,6 @@ class Window {
     FOREST_LANES
     for (int k = 0; k < int(FOREST_TILE); ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
   }
-  /// Whether all samples of a pixel have keys before this one.
-  [[gnu::always_inline]] bool pixel_before(std::int32_t x, std::int32_t y, std::uint32_t key) const {
-    const std::uint32_t* pixel = canvas_.at(x, y);
-    std::uint32_t behind = 0;
-    FOREST_LANES
-    for (int k = 0; k < S; ++k) behind |= pixel[k] >= key ? ~0u : 0u;
-    return !behind;
-  }
   /// Whether all of the FOREST_TILE pixels from `x`, a multiple of as many, on have keys before this one.
   [[gnu::always_inline]] bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const {
     std::uint32_t farthest = 0;
@@ -114,9 +106,6 @@ class Door {
   void put_row(std::int32_t x, std::int32_t y, const std::uint32_t (&keys)[FOREST_TILE]) {
     for (std::int32_t k = 0; k < std::int32_t(FOREST_TILE); ++k)
       if (keys[k] != FOREST_KEY_EMPTY) put(x + k, y, {keys[k]});
-  }
-  bool pixel_before(std::int32_t x, std::int32_t y, std::uint32_t key) const {
-    return window_.pixel_before(x, y, key);
   }
   bool before(std::int32_t x, std::int32_t y, std::uint32_t key) const { return window_.before(x, y, key); }
   bool hidden(float left, float top, float right, float bottom, float nearest_code) const {
