@@ -158,15 +158,16 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const auto oddities = check_surfaces(outer, inner);
   const Laplace field(outer, inner, {.spacing = options.spacing}, progress);
   const TriangleTree outer_tree(outer), inner_tree(inner);
-  const WCurves curves(field, inner_tree);
+  const WCurves curves(field, outer_tree, inner_tree);
   // Two triangles to a side of the lattice that elements are laid by, or more.
   const double side = std::sqrt(options.volume / 2500.);
-  const Ribbon ribbon = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
+  const Ribbon dropped = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
 
   Cortex cortex;
   cortex.oddities = oddities;
   cortex.between = volume(outer) - volume(inner);
-  cortex.wall = cortex.between - covered(ribbon, inner_tree);
+  cortex.wall = cortex.between - covered(dropped, inner_tree);
+  const Ribbon ribbon = unfolded(dropped, curves, progress);
   progress.begin("looking for crests and valleys", 0);
   const auto bent = curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles),
                                options.line_scale);
@@ -174,7 +175,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   progress.end();
   const Quads quads = lay_quads(ribbon, bent, cortex.lines, {.volume = options.volume}, progress);
   progress.begin("looking for the floors of sulci", 0);
-  for (Line& line : sulci(coarser(ribbon), {})) cortex.lines.push_back(std::move(line));
+  for (Line& line : sulci(coarser(dropped), {})) cortex.lines.push_back(std::move(line));
   progress.end();
   cortex.elements = make_elements(ribbon, quads, bent, curves, progress);
   cortex.w_reached = 1. - double(cortex.elements.not_arrived) / double(cortex.elements.curves.size());
@@ -183,9 +184,8 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   std::vector<double> angles(2 * quads.points.size());
   parallel_ranges(quads.points.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      const Place start = on(ribbon.outer, ribbon, quads.points[v]);
-      const auto hit = outer_tree.nearest(start);
-      const WCurve curve = curves.drop(start, -outer_tree.normal(hit->triangle));
+      const WCurve curve = curve_at(ribbon, quads.points[v], curves);
+      const Place& start = curve.points.front();
       const double length = curve.length();
       constexpr double piece = 150.;  // µm
       const double share = length > 2. * piece ? piece / length : .5;

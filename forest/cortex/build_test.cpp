@@ -43,8 +43,8 @@ struct Shell : ::testing::Test {
   struct Made {
     Mesh outer = ball(outside), inner = ball(inside);
     Laplace field{outer, inner, {.spacing = 250.}};
-    TriangleTree tree{inner};
-    WCurves curves{field, tree};
+    TriangleTree outer_tree{outer}, tree{inner};
+    WCurves curves{field, outer_tree, tree};
     Cortex cortex = build();
 
     Cortex build() const {
@@ -86,6 +86,69 @@ TEST_F(Shell, WCurvesAreRadiiAndTheirDepthsShareTheVolume) {
     EXPECT_NEAR(curve.at_length(w).norm(), outside - w * (outside - inside), 12.);
     EXPECT_GT(curve.at(w).normalized().dot(way), std::cos(.005));
   }
+}
+
+TEST_F(Shell, ACurveThroughAPlaceIsTheOneDroppedFromAboveIt) {
+  const Place way = Place(.3, -.5, .7).normalized();
+  for (const double from : {8300., 9000., 9800.}) {
+    // What is given as the way inwards may be wrong by 40°.
+    const auto curve = curves.through(from * way, -way + .8 * way.unitOrthogonal());
+    ASSERT_TRUE(curve);
+    EXPECT_TRUE(curve->arrived);
+    EXPECT_NEAR(curve->length(), outside - inside, 15.);
+    EXPECT_NEAR(curve->points.front().norm(), outside, 15.);
+    EXPECT_NEAR(curve->points.back().norm(), inside, 15.);
+    const double r = std::cbrt((std::pow(outside, 3) + std::pow(inside, 3)) / 2.);
+    EXPECT_NEAR(curve->at(.5).norm(), r, 12.);
+    for (const double w : {0., .5, 1.}) EXPECT_GT(curve->at(w).normalized().dot(way), std::cos(.005));
+    EXPECT_TRUE(std::ranges::is_sorted(curve->volume));
+  }
+  EXPECT_FALSE(curves.through(1.5 * outside * way, -way));  // the field has no slope there
+}
+
+TEST_F(Shell, AFoldedMiddleIsUnfoldedAndTheRestStays) {
+  const Ribbon made = make_ribbon(outer, curves, {.edge = 500.}, Progress::none());
+  const auto turned = [](const Ribbon& ribbon) {
+    return std::ranges::count_if(ribbon.triangles, [&](const Triangle& t) {
+      const Place a = ribbon.middle[t[0]], b = ribbon.middle[t[1]], c = ribbon.middle[t[2]];
+      return (b - a).cross(c - a).dot(a) <= 0.;
+    });
+  };
+  Ribbon ribbon = made;
+  Random random(1, 2, 3);
+  std::vector<std::uint8_t> near(ribbon.size(), 0);
+  for (std::size_t v = 0; v < ribbon.size(); ++v) {
+    if (ribbon.middle[v].x() < 8000.) continue;
+    ribbon.middle[v] += 400. * Place(0., random.normal(), random.normal());
+    ribbon.middle[v] *= made.middle[v].norm() / ribbon.middle[v].norm();
+    near[v] = 1;
+  }
+  ASSERT_GT(turned(ribbon), 50);
+  const Ribbon after = unfolded(ribbon, curves, Progress::none());
+  EXPECT_EQ(turned(after), 0);
+  double sum = 0., radius = 0.;
+  for (const Triangle& t : after.triangles) sum += volume_under(after, t);
+  EXPECT_NEAR(sum, volume(outer) - volume(inner), .005 * sum);
+  for (std::size_t v = 0; v < after.size(); ++v) {
+    if (made.middle[v].x() < 6000.) {
+      EXPECT_EQ(after.middle[v], made.middle[v]);
+    }
+    if (near[v]) radius = std::max(radius, std::abs(after.middle[v].norm() - made.middle[v].norm()));
+  }
+  EXPECT_LT(radius, 150.);  // along the middle, not off it
+}
+
+TEST_F(Shell, ACrumpledSurfaceHasElementsAsEvenAsASmoothOne) {
+  Mesh crumpled = outer;
+  Random random(1, 2, 3);
+  for (Vec3& p : crumpled.positions)
+    if (p.x() > .5 * outside) p += p.normalized() * float(120. * random.normal());
+  const Cortex cortex = build_cortex(crumpled, inner, {.volume = wanted, .spacing = 400.}, Progress::none());
+  const Report r = report(cortex, wanted, nullptr, nullptr, Progress::none());
+  EXPECT_EQ(r.uncertified, 0u);
+  EXPECT_GT(r.volume_within, .995);
+  EXPECT_LT(r.volume_error, .0015);
+  EXPECT_GT(r.jacobian_least, .5);
 }
 
 TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {

@@ -118,6 +118,62 @@ void call_back_strays(Elements& elements) {
   }
 }
 
+// A surface that is crumpled on a smaller scale than an element folds the faces of elements on it: these become smoother, each place
+// going to the middle of those around, until they are folded no more. Sides of one element alone stay.
+void smooth_folded_faces(Elements& elements) {
+  constexpr int most_rounds = 12, steps = 4;
+  constexpr double least = .1;  // scaled Jacobian
+  const Owners of = owners_of(elements);
+  const std::vector<std::uint8_t> rim = by_the_wall(elements);
+  const auto stays = [&](std::uint32_t c) {  // corners by the wall, and what is between them on a side
+    if (c < elements.corners) return rim[c] != 0;
+    const auto& own = elements.elements[of[c][0]];
+    const auto at = std::find(own.begin(), own.end(), c) - own.begin();
+    return of[c].size() == 1 && (at % 4 % 3 == 0 || at / 4 % 3 == 0);
+  };
+  for (const std::size_t depth : {std::size_t(0), std::size_t(3)}) {
+    std::vector<std::uint32_t> look(elements.size());
+    std::iota(look.begin(), look.end(), 0u);
+    for (int round = 0; round < most_rounds && !look.empty(); ++round) {
+      std::vector<std::uint8_t> folded(look.size(), 0);
+      parallel_for(look.size(), 64, [&](std::size_t n) {
+        const Hexahedron h = elements.hexahedron(look[n]);
+        for (int j = 0; j <= steps && !folded[n]; ++j)
+          for (int i = 0; i <= steps && !folded[n]; ++i) {
+            const Eigen::Matrix3d slope =
+                h.jacobian(double(i) / steps, double(j) / steps, depth == 0 ? 0. : 1.);
+            folded[n] = slope.determinant() < least * slope.colwise().norm().prod();
+          }
+      });
+      std::vector<std::uint32_t> moving;
+      for (std::size_t n = 0; n < look.size(); ++n)
+        if (folded[n])
+          for (const std::uint32_t c : elements.elements[look[n]])
+            if (!stays(c)) moving.push_back(c);
+      moving = distinct(std::move(moving));
+      std::vector<Place> next(moving.size());
+      parallel_for(moving.size(), 256, [&](std::size_t n) {
+        Place sum = Place::Zero();
+        double count = 0.;
+        for (const std::uint32_t e : of[moving[n]]) {
+          const auto& own = elements.elements[e];
+          const auto at = int(std::find(own.begin(), own.end(), moving[n]) - own.begin());
+          for (const auto& [u, v] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+            const int i = at % 4 + u, j = at / 4 + v;
+            if (i < 0 || i > 3 || j < 0 || j > 3) continue;
+            sum += elements.curves[own[slot(i, j)]][depth], count += 1.;
+          }
+        }
+        next[n] = sum / count;
+      });
+      for (std::size_t n = 0; n < moving.size(); ++n) elements.curves[moving[n]][depth] = next[n];
+      look.clear();
+      for (const std::uint32_t c : moving) look.insert(look.end(), of[c].begin(), of[c].end());
+      look = distinct(std::move(look));
+    }
+  }
+}
+
 }  // namespace
 
 Hexahedron Elements::hexahedron(std::size_t element) const {
@@ -165,21 +221,13 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
   }
 
   const RibbonLocator locator(ribbon);
-  Mesh surface;
-  for (const Place& p : ribbon.outer) surface.positions.push_back(p.cast<float>());
-  surface.triangles = ribbon.triangles;
-  const std::vector<Vec3> normals = vertex_normals(surface);
   std::vector<std::uint8_t> arrived(starts.size());
   result.curves.resize(starts.size());
   progress.begin("dropping the curves of elements", starts.size());
   parallel_ranges(starts.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t c = begin; c < end; ++c) {
       const RibbonPoint point = c < result.corners ? quads.points[c] : locator.nearest(starts[c]);
-      const Triangle& t = ribbon.triangles[point.triangle];
-      Place inward = Place::Zero();
-      for (std::size_t k = 0; k < 3; ++k)
-        inward -= point.weights[Eigen::Index(k)] * normals[t[k]].cast<double>();
-      const WCurve curve = curves.drop(on(ribbon.outer, ribbon, point), inward);
+      const WCurve curve = curve_at(ribbon, point, curves);
       for (std::size_t k = 0; k < 4; ++k) result.curves[c][k] = curve.at(double(k) / 3.);
       arrived[c] = curve.arrived;
     }
@@ -200,6 +248,7 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
       for (int i = 1; i < 3; ++i) calm(at(i, 0, d), at(i, 1, d), at(i, 2, d), at(i, 3, d));
     }
   });
+  smooth_folded_faces(result);
   result.not_arrived = std::size_t(std::count(arrived.begin(), arrived.end(), 0));
   return result;
 }

@@ -21,7 +21,8 @@
 namespace forest::cortex {
 namespace {
 
-// Volume under a unit of area of the middle, µm, at every vertex.
+// Volume under a unit of area of the middle, µm, at every vertex: of the triangles within three rings, about as many as one
+// element has, since that of single ones on a crumpled surface says nothing.
 std::vector<double> heights(const Ribbon& ribbon) {
   std::vector<double> volumes(ribbon.size(), 0.), areas(ribbon.size(), 0.);
   for (const Triangle& t : ribbon.triangles) {
@@ -32,6 +33,14 @@ std::vector<double> heights(const Ribbon& ribbon) {
         (ribbon.middle[t[1]] - ribbon.middle[t[0]]).cross(ribbon.middle[t[2]] - ribbon.middle[t[0]]).norm();
     for (const std::uint32_t v : t) volumes[v] += volume, areas[v] += area;
   }
+  const Neighbours near = neighbours(ribbon.size(), ribbon.triangles);
+  for (int round = 0; round < 2; ++round)
+    for (std::vector<double>* all : {&volumes, &areas}) {
+      std::vector<double> sums = *all;
+      for (std::size_t v = 0; v < sums.size(); ++v)
+        for (const std::uint32_t other : near.of(std::uint32_t(v))) sums[v] += (*all)[other];
+      all->swap(sums);
+    }
   for (std::size_t v = 0; v < volumes.size(); ++v)
     volumes[v] = areas[v] > 0. ? std::clamp(volumes[v] / areas[v], 200., 1e4) : 0.;
   return volumes;

@@ -197,6 +197,79 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
   return ribbon;
 }
 
+WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& curves) {
+  const Place outer = on(ribbon.outer, ribbon, point), inward = on(ribbon.inner, ribbon, point) - outer;
+  if (auto curve = curves.through(on(ribbon.middle, ribbon, point), inward); curve && curve->arrived)
+    return *std::move(curve);
+  return curves.drop(outer, inward);
+}
+
+Ribbon unfolded(Ribbon ribbon, const WCurves& curves, Progress& progress) {
+  constexpr int turns = 2, passes = 30, rounds = 20;
+  constexpr double least_height =
+      .02;  // of a triangle of the middle: twice its area by the square of its longest side
+  const std::size_t n = ribbon.size();
+  const Neighbours near = neighbours(n, ribbon.triangles);
+  std::vector<std::uint8_t> fixed = ribbon.wall;
+  for (const Triangle& t : ribbon.triangles)
+    if (ribbon.is_wall(t)) fixed[t[0]] = fixed[t[1]] = fixed[t[2]] = 1;
+  std::vector<Place> up(n), next(n);
+  for (std::size_t v = 0; v < n; ++v) up[v] = (ribbon.outer[v] - ribbon.inner[v]).normalized();
+  for (int round = 0; round < 5; ++round) {
+    parallel_for(n, 1024, [&](std::size_t v) {
+      Place sum = up[v];
+      for (const std::uint32_t other : near.of(std::uint32_t(v))) sum += up[other];
+      next[v] = sum.normalized();
+    });
+    up.swap(next);
+  }
+  const auto folded = [&](const Triangle& t) {
+    const Place a = ribbon.middle[t[1]] - ribbon.middle[t[0]], b = ribbon.middle[t[2]] - ribbon.middle[t[0]];
+    const double longest = std::max({a.squaredNorm(), b.squaredNorm(), (a - b).squaredNorm()});
+    return a.cross(b).dot((up[t[0]] + up[t[1]] + up[t[2]]).normalized()) < least_height * longest;
+  };
+  progress.begin("unfolding the middle", 0);
+  for (int turn = 0; turn < turns; ++turn) {
+    std::vector<std::uint8_t> moves(n, 0);
+    std::vector<std::uint32_t> moving;
+    const auto add = [&](std::uint32_t v) {
+      if (!moves[v] && !fixed[v]) moves[v] = 1, moving.push_back(v);
+    };
+    for (int pass = 0; pass < passes; ++pass) {
+      bool any = false;
+      for (const Triangle& t : ribbon.triangles) {
+        if (ribbon.is_wall(t) || !folded(t)) continue;
+        any = true;
+        for (const std::uint32_t v : t) {
+          add(v);
+          for (const std::uint32_t other : near.of(v)) add(other);
+        }
+      }
+      if (!any) break;
+      for (int round = 0; round < rounds; ++round) {
+        parallel_for(moving.size(), 1024, [&](std::size_t i) {
+          const std::uint32_t v = moving[i];
+          Place mean = Place::Zero();
+          for (const std::uint32_t other : near.of(v)) mean += ribbon.middle[other];
+          const Place way = .7 * (mean / double(near.of(v).size()) - ribbon.middle[v]);
+          next[v] = ribbon.middle[v] + way - up[v] * up[v].dot(way);
+        });
+        for (const std::uint32_t v : moving) ribbon.middle[v] = next[v];
+      }
+      progress.advance();
+    }
+    parallel_for(moving.size(), 64, [&](std::size_t i) {
+      const std::uint32_t v = moving[i];
+      const auto curve = curves.through(ribbon.middle[v], -up[v]);
+      if (!curve || !curve->arrived) return;
+      ribbon.outer[v] = curve->points.front(), ribbon.inner[v] = curve->points.back();
+      if (turn + 1 < turns) ribbon.middle[v] = curve->at(.5);  // again half way down, which may fold a little
+    });
+  }
+  progress.end();
+  return ribbon;
+}
+
 double volume_under(const Ribbon& ribbon, const Triangle& triangle) {
   // A prism between two levels as three tetrahedra, cut along diagonals from the corner of the lowest number, as the
   // neighbours' are.

@@ -36,6 +36,12 @@ struct Ribbon {
   bool is_wall(const Triangle& t) const { return wall[t[0]] || wall[t[1]] || wall[t[2]]; }
 };
 
+/// The ribbon with a middle that is folded nowhere. Curves from an outer surface that is crumpled on a smaller scale than the field sees,
+/// as real ones are in the floor of sulci, cross one another and turn triangles of the middle over: there its vertices spread
+/// along it until all triangles face outwards, and each has the curve through its new place. Levels then do not tell any more what the
+/// closed surfaces enclose.
+Ribbon unfolded(Ribbon ribbon, const WCurves& curves, Progress& progress);
+
 /// The ribbon before its triangles were halved the last time; as it is when they never were.
 Ribbon coarser(const Ribbon& ribbon);
 
@@ -45,6 +51,9 @@ struct RibbonPoint {
   Place weights = Place(1., 0., 0.);  // of its corners, in sum 1
 };
 Place on(const std::vector<Place>& level, const Ribbon& ribbon, const RibbonPoint& point);
+
+/// The curve through a place of the middle, or where that does not arrive at both surfaces the one from the outer surface.
+WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& curves);
 
 /// Finds places on the middle of a ribbon, outside its wall.
 class RibbonLocator {

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
 
 namespace forest::cortex {
 namespace {
@@ -45,48 +46,72 @@ double WCurves::straight_way(const Place& from) const {
   return hit ? hit->distance : longest;
 }
 
-WCurve WCurves::drop(const Place& start, const Place& inward) const {
-  WCurve curve;
-  curve.points.push_back(start);
-  curve.volume.push_back(0.);
+// A piece of a curve, as WCurve has it, whose tube grows from its start on.
+struct WCurves::Way {
+  std::vector<Place> points;
+  std::vector<double> volume;
+  std::uint32_t triangle = 0;
+  bool arrived = false, sloping = false;  // sloping: the field has a slope at the start
+};
+
+WCurves::Way WCurves::follow(const Place& start, const Place& towards, bool upwards) const {
+  const TriangleTree& aim = upwards ? outer_ : inner_;
   const double step = step_share * field_.spacing();
-  Place at = start, heading = inward.normalized();
-  const auto slope = [&](const Place& place, const Place& down) { return field_.gradient(place, -down); };
-  if (const auto hit = inner_.nearest(start, touching * field_.spacing())) {  // there is no tissue here
-    curve.points.push_back(hit->at), curve.volume.push_back(0.);
-    curve.triangle = hit->triangle, curve.arrived = true;
-    return curve;
-  }
+  const auto slope = [&](const Place& place, const Place& heading) -> std::optional<Place> {
+    const auto g = field_.gradient(place, upwards ? heading : Place(-heading));
+    return g ? std::optional<Place>(upwards ? *g : Place(-*g)) : std::nullopt;
+  };
+  const auto width_of = [](const Place& g) { return 1. / std::max(g.norm(), least_slope); };
+  Way way{{start}, {0.}};
+  Place at = start, heading = towards.normalized();
   double width = 0.;  // 1/slope at `at`
-  if (const auto g = slope(at, heading))
-    heading = -g->normalized(), width = 1. / std::max(g->norm(), least_slope);
+  if (const auto g = slope(at, heading)) heading = g->normalized(), width = width_of(*g), way.sloping = true;
   const auto add = [&](const Place& place, double width_there) {
-    const double ds = (place - curve.points.back()).norm();
-    curve.volume.push_back(curve.volume.back() + ds * .5 * (width + width_there));
-    curve.points.push_back(place);
+    const double ds = (place - way.points.back()).norm();
+    way.volume.push_back(way.volume.back() + ds * .5 * (width + width_there));
+    way.points.push_back(place);
     width = width_there;
   };
-  for (double way = 0.; way < longest; way += step) {
+  for (double gone = 0.; gone < longest; gone += step) {
     // Midpoint rule.
     Place middle = heading;
-    if (const auto g = slope(at + .5 * step * heading, heading)) middle = -g->normalized();
+    if (const auto g = slope(at + .5 * step * heading, heading)) middle = g->normalized();
     const Place next = at + step * middle;
     // The surface may be met in either half; the way there is straight within a step.
-    if (const auto hit = inner_.first(at, next)) {
+    if (const auto hit = aim.first(at, next)) {
       double width_there = width;
-      if (const auto g = slope(hit->at, middle)) width_there = 1. / std::max(g->norm(), least_slope);
+      if (const auto g = slope(hit->at, middle)) width_there = width_of(*g);
       add(hit->at, width_there);
-      curve.triangle = hit->triangle, curve.arrived = true;
-      return curve;
+      way.triangle = hit->triangle, way.arrived = true;
+      return way;
     }
     const auto g = slope(next, middle);
-    if (!g && way > 0. && !inner_.nearest(next, 2. * field_.spacing())) break;  // it left the tissue
-    add(next, g ? 1. / std::max(g->norm(), least_slope) : width);
-    at = next, heading = g ? Place(-g->normalized()) : middle;
+    if (!g && gone > 0. && !aim.nearest(next, 2. * field_.spacing())) break;  // it left the tissue
+    add(next, g ? width_of(*g) : width);
+    at = next, heading = g ? g->normalized() : middle;
   }
-  if (const auto hit = inner_.nearest(at)) {
+  if (const auto hit = aim.nearest(at)) {
     add(hit->at, width);
-    curve.triangle = hit->triangle;
+    way.triangle = hit->triangle;
+  }
+  return way;
+}
+
+WCurve WCurves::drop(const Place& start, const Place& inward) const {
+  if (const auto hit = inner_.nearest(start, touching * field_.spacing()))  // there is no tissue here
+    return {{start, hit->at}, {0., 0.}, hit->triangle, true};
+  Way way = follow(start, inward, false);
+  return {std::move(way.points), std::move(way.volume), way.triangle, way.arrived};
+}
+
+std::optional<WCurve> WCurves::through(const Place& place, const Place& inward) const {
+  const Way up = follow(place, -inward, true), down = follow(place, inward, false);
+  if (!up.sloping || !down.sloping) return std::nullopt;
+  WCurve curve{{up.points.rbegin(), up.points.rend()}, {}, down.triangle, up.arrived && down.arrived};
+  for (auto v = up.volume.rbegin(); v != up.volume.rend(); ++v) curve.volume.push_back(up.volume.back() - *v);
+  for (std::size_t i = 1; i < down.points.size(); ++i) {
+    curve.points.push_back(down.points[i]);
+    curve.volume.push_back(up.volume.back() + down.volume[i]);
   }
   return curve;
 }

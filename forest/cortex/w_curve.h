@@ -30,20 +30,28 @@ struct WCurve {
   Place at_length(double share) const;
 };
 
-/// Drops curves; the field and the tree must outlive it.
+/// Drops curves; the field and the trees must outlive it.
 class WCurves {
  public:
-  WCurves(const Laplace& field, const TriangleTree& inner) : field_(field), inner_(inner) {}
+  WCurves(const Laplace& field, const TriangleTree& outer, const TriangleTree& inner)
+      : field_(field), outer_(outer), inner_(inner) {}
 
   /// @param start   on the outer surface
   /// @param inward  roughly into the tissue
   WCurve drop(const Place& start, const Place& inward) const;
+  /// The curve through a place between the surfaces, followed both ways: where curves fan out from a crease of the outer surface, one
+  /// of them is told by a place on its way much better than by its start. Arrived: at both surfaces.
+  /// None where the field has no slope.
+  std::optional<WCurve> through(const Place& place, const Place& inward) const;
   /// To the nearest place of the inner surface, µm.
   double straight_way(const Place& from) const;
 
  private:
+  struct Way;
+  Way follow(const Place& start, const Place& heading, bool upwards) const;
+
   const Laplace& field_;
-  const TriangleTree& inner_;
+  const TriangleTree &outer_, &inner_;
 };
 
 }  // namespace forest::cortex
