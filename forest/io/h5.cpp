@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <optional>
@@ -16,6 +15,7 @@
 #include "forest/io/h5_names.h"
 #include "forest/io/hdf5.h"
 #include "forest/io/hdf5_image.h"
+#include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
 #include "forest/io/swc_rows.h"
 
@@ -74,19 +74,6 @@ constexpr std::array<Oddity, static_cast<std::size_t>(H5Oddity::count)> table{{
 }};
 
 using Oddities = OddityList<H5Oddity>;
-
-// Numbers of annotations
-// ---------------------------------------------------------------------------
-
-void append(std::string& text, float value) {
-  std::array<char, 32> digits;
-  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
-}
-
-void append(std::string& text, std::int64_t value) {
-  std::array<char, 24> digits;
-  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
-}
 
 // Groups and their members
 // ---------------------------------------------------------------------------
@@ -596,7 +583,7 @@ class CellReader {
       text.reserve(10 * perimeters_.size());
       for (const float perimeter : perimeters_) {
         if (!text.empty()) text += ' ';
-        append(text, perimeter);
+        append_shortest(text, perimeter);
       }
       builder_.annotate(std::string(perimeters_key), std::move(text));
     }
@@ -667,9 +654,9 @@ class CellReader {
       for (std::size_t c = 0; c < kind.count; ++c) {
         if (c) text += ' ';
         if (kind.columns[c].whole)
-          append(text, whole[c][row]);
+          append_number(text, whole[c][row]);
         else
-          append(text, real[c][row]);
+          append_shortest(text, real[c][row]);
       }
       builder_.annotate(std::string(kind.group), text);
     }
@@ -704,8 +691,8 @@ class CellReader {
       const std::size_t begin = std::size_t(rows[std::size_t(2 * i)]);
       const std::size_t end = std::size_t(i + 1 < count ? rows[std::size_t(2 * i + 2)] : total);
       std::string text;
-      append(text, rows[std::size_t(2 * i + 1)]);
-      for (std::size_t k = 3 * begin; k < 3 * end; ++k) text += ' ', append(text, numbers[k]);
+      append_number(text, rows[std::size_t(2 * i + 1)]);
+      for (std::size_t k = 3 * begin; k < 3 * end; ++k) text += ' ', append_shortest(text, numbers[k]);
       builder_.annotate(std::string(mitochondrion_key), std::move(text));
     }
   }

@@ -1,8 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // Writing of neurons as NeuroML: neuroml.h.
 #include <algorithm>
-#include <array>
-#include <charconv>
 #include <limits>
 #include <map>
 #include <optional>
@@ -13,6 +11,7 @@
 #include "forest/io/keeps.h"
 #include "forest/io/neuroml.h"
 #include "forest/io/neuroml_names.h"
+#include "forest/io/numbers.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/words.h"
@@ -58,11 +57,6 @@ bool plain(std::string_view text) {
     i += size;
   }
   return true;
-}
-
-void append(std::string& text, float value) {
-  std::array<char, 32> digits;
-  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
 }
 
 std::string escaped(std::string_view text) {
@@ -136,7 +130,7 @@ class Writer {
       std::string numbers = fmt::format("{}", s.section.value());
       for (const float number :
            {s.position, s.head.x(), s.head.y(), s.head.z(), s.head_diameter, s.neck_diameter, float(s.shape)})
-        numbers += ' ', append(numbers, number);
+        numbers += ' ', append_shortest(numbers, number);
       property(spine_tag, numbers);
     }
   }
@@ -149,7 +143,7 @@ class Writer {
           {"\" y=\"", p.y},
           {"\" z=\"", p.z},
           {"\" diameter=\"", std::min(2.f * p.radius, std::numeric_limits<float>::max())}})
-      text_ += key, append(text_, number);
+      text_ += key, append_shortest(text_, number);
     text_ += "\"/>\n";
   }
 

@@ -93,6 +93,12 @@ inline void append_number(std::string& text, std::int64_t value) {
   text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
 }
 
+/// The shortest text that is read as the same number, with an exponent where that is shorter.
+inline void append_shortest(std::string& text, float value) {
+  std::array<char, 32> digits;
+  text.append(digits.data(), std::to_chars(digits.data(), digits.data() + digits.size(), value).ptr);
+}
+
 /// Without exponent, as some formats demand: at most some 60 characters.
 inline void append_number(std::string& text, float value) {
   std::array<char, 128> digits;
