@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <regex>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
