@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/round_numbers.h"
 #include "forest/statistics/summary.h"
 #include "forest/statistics/two_samples.h"
 
@@ -55,22 +56,6 @@ std::string number(double x) {
   const double size = std::abs(x);
   if (size >= 1e4 && size < 1e7) return fmt::format("{:.0f}", x);
   return size >= 1e7 || size < 1e-3 ? fmt::format("{:.1e}", x) : fmt::format("{:.4g}", x);
-}
-
-/// Round numbers from low to high, about so many.
-std::vector<double> ticks(double low, double high, int count) {
-  const double span = high - low;
-  if (!(span > 0.) || !std::isfinite(span)) return {low};
-  const double rough = span / count, power = std::pow(10., std::floor(std::log10(rough)));
-  double step = 10. * power;
-  for (const double factor : {1., 2., 5.})
-    if (factor * power >= rough) {
-      step = factor * power;
-      break;
-    }
-  std::vector<double> out;
-  for (double k = std::ceil(low / step - 1e-9); k * step <= high + 1e-9 * step; ++k) out.push_back(k * step);
-  return out;
 }
 
 struct Scale {

@@ -12,10 +12,10 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/round_numbers.h"
 #include "forest/io/png.h"
 #include "forest/reports/activity.h"
 #include "forest/scene/colour_bar.h"
-#include "forest/scene/slice_picture.h"
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
@@ -30,7 +30,7 @@ struct Options {
   std::string size = "1200x800";
   double from = -INFINITY, to = INFINITY;  // ms
   std::vector<float> range{-80.f, 20.f};
-  std::string map = "viridis";
+  std::string map = scene::colour_maps().front().name;
   bool plain = false;
 };
 
@@ -45,7 +45,7 @@ Colour colour_of(const scene::ColourMap& map, float value, float low, float high
 
 // Ticks at round numbers, at least so many pixels apart.
 float tick_step(double units_a_pixel, float apart) {
-  return float(scene::scale_bar_length(2.5 * units_a_pixel * double(apart)));
+  return float(round_below(2.5 * units_a_pixel * double(apart)));
 }
 
 // What lies around a raster: neurons down its left side, ms below, and what its colours mean.

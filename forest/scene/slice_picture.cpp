@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/parallel.h"
+#include "forest/core/round_numbers.h"
 #include "forest/scene/lettering.h"
 
 namespace forest::scene {
@@ -121,7 +122,7 @@ struct ScaleBar {
   std::string label;
 };
 ScaleBar scale_bar_of(const SlicePicture& picture) {
-  const double length = scale_bar_length(.2 * picture.width_pixels * picture.pixel());
+  const double length = round_below(.2 * picture.width_pixels * picture.pixel());
   if (length < 1.) return {length, fmt::format("{:.0f} nm", 1000. * length)};
   return {length,
           length < 1000. ? fmt::format("{:.0f} µm", length) : fmt::format("{:.0f} mm", length / 1000.)};
@@ -147,13 +148,6 @@ void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Gro
 Sheet SlicePicture::sheet() const {
   const Place half(.5 * width_pixels * pixel(), .5 * height);
   return {centre - half, centre + half};
-}
-
-double scale_bar_length(double longest) {
-  const double decade = std::pow(10., std::floor(std::log10(longest)));
-  for (const double step : {5., 2.})
-    if (step * decade <= longest) return step * decade;
-  return decade;
 }
 
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture) {

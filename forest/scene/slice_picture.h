@@ -23,9 +23,6 @@ struct SlicePicture {
 };
 frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
 
-/// A length of 1, 2 or 5 times a power of ten, at most `longest`.
-double scale_bar_length(double longest);
-
 /// The same as SVG with one path a neuron, its profiles united; ids are the neurons' numbers.
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
 

@@ -150,11 +150,5 @@ TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {
   EXPECT_EQ(svg.find("nan"), std::string::npos);
 }
 
-TEST(ScaleBar, IsARoundLength) {
-  for (const auto& [longest, length] :
-       {std::pair(99., 50.), {100., 100.}, {.3, .2}, {7., 5.}, {1999., 1000.}})
-    EXPECT_NEAR(scale_bar_length(longest), length, 1e-9 * length);
-}
-
 }  // namespace
 }  // namespace forest::scene
