@@ -5,6 +5,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <functional>
 #include <limits>
 #include <numbers>
 #include <utility>
@@ -170,39 +171,247 @@ Json json_of(const Appearance& a) {
   return json;
 }
 
-ActivityView activity_of(const Json& json, const std::string& name) {
-  if (!json.is_object())
-    throw InputError(name, 0, "'activity' must be an object such as {\"map\":\"plasma\",\"range\":[-80,20]}");
-  constexpr float far = 1e9f;
-  ActivityView a;
-  for (const auto& [key, value] : json.items()) {
-    if (key == "map") {
-      a.map = value.is_string() ? find_colour_map(value.get<std::string>()) : nullptr;
-      if (!a.map) {
-        std::vector<std::string_view> names;
-        for (const ColourMap& map : colour_maps()) names.push_back(map.name);
-        throw InputError(name, 0, fmt::format("'map' must be one of: {}", fmt::join(names, ", ")));
-      }
-    } else if (key == "range") {
-      if (!value.is_array() || value.size() != 2)
-        throw InputError(name, 0, "'range' must be the values at both ends of the colours, as [-80, 20]");
-      a.low = number_of(value[0], name, key, -far, far), a.high = number_of(value[1], name, key, -far, far);
-      if (!(a.low < a.high)) throw InputError(name, 0, "'range' must have its lower end first");
-    } else if (key == "threshold") {
-      a.threshold = number_of(value, name, key, -far, far);
-    } else if (key == "speed") {
-      a.speed = number_of(value, name, key, 0.f, 1e6f);
-    } else if (key == "fade") {
-      a.fade = number_of(value, name, key, .01f, 1e6f);
-    } else if (key == "time") {
-      number_of(value, name, key, -far, far);
-      a.time = value.get<double>();
-    } else {
-      throw InputError(name, 0,
-                       fmt::format("'{}' is no key of a view's activity; see docs/scene/view.md", key));
-    }
+// A key of a view, or of what is in one: how it is read and written, and what it may hold (words, or a range of numbers).
+template <class Of>
+struct Key {
+  std::string_view name;
+  std::vector<std::string> values;
+  std::function<void(Of&, const Json&, const std::string& file)> read;
+  std::function<Json(const Of&)> write;  // null: nothing is said of it
+
+  Key said_if(bool (*says)(const Of&)) const {
+    Key key = *this;
+    key.write = [says, write = write](const Of& of) { return says(of) ? write(of) : Json(); };
+    return key;
   }
-  return a;
+};
+template <class Of>
+using Keys = std::span<const Key<Of>>;
+
+// "0.05–100,000", as docs/scene/view.md has it.
+std::string range_of(double low, double high) {
+  const auto number = [](double x) {
+    std::string text = fmt::format("{:g}", x);
+    if (x < 1e4) return text;
+    text = fmt::format("{:.0f}", x);
+    for (std::size_t at = text.size(); at > 3;) text.insert(at -= 3, ",");
+    return text;
+  };
+  return fmt::format("{}–{}", number(low), number(high));
+}
+
+// Rows of one kind; `at` is where the value lies: at(View&) is a reference to it, at(const View&) too.
+template <class Of, class At>
+Key<Of> point(std::string_view name, At at) {
+  return {name,
+          {},
+          [=](Of& of, const Json& json, const std::string& file) { at(of) = vector_of(json, file, name); },
+          [=](const Of& of) {
+            const Vec3& p = at(of);
+            return Json{p.x(), p.y(), p.z()};
+          }};
+}
+template <class Of, class At>
+Key<Of> number(std::string_view name, float low, float high, At at) {
+  return {name,
+          {range_of(double(low), double(high))},
+          [=](Of& of, const Json& json, const std::string& file) {
+            at(of) = number_of(json, file, name, low, high);
+          },
+          [=](const Of& of) { return Json(at(of)); }};
+}
+template <class Of, class At>
+Key<Of> whole(std::string_view name, std::uint32_t low, std::uint32_t high, At at) {
+  return {name,
+          {range_of(low, high)},
+          [=](Of& of, const Json& json, const std::string& file) {
+            const double value = json.is_number() ? json.get<double>() : NAN;
+            if (!(value >= low && value <= high && value == std::floor(value)))
+              throw InputError(file, 0,
+                               fmt::format("'{}' must be a whole number from {} to {}", name, low, high));
+            at(of) = std::uint32_t(value);
+          },
+          [=](const Of& of) { return Json(at(of)); }};
+}
+template <class Of, class At>
+Key<Of> flag(std::string_view name, At at) {
+  return {name,
+          {"true", "false"},
+          [=](Of& of, const Json& json, const std::string& file) { at(of) = flag_of(json, file, name); },
+          [=](const Of& of) { return Json(at(of)); }};
+}
+template <class Of, std::size_t N, class At>
+Key<Of> word(std::string_view name, const std::array<std::string_view, N>& words, At at) {
+  return {name,
+          {words.begin(), words.end()},
+          [=, &words](Of& of, const Json& json, const std::string& file) {
+            at(of) = std::remove_cvref_t<decltype(at(of))>(word_of(json, file, name, words));
+          },
+          [=, &words](const Of& of) { return Json(words[std::size_t(at(of))]); }};
+}
+
+template <class Of>
+void read_all(Of& of, const Json& json, Keys<Of> keys, const std::string& file, std::string_view whose) {
+  for (const auto& [name, value] : json.items()) {
+    const auto key = std::ranges::find(keys, name, &Key<Of>::name);
+    if (key == keys.end())
+      throw InputError(file, 0,
+                       fmt::format("'{}' is no key of a view{}; see docs/scene/view.md", name, whose));
+    key->read(of, value, file);
+  }
+}
+template <class Of>
+Json write_all(const Of& of, Keys<Of> keys) {
+  Json json;
+  for (const Key<Of>& key : keys)
+    if (Json value = key.write(of); !value.is_null()) json[std::string(key.name)] = std::move(value);
+  return json;
+}
+
+constexpr float far = 1e9f;  // beyond all values of reports
+
+void read_map(ActivityView& a, const Json& json, const std::string& file) {
+  a.map = json.is_string() ? find_colour_map(json.get<std::string>()) : nullptr;
+  if (a.map) return;
+  std::vector<std::string_view> names;
+  for (const ColourMap& map : colour_maps()) names.push_back(map.name);
+  throw InputError(file, 0, fmt::format("'map' must be one of: {}", fmt::join(names, ", ")));
+}
+
+void read_range(ActivityView& a, const Json& json, const std::string& file) {
+  if (!json.is_array() || json.size() != 2)
+    throw InputError(file, 0, "'range' must be the values at both ends of the colours, as [-80, 20]");
+  a.low = number_of(json[0], file, "range", -far, far), a.high = number_of(json[1], file, "range", -far, far);
+  if (!(a.low < a.high)) throw InputError(file, 0, "'range' must have its lower end first");
+}
+
+// In the order in which they are written.
+Keys<ActivityView> keys_of_activity() {
+  using A = ActivityView;
+  static const std::vector<Key<A>> keys = [] {
+    std::vector<std::string> maps;
+    for (const ColourMap& map : colour_maps()) maps.emplace_back(map.name);
+    return std::vector<Key<A>>{
+        {"map", maps, read_map, [](const A& a) { return Json(a.map->name); }},
+        {"range",
+         {},
+         read_range,
+         [](const A& a) {
+           return Json{a.low, a.high};
+         }},
+        number<A>(
+            "speed", 0.f, 1e6f, [](auto& a) -> auto& { return a.speed; }),
+        number<A>(
+            "fade", .01f, 1e6f, [](auto& a) -> auto& { return a.fade; }),
+        {"threshold",
+         {},
+         [](A& a, const Json& json, const std::string& file) {
+           a.threshold = number_of(json, file, "threshold", -far, far);
+         },
+         [](const A& a) { return a.threshold ? Json(*a.threshold) : Json(); }},
+        {"time",
+         {},
+         [](A& a, const Json& json, const std::string& file) {
+           number_of(json, file, "time", -far, far);
+           a.time = json.get<double>();
+         },
+         [](const A& a) { return a.time ? Json(*a.time) : Json(); }},
+    };
+  }();
+  return keys;
+}
+
+void read_gaze(View& v, const Json& json, const std::string& file) {
+  if (!json.is_array() || json.size() != 2 || !json[0].is_number() || !json[1].is_number())
+    throw InputError(file, 0,
+                     "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
+  v.detail.gaze = Vec2(json[0].get<float>(), json[1].get<float>());
+}
+
+void read_targets(View& v, const Json& json, const std::string& file) {
+  if (!json.is_array()) throw InputError(file, 0, "'targets' must be a list; see docs/scene/targets.md");
+  for (const Json& one : json) v.targets.push_back(appearance_of(one, file));
+}
+
+void read_activity(View& v, const Json& json, const std::string& file) {
+  if (!json.is_object())
+    throw InputError(file, 0, "'activity' must be an object such as {\"map\":\"plasma\",\"range\":[-80,20]}");
+  read_all(v.activity.emplace(), json, keys_of_activity(), file, "'s activity");
+}
+
+bool has_gaze(const View& v) { return v.detail.gaze.has_value(); }
+
+// In the order in which they are written.
+Keys<View> keys_of_view() {
+  using V = View;
+  static const std::vector<Key<V>> keys{
+      point<V>(
+          "eye", [](auto& v) -> auto& { return v.camera.eye; }),
+      point<V>(
+          "target", [](auto& v) -> auto& { return v.camera.target; }),
+      point<V>(
+          "up", [](auto& v) -> auto& { return v.camera.up; }),
+      number<V>(
+          "field_of_view", 1.f, 170.f, [](auto& v) -> auto& { return v.camera.field_of_view; }),
+      word<V>(
+          "projection", projection_names, [](auto& v) -> auto& { return v.camera.projection; }),
+      number<V>(
+          "near", .05f, 1e5f, [](auto& v) -> auto& { return v.camera.near; }),
+      number<V>(
+          "error", .05f, 100.f, [](auto& v) -> auto& { return v.detail.error; }),
+      number<V>(
+          "acuity_slope", 0.f, 60.f, [](auto& v) -> auto& { return v.detail.acuity_slope; }),
+      word<V>(
+          "colour_by", colour_names, [](auto& v) -> auto& { return v.colour_by; }),
+      word<V>(
+          "background", background_names, [](auto& v) -> auto& { return v.background; }),
+      whole<V>(
+          "samples", 1, 1024, [](auto& v) -> auto& { return v.samples; }),
+      number<V>(
+          "fog", 0.f, 100.f, [](auto& v) -> auto& { return v.fog; }),
+      number<V>(
+          "halo", 0.f, 10.f, [](auto& v) -> auto& { return v.halo; }),
+      flag<V>(
+          "skin", [](auto& v) -> auto& { return v.skin; })
+          .said_if([](const V& v) { return !v.skin; }),
+      word<V>(
+          "synapses", synapse_colour_names, [](auto& v) -> auto& { return v.synapses; })
+          .said_if([](const V& v) { return v.synapses != V().synapses; }),
+      {"gaze",
+       {},
+       read_gaze,
+       [](const V& v) {
+         return has_gaze(v) ? Json{v.detail.gaze->x(), v.detail.gaze->y()} : Json();
+       }},
+      number<V>(
+          "fovea", 0.f, 90.f, [](auto& v) -> auto& { return v.detail.fovea; })
+          .said_if(has_gaze),
+      number<V>(
+          "screen", 0.f, 170.f, [](auto& v) -> auto& { return v.detail.screen; })
+          .said_if([](const V& v) { return has_gaze(v) && v.detail.screen > 0.f; }),
+      {"targets",
+       {},
+       read_targets,
+       [](const V& v) {
+         Json list;
+         for (const Appearance& a : v.targets) list.push_back(json_of(a));
+         return list;
+       }},
+      {"activity",
+       {},
+       read_activity,
+       [](const V& v) {
+         return v.activity ? write_all<ActivityView>(*v.activity, keys_of_activity()) : Json();
+       }},
+  };
+  return keys;
+}
+
+template <class Of>
+std::vector<ViewKey> facts_of(Keys<Of> keys) {
+  std::vector<ViewKey> facts;
+  for (const Key<Of>& key : keys) facts.push_back({std::string(key.name), key.values});
+  return facts;
 }
 
 // The colours of activity on a background.
@@ -300,93 +509,16 @@ View parse_view(std::string_view text, const std::string& name) {
     if (!json.contains(needed))
       throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
   View v;
-  for (const auto& [key, value] : json.items()) {
-    if (key == "eye")
-      v.camera.eye = vector_of(value, name, key);
-    else if (key == "target")
-      v.camera.target = vector_of(value, name, key);
-    else if (key == "up")
-      v.camera.up = vector_of(value, name, key);
-    else if (key == "field_of_view")
-      v.camera.field_of_view = number_of(value, name, key, 1.f, 170.f);
-    else if (key == "near")
-      v.camera.near = number_of(value, name, key, .05f, 1e5f);
-    else if (key == "error")
-      v.detail.error = number_of(value, name, key, .05f, 100.f);
-    else if (key == "acuity_slope")
-      v.detail.acuity_slope = number_of(value, name, key, 0.f, 60.f);
-    else if (key == "fovea")
-      v.detail.fovea = number_of(value, name, key, 0.f, 90.f);
-    else if (key == "screen")
-      v.detail.screen = number_of(value, name, key, 0.f, 170.f);
-    else if (key == "projection")
-      v.camera.projection = frame::Projection(word_of(value, name, key, projection_names));
-    else if (key == "samples")
-      v.samples = std::uint32_t(number_of(value, name, key, 1.f, 1024.f));
-    else if (key == "fog")
-      v.fog = number_of(value, name, key, 0.f, 100.f);
-    else if (key == "halo")
-      v.halo = number_of(value, name, key, 0.f, 10.f);
-    else if (key == "skin") {
-      if (!value.is_boolean()) throw InputError(name, 0, "'skin' must be true or false");
-      v.skin = value.get<bool>();
-    } else if (key == "synapses") {
-      v.synapses = SynapseColour(word_of(value, name, key, synapse_colour_names));
-    } else if (key == "colour_by")
-      v.colour_by = ColourBy(word_of(value, name, key, colour_names));
-    else if (key == "background")
-      v.background = Background(word_of(value, name, key, background_names));
-    else if (key == "activity")
-      v.activity = activity_of(value, name);
-    else if (key == "targets") {
-      if (!value.is_array()) throw InputError(name, 0, "'targets' must be a list; see docs/scene/targets.md");
-      for (const Json& one : value) v.targets.push_back(appearance_of(one, name));
-    } else if (key == "gaze") {
-      if (!value.is_array() || value.size() != 2 || !value[0].is_number() || !value[1].is_number())
-        throw InputError(
-            name, 0, "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
-      v.detail.gaze = Vec2(value[0].get<float>(), value[1].get<float>());
-    } else {
-      throw InputError(name, 0, fmt::format("'{}' is no key of a view; see docs/scene/view.md", key));
-    }
-  }
+  read_all(v, json, keys_of_view(), name, "");
   if (v.camera.eye == v.camera.target)
     throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
   return v;
 }
 
-std::string to_json(const View& v) {
-  const auto list = [](const Vec3& p) { return Json{p.x(), p.y(), p.z()}; };
-  Json json{{"eye", list(v.camera.eye)},
-            {"target", list(v.camera.target)},
-            {"up", list(v.camera.up)},
-            {"field_of_view", v.camera.field_of_view},
-            {"projection", projection_names[std::size_t(v.camera.projection)]},
-            {"near", v.camera.near},
-            {"error", v.detail.error},
-            {"acuity_slope", v.detail.acuity_slope},
-            {"colour_by", colour_names[std::size_t(v.colour_by)]},
-            {"background", background_names[std::size_t(v.background)]},
-            {"samples", v.samples},
-            {"fog", v.fog},
-            {"halo", v.halo}};
-  if (!v.skin) json["skin"] = false;
-  if (v.synapses != View().synapses) json["synapses"] = synapse_colour_names[std::size_t(v.synapses)];
-  if (v.detail.gaze) {
-    json["gaze"] = {v.detail.gaze->x(), v.detail.gaze->y()};
-    json["fovea"] = v.detail.fovea;
-    if (v.detail.screen > 0.f) json["screen"] = v.detail.screen;
-  }
-  for (const Appearance& a : v.targets) json["targets"].push_back(json_of(a));
-  if (v.activity) {
-    const ActivityView& a = *v.activity;
-    Json& activity = json["activity"] = {
-        {"map", a.map->name}, {"range", {a.low, a.high}}, {"speed", a.speed}, {"fade", a.fade}};
-    if (a.threshold) activity["threshold"] = *a.threshold;
-    if (a.time) activity["time"] = *a.time;
-  }
-  return json.dump();
-}
+std::string to_json(const View& view) { return write_all(view, keys_of_view()).dump(); }
+
+std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
+std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }
 
 View overview(const Forest& forest, float aspect) {
   View view;

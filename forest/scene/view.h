@@ -47,6 +47,15 @@ struct View {
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);
 
+/// A key of that object, and what it may hold: words, or the range of a number as "1–170"; none where there is more to say. So
+/// docs/scene/view.md has it.
+struct ViewKey {
+  std::string name;
+  std::vector<std::string> values;
+};
+std::vector<ViewKey> view_keys();
+std::vector<ViewKey> activity_keys();  // of its `activity`
+
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture
 View overview(const Forest& forest, float aspect = 16.f / 9.f);

@@ -3,10 +3,14 @@
 
 #include <array>
 #include <cmath>
+#include <map>
+#include <sstream>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/scene/pick.h"
 
 #include "tests/sample_forest.h"
@@ -29,6 +33,45 @@ TEST(View, IsTextAndBack) {
   EXPECT_EQ(*back.detail.gaze, *view.detail.gaze);
 }
 
+// A view of which every key says something.
+View full_view() {
+  View view;
+  view.detail.gaze = Vec2(.25f, .75f);
+  view.detail.screen = 40.f;
+  view.skin = false;
+  view.synapses = SynapseColour::target;
+  view.targets.resize(1);
+  view.targets[0].name = "L5", view.targets[0].opacity = .4f;
+  view.activity.emplace();
+  view.activity->threshold = -60.f, view.activity->time = 12.5;
+  return view;
+}
+
+TEST(View, EveryKeyIsWrittenAndReadBack) {
+  const std::string text = to_json(full_view());
+  for (const auto& keys : {view_keys(), activity_keys()})
+    for (const ViewKey& key : keys)
+      EXPECT_NE(text.find('"' + key.name + "\":"), std::string::npos) << key.name;
+  EXPECT_EQ(to_json(parse_view(text)), text);
+}
+
+TEST(View, ItsPageHasEveryKeyWithWhatItMayHoldAndNoOther) {
+  const MappedFile page(FOREST_SOURCE_DIR "/docs/scene/view.md");
+  std::map<std::string, std::string> rows;  // of its tables, by key
+  std::istringstream lines{std::string(page.text())};
+  for (std::string line; std::getline(lines, line);)
+    if (line.starts_with("| `")) rows.emplace(line.substr(3, line.find('`', 3) - 3), line);
+  std::size_t keys = 0;
+  for (const auto& all : {view_keys(), activity_keys()})
+    for (const ViewKey& key : all) {
+      ASSERT_TRUE(rows.contains(key.name)) << key.name;
+      for (const std::string& value : key.values)
+        EXPECT_NE(rows[key.name].find(value), std::string::npos) << key.name << " may be " << value;
+      ++keys;
+    }
+  EXPECT_EQ(rows.size(), keys);
+}
+
 TEST(View, SaysWhichKeyIsWrong) {
   const auto error_of = [](const char* text) -> std::string {
     try {
@@ -48,6 +91,12 @@ TEST(View, SaysWhichKeyIsWrong) {
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":"mood"})").find("layer"),
             std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"fovv":4})").find("fovv"), std::string::npos);
+  for (const char* samples : {"2.7", "0", "1025", "\"4\"", "-3"})
+    EXPECT_NE(error_of(fmt::format(R"({{"eye":[0,0,1],"target":[0,0,0],"samples":{}}})", samples).c_str())
+                  .find("'samples' must be a whole number from 1 to 1024"),
+              std::string::npos)
+        << samples;
+  EXPECT_EQ(parse_view(R"({"eye":[0,0,1],"target":[0,0,0],"samples":2.0})").samples, 2u);
 }
 
 TEST(View, FogTakesAsMuchContrastOnLightGroundAsOnDark) {
