@@ -15,15 +15,23 @@ namespace {
 constexpr double rim_pixels = 1.1;  // how much darker line a profile has around it, where it is large enough
 constexpr int lines = 4;            // a pixel's scan lines
 constexpr std::size_t rows_at_once = 16;
-constexpr float plate_opacity = .85f;  // behind the scale bar
+constexpr float plate_opacity = .92f;  // behind the scale bar
 
 struct Ground {
-  Vec3 paper, ink;  // linear light
-  float tint, rim;  // share of paper in a filled profile; light that its rim keeps
+  Vec3 paper, ink, plate;  // linear light; the plate under a scale bar is seen on the paper
+  float tint, rim;         // share of paper in a filled profile; light that its rim keeps
 };
 Ground ground_of(Background background) {
-  return background == Background::light ? Ground{Vec3::Constant(.86f), Vec3::Constant(.01f), .30f, .22f}
-                                         : Ground{Vec3(.006f, .009f, .014f), Vec3::Constant(.8f), 0.f, .45f};
+  return background == Background::light ? Ground{.paper = Vec3::Constant(.86f),
+                                                  .ink = Vec3::Constant(.01f),
+                                                  .plate = Vec3::Constant(.77f),
+                                                  .tint = .30f,
+                                                  .rim = .22f}
+                                         : Ground{.paper = Vec3(.006f, .009f, .014f),
+                                                  .ink = Vec3::Constant(.8f),
+                                                  .plate = Vec3(.016f, .021f, .030f),
+                                                  .tint = 0.f,
+                                                  .rim = .45f};
 }
 
 Vec3 fill_of(const Colouring& colouring, const Profile& p, const Ground& ground) {
@@ -138,7 +146,7 @@ void paint_scale_bar(frame::Image& image, const SlicePicture& picture, const Gro
   const float pad = .7f * height,
               wide = std::max(float(bar.length / picture.pixel()), letters.width(bar.label));
   fill(image, {margin - pad, top - 1.7f * height - pad, margin + wide + pad, bottom + pad},
-       ground.paper.unaryExpr(&srgb), plate_opacity);
+       ground.plate.unaryExpr(&srgb), plate_opacity);
   fill(image, {margin, top, margin + float(bar.length / picture.pixel()), bottom}, colour);
   letters.write(image, bar.label, margin, top - .7f * height);
 }
@@ -235,7 +243,7 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
     svg += fmt::format(
         "<rect x=\"{:.4g}\" y=\"{:.4g}\" width=\"{:.4g}\" height=\"{:.4g}\" fill=\"{}\" "
         "fill-opacity=\"{}\"/>\n",
-        .5 * margin, bottom - 1.7 * margin, plate + margin, 2.2 * margin, hex(ground.paper), plate_opacity);
+        .5 * margin, bottom - 1.7 * margin, plate + margin, 2.2 * margin, hex(ground.plate), plate_opacity);
     svg += fmt::format(
         "<rect x=\"{0:.4g}\" y=\"{1:.4g}\" width=\"{2:.6g}\" height=\"{3:.4g}\" fill=\"{4}\"/>\n"
         "<text x=\"{0:.4g}\" y=\"{5:.4g}\" font-family=\"sans-serif\" font-size=\"{6:.4g}\" "
