@@ -1,9 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/surface_files.h"
 
+#include <algorithm>
 #include <cmath>
 #include <string>
 #include <vector>
+
+#include <fmt/format.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -34,6 +37,19 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
     throw;
   } catch (const Error& error) {
     throw InputError(name, 0, error.what());
+  }
+}
+
+void add_surfaces(scene::Surfaces& surfaces, const SurfaceFiles& files) {
+  if (files.overlays.size() > files.surfaces.size())
+    throw Error(fmt::format(
+        "more overlays ({}) than surfaces ({}) are given; an overlay colours the surface in its place",
+        files.overlays.size(), files.surfaces.size()));
+  for (std::size_t i = 0; i < files.surfaces.size(); ++i) {
+    const auto& opacities = files.opacities;
+    add_surface(surfaces, files.surfaces[i],
+                opacities.empty() ? 1.f : opacities[std::min(i, opacities.size() - 1)]);
+    if (i < files.overlays.size()) add_overlay(surfaces, files.overlays[i]);
   }
 }
 

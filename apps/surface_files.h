@@ -3,6 +3,7 @@
 #pragma once
 
 #include <filesystem>
+#include <vector>
 
 #include "forest/scene/surfaces.h"
 
@@ -15,5 +16,13 @@ bool is_surface(const std::filesystem::path& file);
 void add_surface(scene::Surfaces& surfaces, const std::filesystem::path& file, float opacity = 1.f);
 /// Colours the last one by the values or areas of a file.
 void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file);
+
+/// As options of a command line name them.
+struct SurfaceFiles {
+  std::vector<std::filesystem::path> surfaces, overlays;  // an overlay colours the surface in its place
+  std::vector<float> opacities{};  // in their order; the last holds for all that follow, none is 1
+};
+/// Reads all of them. Overlays that belong to no surface, and what cannot be read, throw Error.
+void add_surfaces(scene::Surfaces& surfaces, const SurfaceFiles& files);
 
 }  // namespace forest

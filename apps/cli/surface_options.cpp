@@ -68,16 +68,7 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
       throw Error(fmt::format("there is no colour map '{}'; give one of {}", options.map, map_names()));
   }
   if (!options.range.empty()) surfaces.range = parse_range(options.range);
-  if (options.overlays.size() > options.files.size())
-    throw Error(
-        fmt::format("{} overlays are given and {} surfaces; an overlay colours the surface in its place",
-                    options.overlays.size(), options.files.size()));
-  for (std::size_t i = 0; i < options.files.size(); ++i) {
-    const float opacity =
-        options.opacities.empty() ? 1.f : options.opacities[std::min(i, options.opacities.size() - 1)];
-    add_surface(surfaces, options.files[i], opacity);
-    if (i < options.overlays.size()) add_overlay(surfaces, options.overlays[i]);
-  }
+  forest::add_surfaces(surfaces, {options.files, options.overlays, options.opacities});
   if (options.opacities.size() > options.files.size())
     console.warn(fmt::format("{} of the opacities belong to no surface",
                              options.opacities.size() - options.files.size()));

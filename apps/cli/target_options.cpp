@@ -4,11 +4,11 @@
 #include <CLI/App.hpp>
 #include <fmt/format.h>
 
-#include "forest/io/node_sets.h"
 #include "forest/scene/colouring.h"
 #include "forest/scene/forest.h"
 
 #include "apps/cli/console.h"
+#include "apps/node_set_files.h"
 
 namespace forest::cli {
 
@@ -29,18 +29,7 @@ void add_targets(CLI::App& command, TargetOptions& options) {
 
 circuit::NodeSets read_node_sets(const scene::Forest& forest, const std::vector<std::filesystem::path>& files,
                                  Console& console) {
-  circuit::NodeSets own = io::node_sets_of(forest.nodes()), all = own;
-  for (const auto& file : files) {
-    circuit::NodeSets sets = io::read_node_sets(file);
-    for (circuit::NodeSet& set : sets.sets) {
-      if (all.find(set.name))
-        console.warn(fmt::format("{} replaces the node set '{}' of the {}", file.string(), set.name,
-                                 own.find(set.name) ? "forest" : "files before it"));
-      all.put(std::move(set));
-    }
-    all.source = files.size() == 1 && own.sets.empty() ? sets.source : "the node sets";
-  }
-  return all;
+  return forest::read_node_sets(forest, files, [&](const std::string& sentence) { console.warn(sentence); });
 }
 
 void add_appearances(const TargetOptions& options, std::vector<scene::Appearance>& shown) {

@@ -7,13 +7,13 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
-#include <map>
 
 #include <CLI/CLI.hpp>
 
 #include "forest/core/error.h"
-#include "forest/io/node_sets.h"
 
+#include "apps/drawer.h"
+#include "apps/node_set_files.h"
 #include "apps/studio/report.h"
 #include "apps/studio/theme.h"
 #include "apps/studio/window.h"
@@ -32,8 +32,9 @@ struct Options {
   Drawer drawer = Drawer::automatic;
 };
 
+void say(const std::string& sentence) { std::fprintf(stderr, "brainforest-studio: %s\n", sentence.c_str()); }
 int fail(const std::string& sentence) {
-  std::fprintf(stderr, "brainforest-studio: %s\n", sentence.c_str());
+  say(sentence);
   return 1;
 }
 
@@ -55,27 +56,16 @@ QSize size_of(const std::string& text) {
   return {width, height};
 }
 
-scene::Surfaces read_surfaces(const std::vector<std::filesystem::path>& files,
-                              const std::vector<std::filesystem::path>& overlays) {
-  if (overlays.size() > files.size())
-    throw Error("there are more overlays than surfaces; an overlay colours the surface in its place");
-  scene::Surfaces surfaces;
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    add_surface(surfaces, files[i]);
-    if (i < overlays.size()) add_overlay(surfaces, overlays[i]);
-  }
-  return surfaces;
-}
-
 // Those that were named, or that lie beside the forest; what lies there and is of another forest is told, not shown.
 std::optional<scene::Synapses> synapses_of(const Options& options, const scene::Forest& forest) {
   if (!options.synapses.empty()) return scene::Synapses::open(options.synapses, forest);
   const auto beside = scene::Synapses::beside(options.forest);
-  if (forest.instances().empty() || !std::filesystem::exists(beside)) return std::nullopt;
+  std::error_code unseen;  // in a folder that may not be looked into nothing lies beside
+  if (forest.instances().empty() || !std::filesystem::exists(beside, unseen)) return std::nullopt;
   try {
     return scene::Synapses::open(beside, forest);
   } catch (const InputError& error) {
-    std::fprintf(stderr, "brainforest-studio: the synapses are not shown: %s\n", error.what());
+    say(std::string("the synapses are not shown: ") + error.what());
     return std::nullopt;
   }
 }
@@ -86,7 +76,8 @@ int run(const Options& options, int& argc, char** argv) {
   if (alone) surface_files.insert(surface_files.begin(), options.forest);
   const scene::Forest forest = alone ? scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {}))
                                      : scene::Forest::open(options.forest);
-  const scene::Surfaces surfaces = read_surfaces(surface_files, options.overlays);
+  scene::Surfaces surfaces;
+  add_surfaces(surfaces, {surface_files, options.overlays});
   scene::View view = scene::overview(forest);
   view.camera.near = .5f;
   if (alone) view.camera = surfaces.camera(surfaces.outside(), 1.6f), view.fog = 0.f;
@@ -94,6 +85,8 @@ int run(const Options& options, int& argc, char** argv) {
   std::optional<scene::Playback> playback;
   if (!options.activity.empty()) playback.emplace(scene::Playback::open(forest, options.activity));
   std::optional<scene::Synapses> synapses = synapses_of(options, forest);
+  circuit::NodeSets sets =
+      read_node_sets(forest, options.node_sets, [](const std::string& sentence) { say(sentence); });
   const QSize size = options.size.empty() ? QSize() : size_of(options.size);
 
   QSurfaceFormat format;
@@ -108,12 +101,6 @@ int run(const Options& options, int& argc, char** argv) {
   application.setApplicationName("Studio");
   apply_theme(application);
 
-  circuit::NodeSets sets = io::node_sets_of(forest.nodes());
-  for (const auto& file : options.node_sets) {
-    circuit::NodeSets more = io::read_node_sets(file);
-    for (circuit::NodeSet& set : more.sets) sets.put(std::move(set));
-    sets.source = options.node_sets.size() == 1 ? more.source : "the node sets";
-  }
   Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets),
                 options.drawer);
   if (size.isValid()) window.resize(size);
@@ -169,18 +156,12 @@ int main(int argc, char** argv) {
       "--synapses", options.synapses,
       "Synapses, made by 'brainforest pack'; by default those of column.synapses beside column.forest");
   app.add_option("--surface", options.surfaces,
-                 "Surface of a cortex to show, too: GIFTI or FreeSurfer's lh.pial")
+                 "Surface of a cortex to show, too: GIFTI, FreeSurfer's lh.pial, PLY, STL or OBJ")
       ->allow_extra_args(false);
   app.add_option("--overlay", options.overlays, "Values or areas that colour the surfaces, in their order")
       ->allow_extra_args(false);
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
-  const std::map<std::string, Drawer> drawers{
-      {"auto", Drawer::automatic}, {"opengl", Drawer::opengl}, {"cpu", Drawer::processor}};
-  app.add_option("--renderer", options.drawer,
-                 "Who draws: opengl (a graphics card or Mesa's llvmpipe), cpu, or auto: the card where there "
-                 "is one")
-      ->transform(CLI::CheckedTransformer(drawers))
-      ->option_text("auto|opengl|cpu");
+  forest::add_renderer(app, options.drawer);
   app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");
   app.set_version_flag("--version", FOREST_VERSION);

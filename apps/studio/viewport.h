@@ -17,15 +17,13 @@
 #include "forest/scene/path.h"
 #include "forest/scene/playback.h"
 
+#include "apps/drawer.h"
 #include "apps/dressing.h"
 #include "apps/foveated.h"
 #include "apps/studio/selection.h"
 #include "apps/studio/settings.h"
 
 namespace forest::studio {
-
-/// Who draws: a graphics card where there is one, OpenGL in any case, or the processor in any case.
-enum class Drawer : std::uint8_t { automatic, opengl, processor };
 
 class Viewport final : public QOpenGLWidget {
   Q_OBJECT

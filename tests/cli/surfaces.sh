@@ -74,7 +74,7 @@ cmp no_values.png no_values--no-legend.png || fail "a surface without values has
 
 refuses "cut off" "$program" render lh.short -o x.png
 refuses "2 values and the surface has" "$program" render lh.pial --overlay few.txt -o x.png
-refuses "2 overlays are given and 1" "$program" render lh.pial --overlay few.txt --overlay few.txt -o x.png
+refuses "more overlays (2) than surfaces (1)" "$program" render lh.pial --overlay few.txt --overlay few.txt -o x.png
 refuses "no surface that is known" "$program" render a.forest --surface a.forest -o x.png
 refuses "no range" "$program" render lh.pial --range 3 -o x.png
 refuses "no range" "$program" render lh.pial --range 3:nan -o x.png
