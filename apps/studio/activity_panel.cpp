@@ -16,6 +16,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/round_numbers.h"
+
 #include "apps/studio/annotation.h"
 
 namespace forest::studio {
@@ -29,6 +31,9 @@ const QColor ground(13, 16, 22), frame_colour(37, 45, 57), faint(108, 120, 138),
 
 QColor colour_of(const Vec3& c) { return QColor::fromRgbF(c.x(), c.y(), c.z()); }
 
+// Around a plot, points: what its axes need.
+constexpr int axis_left = 44, axis_right = 8, axis_below = 20, axis_top = 18;
+
 // Where a time lies between the first step and the last, 0 to 1, and back.
 double share_of(const scene::Playback& playback, double time) {
   const double length = playback.end() - playback.begin();
@@ -36,6 +41,21 @@ double share_of(const scene::Playback& playback, double time) {
 }
 double time_at(const scene::Playback& playback, double share) {
   return playback.begin() + std::clamp(share, 0., 1.) * (playback.end() - playback.begin());
+}
+
+// Round times under a plot, and at its right end their unit.
+void paint_times(QPainter& painter, const QRectF& area, const scene::Playback& playback) {
+  constexpr double apart = 80., half = 30.;
+  const double unit = area.right() - painter.fontMetrics().horizontalAdvance("ms") - 6.;
+  painter.setPen(faint);
+  painter.drawText(QRectF(area.left(), area.bottom() + 3, area.width(), 16), Qt::AlignRight, "ms");
+  for (const double t : ticks(playback.begin(), playback.end(), std::max(1, int(area.width() / apart)))) {
+    const double x = area.left() + share_of(playback, t) * area.width();
+    painter.drawLine(QPointF(x, area.bottom() + 1), QPointF(x, area.bottom() + 4));
+    const QString number = QString::number(t);
+    if (x + .5 * painter.fontMetrics().horizontalAdvance(number) < unit)
+      painter.drawText(QRectF(x - half, area.bottom() + 3, 2. * half, 16), Qt::AlignHCenter, number);
+  }
 }
 
 }  // namespace
@@ -54,45 +74,73 @@ void RasterView::forget() {
   update();
 }
 
+QRect RasterView::plot() const { return rect().adjusted(axis_left, axis_top, -axis_right, -axis_below); }
+
+void RasterView::draw() {
+  const scene::Playback& playback = *viewport_.playback();
+  const reports::Activity& activity = playback.activity();
+  const int width = plot().width(), height = plot().height();
+  drawn_ = QImage(plot().size(), QImage::Format_RGB32);
+  const auto codes =
+      activity.raster_picture(0, activity.facts().steps, std::uint32_t(width), std::uint32_t(height));
+  const scene::ActivityView look = viewport_.activity();
+  QRgb colours[256];
+  for (std::size_t code = 0; code < 256; ++code) {
+    const float value = activity.facts().range.value(reports::Code(code));
+    const bool none = std::isnan(value) || (look.threshold && value < *look.threshold);
+    colours[code] = none ? frame_colour.rgb()
+                         : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
+  }
+  for (int y = 0; y < height; ++y)
+    for (int x = 0; x < width; ++x)
+      drawn_.setPixel(x, y, colours[codes[std::size_t(y) * std::size_t(width) + std::size_t(x)]]);
+  if (playback.has_values()) return;
+  QPainter dots(&drawn_);  // spikes alone: a dot each
+  const double row_height = double(height) / double(std::max<std::size_t>(1, activity.rows().size()));
+  for (const reports::Spike& spike : activity.spikes())
+    if (const auto row = activity.row_of_instance(spike.instance))
+      dots.fillRect(QRectF(share_of(playback, spike.time) * width - 1., *row * row_height, 2.,
+                           std::max(2., row_height)),
+                    spike_colour);
+}
+
+// Neurons by the numbers that the selection gives them, at round rows; round times below.
+void RasterView::paint_axes(QPainter& painter) const {
+  const scene::Playback& playback = *viewport_.playback();
+  const auto rows = playback.activity().rows();
+  const QRectF area = plot();
+  const double line = painter.fontMetrics().height(), row_height = area.height() / double(rows.size());
+  painter.setPen(faint);
+  painter.drawText(QRectF(0, 0, area.left() + 60, area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
+                   tr("neuron"));
+  const double apart = std::max(1., round_above(1.5 * line / row_height));  // rows
+  for (double row = 0.; row < double(rows.size()); row += apart) {
+    const double y = area.top() + (row + .5) * row_height;
+    painter.drawLine(QPointF(area.left() - 4, y), QPointF(area.left() - 1, y));
+    painter.drawText(QRectF(0, y - .5 * line, area.left() - 6, line), Qt::AlignRight | Qt::AlignVCenter,
+                     QString::number(rows[std::size_t(row)].instance));
+  }
+  paint_times(painter, area, playback);
+}
+
 void RasterView::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   painter.fillRect(rect(), ground);
   const scene::Playback* playback = viewport_.playback();
-  if (!playback) return;
+  if (!playback || plot().isEmpty()) return;
   const reports::Activity& activity = playback->activity();
-  if (drawn_.size() != size()) {
-    drawn_ = QImage(size(), QImage::Format_RGB32);
-    const auto codes =
-        activity.raster_picture(0, activity.facts().steps, std::uint32_t(width()), std::uint32_t(height()));
-    const scene::ActivityView look = viewport_.activity();
-    QRgb colours[256];
-    for (std::size_t code = 0; code < 256; ++code) {
-      const float value = activity.facts().range.value(reports::Code(code));
-      const bool none = std::isnan(value) || (look.threshold && value < *look.threshold);
-      colours[code] = none ? frame_colour.rgb()
-                           : colour_of(look.map->screen((value - look.low) / (look.high - look.low))).rgb();
-    }
-    for (int y = 0; y < height(); ++y)
-      for (int x = 0; x < width(); ++x)
-        drawn_.setPixel(x, y, colours[codes[std::size_t(y) * std::size_t(width()) + std::size_t(x)]]);
-    if (!playback->has_values()) {  // spikes alone: a dot each
-      QPainter dots(&drawn_);
-      const double row_height = double(height()) / double(std::max<std::size_t>(1, activity.rows().size()));
-      for (const reports::Spike& spike : activity.spikes())
-        if (const auto row = activity.row_of_instance(spike.instance))
-          dots.fillRect(QRectF(share_of(*playback, spike.time) * width() - 1., *row * row_height, 2.,
-                               std::max(2., row_height)),
-                        spike_colour);
-    }
-  }
-  painter.drawImage(0, 0, drawn_);
-  const double x = share_of(*playback, viewport_.time()) * width();
+  const QRectF area = plot();
+  if (drawn_.size() != plot().size()) draw();
+  painter.drawImage(plot().topLeft(), drawn_);
+  paint_axes(painter);
+  const double x = area.left() + share_of(*playback, viewport_.time()) * area.width();
   painter.setPen(QPen(moment_colour, 1.));
-  painter.drawLine(QPointF(x, 0), QPointF(x, height()));
+  painter.drawLine(QPointF(x, area.top()), QPointF(x, area.bottom()));
   if (const auto& selection = viewport_.selection())
     if (const auto row = activity.row_of_instance(selection->pick.instance)) {
-      const double rows = double(activity.rows().size()), line = height() / rows;
-      const QRectF mark(0, *row * line - 1., width() - 1., std::max(line, 2.) + 1.);
+      const double rows = double(activity.rows().size()), line = area.height() / rows;
+      const QRectF mark(area.left(), area.top() + *row * line - 1., area.width() - 1.,
+                        std::max(line, 2.) + 1.);
       painter.setPen(QPen(QColor(255, 90, 130), 1.4));
       painter.drawRect(mark);
     }
@@ -100,10 +148,10 @@ void RasterView::paintEvent(QPaintEvent*) {
 
 void RasterView::mousePressEvent(QMouseEvent* event) {
   const scene::Playback* playback = viewport_.playback();
-  if (!playback) return;
+  if (!playback || plot().isEmpty()) return;
   const auto rows = playback->activity().rows();
-  const auto row =
-      std::size_t(std::clamp(event->position().y() / height(), 0., .999999) * double(rows.size()));
+  const double down = (event->position().y() - plot().top()) / plot().height();
+  const auto row = std::size_t(std::clamp(down, 0., .999999) * double(rows.size()));
   const std::uint32_t instance = rows[row].instance;
   const scene::Forest& forest = viewport_.forest();
   const scene::Neuron& neuron = forest.neurons()[forest.instances()[instance].morphology];
@@ -128,7 +176,9 @@ void TraceView::forget() {
   update();
 }
 
-QRectF TraceView::plot() const { return QRectF(rect()).adjusted(44, 8, -8, -20); }
+QRectF TraceView::plot() const {
+  return QRectF(rect()).adjusted(axis_left, axis_top, -axis_right, -axis_below);
+}
 
 void TraceView::draw() {
   drawn_ = QImage(size() * devicePixelRatioF(), QImage::Format_RGB32);
@@ -155,19 +205,18 @@ void TraceView::draw() {
   const float room = std::max(.05f * (high - low), .5f);
   low -= room, high += room;
   const auto y_of = [&](float v) { return area.bottom() - qreal((v - low) / (high - low)) * area.height(); };
-  const float step = round_length((high - low) / 3.f);
-  for (float v = std::ceil(low / step) * step; v <= high; v += step) {
+  for (const double v : ticks(double(low), double(high), 6)) {
+    const qreal y = y_of(float(v));
     painter.setPen(frame_colour);
-    painter.drawLine(QPointF(area.left(), y_of(v)), QPointF(area.right(), y_of(v)));
+    painter.drawLine(QPointF(area.left(), y), QPointF(area.right(), y));
     painter.setPen(faint);
-    painter.drawText(QRectF(0, y_of(v) - 8, area.left() - 5, 16), Qt::AlignRight | Qt::AlignVCenter,
-                     QString::number(std::abs(v) < .01f * step ? 0. : double(v)));
+    painter.drawText(QRectF(0, y - 8, area.left() - 5, 16), Qt::AlignRight | Qt::AlignVCenter,
+                     QString::number(v));
   }
   painter.setPen(faint);
-  const QRectF below(area.left(), area.bottom() + 3, area.width(), 16);
-  painter.drawText(below, Qt::AlignLeft, QString("%1 ms").arg(playback.begin()));
-  painter.drawText(below, Qt::AlignRight, QString("%1 ms").arg(playback.end()));
-  painter.drawText(below, Qt::AlignHCenter, QString::fromStdString(facts.units));
+  painter.drawText(QRectF(0, 0, area.left() + 60, area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
+                   QString::fromStdString(facts.units));
+  paint_times(painter, area, playback);
   // Of the steps under one column of pixels the least and the greatest: no spike is lost.
   const auto columns = std::max<std::size_t>(2, std::size_t(area.width()));
   for (std::size_t t = 0; t < traces_.size(); ++t) {
@@ -216,6 +265,7 @@ void TraceView::paintEvent(QPaintEvent*) {
   if (!viewport_.playback()) return painter.fillRect(rect(), ground);
   if (drawn_.size() != size() * devicePixelRatioF()) draw();
   painter.drawImage(0, 0, drawn_);
+  if (traces_.empty()) return;  // a word stands there, and no curve
   const double x = plot().left() + share_of(*viewport_.playback(), viewport_.time()) * plot().width();
   painter.setPen(QPen(moment_colour, 1.));
   painter.drawLine(QPointF(x, plot().top()), QPointF(x, plot().bottom()));
@@ -387,6 +437,11 @@ void ActivityPanel::show_selection() {
   traces_.push_back(reports::trace(playback->activity(), compartment->row, compartment->index));
   plot_->forget();
   clamped_(double(clock.nsecsElapsed()) * 1e-6);
+}
+
+QRect ActivityPanel::raster() const {
+  const QRect inside = raster_->plot();
+  return {raster_->mapToGlobal(inside.topLeft()), inside.size()};
 }
 
 void ActivityPanel::step(int steps) {

@@ -13,6 +13,7 @@
 #include "apps/studio/viewport.h"
 
 class QCheckBox;
+class QPainter;
 class QComboBox;
 class QDoubleSpinBox;
 class QLabel;
@@ -25,7 +26,8 @@ namespace forest::studio {
 class RasterView final : public QWidget {
  public:
   explicit RasterView(Viewport& viewport, QWidget* parent = nullptr);
-  void forget();  // what was drawn: another simulation, other colours
+  void forget();       // what was drawn: another simulation, other colours
+  QRect plot() const;  // where the colours are, within the axes
 
  protected:
   void paintEvent(QPaintEvent* event) override;
@@ -33,6 +35,8 @@ class RasterView final : public QWidget {
   QSize sizeHint() const override { return {420, 150}; }
 
  private:
+  void draw();
+  void paint_axes(QPainter& painter) const;
   Viewport& viewport_;
   QImage drawn_;
 };
@@ -67,6 +71,7 @@ class ActivityPanel final : public QWidget {
   void step(int steps);
   void clear_traces();
   const std::vector<reports::Trace>& traces() const { return traces_; }
+  QRect raster() const;  // where its colours are, on the screen
 
  private:
   QDoubleSpinBox* field(const char* name, const char* unit, const char* hint, double low, double high);

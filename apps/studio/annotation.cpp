@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/round_numbers.h"
 #include "forest/scene/colour_bar.h"
 
 #include "apps/studio/selection.h"
@@ -33,17 +34,10 @@ QColor to_screen(const Vec3& linear) {
   return QColor::fromRgbF(c.x(), c.y(), c.z());
 }
 
-float round_length(float longest) {
-  const float decade = std::pow(10.f, std::floor(std::log10(longest)));
-  for (const float step : {5.f, 2.f})
-    if (step * decade <= longest) return step * decade;
-  return decade;
-}
-
 void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
   const float micrometres_a_point =
       camera.pixel_size(float(area.height()), (camera.eye - camera.target).norm());
-  const float length = round_length(micrometres_a_point * 160.f);
+  const float length = float(round_below(double(micrometres_a_point) * 160.));
   const qreal width = qreal(length / micrometres_a_point);
   const QPointF left(area.left() + margin + 10, area.bottom() - margin - 10),
       right = left + QPointF(width, 0);
@@ -57,7 +51,8 @@ void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& came
   painter.drawText(left - QPointF(0, 9), label);
 }
 
-void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
+void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
+                      bool tissue) {
   constexpr qreal length = 30;
   const QPointF centre(area.right() - margin - 40, area.bottom() - margin - 40);
   plate(painter, QRectF(centre - QPointF(48, 48), QSizeF(96, 96)), ink);
@@ -68,7 +63,7 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
   };
   // Okabe & Ito's vermilion, green and blue.
   Axis axes[] = {{"x", Vec3::UnitX(), {213, 94, 0}},
-                 {"y pia", Vec3::UnitY(), {0, 178, 130}},
+                 {tissue ? "y pia" : "y", Vec3::UnitY(), {0, 178, 130}},
                  {"z", Vec3::UnitZ(), {70, 150, 220}}};
   const Mat3 seen = camera.axes().transpose();
   std::ranges::sort(axes, {}, [&](const Axis& a) { return (seen * a.way).z(); });  // far ones first
@@ -159,10 +154,12 @@ void mark_selection(frame::Palette& palette, scene::Background background, bool 
   const bool light = background == scene::Background::light;
   if (dim) {
     const Vec3 back = light ? Vec3(.80f, .84f, .90f) : Vec3(.006f, .008f, .012f);
+    const float kept =
+        light ? .22f : .4f;  // of what the rest shows: on dark ground more, so that it is still seen
     for (std::size_t i = 0; i < palette.size(); ++i)
       if (i != scene::highlight_entry && i != scene::outline_entry && i != scene::spike_entry &&
           i != scene::fading_entry)
-        palette[i] = .22f * palette[i] + .78f * back;
+        palette[i] = kept * palette[i] + (1.f - kept) * back;
   }
   palette[scene::section_entry] = light ? Vec3(.75f, .04f, .12f) : Vec3(1.f, .22f, .42f);
   palette[scene::highlight_entry] = light ? Vec3(.05f, .05f, .35f) : Vec3(.80f, .90f, 1.f);

@@ -19,13 +19,12 @@ struct Ink {
 Ink ink_on(scene::Background background);
 QColor to_screen(const Vec3& linear);
 
-/// The longest of 1, 2 and 5 × 10ⁿ that is no more than `longest`.
-float round_length(float longest);
-
 /// A bar of a round number of µm or mm, true at the target's depth; at the bottom left.
 void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink);
-/// The axes of the tissue; at the bottom right.
-void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink);
+/// The axes; at the bottom right.
+/// @param tissue  they are those of a forest, in which y grows towards the pia; a surface alone has its scanner's
+void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
+                      bool tissue);
 /// At the top left.
 void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
                   const Ink& ink);

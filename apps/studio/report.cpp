@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/studio/report.h"
 
+#include <QAbstractSpinBox>
+#include <QComboBox>
+#include <QLineEdit>
 #include <QScrollArea>
-#include <QWidget>
+#include <QStyleOptionComboBox>
 #include <cstdio>
 
 #include <nlohmann/json.hpp>
@@ -14,20 +17,44 @@ namespace {
 
 using Json = nlohmann::ordered_json;
 
-Json place_of(const QWidget* widget) {  // on the screen
-  const QPoint corner = widget->mapToGlobal(QPoint(0, 0));
-  return {{"x", corner.x()}, {"y", corner.y()}, {"width", widget->width()}, {"height", widget->height()}};
+Json place_of(const QRect& r) {  // on the screen
+  return {{"x", r.x()}, {"y", r.y()}, {"width", r.width()}, {"height", r.height()}};
 }
 
-// Fields that are cut off on the right, by name: of those that scroll, beyond the edge of their panel.
+// Whether a field shows less than the whole of its text.
+bool lacks_room(const QWidget* field) {
+  constexpr int margins = 4;  // of a line of text, on both sides
+  const QFontMetrics letters = field->fontMetrics();
+  if (qobject_cast<const QAbstractSpinBox*>(field)) {
+    const auto* line = field->findChild<const QLineEdit*>();
+    return line && letters.horizontalAdvance(line->text()) > line->width() - margins;
+  }
+  if (const auto* box = qobject_cast<const QComboBox*>(field)) {
+    QStyleOptionComboBox option;
+    option.initFrom(box);
+    const QRect inside =
+        box->style()->subControlRect(QStyle::CC_ComboBox, &option, QStyle::SC_ComboBoxEditField, box);
+    const int icon = box->itemIcon(box->currentIndex()).isNull() ? 0 : box->iconSize().width() + margins;
+    return letters.horizontalAdvance(box->currentText()) > inside.width() - icon;
+  }
+  return false;
+}
+
+// Whether the edge of a panel that scrolls hides the right end of a field.
+bool leaves_its_panel(const QWidget* field) {
+  for (const QWidget* w = field->parentWidget(); w; w = w->parentWidget())
+    if (const auto* panel = qobject_cast<const QScrollArea*>(w))
+      return field->mapTo(panel, QPoint(field->width(), 0)).x() > panel->viewport()->width();
+  return false;
+}
+
+// Fields that are cut off, by name.
 Json cut_off(const Window& window) {
   Json names = Json::array();
-  for (const QScrollArea* panel : window.findChildren<QScrollArea*>())
-    for (const QWidget* field :
-         panel->widget() ? panel->widget()->findChildren<QWidget*>() : QList<QWidget*>())
-      if (field->isVisible() && (field->inherits("QAbstractSpinBox") || field->inherits("QComboBox")) &&
-          field->mapTo(panel, QPoint(field->width(), 0)).x() > panel->viewport()->width())
-        names.push_back(field->accessibleName().toStdString());
+  for (const QWidget* field : window.findChildren<QWidget*>())
+    if (field->isVisible() && (field->inherits("QAbstractSpinBox") || field->inherits("QComboBox")) &&
+        (leaves_its_panel(field) || lacks_room(field)))
+      names.push_back(field->accessibleName().toStdString());
   return names;
 }
 
@@ -57,13 +84,20 @@ void report(Window& window) {
     for (const reports::Trace& trace : window.traces()) names.push_back(trace.name());
     print({{"event", "clamped"}, {"traces", names}, {"milliseconds", milliseconds}});
   });
+  QObject::connect(&window, &Window::explained, &window, [&window] {
+    Json keys = Json::array();
+    for (const Window::Key& k : window.keys())
+      keys.push_back(
+          {{"key", k.key.toStdString()}, {"name", k.name.toStdString()}, {"what", k.what.toStdString()}});
+    print({{"event", "explained"}, {"keys", keys}});
+  });
   QObject::connect(viewport, &Viewport::settled, viewport, [viewport, &window] {
-    Json picture = place_of(viewport), activity;
+    Json picture = place_of({viewport->mapToGlobal(QPoint(0, 0)), viewport->size()}), activity;
     picture["pixel_ratio"] = viewport->devicePixelRatioF();
     if (viewport->playback())
       activity = {{"time", viewport->time()},
                   {"playing", viewport->playing()},
-                  {"raster", place_of(window.findChild<QWidget*>("raster"))}};
+                  {"raster", place_of(window.raster())}};
     const Viewport::Figures& f = viewport->figures();
     print({{"event", "settled"},
            {"view", Json::parse(scene::to_json(viewport->settings().view))},

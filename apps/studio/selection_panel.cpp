@@ -7,9 +7,9 @@
 
 namespace forest::studio {
 
-SelectionPanel::SelectionPanel(QWidget* parent) : QStackedWidget(parent), table_(new QTableWidget(this)) {
-  auto* hint =
-      new QLabel(tr("Click a branch to see what it is.\nIts subarbor is lit; Esc puts it out."), this);
+SelectionPanel::SelectionPanel(const QString& word, QWidget* parent)
+    : QStackedWidget(parent), table_(new QTableWidget(this)) {
+  auto* hint = new QLabel(word, this);
   hint->setObjectName("hint");
   hint->setAlignment(Qt::AlignCenter);
   hint->setWordWrap(true);

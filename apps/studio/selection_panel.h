@@ -13,8 +13,9 @@ namespace forest::studio {
 
 class SelectionPanel final : public QStackedWidget {
  public:
-  explicit SelectionPanel(QWidget* parent = nullptr);
-  /// None: says how to select something.
+  /// @param word  shown while nothing is selected: how something is, or why nothing can be
+  explicit SelectionPanel(const QString& word, QWidget* parent = nullptr);
+  /// None: shows that word.
   void show_facts(const std::vector<Fact>& facts);
 
  private:

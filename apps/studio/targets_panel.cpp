@@ -4,7 +4,7 @@
 #include <QCheckBox>
 #include <QColorDialog>
 #include <QComboBox>
-#include <QFormLayout>
+#include <QGridLayout>
 #include <QHeaderView>
 #include <QKeyEvent>
 #include <QLabel>
@@ -22,6 +22,8 @@
 
 namespace forest::studio {
 namespace {
+
+constexpr int rows_seen = 6;  // at least, without scrolling
 
 QIcon swatch(const QColor& colour) {
   QPixmap picture(24, 24);
@@ -81,6 +83,7 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   list_->setFrameShape(QFrame::NoFrame);
   list_->setUniformRowHeights(true);
   list_->setAlternatingRowColors(true);
+  list_->setMinimumHeight(rows_seen * (fontMetrics().height() + 6));
   list_->header()->setStretchLastSection(false);
   list_->header()->setSectionResizeMode(0, QHeaderView::Stretch);
   list_->header()->setSectionResizeMode(1, QHeaderView::ResizeToContents);
@@ -120,9 +123,10 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
     list_->setFocus();
   });
 
-  auto* form = new QFormLayout;
+  auto* form = new QGridLayout;
   form->setContentsMargins(4, 4, 4, 0);
   form->setSpacing(4);
+  form->setColumnStretch(1, 1);
   colour_ = named(new QComboBox(this), "Colour of the target", "One colour, or what colours mean", "Alt+C");
   for (const TargetColour& colour : target_colours())
     colour_->addItem(colour.rgb ? swatch(QColor::fromRgb(*colour.rgb)) : QIcon(), colour.name);
@@ -140,7 +144,8 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
     what.colour = chosen_colour.rgb() & 0xffffffu;
     say(what);
   });
-  form->addRow(tr("Colour"), colour_);
+  form->addWidget(new QLabel(tr("Colour"), this), 0, 0);
+  form->addWidget(colour_, 0, 1);
 
   kind_ = named(new QComboBox(this), "Kind of the target", "What its neurons are drawn with", "Alt+K");
   for (const char* word : kind_words()) kind_->addItem(word);
@@ -149,11 +154,11 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
     what.kind = frame::Kind(index);
     say(what);
   });
-  form->addRow(tr("Drawn"), kind_);
+  form->addWidget(new QLabel(tr("Drawn"), this), 1, 0);
+  form->addWidget(kind_, 1, 1);
 
   opacity_ = named(new QSpinBox(this), "Opacity of the target (%)",
                    "100 hides what lies behind, 0 shows nothing of it", "Alt+Q");
-  opacity_->setRange(0, 100);
   opacity_->setSingleStep(10);
   opacity_->setSuffix(" %");
   opacity_->setKeyboardTracking(false);
@@ -162,16 +167,20 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
     what.opacity = float(percent) / 100.f;
     say(what);
   });
-  form->addRow(tr("Opacity"), opacity_);
+  form->addWidget(new QLabel(tr("Opacity"), this), 1, 2);
+  form->addWidget(opacity_, 1, 3);
 
   simulated_ = new QCheckBox(tr("Simulated"), this);
+  QSizePolicy keeps_place = simulated_->sizePolicy();
+  keeps_place.setRetainSizeWhenHidden(true);
+  simulated_->setSizePolicy(keeps_place);
   simulated_->setToolTip(tr("Kept for simulators; changes nothing of the picture"));
   connect(simulated_, &QCheckBox::clicked, this, [this](bool on) {
     scene::Appearance what;
     what.simulated = on;
     say(what);
   });
-  form->addRow(QString(), simulated_);
+  form->addWidget(simulated_, 0, 2, 1, 2);
   column->addLayout(form);
   show_chosen();
 }
@@ -214,14 +223,29 @@ void TargetsPanel::show_rows(std::vector<TargetRow> rows) {
   show_chosen();
 }
 
+void TargetsPanel::rest(const QString& word) {
+  setEnabled(false);
+  problem_->setText(word);
+  problem_->show();
+}
+
 void TargetsPanel::show_chosen() {
   const TargetRow* row = chosen();
   const bool usable = row && row->problem.empty() && row->count;
   for (QWidget* control : {static_cast<QWidget*>(colour_), static_cast<QWidget*>(kind_),
                            static_cast<QWidget*>(opacity_), static_cast<QWidget*>(simulated_)})
     control->setEnabled(usable);
-  if (!usable) return;
   const QSignalBlocker quiet_opacity(opacity_);
+  // Of no target nothing is said: less than the least is shown as no number, and the box keeps its place.
+  simulated_->setVisible(usable);
+  opacity_->setRange(usable ? 0 : -1, 100);
+  opacity_->setSpecialValueText(usable ? QString() : QString(" "));
+  if (!usable) {
+    opacity_->setValue(-1);
+    colour_->setCurrentIndex(-1);
+    kind_->setCurrentIndex(-1);
+    return;
+  }
   kind_->setCurrentIndex(int(row->kind));
   opacity_->setValue(int(std::lround(100.f * row->opacity)));
   simulated_->setChecked(row->simulated);

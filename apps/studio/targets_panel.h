@@ -28,6 +28,8 @@ class TargetsPanel final : public QWidget {
   explicit TargetsPanel(Changes changes, QWidget* parent = nullptr);
   /// Shows them, telling nobody. The row that is chosen stays so.
   void show_rows(std::vector<TargetRow> rows);
+  /// There are no neurons: nothing can be done here, and the word says why.
+  void rest(const QString& word);
 
  private:
   const TargetRow* chosen() const;

@@ -10,7 +10,9 @@
 #include <QLineEdit>
 #include <QShortcut>
 #include <QSignalBlocker>
+#include <QStyleOptionSpinBox>
 #include <QVBoxLayout>
+#include <algorithm>
 #include <cstring>
 
 namespace forest::studio {
@@ -21,17 +23,27 @@ QString with_shortcut(const char* hint, const char* shortcut) {
                    : QString(hint);
 }
 
-// A number field that shows no more digits than matter, and gives the keyboard back when Enter is pressed.
+// A number field that shows no more digits than matter, and gives the keyboard back when Enter is pressed. It is as wide as
+// the longest number that it has shown: what is far away has long coordinates.
 class NumberField final : public QDoubleSpinBox {
  public:
   using QDoubleSpinBox::QDoubleSpinBox;
+  void show_number(double value) {
+    setValue(value);
+    if (const int wanted = width_of(text()); wanted > widest_) {
+      widest_ = wanted;
+      updateGeometry();
+    }
+  }
   QString textFromValue(double value) const override {
     return locale()
         .toString(value, 'f', std::abs(value) < 1000. ? decimals() : 0)
         .remove(locale().groupSeparator());
   }
-  QSize minimumSizeHint() const override { return {52, QDoubleSpinBox::minimumSizeHint().height()}; }
-  QSize sizeHint() const override { return {64, QDoubleSpinBox::sizeHint().height()}; }
+  QSize minimumSizeHint() const override {
+    return {std::max(52, widest_), QDoubleSpinBox::minimumSizeHint().height()};
+  }
+  QSize sizeHint() const override { return {std::max(64, widest_), QDoubleSpinBox::sizeHint().height()}; }
 
  protected:
   void keyPressEvent(QKeyEvent* event) override {
@@ -39,6 +51,20 @@ class NumberField final : public QDoubleSpinBox {
     if (event->key() == Qt::Key_Return || event->key() == Qt::Key_Enter || event->key() == Qt::Key_Escape)
       clearFocus();
   }
+
+ private:
+  int width_of(const QString& text) const {  // with what the style draws around it
+    ensurePolished();                        // else the margins are not known yet
+    QStyleOptionSpinBox option;
+    initStyleOption(&option);
+    option.rect = QRect(0, 0, 100, 20);
+    const QRect inside =
+        style()->subControlRect(QStyle::CC_SpinBox, &option, QStyle::SC_SpinBoxEditField, this);
+    return fontMetrics().horizontalAdvance(text) + text_margin + 100 - inside.width();
+  }
+
+  static constexpr int text_margin = 6;  // of a line of text, on both sides, and its cursor
+  int widest_ = 0;
 };
 
 }  // namespace
@@ -116,7 +142,7 @@ QWidget* ViewPanel::field(const Number& number) {
   refresh_.push_back([this, box, &number] {
     if (box->hasFocus() && box->findChild<QLineEdit*>()->isModified()) return;  // being typed
     const QSignalBlocker quiet(box);
-    box->setValue(double(number.value(settings_)));
+    box->show_number(double(number.value(settings_)));
   });
   return box;
 }

@@ -498,7 +498,7 @@ void Viewport::annotate() {
   const Ink ink = ink_on(settings_.view.background);
   if (settings_.scale) {
     paint_scale(painter, rect(), settings_.view.camera, ink);
-    paint_directions(painter, rect(), settings_.view.camera, ink);
+    paint_directions(painter, rect(), settings_.view.camera, ink, !forest_.instances().empty());
   }
   if (settings_.legend && playback_ && !playback_->has_values())
     paint_spikes(painter, rect(), activity(), time(), settings_.view.background, ink);

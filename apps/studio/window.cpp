@@ -26,6 +26,7 @@
 #include "forest/io/png.h"
 
 #include "apps/studio/activity_panel.h"
+#include "apps/studio/save_name.h"
 #include "apps/studio/section_panel.h"
 #include "apps/studio/selection_panel.h"
 #include "apps/studio/targets_panel.h"
@@ -58,6 +59,12 @@ class Scroll final : public QScrollArea {
     const int inside = widget() ? widget()->minimumSizeHint().width() : 0;
     return {std::max(300, inside + verticalScrollBar()->sizeHint().width() + 2 * frameWidth()),
             QScrollArea::minimumSizeHint().height()};
+  }
+
+ protected:
+  bool eventFilter(QObject* of, QEvent* event) override {
+    if (event->type() == QEvent::LayoutRequest) updateGeometry();  // what is in it has become wider
+    return QScrollArea::eventFilter(of, event);
   }
 };
 
@@ -114,7 +121,7 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   resize(1280, 800);
   QSettings kept;
   restoreGeometry(kept.value("window/geometry").toByteArray());
-  restoreState(kept.value("window/panels").toByteArray());
+  restoreState(kept.value(panels_key()).toByteArray());
   viewport_->setFocus();
 }
 
@@ -129,10 +136,20 @@ void Window::renew() {
   viewport_->setFocus();
 }
 
+bool Window::surfaces_alone() const { return viewport_->forest().instances().empty(); }
+
+// Panels are remembered apart for windows that need others.
+QString Window::panels_key() const {
+  return surfaces_alone() ? "window/panels_of_surfaces" : "window/panels";
+}
+
 void Window::add_docks() {
   view_panel_ = new ViewPanel(
       viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
-  selection_panel_ = new SelectionPanel(this);
+  selection_panel_ = new SelectionPanel(
+      surfaces_alone() ? tr("There are no branches here to click: a surface is shown without a forest.")
+                       : tr("Click a branch to see what it is.\nIts subarbor is lit; Esc puts it out."),
+      this);
   auto* scroll = new Scroll(this);
   scroll->setWidget(view_panel_);
   targets_panel_ =
@@ -163,8 +180,10 @@ void Window::add_docks() {
       });
     else
       added.push_back(dock);
-    dock->setVisible(!section);
+    dock->setVisible(!section && (widget == scroll || !surfaces_alone()));
   }
+  if (surfaces_alone())
+    targets_panel_->rest(tr("There are no neurons here: a surface is shown without a forest."));
   resizeDocks(added, {220, 260, 260}, Qt::Vertical);
   activity_panel_ = new ActivityPanel(
       *viewport_, [this](double milliseconds) { Q_EMIT clamped(milliseconds); }, this);
@@ -194,7 +213,8 @@ void Window::add_menus() {
        "Show the synapses of a file: pack writes column.synapses beside column.forest",
        [this] { open_synapses(); }},
       {"&File", "Open su&rface…", "Ctrl+Shift+O",
-       "Add the surface of a cortex: GIFTI or FreeSurfer's lh.pial", [this] { open_surface(); }},
+       "Add the surface of a cortex: GIFTI, FreeSurfer's lh.pial, PLY, STL or OBJ",
+       [this] { open_surface(); }},
       {"&File", "Colour the surface by a &map…", "",
        "Values or areas on the last surface: GIFTI, FreeSurfer's lh.thickness, or text",
        [this] { open_overlay(); }},
@@ -364,24 +384,24 @@ void Window::paste_view() {
 }
 
 void Window::save_picture(bool as_seen) {
-  QString path = QFileDialog::getSaveFileName(this, tr("Save picture"), "forest.png", tr("Pictures (*.png)"),
-                                              nullptr, QFileDialog::DontUseNativeDialog);
-  if (path.isEmpty()) return;
-  if (!path.endsWith(".png", Qt::CaseInsensitive)) path += ".png";
+  const auto path = save_name(this, {tr("Save picture"), "forest.png", "png", tr("Pictures (*.png)")});
+  if (!path) return;
   try {
     if (as_seen) {
-      write_image(path.toStdString(), viewport_->seen());
+      write_image(path->toStdString(), viewport_->seen());
     } else {
       const frame::Image image = viewport_->picture();
-      io::write_png(path.toStdString(), image.width, image.height, image.pixels);
+      io::write_png(path->toStdString(), image.width, image.height, image.pixels);
     }
-    statusBar()->showMessage(tr("Saved %1").arg(path), 6000);
+    statusBar()->showMessage(tr("Saved %1").arg(*path), 6000);
   } catch (const std::exception& error) {
     QMessageBox::warning(this, tr("Save picture"), QString::fromUtf8(error.what()));
   }
 }
 
 const std::vector<reports::Trace>& Window::traces() const { return activity_panel_->traces(); }
+
+QRect Window::raster() const { return activity_panel_->raster(); }
 
 void Window::open_activity() {
   open_with(tr("Open activity"), tr("Activity files (*.activity)"), [this](const std::string& path) {
@@ -416,7 +436,8 @@ void Window::open_synapses() {
 }
 
 void Window::open_surface() {
-  open_with(tr("Open surface"), tr("Surfaces (*.surf.gii *.pial *.white *.inflated)"),
+  open_with(tr("Open surface"),
+            tr("Surfaces (*.gii *.pial *.white *.inflated *.sphere *.smoothwm *.ply *.stl *.obj)"),
             [this](const std::string& path) {
               scene::Surfaces surfaces = viewport_->surfaces();
               const bool first = surfaces.empty();
@@ -445,29 +466,38 @@ void Window::save_traces() {
                              6000);
     return;
   }
-  QString path = QFileDialog::getSaveFileName(this, tr("Save traces"), "traces.csv", tr("Tables (*.csv)"),
-                                              nullptr, QFileDialog::DontUseNativeDialog);
-  if (path.isEmpty()) return;
-  if (!path.endsWith(".csv", Qt::CaseInsensitive)) path += ".csv";
+  const auto path = save_name(this, {tr("Save traces"), "traces.csv", "csv", tr("Tables (*.csv)")});
+  if (!path) return;
   try {
-    write_file(path.toStdString(), csv_of(viewport_->playback()->activity().facts(), traces()));
-    statusBar()->showMessage(tr("Saved %1").arg(path), 6000);
+    write_file(path->toStdString(), csv_of(viewport_->playback()->activity().facts(), traces()));
+    statusBar()->showMessage(tr("Saved %1").arg(*path), 6000);
   } catch (const std::exception& error) {
     QMessageBox::warning(this, tr("Save traces"), QString::fromUtf8(error.what()));
   }
 }
 
+std::vector<Window::Key> Window::keys() const {
+  std::vector<Key> all;
+  for (const auto& [gesture, what] : gestures) all.push_back({tr(gesture), {}, tr(what)});
+  for (QAction* menu : menuBar()->actions())
+    for (QAction* action : menu->menu()->actions()) {
+      if (action->shortcut().isEmpty()) continue;
+      const QString name = action->text().remove('&').remove("…");
+      all.push_back({action->shortcut().toString(QKeySequence::NativeText), name,
+                     action->statusTip()});  // panels have no hint beside their name
+    }
+  return all;
+}
+
 void Window::explain() {
   QString text = "<table cellspacing='4'>";
-  const auto row = [&text](const QString& key, const QString& what) {
-    text += QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>").arg(key, what);
-  };
-  for (const auto& [gesture, what] : gestures) row(gesture, what);
-  for (QAction* menu : menuBar()->actions())
-    for (QAction* action : menu->menu()->actions())
-      if (!action->shortcut().isEmpty())
-        row(action->shortcut().toString(QKeySequence::NativeText),
-            action->toolTip().isEmpty() ? action->text().remove('&') : action->toolTip());
+  for (const Key& key : keys())
+    text += QString("<tr><td><b>%1</b>&nbsp;&nbsp;</td><td>%2</td></tr>")
+                .arg(key.key.toHtmlEscaped(),
+                     key.name.isEmpty()   ? key.what.toHtmlEscaped()
+                     : key.what.isEmpty() ? key.name.toHtmlEscaped()
+                                          : QString("%1 <span style='color:#8c99ac'>– %2</span>")
+                                                .arg(key.name.toHtmlEscaped(), key.what.toHtmlEscaped()));
   auto* box = new QDialog(this);
   box->setObjectName("keys");
   box->setWindowTitle(tr("Keys and mouse"));
@@ -484,12 +514,13 @@ void Window::explain() {
   box->resize(std::min(640, room.width() * 9 / 10),
               std::min({720, height() * 9 / 10, room.height() * 8 / 10}));
   box->show();
+  Q_EMIT explained();
 }
 
 void Window::closeEvent(QCloseEvent* event) {
   QSettings kept;
   kept.setValue("window/geometry", saveGeometry());
-  kept.setValue("window/panels", saveState());
+  kept.setValue(panels_key(), saveState());
   QMainWindow::closeEvent(event);
 }
 

@@ -32,15 +32,24 @@ class Window final : public QMainWindow {
 
   Viewport& viewport() { return *viewport_; }
   const std::vector<reports::Trace>& traces() const;
+  QRect raster() const;  // where its colours are, on the screen
+  /// What a gesture or a key does: the name of its command (none of a gesture), and a hint (none where the name says all).
+  struct Key {
+    QString key, name, what;
+  };
+  std::vector<Key> keys() const;
 
  Q_SIGNALS:
   void clamped(double milliseconds);  // another trace is shown, or none: how long it took to read
+  void explained();                   // the keys are on the screen
 
  protected:
   void closeEvent(QCloseEvent* event) override;
 
  private:
-  void renew();  // the window on the screen, and all contexts with it
+  void renew();                 // the window on the screen, and all contexts with it
+  bool surfaces_alone() const;  // there is no forest: nothing to select, no targets
+  QString panels_key() const;
   void add_docks();
   void add_menus();
   void show_figures();

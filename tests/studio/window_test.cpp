@@ -9,6 +9,7 @@
 #include <fcntl.h>
 #include <filesystem>
 #include <fstream>
+#include <map>
 #include <poll.h>
 #include <set>
 #include <unistd.h>
@@ -224,6 +225,20 @@ class Window : public ::testing::Test {
     finish();
     xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
     return io::read_png(path);
+  }
+
+  // How many windows of that name are seen.
+  static int windows(const std::string& name) {
+    const auto list = folder / "windows.txt";
+    // Fails where there is none.
+    [[maybe_unused]] const int found =
+        std::system(fmt::format("xdotool search --onlyvisible --name '{}' >{}", name, list.string()).c_str());
+    const MappedFile lines(list);
+    return int(std::ranges::count(lines.text(), '\n'));
+  }
+  static void wait_for_windows(const std::string& name, int count) {
+    for (int i = 0; i < patience / 50 && windows(name) != count; ++i) usleep(50'000);
+    ASSERT_EQ(windows(name), count) << name;
   }
 
   std::unique_ptr<Studio> studio_;
@@ -548,6 +563,37 @@ TEST_F(Window, GazeFollowsTheMouse) {
   EXPECT_NEAR(view_.detail.gaze->y() * viewport().height, 250.f, 1.f);
 }
 
+TEST_F(Window, WhatSavingWouldReplaceIsAskedOfUnderItsTrueName) {
+  // A plain name, one with another ending, one in a folder with a dot.
+  std::filesystem::create_directories(folder / "v1.2");
+  for (const std::string name : {"asked", "asked.v2", "v1.2/asked"}) {
+    const auto path = folder / (name + ".png");
+    write_file(path, "a person's own");
+    key("ctrl+s");
+    xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus");
+    xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", (folder / name).string()));
+    key("Return");
+    // The question says no unless one says yes; then the dialog is there again.
+    wait_for_windows("Save picture", name == "asked" ? 2 : 1);
+    usleep(300'000);
+    EXPECT_EQ(MappedFile(path).text(), "a person's own") << name;
+    key("Return");
+    usleep(300'000);
+    key("Escape");
+    wait_for_windows("Save picture", 0);
+    EXPECT_EQ(MappedFile(path).text(), "a person's own") << name;
+    EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
+  }
+  // A name that nobody has is not asked of.
+  std::filesystem::remove(folder / "unasked.png");
+  key("ctrl+s");
+  xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus");
+  xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", (folder / "unasked").string()));
+  key("Return");
+  wait_for_windows("Save picture", 0);
+  EXPECT_GT(io::read_png(folder / "unasked.png").width, 100u);
+}
+
 TEST_F(Window, NoFieldOfThePanelsIsCutOff) { EXPECT_EQ(cut_off_, Json::array()); }
 
 TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
@@ -563,6 +609,16 @@ TEST_F(Window, KeysAndMouseAreExplainedOnTheScreen) {
   EXPECT_GT(height, 300);
   EXPECT_LE(x + width, 1280);
   EXPECT_LE(y + height, 800);  // the button at its lower end can be clicked
+  // Every command has its name beside its key.
+  std::map<std::string, std::string> names;
+  for (const Json& row : studio_->wait_for("explained").at("keys"))
+    names.emplace(row.at("key"), row.at("name"));
+  EXPECT_EQ(names.at("U"), "Surfaces");
+  EXPECT_EQ(names.at("L"), "Legend");
+  EXPECT_EQ(names.at("Ctrl+S"), "Save picture");
+  EXPECT_EQ(names.at("Ctrl+1"), "Selection");
+  EXPECT_EQ(std::ranges::count(names, "", &std::pair<const std::string, std::string>::second), 7)
+      << "gestures alone say what they do without a name";
 }
 
 TEST_F(OnACard, ThatIsLostTheForestIsLoadedAnewAndThenDrawnByTheProcessor) {
@@ -770,6 +826,7 @@ TEST(Studio, ShowsASurfaceWithoutAForest) {
   const scene::View view = scene::parse_view(report.at("view").dump());
   EXPECT_GT((view.camera.eye - view.camera.target).norm(), 40e3f);
   EXPECT_EQ(report.at("segments"), 0);
+  EXPECT_EQ(report.at("cut_off"), Json::array());  // of coordinates with six digits
   EXPECT_EQ(studio.end(), std::pair(std::string(), 0));
   const io::Picture seen = io::read_png(folder / "surface.png");
   std::size_t bright = 0;
@@ -777,7 +834,7 @@ TEST(Studio, ShowsASurfaceWithoutAForest) {
     bright += seen.pixels[i] > 110 && seen.pixels[i + 2] > 60;
   EXPECT_GT(bright, 5000u);
   Studio wrong({sample_file(), "--overlay", folder / "lh.pial"});
-  EXPECT_NE(wrong.end().first.find("more overlays than surfaces"), std::string::npos);
+  EXPECT_NE(wrong.end().first.find("more overlays (1) than surfaces (0)"), std::string::npos);
 }
 
 TEST(Studio, RefusesASimulationOfAnotherCircuit) {
@@ -815,6 +872,30 @@ TEST(Studio, WritesAScreenshotOfItsWindow) {
   const io::Picture picture = io::read_png(path);
   EXPECT_EQ(picture.width, 1000u);
   EXPECT_EQ(picture.height, 700u);
+}
+
+TEST(Studio, SaysWhichNodeSetReplacesWhich) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  sample_file();
+  write_file(folder / "one.json", R"({"mine": {"node_id": [1, 2]}})");
+  write_file(folder / "two.json", R"({"mine": {"node_id": [3]}})");
+  const auto [said, status] = Studio({sample_file(), "--node-sets", folder / "one.json", folder / "two.json",
+                                      "--screenshot", folder / "sets.png"})
+                                  .end();
+  EXPECT_EQ(status, 0);
+  EXPECT_NE(said.find("two.json replaces the node set 'mine' of the files before it"), std::string::npos)
+      << said;
+  EXPECT_EQ(std::ranges::count(said, '\n'), 1) << said;
+}
+
+TEST(Studio, OpensAForestWithTheLongestName) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  // That of its synapses would be longer than any file's may be.
+  const auto path = folder / (std::string(255 - 7, 'x') + ".forest");
+  write_file(path, MappedFile(sample_file()).bytes());
+  Studio studio({path, "--screenshot", folder / "long.png"});
+  EXPECT_EQ(studio.end(), std::pair(std::string(), 0));
+  std::filesystem::remove(path);
 }
 
 TEST(Studio, WhatGoesWrongIsOneSentence) {
