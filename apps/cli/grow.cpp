@@ -217,6 +217,10 @@ void run_into_cells(const Options& options, Console& console) {
 
 void run(const Options& options, Console& console) {
   if (is_cells_file(options.out)) return run_into_cells(options, console);
+  if (container_of(options.out))
+    throw Error(fmt::format(
+        "{}: neurons grow into a folder of SWC files or into one file NAME.cells; grow that and convert it",
+        repository::escaped(options.out.string())));
   if (started_ranks() > 1)
     throw Error(
         "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "
