@@ -250,6 +250,7 @@ void run(const Options& options, Console& console) {
       compare(tables[0], tables[1],
               {.repeats = options.repeats, .permutations = options.permutations, .seed = options.seed},
               console.progress());
+  warn_of_shared(samples[0], samples[1], console);
   if (!options.csv.empty()) write_unless_there(options.csv, features_csv(tables, names), options.force);
   if (!options.report.empty())
     write_unless_there(options.report, report_of(c, tables, names, options), options.force);

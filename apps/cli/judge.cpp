@@ -310,6 +310,7 @@ void run(const Options& options, Console& console) {
       judge_samples(train, held_out, grown, parametric.neurons.empty() ? nullptr : &parametric, options.kind,
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
+  warn_of_shared(train, held_out, console);
   if (!options.features.empty())
     write_unless_there(options.features,
                        features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
