@@ -20,7 +20,7 @@ std::optional<QString> save_name(QWidget* parent, const Saved& what) {
     name += "." + what.ending;
     if (!QFileInfo::exists(name) ||
         QMessageBox::warning(
-            parent, what.title,
+            parent, QObject::tr("Replace the file?"),
             QObject::tr("%1 already exists.\nDo you want to replace it?").arg(QFileInfo(name).fileName()),
             QMessageBox::Yes | QMessageBox::No, QMessageBox::No) == QMessageBox::Yes)
       return name;
