@@ -243,14 +243,10 @@ class Window : public ::testing::Test {
     const MappedFile lines(list);
     return int(std::ranges::count(lines.text(), '\n'));
   }
-  static void wait_for_windows(const std::string& name, int count) {
-    for (int i = 0; i < 600 && windows(name) != count; ++i) usleep(50'000);
-    ASSERT_EQ(windows(name), count) << name;
-  }
-  // Presses Return until there are so many.
-  void return_until(const std::string& name, int count) {
+  // Presses a key until there are so many: names to choose from, below the typed one, may take it.
+  void press_until(const std::string& pressed, const std::string& name, int count) {
     for (int i = 0; i < 600 && windows(name) != count; ++i) {
-      if (i % 60 == 0) key("Return");
+      if (i % 60 == 0) key(pressed);
       usleep(50'000);
     }
     ASSERT_EQ(windows(name), count) << name;
@@ -589,13 +585,12 @@ TEST_F(Window, WhatSavingWouldReplaceIsAskedOfUnderItsTrueName) {
     xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", (folder / name).string()));
     // Either the dialog asks, under its own title, or we do where it cannot know the true name.
     const bool by_dialog = name == "asked";
-    return_until(by_dialog ? "Save picture" : "Replace the file", by_dialog ? 2 : 1);
+    press_until("Return", by_dialog ? "Save picture" : "Replace the file", by_dialog ? 2 : 1);
     EXPECT_EQ(MappedFile(path).text(), "a person's own") << name;
-    key("Return");  // no, unless one says yes; then the dialog is there again
-    wait_for_windows("Replace the file", 0);
-    wait_for_windows("Save picture", 1);
-    xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus key Escape");
-    wait_for_windows("Save picture", 0);
+    // No, unless one says yes; then the dialog is there again.
+    press_until("Return", by_dialog ? "Save picture" : "Replace the file", by_dialog ? 1 : 0);
+    xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus");
+    press_until("Escape", "Save picture", 0);
     xdotool("search --sync --onlyvisible --name 'Brain Forest' windowfocus");
     EXPECT_EQ(MappedFile(path).text(), "a person's own") << name;
     EXPECT_FALSE(std::filesystem::exists(folder / name)) << name;
@@ -605,7 +600,7 @@ TEST_F(Window, WhatSavingWouldReplaceIsAskedOfUnderItsTrueName) {
   key("ctrl+s");
   xdotool("search --sync --onlyvisible --name 'Save picture' windowfocus");
   xdotool(fmt::format("key ctrl+a type --delay 5 '{}'", (folder / "unasked").string()));
-  return_until("Save picture", 0);
+  press_until("Return", "Save picture", 0);
   EXPECT_GT(io::read_png(folder / "unasked.png").width, 100u);
 }
 
