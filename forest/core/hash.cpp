@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <new>
 #if defined(__x86_64__)
+#include <immintrin.h>
 #include <xxh_x86dispatch.h>  // the same sums, by the processor's widest vectors
 #else
 #include <xxhash.h>
@@ -14,8 +15,32 @@
 #include "forest/core/parallel.h"
 
 namespace forest {
+namespace {
+
+// While it lives the library may use its widest vectors. Those of xxHash 0.8.1 leave the upper halves of the registers in use,
+// and from then on each instruction that leaves these as they are, as all of SSE do, waits for the register's last one: what the
+// thread does next is up to four times slower.
+class Wide {
+ public:
+  Wide() = default;
+  Wide(const Wide&) = delete;
+  Wide& operator=(const Wide&) = delete;
+#if defined(__x86_64__)
+  ~Wide() {
+    if (__builtin_cpu_supports("avx")) release();
+  }
+
+ private:
+  [[gnu::target("avx")]] static void release() { _mm256_zeroupper(); }
+#else
+  ~Wide() {}
+#endif
+};
+
+}  // namespace
 
 std::uint64_t hash64(std::span<const std::byte> bytes, std::uint64_t seed) {
+  const Wide wide;
   return XXH3_64bits_withSeed(bytes.data(), bytes.size(), seed);
 }
 
@@ -26,6 +51,7 @@ BlockHash::BlockHash()
 }
 
 void BlockHash::add(std::span<const std::byte> bytes) {
+  const Wide wide;
   auto* const state = static_cast<XXH3_state_t*>(state_.get());
   while (!bytes.empty()) {
     const std::size_t take = std::min(bytes.size(), block - filled_);
@@ -40,6 +66,7 @@ void BlockHash::add(std::span<const std::byte> bytes) {
 }
 
 std::uint64_t BlockHash::value() const {
+  const Wide wide;
   std::vector<std::uint64_t> all = blocks_;
   if (filled_) all.push_back(XXH3_64bits_digest(static_cast<const XXH3_state_t*>(state_.get())));
   return hash64(std::as_bytes(std::span(all)));
@@ -55,6 +82,7 @@ std::uint64_t block_hash(std::span<const std::byte> bytes) {
 }
 
 std::string hash_hex(std::span<const std::byte> bytes) {
+  const Wide wide;
   const XXH128_hash_t hash = XXH3_128bits(bytes.data(), bytes.size());
   return fmt::format("{:016x}{:016x}", hash.high64, hash.low64);
 }

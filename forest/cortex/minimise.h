@@ -69,8 +69,9 @@ struct Unfolding {
 template <class Function>
 double minimise(Vector& x, int iterations, double enough, Function&& f) {
   constexpr std::size_t memory = 12;
-  Vector gradient, next_gradient;
-  double value = f(x, gradient);
+  Vector gradient, next, next_gradient, tried, tried_gradient;
+  double value = f(x, gradient), next_value = value;
+  if (!std::isfinite(value)) return value;
   std::vector<std::pair<Vector, Vector>> past;  // steps and changes of the gradient
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Vector direction = -gradient;
@@ -90,26 +91,23 @@ double minimise(Vector& x, int iterations, double enough, Function&& f) {
       past.clear();
       continue;
     }
-    // A step after Lewis & Overton (2013): the value falls enough, the slope flattens; by bisection.
+    // A step after Lewis & Overton (2013): the value falls enough, the slope flattens; by bisection. Where no step does both, the
+    // longest that was low enough.
     double low = 0., high = std::numeric_limits<double>::infinity();
     double step = past.empty() ? std::min(1., enough * 1e4 / direction.cwiseAbs().maxCoeff()) : 1.;
-    Vector next;
-    double next_value = value;
-    bool found = false;
     for (int attempt = 0; attempt < 40; ++attempt) {
-      next = x + step * direction;
-      next_value = f(next, next_gradient);
-      if (!(next_value <= value + 1e-4 * step * along))
+      tried = x + step * direction;
+      const double tried_value = f(tried, tried_gradient);
+      if (tried_value <= value + 1e-4 * step * along) {
+        low = step, next_value = tried_value;
+        next.swap(tried), next_gradient.swap(tried_gradient);
+        if (!(next_gradient.dot(direction) < .9 * along)) break;
+      } else {
         high = step;
-      else if (next_gradient.dot(direction) < .9 * along)
-        low = step, found = true;
-      else {
-        found = true;
-        break;
       }
       step = std::isinf(high) ? 2. * step : .5 * (low + high);
     }
-    if (!found) {
+    if (low == 0.) {
       if (past.empty()) break;
       past.clear();
       continue;
