@@ -251,7 +251,8 @@ class Writer {
         for (std::size_t l = 0; l < kin(); ++l)
           differ(traced_.cells[others[k].second], traced_.cells[others[l].second]);
     }
-    put("\n\n# To each neuron another, whose stems of one kind it has: as alike as can be when each is another's "
+    put("\n\n# To each neuron another, whose stems of one kind it has: as alike as can be when each is "
+        "another's "
         "only once.\nsample mates(cell = -> cell) =");
     const std::vector<std::size_t> mate = mates(apart);
     for (std::size_t i = 0; i < mate.size(); ++i) {
@@ -264,9 +265,13 @@ class Writer {
   std::vector<std::size_t> mates(auto&& apart) const {
     const std::size_t n = traced_.cells.size();
     std::vector<double> between(n * n, 1e9);  // of itself: never
+    const auto basal = [](const Stem& s) { return s.kind == int(SectionKind::basal); };
     for (std::size_t i = 0; i < n; ++i)
       for (std::size_t j = 0; j < n; ++j)
-        if (j != i) between[i * n + j] = apart(traced_.cells[i], traced_.cells[j]);
+        if (const Cell& a = traced_.cells[i], &b = traced_.cells[j]; j != i)
+          between[i * n + j] = std::ranges::all_of(a.stems, basal) && std::ranges::none_of(b.stems, basal)
+                                   ? 1e6  // there would be no stem at all
+                                   : apart(a, b);
     std::vector<std::size_t> mate(n);
     for (std::size_t i = 0; i < n; ++i) mate[i] = (i + 1) % n;
     for (bool better = true; std::exchange(better, false);)
@@ -412,7 +417,9 @@ class Writer {
         "two neurons alike to it differ.\n"
         "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
-        "cell mate = mates.cell(mates(me))\n#define others_kind {}  # of the stems that are those of the mate\ncell thin_as = one\n#define stray {:.4g}\n"
+        "cell mate = mates.cell(mates(me))\n#define others_kind {}  # of the stems that are the mate's, -1: "
+        "none\n"
+        "cell thin_as = one\n#define stray {:.4g}\n"
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
         traced_.cells.size(), kin(), others_kind(), options_.smoothing, kept());
@@ -439,9 +446,9 @@ class Writer {
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
       style += fmt::format(fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
-                                        : habit(i) ? ", styles.{0}(t)"
+                                        : habit(i)                  ? ", styles.{0}(t)"
                                                    : ", own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
-          style_names[i]);
+                           style_names[i]);
     put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"

@@ -34,9 +34,9 @@ struct Resampling {
   double lean = .12;                          // of how far aside of the way out it heads
   double style = .45;                         // in standard deviations among the neurons
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
-  double familiar = .5;    // how often a fork may come from the neuron whose stems these are
+  double familiar = .5;         // how often a fork may come from the neuron whose stems these are
   double familiar_to_two = 1.;  // … where a neuron has the stems of two
-  double smoothing = 1.2;  // of a neuron's style: 0 takes that of a traced neuron as it is
+  double smoothing = 1.2;       // of a neuron's style: 0 takes that of a traced neuron as it is
   double sway =
       .2;  // of a stem's direction, in shares of how much directions differ in the plane of the slice
   double jitter = .1;   // of the logarithms of a stem's tips and reach
