@@ -12,7 +12,10 @@
 
 namespace forest {
 
-bool is_surface(const std::filesystem::path& file) { return io::may_be_surface(MappedFile(file).text()); }
+bool is_surface(const std::filesystem::path& file) {
+  std::error_code none;
+  return !std::filesystem::is_directory(file, none) && io::may_be_surface(MappedFile(file).text());
+}
 
 void add_surface(scene::Surfaces& surfaces, const std::filesystem::path& file, float opacity) {
   surfaces.add(io::read_surface(MappedFile(file).text(), file.string()), opacity);

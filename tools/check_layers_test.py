@@ -52,6 +52,10 @@ class CheckLayers(unittest.TestCase):
         self.append("core/error.cpp", '#include "../morphology/morphology.h"')
         self.assert_refused("error.cpp", "from the root")
 
+    def test_a_second_type_of_one_name_is_refused(self):
+        self.append("statistics/two_samples.h", "namespace forest::statistics {\nstruct Metric {\n};\n}")
+        self.assert_refused("forest::statistics::Metric is another type in", "name them apart")
+
     def test_a_library_in_a_header_that_others_include_is_refused(self):
         self.append("core/vec.h", "#include <hdf5.h>")
         self.assert_refused("vec.h brings <hdf5.h>", "private to core")

@@ -5,7 +5,7 @@
 #include <filesystem>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -15,6 +15,7 @@
 
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -32,6 +33,7 @@ void run(const Options& options, Console& console) {
   for (const auto& input : {options.report, options.spikes})
     if (std::filesystem::equivalent(input, options.out, none))
       throw Error(options.out.string() + ": is what is read, so it is not replaced; name another file");
+  must_take(options.out, activity_file);
   const bool spikes_alone = options.report.empty();
   if (spikes_alone && options.spikes.empty())
     throw Error("there is nothing to pack; name a report, or spikes with --spikes");

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <cstdio>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
@@ -166,8 +166,8 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
   const double time = view.activity->time.value_or(playback.has_values() ? playback.begin()
                                                                          : playback.busiest(*view.activity));
   if (!(time >= playback.begin() && time <= playback.end() + playback.activity().facts().step))
-    throw Error(fmt::format("{}: holds no time {} ms; it runs from {} to {} ms", options.file.string(), time,
-                            playback.begin(), playback.end()));
+    throw Error(fmt::format("{}: holds no time {:g} ms; it runs from {:g} to {:g} ms", options.file.string(),
+                            time, playback.begin(), playback.end()));
   view.activity->time = time;
 }
 

@@ -4,7 +4,7 @@
 #include <array>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"

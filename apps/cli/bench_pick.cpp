@@ -3,7 +3,7 @@
 // plain loop over all segments finds, and how many picks are made in a second? What "under" means: forest/scene/pick.h.
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

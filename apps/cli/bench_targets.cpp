@@ -2,7 +2,7 @@
 // brainforest bench targets: how long does it take to show thousands of neurons otherwise?
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -239,6 +239,7 @@ void run(const Options& options, Console& console) {
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),
       read_sample({stored ? options.with : options.samples[1]}, options.repo, console)};
   const std::vector<Group> groups = groups_of(options.kind);
+  warn_of_shared(samples[0], samples[1], console);
   std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
                                      measured(samples[1], groups, console)};
   if (!options.slices.empty())

@@ -36,7 +36,12 @@ void ProgressBar::end() {
 void ProgressBar::draw(Clock::time_point now) {
   static const bool terminal = ::isatty(2) != 0;
   drawn_ = now;
-  if (!terminal) return;
+  if (!terminal) {  // a line a minute, for who reads the log of a long run
+    if (now - told_ < 60s) return;
+    told_ = now;
+    fmt::print(stderr, "{}: {}{}\n", stage_, done_, total_ ? fmt::format(" of {}", total_) : "");
+    return;
+  }
   constexpr std::size_t width = 30;
   if (total_) {
     const std::size_t filled = std::min(width, width * done_ / total_);
@@ -56,6 +61,7 @@ void Console::say(std::string_view line) {
 
 void Console::warn(std::string_view sentence) {
   bar_.end();
+  std::fflush(stdout);  // in one file or pipe with what was said before
   fmt::print(stderr, "{}\n", sentence);
 }
 

@@ -16,7 +16,7 @@
 
 namespace forest::cli {
 
-/// A progress bar on standard error; silent when that is no terminal, and for stages shorter than a second.
+/// A progress bar on standard error, for stages of a third of a second and more; where that is no terminal, a line a minute.
 class ProgressBar final : public Progress {
  public:
   void begin(std::string_view stage, std::size_t total) override;
@@ -30,7 +30,7 @@ class ProgressBar final : public Progress {
   std::mutex mutex_;
   std::string stage_;
   std::size_t total_ = 0, done_ = 0;
-  Clock::time_point begin_, drawn_;
+  Clock::time_point begin_, drawn_, told_ = Clock::now();
   bool shown_ = false;
 };
 
@@ -57,7 +57,7 @@ std::string counted(std::size_t count, std::string_view noun, std::string_view p
 std::uint64_t peak_bytes();
 
 /// Where the project's own grammars and recipes are: the folder `data` of the source tree or of the
-/// installation.
+/// installation, or what BRAINFOREST_SHARE names.
 std::filesystem::path data_folder();
 
 }  // namespace forest::cli

@@ -7,7 +7,7 @@
 #include <memory>
 #include <set>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -74,7 +74,7 @@ fs::path numbered(const fs::path& path, int number) {
   return path.parent_path() / fmt::format("{}-{}{}", path.stem().string(), number, path.extension().string());
 }
 
-using Put = std::function<void(const fs::path& to, std::string_view bytes)>;
+using Put = std::function<void(const fs::path& to, const std::function<std::string()>& bytes)>;
 
 /// Where the cells of a file go, each by its own name when there are several; to none of the `others`.
 std::vector<fs::path> places_of(const io::CellReader& cells, const fs::path& to,
@@ -143,19 +143,42 @@ std::vector<Conversion> convert_file(const fs::path& from, const Options& option
   return done;
 }
 
-void tell(const Conversion& conversion, const Options& options, Console& console) {
-  const std::string from = escaped(conversion.from.string());
-  if (!conversion.error.empty()) {
-    console.warn(conversion.skipped ? conversion.error + "; skipped" : conversion.error);
-    return;
+/// Says what was found in the conversions, one after another: the cells of one damaged block share one sentence, and of many
+/// losses of one kind the first few stand for all unless --verbose asks for each.
+class Teller {
+ public:
+  Teller(const Options& options, Console& console) : options_(options), console_(console) {}
+
+  void tell(const Conversion& conversion) {
+    if (!conversion.error.empty()) {
+      if (conversion.error != error_)
+        console_.warn(conversion.skipped ? conversion.error + "; skipped" : conversion.error);
+      error_ = conversion.error;
+      return;
+    }
+    for (const io::Warning& w : conversion.warnings)
+      if (options_.verbose || w.lost)
+        tell(w, escaped(conversion.from.string()) + (w.line ? fmt::format(":{}", w.line) : ""));
+    for (const io::Warning& w : conversion.losses) tell(w, escaped(conversion.to.string()));
   }
-  for (const io::Warning& w : conversion.warnings)
-    if (options.verbose || w.lost)
-      console.warn(
-          fmt::format("{}{}: {}: {}", from, w.line ? fmt::format(":{}", w.line) : "", w.code, w.sentence));
-  for (const io::Warning& w : conversion.losses)
-    console.warn(fmt::format("{}: {}: {}", escaped(conversion.to.string()), w.code, w.sentence));
-}
+  void end() const {
+    for (const auto& [code, count] : told_)
+      if (count > few && !options_.verbose)
+        console_.warn(fmt::format("{} more of {}; see all with --verbose", count - few, code));
+  }
+
+ private:
+  static constexpr std::size_t few = 10;  // of a kind
+  const Options& options_;
+  Console& console_;
+  std::string error_;  // the last one
+  std::map<std::string_view, std::size_t> told_;
+
+  void tell(const io::Warning& w, const std::string& where) {
+    if (++told_[w.code] <= few || options_.verbose)
+      console_.warn(fmt::format("{}: {}: {}", where, w.code, w.sentence));
+  }
+};
 
 nlohmann::ordered_json json_of(const std::vector<io::Warning>& warnings) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
@@ -193,9 +216,10 @@ void report(const std::vector<std::vector<Conversion>>& done, const Target& targ
             Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t written = 0, failed = 0, skipped = 0, oddities = 0, lost = 0;
+  Teller teller(options, console);
   for (const auto& conversions : done)
     for (const Conversion& c : conversions) {
-      tell(c, options, console);
+      teller.tell(c);
       (c.error.empty() ? written : c.skipped ? skipped : failed) += 1;
       const auto not_kept = std::size_t(std::ranges::count_if(c.warnings, &io::Warning::lost));
       oddities += c.warnings.size() - not_kept, lost += c.losses.size() + not_kept;
@@ -209,6 +233,7 @@ void report(const std::vector<std::vector<Conversion>>& done, const Target& targ
       }
       list.push_back(std::move(entry));
     }
+  teller.end();
   console.print({{"format", target.name()},
                  {"written", written},
                  {"failed", failed},
@@ -220,8 +245,8 @@ void report(const std::vector<std::vector<Conversion>>& done, const Target& targ
                                                                      counted(oddities, "oddity", "oddities"))
                                                        : ""));
   if (failed)
-    throw Error(fmt::format("{} of {} files could not be converted; the sentences above say why", failed,
-                            done.size()));
+    throw Error(fmt::format("{} of {} could not be converted; the sentences above say why", failed,
+                            counted(written + failed, "neuron")));
 }
 
 void make_folder_of(const fs::path& file) {
@@ -297,14 +322,15 @@ void run_apart(const Options& options, const std::vector<fs::path>& files, const
                                                                     io::Cell cell) {
           conversion.to = places[i];
           const Morphology& m = cell.read.morphology;
-          if (target.neuron) {
-            conversion.losses = io::losses(m, target.neuron->keeps);
-            put(conversion.to, target.neuron->write(m));
-          } else {
+          put(conversion.to, [&] {
+            if (target.neuron) {
+              conversion.losses = io::losses(m, target.neuron->keeps);
+              return target.neuron->write(m);
+            }
             const io::Model model =
                 io::make_model(m, conversion.to.stem().string(), options.model, conversion.losses);
-            put(conversion.to, target.model->write(model));
-          }
+            return target.model->write(model);
+          });
         };
       });
       console.progress().advance();
@@ -313,11 +339,14 @@ void run_apart(const Options& options, const std::vector<fs::path>& files, const
   };
   if (!options.force && holds_files(folder)) {
     Overwrites overwrites;
-    each("comparing", [&](const fs::path& path, std::string_view bytes) { overwrites.look(path, bytes); });
+    each("comparing", [&](const fs::path& path, const std::function<std::string()>& bytes) {
+      if (std::error_code none; fs::exists(path, none)) overwrites.look(path, bytes());
+    });
     overwrites.refuse();
   }
   for (const fs::path& path : to) make_folder_of(path);
-  each("converting", [](const fs::path& path, std::string_view bytes) { write_file(path, bytes); });
+  each("converting",
+       [](const fs::path& path, const std::function<std::string()>& bytes) { write_file(path, bytes()); });
   report(done, target, options, console);
 }
 

@@ -9,7 +9,7 @@
 #include <utility>
 #include <vector>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -23,6 +23,8 @@
 
 #include "apps/cli/console.h"
 #include "apps/cli/cortex.h"
+#include "apps/cli/files.h"
+#include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -35,6 +37,7 @@ struct Options {
   int steps = 0;       // 0: 20 in the plane, 10 in space
   int dimensions = 0;  // of the domains that are compared; 0: all
   std::filesystem::path out;
+  bool force = false;
   cortex::GridPicture picture;
 };
 
@@ -63,9 +66,9 @@ double least_scaled_jacobian(const cortex::Grid& grid) {
 void write(const Options& options, std::span<const cortex::GridPanel> panels) {
   const std::string extension = options.out.extension().string();
   if (extension == ".svg")
-    write_file(options.out, cortex::to_svg(panels, options.picture));
+    write_unless_there(options.out, cortex::to_svg(panels, options.picture), options.force);
   else if (extension == ".obj" && panels.size() == 1)
-    write_file(options.out, cortex::to_obj(*panels.front().grid));
+    write_unless_there(options.out, cortex::to_obj(*panels.front().grid), options.force);
   else
     throw Error(fmt::format("'{}' has no ending that can be written; give {}", options.out.string(),
                             panels.size() == 1 ? ".svg or .obj" : ".svg"));
@@ -189,6 +192,7 @@ std::function<void()> cortex_grid(CLI::App& command, Console& console) {
       ->capture_default_str();
   command.add_flag("!--closed", options->picture.opened, "Do not cut out the corner nearest to the eye");
   command.add_option("-o,--out", options->out, "A drawing (.svg), or of one block a mesh (.obj)");
+  add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }
 

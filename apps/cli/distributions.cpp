@@ -6,7 +6,7 @@
 #include <memory>
 #include <utility>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -43,21 +43,21 @@ struct Options {
 
 std::string shown(double value) { return std::isnan(value) ? "-" : fmt::format("{:.4g}", value); }
 
-std::string shown(const Estimate& e) {
+std::string shown(const ParameterEstimate& e) {
   return std::isnan(e.lower) ? shown(e.value)
                              : fmt::format("{} [{}, {}]", shown(e.value), shown(e.lower), shown(e.upper));
 }
 
 Json number(double value) { return std::isfinite(value) ? Json(value) : Json(nullptr); }
 
-Json json_of(const Estimate& e) {
+Json json_of(const ParameterEstimate& e) {
   return {
       {"name", e.name}, {"value", number(e.value)}, {"lower", number(e.lower)}, {"upper", number(e.upper)}};
 }
 
 Json json_of(const DistributionFit& f) {
   Json estimates = Json::array(), candidates = Json::array();
-  for (const Estimate& e : f.estimates) estimates.push_back(json_of(e));
+  for (const ParameterEstimate& e : f.estimates) estimates.push_back(json_of(e));
   for (const Candidate& c : f.candidates)
     candidates.push_back({{"family", c.name},
                           {"log_likelihood", number(c.log_likelihood)},
@@ -79,7 +79,7 @@ Json json_of(const DistributionFit& f) {
 
 std::string estimates_of(const DistributionFit& f) {
   std::string text;
-  for (const Estimate& e : f.estimates)
+  for (const ParameterEstimate& e : f.estimates)
     text += fmt::format("{}{} {}", text.empty() ? "" : ", ", e.name, shown(e));
   if (f.distribution.step > 0.) text += fmt::format(", in steps of {}", shown(f.distribution.step));
   return text;
@@ -148,7 +148,7 @@ Json json_of(const SegmentFamilies& f) {
           {"quantities", quantities}};
 }
 
-std::string percent(const Estimate& e) {
+std::string percent(const ParameterEstimate& e) {
   return fmt::format("{:.1f} % ({:.1f}–{:.1f})", 100. * e.value, 100. * e.lower, 100. * e.upper);
 }
 
@@ -194,7 +194,7 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
       for (const Atom& atom : q.fit.distribution.atoms) panel.atoms.emplace_back(atom.value, atom.weight);
       panels.push_back(std::move(panel));
       bool first = true;
-      for (const Estimate& e : q.fit.estimates)
+      for (const ParameterEstimate& e : q.fit.estimates)
         parameters.push_back({first ? std::string(q.name) : "", std::exchange(first, false) ? q.fit.name : "",
                               e.name, shown(e.value), shown(e.lower), shown(e.upper)});
       for (const auto& c : q.fit.candidates)
@@ -234,7 +234,8 @@ void run(const Options& options, Console& console) {
                        {.kinds = kinds,
                         .given = by,
                         .binning = {.least = options.least},
-                        .fit = {.criterion = options.criterion == "bic" ? Criterion::bic : Criterion::aicc,
+                        .fit = {.criterion = options.criterion == "bic" ? InformationCriterion::bic
+                                                                        : InformationCriterion::aicc,
                                 .replicates = options.replicates,
                                 .seed = options.seed}},
                        console.progress());

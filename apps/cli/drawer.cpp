@@ -3,7 +3,7 @@
 
 #include <map>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 
 #include "forest/core/error.h"
 #include "forest/render/cpu/cpu_renderer.h"

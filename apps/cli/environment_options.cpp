@@ -5,7 +5,7 @@
 #include <charconv>
 #include <filesystem>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/circuit/environment.h"

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cctype>
+#include <fstream>
 #include <functional>
 #include <map>
 
@@ -140,6 +141,26 @@ void refuse_existing(const std::vector<fs::path>& files) {
       throw Error(fmt::format(
           "{} is there already, so nothing was written; choose another name, or replace it with --force",
           repository::escaped(file.string())));
+}
+
+void must_take(const fs::path& place, const Product& product) {
+  std::error_code none;
+  const std::string name = repository::escaped(place.string());
+  const auto there = fs::symlink_status(followed(place), none);
+  if (fs::is_directory(there)) throw Error(fmt::format("{} is a folder; name a file in it", name));
+  if (fs::exists(there) && !fs::is_regular_file(there)) return;
+  if (*product.ending && extension_of(place) != product.ending)
+    throw Error(
+        fmt::format("{}: {}s have names that end in {}; choose one", name, product.what, product.ending));
+  if (const fs::path folder = place.parent_path(); !folder.empty() && !fs::is_directory(folder, none))
+    throw Error(fmt::format("{}: its folder is not there; make it first", name));
+  if (!fs::exists(there) || fs::file_size(place, none) == 0) return;
+  std::string mark(product.mark.size(), 0);
+  std::ifstream file(place, std::ios::binary);
+  file.seekg(std::streamoff(product.at)).read(mark.data(), std::streamsize(mark.size()));
+  if (!file || mark != product.mark)
+    throw Error(fmt::format("{} is there and is no {}, so nothing was written; choose another name", name,
+                            product.what));
 }
 
 bool holds_files(const fs::path& folder) {

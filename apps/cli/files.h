@@ -49,6 +49,21 @@ void write_unless_there(const std::filesystem::path& to, std::string_view bytes,
 /// Throws Error when one of them is there, whatever it holds: people write into tables.
 void refuse_existing(const std::vector<std::filesystem::path>& files);
 
+/// What a verb draws or packs anew each time: it replaces an older one of its kind, and nothing else.
+struct Product {
+  const char* what;
+  const char* ending;     // that its name must have; empty: any
+  std::size_t at;         // where in the file the mark is
+  std::string_view mark;  // by which it is known
+};
+inline constexpr Product png_picture{"PNG picture", ".png", 0, "\x89PNG\r\n"},
+    mp4_film{"MP4 film", ".mp4", 4, "ftyp"}, forest_file{"forest file", "", 0, "BFOREST\n"},
+    synapses_file{"file of synapses", "", 0, "BFSYNAP\n"}, activity_file{"activity file", "", 0, "BFACTIV\n"};
+
+/// Throws Error when a product cannot go there: its folder is missing, its name ends otherwise, something else is there.
+/// To be asked before the work begins. Where no file can lie (a pipe, /dev/stdout) anything goes.
+void must_take(const std::filesystem::path& place, const Product& product);
+
 /// Whether there may be something to overwrite: the folder is there and not empty.
 bool holds_files(const std::filesystem::path& folder);
 

@@ -2,7 +2,7 @@
 // brainforest fit: from traced neurons to a model that grows more of them.
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

@@ -6,7 +6,7 @@
 #include <memory>
 #include <optional>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -262,7 +262,7 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");
   CLI::Option* out = into->add_option("--out", options->out,
                                       "Write them into this folder as SWC files, or into one file where it "
-                                      "ends in .cells; that is gone on with when the program was killed");
+                                      "ends in .cells; that is continued after an interruption");
   into->require_option(1, 2);
   model->needs(repo);
   CLI::Option* lapse =

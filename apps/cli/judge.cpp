@@ -4,7 +4,7 @@
 #include <array>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -287,6 +287,7 @@ void run(const Options& options, Console& console) {
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
+  warn_of_shared(train, held_out, console);
   Sample grown, parametric;
   std::optional<std::size_t> longest_run;
   if (options.model.empty()) {

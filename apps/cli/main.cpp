@@ -1,5 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <csignal>
+#include <cstdio>
+#include <filesystem>
 #include <memory>
 
 #include <CLI/CLI.hpp>
@@ -61,9 +63,14 @@ int main(int argc, char** argv) {
   try {
     const ThreadLimit limit(console.threads);
     run();
+    if (std::fflush(stdout) != 0 || std::ferror(stdout))
+      throw forest::Error("what was to be said cannot be written; check that the disk has room");
     return 0;
   } catch (const std::bad_alloc&) {
     console.warn("brainforest: there is not enough memory for this; use fewer or smaller neurons");
+  } catch (const std::filesystem::filesystem_error& error) {
+    console.warn(fmt::format("brainforest: {}: {}; check the path, and who may read and write there",
+                             repository::escaped(error.path1().string()), error.code().message()));
   } catch (const std::exception& error) {
     console.warn(fmt::format("brainforest: {}", error.what()));
   }

@@ -4,7 +4,7 @@
 #include <charconv>
 #include <limits>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"

@@ -4,7 +4,7 @@
 #include <atomic>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +18,7 @@
 
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -77,6 +78,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
   command.add_flag("--no-synapses", options->no_synapses,
                    "Leave out the synapses, which are packed beside the forest: column.synapses");
   return [options, &console] {
+    must_take(options->out, forest_file);
+    if (!options->no_synapses) must_take(scene::Synapses::beside(options->out), synapses_file);
     const auto begin = Clock::now();
     io::SonataOutline outline = io::outline_sonata(options->circuit);
     std::vector<std::vector<io::Warning>> oddities(outline.files.size());  // of their files

@@ -7,7 +7,7 @@
 #include <numeric>
 #include <set>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 

@@ -2,7 +2,7 @@
 // brainforest query: a question in SQL to a repository, which nothing can be written by.
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 

@@ -7,7 +7,7 @@
 #include <memory>
 #include <optional>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -19,6 +19,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
@@ -106,6 +107,7 @@ class Axes {
 };
 
 void run(const Options& options, Console& console) {
+  must_take(options.out, png_picture);
   auto [width, height] = parse_size(options.size);
   if (!(options.range[0] < options.range[1]))
     throw Error(fmt::format("colours from {} to {} show nothing; give the lower end first", options.range[0],
@@ -118,8 +120,8 @@ void run(const Options& options, Console& console) {
   };
   const std::uint64_t begin = step_at(options.from), end = step_at(options.to);
   if (begin >= end)
-    throw Error(fmt::format("{} to {} ms holds no step; the simulation runs from {} to {} ms", options.from,
-                            options.to, facts.start, facts.time(facts.steps)));
+    throw Error(fmt::format("{:g} to {:g} ms holds no step; the simulation runs from {:g} to {:g} ms",
+                            options.from, options.to, facts.start, facts.time(facts.steps)));
   std::optional<Axes> axes;
   if (!options.plain) {
     axes.emplace(width, height, activity.rows().size());

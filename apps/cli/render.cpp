@@ -4,7 +4,7 @@
 #include <map>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -14,6 +14,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/surface_options.h"
 #include "apps/cli/synapse_options.h"
@@ -101,6 +102,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
   add_legend(command, options->legend);
   add_renderer(command, options->drawer);
   return [options, &console] {
+    must_take(options->out, png_picture);
     const auto [width, height] = parse_size(options->size);
     SurfaceOptions named = options->surfaces;
     const bool alone = is_surface(options->forest);
@@ -210,6 +212,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   add_renderer(command, options->drawer);
   command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
   return [options, &console] {
+    must_take(options->out, mp4_film);
     FilmPlan plan = options->plan;
     std::tie(plan.width, plan.height) = parse_size(options->size);
     const scene::Forest forest = scene::Forest::open(options->forest);

@@ -3,13 +3,16 @@
 
 #include <algorithm>
 #include <regex>
+#include <set>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/io/workbook.h"
+#include "forest/repository/names.h"
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
@@ -104,6 +107,20 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
   }
   if (sample.neurons.empty()) throw Error(fmt::format("{} holds no neuron; name another", sample.name));
   return sample;
+}
+
+void warn_of_shared(const Sample& one, const Sample& other, Console& console) {
+  const auto sum = [](const Morphology& m) { return hash64(std::as_bytes(m.points())); };
+  std::set<std::uint64_t> sums;
+  for (const Morphology& m : one.neurons) sums.insert(sum(m));
+  std::size_t shared = 0, first = 0;
+  for (std::size_t i = other.neurons.size(); i-- > 0;)
+    if (sums.contains(sum(other.neurons[i]))) ++shared, first = i;
+  if (shared)
+    console.warn(fmt::format(
+        "{} of {} {} in {}, too, {} first; leave what is in both out of one, or they look too much alike",
+        counted(shared, "cell"), repository::escaped(one.name), shared == 1 ? "is" : "are",
+        repository::escaped(other.name), repository::escaped(other.cells[first])));
 }
 
 statistics::FeatureTable measured(const Sample& sample, std::span<const statistics::Group> groups,

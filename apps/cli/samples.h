@@ -30,6 +30,9 @@ struct Sample {
 /// What cannot be read is told and left out. Throws Error when nothing is left.
 Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console);
 
+/// Warns of cells that are in both samples, by their points: how two samples differ is then said of less than it seems.
+void warn_of_shared(const Sample& one, const Sample& other, Console& console);
+
 /// Features of the cells, on all cores.
 statistics::FeatureTable measured(const Sample& sample, std::span<const statistics::Group> groups,
                                   Console& console);

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <memory>
 
-#include <CLI/CLI.hpp>
+#include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -18,6 +18,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
 
@@ -30,6 +31,7 @@ struct Options {
   double height = 0.;  // µm; 0: all of it
   double depth = 0., seconds = 5.;
   int rate = 25;
+  bool force = false;
 };
 
 /// Numbers between commas; throws Error.
@@ -63,15 +65,14 @@ Plane plane_of(const std::string& text, const scene::Forest& forest) {
   return Plane::through({n[0], n[1], n[2]}, normal);
 }
 
-void write_csv(const std::filesystem::path& path, const scene::Forest& forest,
-               const std::vector<scene::ProfileArea>& areas) {
+std::string csv_of(const scene::Forest& forest, const std::vector<scene::ProfileArea>& areas) {
   std::string text = "neuron,type,layer,kind,profiles,area\n";
   for (const scene::ProfileArea& a : areas)
     text += fmt::format("{},\"{}\",\"{}\",{},{},{:.6g}\n", a.instance,
                         forest.circuit().types[forest.types()[a.instance]].name,
                         forest.circuit().layers[forest.layers()[a.instance]].name,
                         a.kind == 1 ? "soma" : name_of(SectionKind(a.kind)), a.profiles, a.area);
-  write_file(path, text);
+  return text;
 }
 
 void film(const Options& options, const scene::Forest& forest, const Plane& plane,
@@ -94,6 +95,8 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
 
 void run(const Options& options, Console& console) {
   const std::string extension = options.out.extension().string();
+  if (extension == ".png") must_take(options.out, png_picture);
+  if (extension == ".mp4") must_take(options.out, mp4_film);
   const scene::Forest forest = scene::Forest::open(options.forest);
   const Plane plane = plane_of(options.plane, forest);
   scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
@@ -123,9 +126,9 @@ void run(const Options& options, Console& console) {
   const scene::Slice slice = scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet());
   const auto areas = scene::areas(slice);
   if (table)
-    write_csv(options.out, forest, areas);
+    write_unless_there(options.out, csv_of(forest, areas), options.force);
   else if (extension == ".svg")
-    write_file(options.out, scene::to_svg(slice, colouring, picture));
+    write_unless_there(options.out, scene::to_svg(slice, colouring, picture), options.force);
   else
     io::write_png(options.out, picture.width_pixels, picture.height_pixels,
                   scene::paint(slice, colouring, picture).pixels);
@@ -193,6 +196,7 @@ std::function<void()> section(CLI::App& command, Console& console) {
                    ? ""
                    : "give a file ending in .png, .svg, .csv or .mp4";
       });
+  add_force(command, options->force);
   return [options, &console] { run(*options, console); };
 }
 

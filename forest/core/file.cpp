@@ -58,6 +58,16 @@ int open_file_at(const std::filesystem::path& place) {
 
 }  // namespace
 
+unsigned permissions(unsigned wanted) {
+  // It can only be asked by being set.
+  static const mode_t mask = [] {
+    const mode_t own = ::umask(0);
+    ::umask(own);
+    return own;
+  }();
+  return wanted & ~mask;
+}
+
 std::filesystem::path followed(const std::filesystem::path& path) {
   std::filesystem::path place = path;
   for (int links = 0; links < 40; ++links) {  // as many as the kernel follows
@@ -127,7 +137,7 @@ NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(
     if (file_ < 0) fail("created");
     part_ = part;
   }
-  ::fchmod(file_, there && !stream_ ? status.st_mode & 0777 : 0644);
+  ::fchmod(file_, there && !stream_ ? status.st_mode & 0777 : permissions(0666));
 }
 
 NewFile::~NewFile() {

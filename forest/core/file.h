@@ -105,6 +105,9 @@ class PartFile {
   int file_ = -1;
 };
 
+/// What the user's mask (umask) leaves of the permissions of something new.
+unsigned permissions(unsigned wanted);
+
 /// Where a path leads: symbolic links are followed, also one to a file that is not there yet. Throws Error for a circle.
 std::filesystem::path followed(const std::filesystem::path& path);
 

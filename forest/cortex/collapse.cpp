@@ -85,7 +85,7 @@ Faces extract(const Level& level, std::vector<Triangle> triangles) {
       const std::uint32_t j = level.list[e];
       if (j < i) continue;
       if (mesh.shared(i, j).size() == 1) mesh.border[i] = mesh.border[j] = 1;
-      const Site &a = level.sites[i], &b = level.sites[j];
+      const LatticeSite &a = level.sites[i], &b = level.sites[j];
       if (step_between(a, b).isZero()) zeros.emplace_back((a.point - b.point).norm() / a.spacing, i, j);
     }
   std::sort(zeros.begin(), zeros.end());
@@ -99,7 +99,7 @@ Faces extract(const Level& level, std::vector<Triangle> triangles) {
   std::vector<double> nearest(n, 1e300);
   std::vector<std::optional<Pass>> valley(n);
   for (std::uint32_t i = 0; i < n; ++i) {
-    const Site& s = level.sites[i];
+    const LatticeSite& s = level.sites[i];
     const std::uint32_t r = mesh.root(i);
     const double d = (s.point - s.at).norm() / s.spacing,
                  w = (s.area + 1.) * std::exp(-9. * std::min(d * d, 4.));

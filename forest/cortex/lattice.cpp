@@ -11,7 +11,7 @@ namespace forest::cortex {
 namespace {
 
 // Where the tangent planes of two sites meet, nearest to both.
-Place between(const Site& a, const Site& b) {
+Place between(const LatticeSite& a, const LatticeSite& b) {
   const double ab = a.normal.dot(b.normal), da = a.normal.dot(b.at - a.at), db = b.normal.dot(a.at - b.at);
   const double f = 1. / (1. - ab * ab + 1e-4);
   const double la = 2. * (da - ab * db) * f, lb = 2. * (db - ab * da) * f;
@@ -23,13 +23,13 @@ struct Agreement {
   Place one, other;
   Eigen::Vector2i from_one, from_other;  // steps along and up from each site's own point
 };
-Agreement agree(const Site& a, const Place& a_point, const Site& b, const Place& b_point) {
+Agreement agree(const LatticeSite& a, const Place& a_point, const LatticeSite& b, const Place& b_point) {
   const Place middle = between(a, b);
   struct Corner {
     Place at[4];
     Eigen::Vector2i steps[4];
   };
-  const auto corners = [&](const Site& s, const Place& point) {
+  const auto corners = [&](const LatticeSite& s, const Place& point) {
     Corner c;
     const Place d = middle - point, up = s.up();
     const int x = int(std::floor(s.along.dot(d) / s.spacing)), y = int(std::floor(up.dot(d) / s.spacing));
@@ -49,7 +49,7 @@ Agreement agree(const Site& a, const Place& a_point, const Site& b, const Place&
   return best;
 }
 
-void hold_to_line(const Site& site, Place& point) {
+void hold_to_line(const LatticeSite& site, Place& point) {
   if (!site.line || !site.line->holds()) return;
   const Place side = site.normal.cross(site.line->along);
   if (side.squaredNorm() > 0.) point += side * side.dot(site.line->at - point) / side.squaredNorm();
@@ -58,11 +58,11 @@ void hold_to_line(const Site& site, Place& point) {
 void settle(Level& level, int rounds) {
   for (int round = 0; round < rounds; ++round)
     for (std::size_t i = 0; i < level.sites.size(); ++i) {
-      Site& site = level.sites[i];
+      LatticeSite& site = level.sites[i];
       Place sum = site.point;
       double weights = 0.;
       for (std::uint32_t e = level.starts[i]; e < level.starts[i + 1]; ++e) {
-        const Site& other = level.sites[level.list[e]];
+        const LatticeSite& other = level.sites[level.list[e]];
         const Agreement agreed = agree(site, sum, other, other.point);
         const double w = double(level.weights[e]);
         sum = (weights * agreed.one + w * agreed.other) / (weights + w);
@@ -83,7 +83,7 @@ Level coarser(Level& fine) {
     for (std::uint32_t e = fine.starts[i]; e < fine.starts[i + 1]; ++e) {
       const std::uint32_t j = fine.list[e];
       if (j <= i) continue;
-      const Site &a = fine.sites[i], &b = fine.sites[j];
+      const LatticeSite &a = fine.sites[i], &b = fine.sites[j];
       const double ratio = std::min(a.area, b.area) / std::max(a.area, b.area);
       pairs.emplace_back(-a.normal.dot(b.normal) * ratio, i, j);
     }
@@ -92,8 +92,8 @@ Level coarser(Level& fine) {
   Level level;
   fine.coarser.assign(n, none);
   const auto merge = [&](std::uint32_t i, std::uint32_t j) {
-    const Site &a = fine.sites[i], &b = fine.sites[j];
-    Site s = a;
+    const LatticeSite &a = fine.sites[i], &b = fine.sites[j];
+    LatticeSite s = a;
     if (i != j) {
       const double area = a.area + b.area, wa = a.area / area, wb = b.area / area;
       s.at = wa * a.at + wb * b.at;
@@ -154,7 +154,7 @@ void settle(Level& finest) {
     Level& level = levels[l];
     if (l + 1 < levels.size())
       for (std::size_t i = 0; i < level.sites.size(); ++i) {
-        Site& site = level.sites[i];
+        LatticeSite& site = level.sites[i];
         const Place from = levels[l + 1].sites[level.coarser[i]].point;
         Place point = from - site.normal * site.normal.dot(from - site.at);
         hold_to_line(site, point);
@@ -165,7 +165,7 @@ void settle(Level& finest) {
   finest = std::move(levels.front());
 }
 
-Eigen::Vector2i step_between(const Site& a, const Site& b) {
+Eigen::Vector2i step_between(const LatticeSite& a, const LatticeSite& b) {
   const Agreement agreed = agree(a, a.point, b, b.point);
   const int x = agreed.from_other.x(), y = agreed.from_other.y();
   const std::array<Place, 4> arms{b.along, b.up(), -b.along, -b.up()};

@@ -13,7 +13,7 @@
 namespace forest::cortex {
 
 // A vertex of one level of the hierarchy, and the lattice seen from it.
-struct Site {
+struct LatticeSite {
   Place at, normal, along;  // along: one arm of its cross
   double spacing, area;
   Place point;  // a point of the lattice, the nearest
@@ -29,7 +29,7 @@ struct Site {
 };
 
 struct Level {
-  std::vector<Site> sites;
+  std::vector<LatticeSite> sites;
   std::vector<std::uint32_t> starts, list;
   std::vector<float> weights;
   std::vector<std::uint32_t> coarser;  // of each site, in the next level
@@ -40,6 +40,6 @@ void settle(Level& finest);
 
 /// The step of a lattice from the point of one site to that of another, in the frame of the first: none where they have one
 /// point in common.
-Eigen::Vector2i step_between(const Site& a, const Site& b);
+Eigen::Vector2i step_between(const LatticeSite& a, const LatticeSite& b);
 
 }  // namespace forest::cortex

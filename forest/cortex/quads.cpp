@@ -94,13 +94,13 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     progress.begin("laying the lattice of elements", 0);
     finest.sites.clear();
     for (const std::uint32_t v : vertices) {
-      Site s{.at = ribbon.middle[v],
-             .normal = curvature[v].normal,
-             .along = arms[v],
-             .spacing = 2. * std::sqrt(factor * options.volume / height[v]),
-             .area = areas[v],
-             .point = ribbon.middle[v],
-             .line = by[v]};
+      LatticeSite s{.at = ribbon.middle[v],
+                    .normal = curvature[v].normal,
+                    .along = arms[v],
+                    .spacing = 2. * std::sqrt(factor * options.volume / height[v]),
+                    .area = areas[v],
+                    .point = ribbon.middle[v],
+                    .line = by[v]};
       finest.sites.push_back(s);
     }
     settle(finest);

@@ -26,7 +26,7 @@ NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
   std::string name = (wanted_.parent_path() / ("." + wanted_.filename().string() + ".XXXXXX")).string();
   if (!::mkdtemp(name.data())) fail("created");
   part_ = name;
-  ::chmod(name.c_str(), 0755);
+  ::chmod(name.c_str(), permissions(0777));
 }
 
 NewFolder::~NewFolder() {

@@ -8,7 +8,8 @@
 namespace forest::io {
 
 /// Collects files in a hidden folder beside the one that is wanted. commit() puts it in its place at once; without it
-/// (an exception) the hidden folder goes away and what was there before stays.
+/// (an exception) the hidden folder goes away and what was there before stays. A killed program leaves it behind: `.NAME.`
+/// and six letters, which may be removed.
 class NewFolder {
  public:
   /// Throws Error when the folder above is missing or cannot be written.

@@ -18,8 +18,9 @@ SonataConfig::SonataConfig(const std::filesystem::path& place)
     json_ = Json::parse(text);
   } catch (const Json::parse_error& error) {
     const auto before = text.substr(0, std::min(text.size(), error.byte ? error.byte - 1 : 0));
-    throw InputError(file_.string(), std::size_t(std::ranges::count(before, '\n')) + 1,
-                     "this is not JSON; correct what stands here or before");
+    throw InputError(
+        file_.string(), std::size_t(std::ranges::count(before, '\n')) + 1,
+        "this is not JSON; correct what stands here or before, or name the folder of a SONATA circuit");
   }
   if (!find(json_, "networks"))
     refuse("has no \"networks\"; name the configuration file of a SONATA circuit, or its folder");

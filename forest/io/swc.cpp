@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/bounds.h"
 #include "forest/core/error.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
@@ -71,8 +72,8 @@ constexpr std::array<Oddity, static_cast<std::size_t>(SwcOddity::count)> table{{
     {"soma-branches", false, "read as joined cylinders"},
     {"all-soma", false, "the first one is read as the soma, the others as neurites of undefined kind",
      "give the neurites their types"},
-    {"units", false, "read as µm; if they are nm, scale by 0.001",
-     "divide places and radii by 1000 if they are in nm"},
+    {"units", false, "read as µm; if they are nm, scale by 0.001, if mm by 1000",
+     "divide places and radii by 1000 if they are in nm, multiply by as much if in mm"},
 }};
 
 using Oddities = OddityList<SwcOddity>;
@@ -551,10 +552,16 @@ class Assembler {
   void look_at_units() {
     const std::size_t n = rows_.size(), step = n / 256 + 1;
     float mean = 0.f;
-    for (std::size_t i = 0; i < n; i += step) mean += rows_.points[i].radius / float(n / step + 1);
+    Bounds bounds;
+    for (std::size_t i = 0; i < n; i += step) {
+      mean += rows_.points[i].radius / float(n / step + 1);
+      bounds.add(rows_.points[i].position());
+    }
     const bool giant = !soma_rows_.empty() && radius(soma_rows_[0]) > 150.f;
     if ((n > 100 && mean > 30.f) || giant)
       oddities_.add(SwcOddity::units, 0, "the radii are far larger than those of neurons in µm");
+    if (n > 20 && bounds.extent().norm() < 2.f)
+      oddities_.add(SwcOddity::units, 0, "all of it is far smaller than neurons are in µm");
   }
 
   struct Run {  // the rows of a section, its joint aside

@@ -215,6 +215,13 @@ const std::vector<Dialect>& dialects() {
          EXPECT_EQ(m.sections().size(), 2u);
        }},
       {"units", 0, "1 1 0 0 0 5000 -1\n2 3 0 5000 0 1000 1\n", has_one_section},
+      {"units", 0,
+       "1 1 0 0 0 .005 -1\n" + repeated(30,
+                                        [](std::size_t i) {
+                                          return fmt::format("{} 3 0 .{:02} 0 .001 {}\n", i + 2, i + 1,
+                                                             i + 1);
+                                        }),
+       has_one_section},
   };
   return table;
 }

@@ -8,6 +8,7 @@
 #include <xlsxwriter.h>
 
 #include <fmt/format.h>
+#include <sys/mman.h>
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
@@ -177,15 +178,12 @@ std::string_view cell_text(std::string_view text) {
 }
 
 void write_workbook(const std::filesystem::path& path, const Workbook& workbook) {
-  const std::filesystem::path part =
-      std::filesystem::temp_directory_path() / fmt::format("forest-workbook-{}.xlsx", ::getpid());
-  struct Remove {
-    const std::filesystem::path& file;
-    ~Remove() {
-      std::error_code ignored;
-      std::filesystem::remove(file, ignored);
-    }
-  } const remove{part};
+  // Its library writes into a file of some name: one in memory, that nobody else can open and no kill leaves behind.
+  struct InMemory {
+    int file = ::memfd_create("workbook", MFD_CLOEXEC);
+    ~InMemory() { ::close(file); }
+  } const in_memory;
+  const std::filesystem::path part = fmt::format("/proc/self/fd/{}", in_memory.file);
   lxw_workbook_options options{.constant_memory = LXW_FALSE, .tmpdir = nullptr, .use_zip64 = LXW_FALSE};
   std::unique_ptr<lxw_workbook, void (*)(lxw_workbook*)> owner(workbook_new_opt(part.c_str(), &options),
                                                                lxw_workbook_free);
@@ -206,7 +204,7 @@ void write_workbook(const std::filesystem::path& path, const Workbook& workbook)
   if (!is_whole(part, workbook))
     throw Error(
         fmt::format("{}: the workbook cannot be written; make room in the folder {}, or choose fewer neurons",
-                    target, part.parent_path().string()));
+                    target, std::filesystem::temp_directory_path().string()));
   write_file(path, MappedFile(part).bytes());
 }
 

@@ -92,6 +92,9 @@ std::uint64_t Forest::segment_total() const { return data_->segment_total; }
 std::uint64_t Forest::bytes() const { return data_->bytes; }
 
 Forest Forest::open(const std::filesystem::path& path) {
+  if (std::error_code none; std::filesystem::is_directory(path, none))
+    throw InputError(path.string(), 0,
+                     "is a folder; name a forest file, which 'brainforest pack' makes of a circuit");
   auto data = std::make_shared<Data>();
   data->file.emplace(path);
   const auto bytes = data->file->bytes();

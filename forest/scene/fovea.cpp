@@ -2,6 +2,7 @@
 #include "forest/scene/fovea.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cmath>
 #include <cstring>
 
@@ -245,7 +246,6 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
            std::uint32_t width, std::uint32_t height, frame::Image& whole) {
   whole.width = width, whole.height = height;
   whole.pixels.resize(std::size_t(width) * height * 4);
-  whole.covered = pictures.back()->covered;
   const Gaze gaze(view.camera, {float(width), float(height)}, detail_for(view, width, height));
   // Of the picture, what shows anything of a layer, and how.
   struct Source {
@@ -278,6 +278,7 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
     for (const std::uint8_t share : s.columns.share) s.shares.insert(s.shares.end(), 4, share);
   }
   const Vec3 ahead = gaze.direction();
+  std::atomic<std::uint64_t> covered = 0;
   parallel_ranges(height, rows_at_once, [&](std::size_t begin, std::size_t end) {
     // A row of a layer, its pixels that are the neighbours of the picture's, those mixed, and how much of each shows.
     std::vector<std::uint8_t> mixed, shares(4 * std::size_t(width)), colours(4 * std::size_t(width));
@@ -314,8 +315,12 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
                   shares.data());
         mix(to, colours.data(), shares.data(), 4 * count, to);
       }
+      std::uint64_t alpha = 0;
+      for (std::size_t x = 0; x < width; ++x) alpha += row[4 * x + 3];
+      covered += alpha;
     }
   });
+  whole.covered = double(covered) / 255. / (double(width) * double(height));
 }
 
 void trace_lines(const View& view, std::span<const Layer> layers, std::span<const frame::Overlay> lines,

@@ -143,6 +143,7 @@ TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
   frame::Image whole;
   unite(view, layers, drawn, width, height, whole);
   ASSERT_EQ(whole.pixels.size(), std::size_t(width) * height * 4);
+  EXPECT_NEAR(whole.covered, 1., .01);
   const Gaze gaze(view.camera, {width, height}, detail_for(view, width, height));
   for (std::uint32_t y = 0; y < height; y += 7)
     for (std::uint32_t x = 0; x < width; x += 5) {

@@ -28,7 +28,7 @@ std::size_t bin_of(std::span<const double> edges, double given);  // edges not e
 struct ChanceBin {
   double upper;
   std::size_t count;
-  Estimate chance;
+  ParameterEstimate chance;
 };
 /// @param happened  one an entry of `given`
 std::vector<ChanceBin> chance_by(std::span<const char> happened, std::span<const double> given,

@@ -182,7 +182,7 @@ TEST(Fit, IntervalsHoldTheTruthAsOftenAsTheySay) {
                                                              .angles = c.family->support == Family::circle,
                                                              .replicates = 0});
       for (int i = 0; i < c.family->count; ++i, ++all) {
-        const Estimate& e = f.estimates[std::size_t(i)];
+        const ParameterEstimate& e = f.estimates[std::size_t(i)];
         EXPECT_LE(e.lower, e.value);
         EXPECT_GE(e.upper, e.value);
         inside += e.lower <= c.parameters[std::size_t(i)] && c.parameters[std::size_t(i)] <= e.upper;
@@ -319,7 +319,7 @@ TEST(Fit, IsTheSameEveryTime) {
 }
 
 TEST(Fit, ChanceHasWilsonsInterval) {
-  const Estimate e = chance_of("fork", 5, 20);
+  const ParameterEstimate e = chance_of("fork", 5, 20);
   EXPECT_DOUBLE_EQ(e.value, 0.25);
   EXPECT_NEAR(e.lower, 0.1119, 1e-4);
   EXPECT_NEAR(e.upper, 0.4687, 1e-4);

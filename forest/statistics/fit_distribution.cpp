@@ -376,12 +376,13 @@ Values half_widths(const Components& best, const Coordinates& coordinates, const
   return widths;
 }
 
-std::vector<Estimate> estimates_of(const Components& best, const Values& x, double part, double confidence) {
+std::vector<ParameterEstimate> estimates_of(const Components& best, const Values& x, double part,
+                                            double confidence) {
   const Coordinates coordinates(best);
   const Values widths = half_widths(best, coordinates, x, confidence);
   const auto first_weight = std::size_t(
       std::ranges::find(coordinates.places, -1, &Coordinates::Place::parameter) - coordinates.places.begin());
-  std::vector<Estimate> out;
+  std::vector<ParameterEstimate> out;
   for (std::size_t j = 0; j < best.size(); ++j) {
     const Family& f = *best[j].family;
     const std::string before = best.size() > 1 ? fmt::format("{} ", j + 1) : "";
@@ -400,8 +401,8 @@ std::vector<Estimate> estimates_of(const Components& best, const Values& x, doub
       if (std::isnan(wide)) out.back().lower = out.back().upper = nan;
     }
     for (int i = 0; i < f.count; ++i) {
-      Estimate e{before + std::string(f.parameters[std::size_t(i)]), best[j].parameters[std::size_t(i)], nan,
-                 nan};
+      ParameterEstimate e{before + std::string(f.parameters[std::size_t(i)]),
+                          best[j].parameters[std::size_t(i)], nan, nan};
       if (f.is_limit[std::size_t(i)]) {
         // The outermost value lies about 1 / (n f) inside of the limit, where f is the density there.
         const double reach =
@@ -471,7 +472,7 @@ double p_of(const Spec& spec, const Components& best, const Values& x, const Fit
 
 }  // namespace
 
-Estimate chance_of(std::string name, std::size_t hits, std::size_t count, double confidence) {
+ParameterEstimate chance_of(std::string name, std::size_t hits, std::size_t count, double confidence) {
   if (count == 0) return {std::move(name), nan, nan, nan};
   const double n = double(count), p = double(hits) / n, z = normal_quantile(confidence), zz = z * z / n;
   const double centre = (p + 0.5 * zz) / (1. + zz),
@@ -511,7 +512,7 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
     if (all.empty()) attempt({find_family("uniform")});  // values that hardly differ
   }
   std::ranges::stable_sort(all, {}, [&](const Fitted& f) {
-    return options.criterion == Criterion::aicc ? f.candidate.aicc : f.candidate.bic;
+    return options.criterion == InformationCriterion::aicc ? f.candidate.aicc : f.candidate.bic;
   });
   for (const Fitted& f : all) fit.candidates.push_back(f.candidate);
   const double part = double(x.size()) / double(sample.count);

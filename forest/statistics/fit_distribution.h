@@ -16,7 +16,7 @@
 
 namespace forest::statistics {
 
-enum class Criterion : std::uint8_t { aicc, bic };
+enum class InformationCriterion : std::uint8_t { aicc, bic };
 
 struct FitOptions {
   /// What may be chosen, "gamma" or a mixture of two or three, "normal + normal". Empty: all families that the values
@@ -24,7 +24,7 @@ struct FitOptions {
   std::vector<std::string> families = {};
   bool angles = false;  // degrees on the circle: values are brought to (-180, 180]
   bool atoms = true;    // look for values that come back exactly and for the steps of a tracer
-  Criterion criterion = Criterion::bic;
+  InformationCriterion criterion = InformationCriterion::bic;
   double confidence = 0.95;
   std::size_t replicates = 99;  // of the parametric bootstrap behind p; 0: p is not worked out
   std::uint64_t seed = 0;       // of the bootstrap
@@ -32,7 +32,7 @@ struct FitOptions {
 
 /// A parameter with the interval in which it lies by the chosen confidence: from the observed Fisher information, for the
 /// limits of uniform and truncnormal from the spacing of values near them, for atoms by Wilson 1927. NaN: not known.
-struct Estimate {
+struct ParameterEstimate {
   std::string name;  // "shape"; of a mixture "2 shape", "2 weight"; of an atom "atom at 1"
   double value, lower, upper;
 };
@@ -53,7 +53,7 @@ struct DistributionFit {
   std::size_t count = 0;     // values that were used
   std::size_t left_out = 0;  // not numbers, or beyond 1e100
   std::size_t in_atoms = 0;
-  std::vector<Estimate> estimates;
+  std::vector<ParameterEstimate> estimates;
   std::vector<Candidate> candidates;  // all that could be fitted, the chosen one first; of what is no atom
   double kolmogorov = nan;            // largest distance between the two distribution functions, atoms aside
   double anderson_darling = nan;
@@ -67,6 +67,6 @@ struct DistributionFit {
 DistributionFit fit_distribution(std::span<const double> values, const FitOptions& options = {});
 
 /// The interval of a chance that was seen `hits` times of `count` (Wilson 1927).
-Estimate chance_of(std::string name, std::size_t hits, std::size_t count, double confidence = 0.95);
+ParameterEstimate chance_of(std::string name, std::size_t hits, std::size_t count, double confidence = 0.95);
 
 }  // namespace forest::statistics

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // The table of metrics. A metric is one row of metrics_of_<level>.cpp: command line, documentation
-// (docs/statistics/metrics.md), Python and tests walk over the rows. Names are NeuroM's; where NeuroM has none, L-Measure's
+// (docs/statistics/metrics.md) and tests walk over the rows. Names are NeuroM's; where NeuroM has none, L-Measure's
 // in lower case.
 #pragma once
 

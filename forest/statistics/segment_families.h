@@ -65,7 +65,7 @@ struct FittedQuantity {
 
 struct SegmentFamilies {
   std::size_t cells = 0, sections = 0;
-  Estimate nontermination;  // the chance that a section forks
+  ParameterEstimate nontermination;  // the chance that a section forks
   struct Table {
     Given given;
     std::vector<ChanceBin> bins;

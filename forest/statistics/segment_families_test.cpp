@@ -112,7 +112,7 @@ TEST(SegmentFamilies, FindWhatATreeWasMadeWith) {
   const auto& by_order = f.tables[0].bins;
   ASSERT_EQ(by_order.size(), 4u);
   for (int order = 0; order < 4; ++order) {
-    const Estimate& chance = by_order[std::size_t(order)].chance;
+    const ParameterEstimate& chance = by_order[std::size_t(order)].chance;
     EXPECT_EQ(by_order[std::size_t(order)].upper, order);
     EXPECT_LE(chance.lower, std::max(0., 0.8 - 0.3 * order) + 0.02);
     EXPECT_GE(chance.upper, std::max(0., 0.8 - 0.3 * order) - 0.02);

@@ -10,6 +10,12 @@ cpu=(--renderer cpu --size 320x180)
 "$program" render a.forest "${cpu[@]}" --gaze .4 .5 -o a.png --json >a.json
 "$program" render a.forest "${cpu[@]}" --gaze .4 .5 -o b.png --threads 1 >/dev/null
 cmp a.png b.png || fail "the picture depends on the number of threads"
+"$program" render a.forest "${cpu[@]}" -o without.png --json >without.json
+/usr/bin/python3 - <<'PY'
+import json
+covered = [json.load(open(name))["covered"] for name in ("a.json", "without.json")]
+assert .02 < covered[1] and .7 < covered[0] / covered[1] < 1.5, covered
+PY
 /usr/bin/python3 -c 'import json; v = json.load(open("a.json"))["view"]; assert abs(v["gaze"][0] - .4) < 1e-6 and v["fovea"] == 2.5 and v["projection"] == "perspective", v'
 view='{"eye":[700,1500,900],"target":[0,1300,0],"samples":2,"projection":"orthographic"}'
 "$program" render a.forest "${cpu[@]}" --view "$view" -o o.png --json >o.json

@@ -5,9 +5,8 @@ ln -s "$FOREST_SOURCE_DIR/examples" examples
 unset DISPLAY  # NEURON opens windows where there is one
 export PATH="$(dirname "$BRAINFOREST"):$PATH"
 export EDITOR="sed -i '\$ a # mine'"
-brainforest grow --grammar data/grammars/motoneuron.lsys --count 3 --seed 7 --out cells/  # the reader's own cells
 
-grep -e '^brainforest ' -e '^/usr/bin/python3 ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' |  # a window needs a display, a service a network
+grep -e '^brainforest ' -e '^/usr/bin/python3 ' -e '^mv ' "$FOREST_SOURCE_DIR/README.md" | grep -v -e ' view ' -e ' fetch ' |  # a window needs a display, a service a network
   sed 's/^brainforest movie .*/& --size 320x180 --fps 5 --samples 2/' >commands
 grep -q '^brainforest import' commands
 grep -q 'simulate_column.py' commands
@@ -15,7 +14,6 @@ if ! /usr/bin/python3 -c 'import neuron, h5py' 2>/dev/null; then  # what it simu
   [ "${BRAINFOREST_REQUIRE_DATA:-0}" = 1 ] && { echo "readme.sh: python3-neuron or python3-h5py is not installed"; exit 1; }
   sed -i -e '/ run\.activity/d' -e '/ run\//d' commands
 fi
-mv cells/motoneuron-7-00000.swc cells/cell7.swc
 
 while read -r command; do
   bash -euo pipefail -c "$command" </dev/null || { echo "the README's command failed: $command"; exit 1; }
