@@ -239,7 +239,6 @@ void run(const Options& options, Console& console) {
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),
       read_sample({stored ? options.with : options.samples[1]}, options.repo, console)};
   const std::vector<Group> groups = groups_of(options.kind);
-  warn_of_shared(samples[0], samples[1], console);
   std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
                                      measured(samples[1], groups, console)};
   if (!options.slices.empty())
@@ -251,6 +250,7 @@ void run(const Options& options, Console& console) {
       compare(tables[0], tables[1],
               {.repeats = options.repeats, .permutations = options.permutations, .seed = options.seed},
               console.progress());
+  warn_of_shared(samples[0], samples[1], console);
   if (!options.csv.empty()) write_unless_there(options.csv, features_csv(tables, names), options.force);
   if (!options.report.empty())
     write_unless_there(options.report, report_of(c, tables, names, options), options.force);

@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/calibration.h"
 #include "forest/lsystem/grammar.h"
+#include "forest/repository/names.h"
 #include "forest/statistics/dealing.h"
 
 #include "apps/cli/console.h"
@@ -72,11 +73,16 @@ void run(const Options& options, Console& console) {
     rows.push_back({s.name, fmt::format("{}", s.rows())});
     samples[s.name] = s.rows();
   }
-  console.table({"sample", "rows"}, rows);
+  console.table({"branches are drawn from", "rows"}, rows);
   if (fitted.gap_before > 0.)
     console.say(
         fmt::format("calibrated in {} rounds: mean square gap to thirds held back {:.3f}, {:.3f} before",
                     fitted.rounds, fitted.gap_after, fitted.gap_before));
+  if (!options.out.empty())
+    console.say(fmt::format("written to {}", repository::escaped(options.out.string())));
+  if (version)
+    console.say(fmt::format("stored in {} as {}, version {}", repository::escaped(options.repo),
+                            repository::escaped(options.model), version));
   console.print({{"model", name},
                  {"version", version},
                  {"neurons", neurons.size()},

@@ -77,6 +77,7 @@ class Destination {
   virtual ~Destination() = default;
   virtual void put(Ready& neuron, const std::string& name, std::uint64_t index) = 0;
   virtual void finish() = 0;
+  virtual std::string told() const = 0;  // where they are, for a person
 };
 
 class IntoRepository final : public Destination {
@@ -84,30 +85,38 @@ class IntoRepository final : public Destination {
   IntoRepository(const Options& options, const lsystem::Grammar& grammar)
       : options_(options),
         name_(grammar.name),
+        population_(options.population.empty() ? name_ : options.population),
         repository_(repository::Repository::open(options.repo, repository::Access::write)),
         hash_(repository_.add_grammar(grammar.name, grammar.text, distributions_of(grammar))) {}
 
   void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
     if (!transaction_) transaction_.emplace(repository_.begin());
-    repository_.add(std::move(*neuron.prepared),
-                    {.name = name,
-                     .population = options_.population.empty() ? name_ : options_.population,
-                     .provenance = repository::Grown{name_, hash_, options_.seed, index},
-                     .number_if_taken = true});
+    const auto added = repository_.add(std::move(*neuron.prepared),
+                                       {.name = name,
+                                        .population = population_,
+                                        .provenance = repository::Grown{name_, hash_, options_.seed, index},
+                                        .number_if_taken = true});
+    there_ += added.already_there;
     if (++count_ % stored == 0) finish();
   }
   void finish() override {
     if (transaction_) transaction_->commit();
     transaction_.reset();
   }
+  std::string told() const override {
+    return fmt::format(
+        "stored in {} as population {}{}", repository::escaped(options_.repo),
+        repository::escaped(population_),
+        there_ ? fmt::format("; {} of them {} there already", there_, there_ == 1 ? "was" : "were") : "");
+  }
 
  private:
   const Options& options_;
-  std::string name_;
+  std::string name_, population_;
   repository::Repository repository_;
   std::optional<repository::Repository::Transaction> transaction_;
   std::string hash_;
-  std::size_t count_ = 0;
+  std::size_t count_ = 0, there_ = 0;
 };
 
 class IntoFolder final : public Destination {
@@ -128,6 +137,9 @@ class IntoFolder final : public Destination {
     for (const Younger& y : ready.younger) write(name_at(name, y.step), y.neuron);
   }
   void finish() override { unfinished_.clear(); }
+  std::string told() const override {
+    return fmt::format("written as SWC files into {}", repository::escaped(folder_.string()));
+  }
 
  private:
   void write(const std::string& name, const Morphology& neuron) {
@@ -205,6 +217,10 @@ void run_into_cells(const Options& options, Console& console) {
 
 void run(const Options& options, Console& console) {
   if (is_cells_file(options.out)) return run_into_cells(options, console);
+  if (container_of(options.out))
+    throw Error(fmt::format(
+        "{}: neurons grow into a folder of SWC files or into one file NAME.cells; grow that and convert it",
+        repository::escaped(options.out.string())));
   if (started_ranks() > 1)
     throw Error(
         "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "
@@ -241,6 +257,7 @@ void run(const Options& options, Console& console) {
   for (const auto& destination : destinations) destination->finish();
 
   report(options, grammar, total, {{"steps", steps}}, console);
+  for (const auto& destination : destinations) console.say(destination->told());
 }
 
 }  // namespace

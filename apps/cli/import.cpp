@@ -232,7 +232,7 @@ void run(const Options& options, Console& console) {
   std::vector<Arrival> files;
   std::optional<Repository> repository;  // made when there is something to store
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
-  const std::size_t window = 64;  // sources in memory at a time
+  const std::size_t window = 64;  // sources in memory at a time, and stored in one transaction
   std::size_t done = 0;
   console.progress().begin("importing", sources.size());
   for (std::size_t first = 0; first < sources.size(); first += window) {
@@ -243,6 +243,8 @@ void run(const Options& options, Console& console) {
       console.progress().advance();
     });
     for (auto& arrivals : arrived) std::ranges::move(arrivals, std::back_inserter(files));
+    std::optional<Repository::Transaction> transaction;
+    std::size_t stored = 0;
     for (Arrival& file : std::span(files).subspan(begin)) {
       if (!file.error.empty()) {
         console.warn(file.skipped ? file.error + "; skipped" : file.error);
@@ -255,11 +257,12 @@ void run(const Options& options, Console& console) {
       neuron.provenance = Traced{file.path.string(), file.hash};
       try {
         if (!repository) repository = Repository::open(options.repo, Access::write);
+        if (!transaction) transaction.emplace(repository->begin());
         file.added = repository->add(std::move(*file.prepared), neuron);
       } catch (const Error& error) {  // the repository's trouble, not the file's
-        throw Error(fmt::format("{} ({} neurons are stored)", error.what(), done));
+        throw Error(fmt::format("{} ({} stored)", error.what(), counted(done, "neuron is", "neurons are")));
       }
-      ++done;
+      ++stored;
       if (file.added->name != neuron.name)
         console.warn(file.added->already_there
                          ? fmt::format("{}: is the same file as that of neuron '{}', which is already there",
@@ -268,6 +271,8 @@ void run(const Options& options, Console& console) {
                                        escaped(file.path.string()), neuron.name, file.added->name));
       file.prepared.reset();
     }
+    if (transaction) transaction->commit();
+    done += stored;
   }
   console.progress().end();
   report(files, options, console);

@@ -287,7 +287,6 @@ void run(const Options& options, Console& console) {
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
-  warn_of_shared(train, held_out, console);
   Sample grown, parametric;
   std::optional<std::size_t> longest_run;
   if (options.model.empty()) {
@@ -311,6 +310,7 @@ void run(const Options& options, Console& console) {
       judge_samples(train, held_out, grown, parametric.neurons.empty() ? nullptr : &parametric, options.kind,
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
+  warn_of_shared(train, held_out, console);
   if (!options.features.empty())
     write_unless_there(options.features,
                        features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),

@@ -41,7 +41,10 @@ int main(int argc, char** argv) {
   CLI::App app{"Brain Forest: from traced neurons to a forest one can walk through.", "brainforest"};
   app.set_version_flag("--version", FOREST_VERSION);
   app.require_subcommand(1);
-  app.failure_message(CLI::FailureMessage::simple);
+  app.failure_message([](const CLI::App* at, const CLI::Error& error) {
+    return fmt::format("brainforest: {}\nRun with {} for more information.\n", error.what(),
+                       at->get_help_ptr() ? at->get_help_ptr()->get_name(false, false) : "--help");
+  });
   std::function<void()> run;
   for (const cli::Verb& verb : cli::verbs()) {
     CLI::App* command = app.add_subcommand(verb.name, verb.summary);

@@ -123,6 +123,7 @@ std::vector<NeuronRow> rows_for(const circuit::Recipe& recipe, const std::string
   std::vector<NeuronRow> rows;
   std::optional<Repository> repository;
   std::set<std::string> populations;
+  std::vector<std::string> empty;
   for (std::size_t type = 0; type < recipe.types.size(); ++type) {
     const std::string& population = recipe.types[type].population;
     if (std::ranges::all_of(wanted, [&](const auto& layer) { return layer[type] == 0; }) ||
@@ -133,14 +134,17 @@ std::vector<NeuronRow> rows_for(const circuit::Recipe& recipe, const std::string
                               recipe.name, recipe.types[type].name, population));
     if (!repository) repository.emplace(Repository::open(repo, Access::read));
     const auto found = repository->neurons(population);
-    if (found.empty())
-      throw Error(fmt::format(
-          "{0}: recipe {1} plants {2}s from population {3}, which is empty; grow neurons into it "
-          "(brainforest grow --grammar NAME --count 30 --repo {0} --population {3}) or import them "
-          "(brainforest import FILES --repo {0} --population {3})",
-          repo, recipe.name, recipe.types[type].name, population));
+    if (found.empty()) empty.push_back(population);
     rows.insert(rows.end(), found.begin(), found.end());
   }
+  if (!empty.empty())
+    throw Error(fmt::format(
+        "{0}: recipe {1} plants from {2} {3}, which {4} empty; grow neurons into {5} (brainforest grow "
+        "--grammar "
+        "NAME --count 30 --repo {0} --population {6}) or import them (brainforest import FILES --repo {0} "
+        "--population {6})",
+        repo, recipe.name, empty.size() == 1 ? "population" : "populations", fmt::join(empty, ", "),
+        empty.size() == 1 ? "is" : "are", empty.size() == 1 ? "it" : "each", empty.front()));
   return rows;
 }
 

@@ -47,11 +47,8 @@ struct Bending {
   Spread ratio;               // … of single neurons
   std::size_t shortened = 0;  // neurons that were taller than the tissue above their soma
   Spread turn;                // degrees by which angles between segments changed, mean of each neuron
-  double
-      beyond_pia = 0.,
-      pressed = 0., beyond_white = 0.,
-      beside =
-          0.;  // shares of length: above the pia; at the pia, where it would have passed; in the white matter; off the rim
+  // Shares of length: above the pia; at the pia, where it would have passed; in the white matter; off the rim.
+  double beyond_pia = 0., pressed = 0., beyond_white = 0., beside = 0.;
 };
 
 struct PlantedElements {

@@ -110,7 +110,7 @@ std::span<const Verb> verbs() {
        "brainforest grow --grammar pyramidal --count 100 --seed 1 --repo forest.db\n"
        "  brainforest grow --grammar pyramidal --count 1000000 --seed 1 --out grown.cells",
        grow},
-      {"plant", "Plant neurons of a repository in a column, as a SONATA circuit",
+      {"plant", "Plant neurons of a repository in a column or in elements of a cortex, as a SONATA circuit",
        "brainforest plant --recipe column-1000 --repo cells.db --seed 7 --out column/", plant},
       {"pack", "Pack a circuit for drawing, as a forest file", "brainforest pack column/ -o column.forest",
        pack},

@@ -56,9 +56,8 @@ class ElementPlanter {
 
   /// Depths where the layers end; the first begins at 0 and the last ends at 1.
   std::span<const double> depths() const { return depths_; }
-  std::size_t left_out(std::size_t layer) const {
-    return left_out_[layer];
-  }                                                                      // candidates with somata too wide
+  /// Candidates with somata too wide.
+  std::size_t left_out(std::size_t layer) const { return left_out_[layer]; }
   double widest(std::size_t layer) const { return radii_[layer]; }       // soma, radius in µm
   double density(std::size_t layer) const { return densities_[layer]; }  // neurons/mm³, scaled
 

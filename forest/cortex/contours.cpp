@@ -267,11 +267,13 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
   std::vector<double> tolerances(all.size(), options.tolerance);
   std::vector<BezierLoop> given;
   for (const Contour* contour : all) given.push_back(contour->curve);
+  for (std::size_t i = 0; i < all.size(); ++i)
+    if (!given[i].polygon()) tolerances[i] = 0.;
   const auto fit_one = [&](std::size_t i) {
     const double along = length(given[i]);
     if (tolerances[i] < options.tolerance / 20.) {  // as it is
       all[i]->curve = given[i];
-      each[i] = {1, given[i].pieces(), given[i].pieces(), along, 0., 0.};
+      each[i] = {1, given[i].pieces(), given[i].polygon() ? given[i].pieces() : 0, along, 0., 0.};
       return;
     }
     const Fit fit = fit_loop(flattened(given[i], tolerances[i] / 4.),

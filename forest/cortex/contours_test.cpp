@@ -129,6 +129,21 @@ TEST(Fitted, TellsHowManyCurvesAndHowFarOffTheyAre) {
   EXPECT_EQ(fault_of(curves), "");
 }
 
+TEST(Fitted, WhatIsCurvesStaysAsItIs) {
+  const double planes[] = {-3000., 0., 4000.};
+  FitSummary once, again;
+  const ContourStack curves = fitted(cut(ball(), "outer", Axis::z, planes), {}, once, Progress::none()),
+                     same = fitted(curves, {.tolerance = 500.}, again, Progress::none());
+  ASSERT_EQ(curves.sections.size(), same.sections.size());
+  for (std::size_t s = 0; s < curves.sections.size(); ++s) {
+    ASSERT_EQ(curves.sections[s].contours.size(), same.sections[s].contours.size());
+    for (std::size_t c = 0; c < curves.sections[s].contours.size(); ++c)
+      EXPECT_EQ(curves.sections[s].contours[c].curve, same.sections[s].contours[c].curve);
+  }
+  EXPECT_EQ(once.pieces, again.pieces);
+  EXPECT_EQ(again.greatest, 0.);
+}
+
 TEST(Fitted, BanksOfANarrowSulcusDoNotCross) {
   // A disc with a bent slit, 6 µm wide, which curves of 20 µm are free to cross.
   std::vector<Place> disc;

@@ -1,6 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // How good the cells of a grid are, by the usual measures: P. Knupp (2000), "Achieving finite element mesh quality via optimization
-// of the Jacobian matrix norm and associated quantities", Int J Numer Meth Eng 48:1165, and the definitions of Verdict
+// of the Jacobian matrix norm and associated quantities. Part II", Int J Numer Meth Eng 48:1165, and the definitions of Verdict
 // (Stimpson, Ernst, Knupp, Pébay & Thompson 2007, "The Verdict geometric quality library", SAND2007-1751).
 #pragma once
 

@@ -5,7 +5,7 @@
 //     Σ max(0, wanted − s)²  +  small · Σ (way from the place before)²  +  Σ (distance from the surface)²
 //
 // is least, where s is the scaled Jacobian at every one of the 4×4×4 places of an element (Knupp 2000, "Achieving finite element mesh
-// quality via optimization of the Jacobian matrix norm and associated quantities", Int J Numer Meth Eng 48:401, of whose
+// quality via optimization of the Jacobian matrix norm and associated quantities. Part I", Int J Numer Meth Eng 48:401, of whose
 // measures this one is bounded and so can begin at folded elements). What is well shaped stays where it is.
 #pragma once
 

@@ -403,6 +403,12 @@ Place Cubic::derivative(double t) const {
                t * t * (points[3] - points[2]));
 }
 
+bool BezierLoop::polygon() const {
+  for (std::size_t i = 0; i < pieces(); ++i)
+    if (!piece(i).straight()) return false;
+  return true;
+}
+
 Cubic BezierLoop::piece(std::size_t i) const {
   return {{points[3 * i], points[3 * i + 1], points[3 * i + 2], points[(3 * i + 3) % points.size()]}};
 }

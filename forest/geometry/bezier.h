@@ -30,6 +30,7 @@ struct BezierLoop {
 
   std::size_t pieces() const { return points.size() / 3; }
   Cubic piece(std::size_t i) const;
+  bool polygon() const;  // all its pieces are straight
 
   friend bool operator==(const BezierLoop&, const BezierLoop&) = default;
 };

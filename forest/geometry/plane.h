@@ -30,9 +30,8 @@ struct Plane {
     return plane;
   }
 
-  float height(const Vec3& point) const {
-    return normal.dot(point - origin);
-  }  // µm; positive on the side seen
+  /// µm; positive on the side seen.
+  float height(const Vec3& point) const { return normal.dot(point - origin); }
   Vec2 place(const Vec3& point) const { return {right.dot(point - origin), up.dot(point - origin)}; }
   Vec3 point(const Vec2& place) const { return origin + place.x() * right + place.y() * up; }
 };

@@ -525,9 +525,11 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
                      fmt::format("is no SVG drawing ({}); save it as plain SVG", parsed.description()));
   ReadContours result;
   ContourStack& stack = result.stack;
-  const auto axis =
-      std::ranges::find(axis_names, std::string_view(root.attribute("data-axis").as_string("y")));
-  stack.axis = axis == axis_names.end() ? Axis::y : Axis(axis - axis_names.begin());
+  const std::string_view axis_name = root.attribute("data-axis").as_string("y");
+  const auto axis = std::ranges::find(axis_names, axis_name);
+  if (axis == axis_names.end())
+    throw InputError(name, 0, fmt::format("its data-axis is {}; write x, y or z", shown(axis_name, 20)));
+  stack.axis = Axis(axis - axis_names.begin());
   Section& section = stack.sections.emplace_back();
   const auto real = [&](std::string_view word) {
     double value = NAN;

@@ -4,12 +4,11 @@
 // comes back as a warning with its line, its code and how it was read. docs/formats/swc.md gives each choice
 // to the person with the file.
 //
-//   - Sections end at branch points and where the type changes. A row's type is Section::tag, and says the
-//   kind.
-//   - Type 1 is the soma: one point a sphere; three in the pattern of NeuroMorpho.Org a sphere too; a closed
-//   chain of thin
-//     points a contour; else cylinders. A root section begins at its own first point; Section::soma_point
-//     remembers the soma point it hangs on.
+//   - Sections end at branch points and where the type changes. A row's type is Section::tag, and says
+//     the kind.
+//   - Type 1 is the soma: one point a sphere; three in the pattern of NeuroMorpho.Org a sphere too; a
+//     closed chain of thin points a contour; else cylinders. A root section begins at its own first
+//     point; Section::soma_point remembers the soma point it hangs on.
 //   - Comment lines are kept as annotations: `# KEY value`, or ("comment", text).
 #pragma once
 

@@ -7,10 +7,11 @@
 //    [apical P(0,15,0,1) P(3,19,0,1)]
 //    [apical P(0,15,0,0.5) P(-3,19,0,0.5) Spine(2.5, 0.4,0,0.3, 0.5,0.1, 3)]]
 //
-//   sphere, cylinders, contours   the soma; P(x,y,z,radius); Parents(…) of cylinders and Starts(…) of
-//   contours by index axon, basal, apical, …        a section; (tag), (tag, soma_point) or (tag, soma_point,
-//   index) follow when they are not
-//                                 the number of the kind, -1, and the place in the string
+//   sphere, cylinders, contours   the soma; P(x,y,z,radius); Parents(…) of cylinders and
+//                                 Starts(…) of contours by index
+//   axon, basal, apical, …        a section; (tag), (tag, soma_point) or (tag, soma_point, index)
+//                                 follow when they are not the number of the kind, -1, and the
+//                                 place in the string
 //   Spine(position, head x,y,z, head diameter, neck diameter, shape[, index])
 #pragma once
 

@@ -3,11 +3,11 @@
 // *segment* is the piece between two consecutive points of a section. Terms of N++ (stem, terminal,
 // nonterminal, bifurcation, multifurcation) are in docs/glossary.md.
 //
-//        0────┬─1──      sections are in parent-first order: parent(i) < i. The first point of a child
-//        repeats the
-//   soma      └─2──┬─3   last point of its parent (its radius may differ), so each section is drawn and
-//   measured
-//                  └─4   alone. A root may have a single point, any other section has at least two.
+//        0────┬─1──      Sections are in parent-first order: parent(i) < i. The first point of a
+//   soma      └─2──┬─3   child repeats the last point of its parent (its radius may differ), so each
+//                  └─4   section is drawn and measured alone. A root may have a single point, any
+//                        other section has at least two.
+//
 #pragma once
 
 #include <cstdint>

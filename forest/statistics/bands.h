@@ -17,14 +17,13 @@ Curve mean_curve(std::span<const Curve> curves);
 /// Where the mean of `cells` further cells of a population would lie, of which `known` and `more` cells are known.
 struct Band {
   Curve mean;  // of `known`
-  Curve lower,
-      upper;  // inside at 95 % of radii is, in 95 % of the cases, the mean of `cells` cells of the same population
+  // Between them, at 95 % of radii, is the mean of `cells` cells of the same population, in 95 % of the cases.
+  Curve lower, upper;
 };
 
 /// By the bootstrap: pairs of samples, as large as `known` and as `cells`, are drawn with repetition from all known
 /// cells; the band is as wide as the standard deviation of their difference at each radius, times what holds 95 % of the
-/// pairs at 95 % of the radii. Radii that hardly any cell
-/// reaches do not count.
+/// pairs at 95 % of the radii. Radii that hardly any cell reaches do not count.
 Band band_of(std::span<const Curve> known, std::span<const Curve> more, std::size_t cells, std::size_t draws,
              std::uint64_t seed);
 

@@ -67,8 +67,8 @@ FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> row
 FeatureTable structure_of(const FeatureTable& table);
 
 /// What of a table may tell cells apart: without columns that are the same in all cells, repeat another, or are defined in
-/// fewer than one of twenty cells. For features
-/// that are missing in some cells a column "… is defined" (0 or 1) is added, one for all that are missing in the same.
+/// fewer than one of twenty cells. For features that are missing in some cells a column "… is defined" (0 or 1) is added,
+/// one for all that are missing in the same.
 FeatureTable distinct(const FeatureTable& table);
 
 /// A distinct table as classifiers and distances take it, every value defined: what is missing becomes the median of its

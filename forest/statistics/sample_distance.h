@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // Two samples of whole feature vectors: are they of one distribution? Both distances are zero, for infinitely many
-// cells, when the distributions are the same and only then; how surely is told by dealing the cells anew to the two
-// samples many times, with `slices` (dealing.h) those of one
-// slice together. Rows are cells, columns standardised features.
+// cells, when the distributions are the same and only then; how surely is found by dealing the cells anew to the two
+// samples many times, with `slices` (dealing.h) those of one slice together. Rows are cells, columns standardised
+// features.
 #pragma once
 
 #include <cstddef>

@@ -44,7 +44,7 @@ fails_with 2 "say different formats" "$program" convert cells --format swc --out
 
 # A broken file is told; the others are written.
 printf '1 1 0 0\n' >broken.swc
-fails_with 1 "1 of 2 files" "$program" convert broken.swc "cells/$first" --out rest.h5
+fails_with 1 "1 of 2 neurons" "$program" convert broken.swc "cells/$first" --out rest.h5
 "$program" convert rest.h5 rest.swc >/dev/null 2>&1
 cmp rest.swc "cells/$first"
 echo "containers.sh: all is well"

@@ -36,7 +36,7 @@ $BRAINFOREST plant --recipe column-1000 --repo names.db --out names >/dev/null
 
 # What is wrong is said in a sentence with what to do, and nothing is left behind.
 $BRAINFOREST import pyramidal-1.swc --repo few.db --population pyramidal >/dev/null
-fails_with 1 'population purkinje, which is empty; grow' $BRAINFOREST plant --recipe column-1000 --repo few.db --out few
+fails_with 1 'populations purkinje, motoneuron, which are empty; grow' $BRAINFOREST plant --recipe column-1000 --repo few.db --out few
 fails_with 1 'column-1000, column-10000' $BRAINFOREST plant --recipe nosuch --repo cells.db --out few
 sed 's/^radius = .*/radius = 20/' "$FOREST_SOURCE_DIR/data/recipes/column-1000.toml" >narrow.toml
 fails_with 1 'do not fit without overlap' $BRAINFOREST plant --recipe narrow.toml --repo cells.db --out few

@@ -71,6 +71,8 @@ told sisters.json 'd["random_forest"]["value"] < .9 and d["a"]["cells"] == 12'
 fails_with 2 'no regular expression' $BRAINFOREST compare one two --slices '(['
 
 refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc
+$BRAINFOREST compare one one $quick >/dev/null 2>own.txt  # the same cells on both sides
+grep -q 'in one, too' own.txt
 
 # How typical: a cell of another kind is not, and it is said by what.
 $BRAINFOREST typical purkinje/*-00000.swc --population all --report typical.html --json >typical.json
