@@ -163,6 +163,30 @@ TEST_F(Shell, ARibbonHasTheVolumeBetweenTheSurfaces) {
   EXPECT_EQ(std::count(ribbon.wall.begin(), ribbon.wall.end(), 1), 0);
 }
 
+TEST_F(Shell, AnIslandInTheWallIsWall) {
+  // Towards +x the surfaces are .3 mm apart, but for a spot in the middle.
+  const auto thin = [](double from, double to) {
+    return star(6, [&](const Vec3& d) { return d.x() < from || d.x() > to ? outside : inside + 300.; });
+  };
+  const auto wall_of = [&](const Mesh& mesh, double least) {
+    const TriangleTree mesh_tree(mesh);
+    const Laplace between(mesh, inner, {.spacing = 250.});
+    const WCurves own(between, mesh_tree, tree);
+    const Ribbon r = make_ribbon(mesh, own, {.edge = 500., .least_wall = least}, Progress::none());
+    std::pair<std::size_t, std::size_t> result{0, 0};  // in the spot, and elsewhere
+    for (std::size_t v = 0; v < r.size(); ++v)
+      (r.outer[v].normalized().x() > .9 ? result.first : result.second) += r.wall[v];
+    return result;
+  };
+  const auto island = wall_of(thin(.8, .97), 50e6);  // 19 mm² in a wall of 107
+  const auto whole = wall_of(thin(.8, 2.), 50e6);
+  EXPECT_GT(whole.first, 500u);
+  EXPECT_EQ(island.first, whole.first);
+  EXPECT_EQ(island.second, whole.second);
+  const auto larger = wall_of(thin(.8, .97), 10e6);  // than what a wall has to be: it stays
+  EXPECT_LT(larger.first, whole.first - 100);
+}
+
 TEST_F(Shell, ACoarserRibbonIsTheOneOfTheTrianglesBeforeTheyWereHalved) {
   const Ribbon once = make_ribbon(outer, curves, {.edge = 200.}, Progress::none());
   ASSERT_EQ(once.halvings, 1);

@@ -118,11 +118,12 @@ void call_back_strays(Elements& elements) {
   }
 }
 
-// A surface that is crumpled on a smaller scale than an element folds the faces of elements on it: these become smoother, each place
-// going to the middle of those around, until they are folded no more. Sides of one element alone stay.
+// An outer surface that is crumpled on a smaller scale than an element, or creased like the floor of a sulcus whose banks touch, folds the
+// faces of elements on it: these become smoother, each place going to the middle of those around, until they are folded no more. The
+// inner half of the curves hardly follows and their slope at the inner surface stays: (1 − w)² of the way. Sides of one element alone stay.
 void smooth_folded_faces(Elements& elements) {
-  constexpr int most_rounds = 12, steps = 4;
-  constexpr double least = .1;  // scaled Jacobian
+  constexpr int most_rounds = 6, steps = 4;
+  constexpr double least = .2;  // scaled Jacobian
   const Owners of = owners_of(elements);
   const std::vector<std::uint8_t> rim = by_the_wall(elements);
   const auto stays = [&](std::uint32_t c) {  // corners by the wall, and what is between them on a side
@@ -131,46 +132,45 @@ void smooth_folded_faces(Elements& elements) {
     const auto at = std::find(own.begin(), own.end(), c) - own.begin();
     return of[c].size() == 1 && (at % 4 % 3 == 0 || at / 4 % 3 == 0);
   };
-  for (const std::size_t depth : {std::size_t(0), std::size_t(3)}) {
-    std::vector<std::uint32_t> look(elements.size());
-    std::iota(look.begin(), look.end(), 0u);
-    for (int round = 0; round < most_rounds && !look.empty(); ++round) {
-      std::vector<std::uint8_t> folded(look.size(), 0);
-      parallel_for(look.size(), 64, [&](std::size_t n) {
-        const Hexahedron h = elements.hexahedron(look[n]);
-        for (int j = 0; j <= steps && !folded[n]; ++j)
-          for (int i = 0; i <= steps && !folded[n]; ++i) {
-            const Eigen::Matrix3d slope =
-                h.jacobian(double(i) / steps, double(j) / steps, depth == 0 ? 0. : 1.);
-            folded[n] = slope.determinant() < least * slope.colwise().norm().prod();
-          }
-      });
-      std::vector<std::uint32_t> moving;
-      for (std::size_t n = 0; n < look.size(); ++n)
-        if (folded[n])
-          for (const std::uint32_t c : elements.elements[look[n]])
-            if (!stays(c)) moving.push_back(c);
-      moving = distinct(std::move(moving));
-      std::vector<Place> next(moving.size());
-      parallel_for(moving.size(), 256, [&](std::size_t n) {
-        Place sum = Place::Zero();
-        double count = 0.;
-        for (const std::uint32_t e : of[moving[n]]) {
-          const auto& own = elements.elements[e];
-          const auto at = int(std::find(own.begin(), own.end(), moving[n]) - own.begin());
-          for (const auto& [u, v] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
-            const int i = at % 4 + u, j = at / 4 + v;
-            if (i < 0 || i > 3 || j < 0 || j > 3) continue;
-            sum += elements.curves[own[slot(i, j)]][depth], count += 1.;
-          }
+  std::vector<std::uint32_t> look(elements.size());
+  std::iota(look.begin(), look.end(), 0u);
+  for (int round = 0; round < most_rounds && !look.empty(); ++round) {
+    std::vector<std::uint8_t> folded(look.size(), 0);
+    parallel_for(look.size(), 64, [&](std::size_t n) {
+      const Hexahedron h = elements.hexahedron(look[n]);
+      for (int j = 0; j <= steps && !folded[n]; ++j)
+        for (int i = 0; i <= steps && !folded[n]; ++i) {
+          const Eigen::Matrix3d slope = h.jacobian(double(i) / steps, double(j) / steps, 0.);
+          folded[n] = slope.determinant() < least * slope.colwise().norm().prod();
         }
-        next[n] = sum / count;
-      });
-      for (std::size_t n = 0; n < moving.size(); ++n) elements.curves[moving[n]][depth] = next[n];
-      look.clear();
-      for (const std::uint32_t c : moving) look.insert(look.end(), of[c].begin(), of[c].end());
-      look = distinct(std::move(look));
-    }
+    });
+    std::vector<std::uint32_t> moving;
+    for (std::size_t n = 0; n < look.size(); ++n)
+      if (folded[n])
+        for (const std::uint32_t c : elements.elements[look[n]])
+          if (!stays(c)) moving.push_back(c);
+    moving = distinct(std::move(moving));
+    std::vector<Place> ways(moving.size());
+    parallel_for(moving.size(), 256, [&](std::size_t n) {
+      Place sum = Place::Zero();
+      double count = 0.;
+      for (const std::uint32_t e : of[moving[n]]) {
+        const auto& own = elements.elements[e];
+        const auto at = int(std::find(own.begin(), own.end(), moving[n]) - own.begin());
+        for (const auto& [u, v] : {std::pair{-1, 0}, {1, 0}, {0, -1}, {0, 1}}) {
+          const int i = at % 4 + u, j = at / 4 + v;
+          if (i < 0 || i > 3 || j < 0 || j > 3) continue;
+          sum += elements.curves[own[slot(i, j)]][0], count += 1.;
+        }
+      }
+      ways[n] = sum / count - elements.curves[moving[n]][0];
+    });
+    for (std::size_t n = 0; n < moving.size(); ++n)
+      for (std::size_t d = 0; d < 3; ++d)
+        elements.curves[moving[n]][d] += double((3 - d) * (3 - d)) / 9. * ways[n];
+    look.clear();
+    for (const std::uint32_t c : moving) look.insert(look.end(), of[c].begin(), of[c].end());
+    look = distinct(std::move(look));
   }
 }
 

@@ -24,6 +24,27 @@ double area_of(const std::vector<Place>& at, const Triangle& t) {
   return .5 * (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]).norm();
 }
 
+// Marks what no elements can be laid over: pieces of cortex within the wall that are smaller than a wall has to be. The largest one stays.
+void close_islands(const Ribbon& ribbon, std::span<const double> areas, double least,
+                   std::vector<std::uint8_t>& wall) {
+  std::vector<std::uint32_t> first(ribbon.size());  // of each piece, by way of others
+  std::iota(first.begin(), first.end(), 0u);
+  const auto piece_of = [&](std::uint32_t v) {
+    while (first[v] != v) v = first[v] = first[first[v]];
+    return v;
+  };
+  for (const Triangle& t : ribbon.triangles) {
+    if (wall[t[0]] || wall[t[1]] || wall[t[2]]) continue;
+    for (const std::size_t k : {1u, 2u}) first[piece_of(t[k])] = piece_of(t[0]);
+  }
+  std::vector<double> area(ribbon.size(), 0.);
+  for (std::uint32_t v = 0; v < ribbon.size(); ++v)
+    if (!wall[v]) area[piece_of(v)] += areas[v];
+  const double enough = area.empty() ? 0. : std::min(least, *std::max_element(area.begin(), area.end()));
+  for (std::uint32_t v = 0; v < ribbon.size(); ++v)
+    if (!wall[v] && area[piece_of(v)] < enough) wall[v] = 1;
+}
+
 // Thin places that hang together over an area are a wall.
 std::vector<std::uint8_t> find_wall(const Ribbon& ribbon, const RibbonOptions& options) {
   const std::size_t n = ribbon.size();
@@ -46,6 +67,7 @@ std::vector<std::uint8_t> find_wall(const Ribbon& ribbon, const RibbonOptions& o
     if (area >= options.least_wall)
       for (const std::uint32_t v : piece) wall[v] = 1;
   }
+  close_islands(ribbon, areas, options.least_wall, wall);
   return wall;
 }
 

@@ -70,7 +70,7 @@ class RibbonLocator {
 struct RibbonOptions {
   double edge = 400.;             // µm: triangles are halved until their mean edge is no longer
   double least_thickness = 500.;  // µm: thinner places are no cortex where they make up a wall of
-  double least_wall = 100e6;      // µm² or more
+  double least_wall = 100e6;  // µm² or more; a thicker island in it is wall, too, if it is smaller than this
 };
 
 /// `outer` must be the surface that the curves' field has as its outer one.

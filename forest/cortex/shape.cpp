@@ -70,48 +70,59 @@ using Coordinates = double[3][64];
 FOREST_CLONES
 void jacobians(const Coordinates& places, Nine& out) {
   constexpr int square = samples * samples;
-  for (int one = 0; one < 3; ++one)
-    for (int axis = 0; axis < 3; ++axis) {
-      const auto &u = rows(axis, 0), &v = rows(axis, 1), &w = rows(axis, 2);
-      double along_u[samples][16], along_v[4][square];  // the latter: k, then u and v
-      for (int s = 0; s < samples; ++s)
+  for (int one = 0; one < 3; ++one) {
+    double along_u[2][samples][16];  // of slopes, and of values
+    for (int s = 0; s < samples; ++s)
+      for (int of = 0; of < 2; ++of) {
+        const double* const u = of == 0 ? by_place.slope[s] : by_place.value[s];
         for (int line = 0; line < 16; ++line)
-          along_u[s][line] = u[s][0] * places[one][line] + u[s][1] * places[one][16 + line] +
-                             u[s][2] * places[one][32 + line] + u[s][3] * places[one][48 + line];
+          along_u[of][s][line] = u[0] * places[one][line] + u[1] * places[one][16 + line] +
+                                 u[2] * places[one][32 + line] + u[3] * places[one][48 + line];
+      }
+    for (int axis = 0; axis < 3; ++axis) {
+      const auto &v = rows(axis, 1), &w = rows(axis, 2);
+      const auto& lines = along_u[axis == 0 ? 0 : 1];
+      double along_v[4][square];  // k, then u and v
       for (int s = 0; s < samples; ++s)
         for (int t = 0; t < samples; ++t)
           for (int k = 0; k < 4; ++k)
-            along_v[k][samples * s + t] = v[t][0] * along_u[s][k] + v[t][1] * along_u[s][4 + k] +
-                                          v[t][2] * along_u[s][8 + k] + v[t][3] * along_u[s][12 + k];
+            along_v[k][samples * s + t] = v[t][0] * lines[s][k] + v[t][1] * lines[s][4 + k] +
+                                          v[t][2] * lines[s][8 + k] + v[t][3] * lines[s][12 + k];
       for (int r = 0; r < samples; ++r)
         for (int p = 0; p < square; ++p)
           out[axis][one][square * r + p] = w[r][0] * along_v[0][p] + w[r][1] * along_v[1][p] +
                                            w[r][2] * along_v[2][p] + w[r][3] * along_v[3][p];
     }
+  }
 }
 
 // The other way: adds to each place what the slopes at all samples ask of it.
 FOREST_CLONES
 void pull_back(const Nine& in, Coordinates& gradient) {
   constexpr int square = samples * samples;
-  for (int one = 0; one < 3; ++one)
+  for (int one = 0; one < 3; ++one) {
+    double along_u[2][samples][16] = {};
     for (int axis = 0; axis < 3; ++axis) {
-      const auto &u = rows(axis, 0), &v = rows(axis, 1), &w = rows(axis, 2);
-      double along_u[samples][16] = {}, along_v[4][square];
-      for (int k = 0; k < 4; ++k)
-        for (int p = 0; p < square; ++p) {
-          double sum = 0.;
-          for (int r = 0; r < samples; ++r) sum += w[r][k] * in[axis][one][square * r + p];
-          along_v[k][p] = sum;
-        }
+      const auto &v = rows(axis, 1), &w = rows(axis, 2);
+      double along_v[square][4];
+      for (int k = 0; k < 4; ++k) {
+        double sum[square] = {};
+        for (int r = 0; r < samples; ++r)
+          for (int p = 0; p < square; ++p) sum[p] += w[r][k] * in[axis][one][square * r + p];
+        for (int p = 0; p < square; ++p) along_v[p][k] = sum[p];
+      }
+      auto& lines = along_u[axis == 0 ? 0 : 1];
       for (int s = 0; s < samples; ++s)
         for (int t = 0; t < samples; ++t)
           for (int j = 0; j < 4; ++j)
-            for (int k = 0; k < 4; ++k) along_u[s][4 * j + k] += v[t][j] * along_v[k][samples * s + t];
-      for (int s = 0; s < samples; ++s)
-        for (int i = 0; i < 4; ++i)
-          for (int line = 0; line < 16; ++line) gradient[one][16 * i + line] += u[s][i] * along_u[s][line];
+            for (int k = 0; k < 4; ++k) lines[s][4 * j + k] += v[t][j] * along_v[samples * s + t][k];
     }
+    for (int s = 0; s < samples; ++s)
+      for (int i = 0; i < 4; ++i)
+        for (int line = 0; line < 16; ++line)
+          gradient[one][16 * i + line] +=
+              by_place.slope[s][i] * along_u[0][s][line] + by_place.value[s][i] * along_u[1][s][line];
+  }
 }
 
 // det J, the product of the lengths of its columns, and these squared, each a little more so that none is nothing.

@@ -23,6 +23,9 @@ namespace {
 
 using Out = std::back_insert_iterator<std::string>;
 
+// What is a tracer's habit rather than a neuron's.
+constexpr bool habit(std::size_t style) { return style == grain || style == slope || style == kink; }
+
 double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
 
 // What a neuron begins with, in `growth` and when there are some without a soma.
@@ -38,14 +41,19 @@ constexpr std::string_view growth = R"(
 # stays single.
 function share(part, whole, n, others) =
   if(part == 1, 1, max(min(2, n - others), min(n - others, round(n * part / whole))))
+# The traced neuron whose stems of a kind these are, the stems of both, one after the other, and whether one is among them.
+function whose(kind) = if(kind == others_kind, mate, me)
+cell planned = cells.stems(me) + if(others_kind < 0, 0, cells.stems(mate))
+distribution plan(i) = if(i < cells.stems(me), plans(me, i), plans(mate, i - cells.stems(me)))
+distribution its(i) = if(i < planned, (plans.kind(plan(i)) == others_kind) == (i >= cells.stems(me)), 0)
 # How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
-function longer(wanted, traced) = max(0.6, min(1.6, wanted / max(traced, 1)))
+function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
 function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 # How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
-function steeper(kind, s, u, v, donor) = max(0.6, min(1.6, (slope(kind, own(styles.slope(s), styles.slope(u), styles.slope(v))) / slope(kind, styles.slope(donor)))^steep))
+distribution steeper(kind, donor) = max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
 # together take the whole.
@@ -64,7 +72,7 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 function swayed_x(angle, x, y) = cos(angle) * x - sin(angle) * y
 function swayed_y(angle, x, y) = sin(angle) * x + cos(angle) * y
 # How many times thicker this neuron is than the one whose stems it has, as the neuron is whose diameters it has.
-distribution thicker(kind) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(me, kind))))
+distribution thicker(kind) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(whose(kind), kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
@@ -75,23 +83,23 @@ module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay,
 axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
-stem: Plan(i) : if(i < cells.stems(me), plans.length(plans(me, i)), 0) > 0
-  { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
+stem: Plan(i) : if(its(i), plans.length(plan(i)), 0) > 0
+  { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
     ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), thick = thicker(kind), d = thick * plans.d(p),
     sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
     bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
     ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
-    r = stems(kind, me, log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
-    sz = steeper(kind, s, u, v, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
+    r = stems(kind, whose(kind), log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(bx, by, plans.z(p)) Head(x, y, z)
        Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
-bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
-  { p = plans(me, i), kind = plans.kind(p), s = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
+bud: Plan(i) : its(i)  # it forks where it leaves
+  { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
     ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
     away = ahead / max(1, plans.ahead(p)), d = thicker(kind) * plans.d(p), sway = normal(0, sways(kind)) }
@@ -99,7 +107,8 @@ bud: Plan(i) : i < cells.stems(me)  # it forks where it leaves
        Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * swayed_x(sway, plans.tx(p), plans.ty(p)), away * swayed_y(sway, plans.tx(p), plans.ty(p)), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
-planned: Plan(i) ->
+passed: Plan(i) : i < planned -> Plan(i + 1)
+done: Plan(i) ->
 
 # A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
 # neuron may lie anywhere between the faces of its slice.
@@ -111,9 +120,9 @@ on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
-  { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
+  { s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
-    r = forks(kind, donor, if(chance(familiar), -1, me), log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
+    r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style),
     q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
@@ -135,11 +144,11 @@ three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az
      [ Limb(kind, r, q, run, 1, m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
      [ Limb(kind, r, q, run, 2, tips - n - m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
 limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
-  { s = styles(me, kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
+  { s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
-    sz = steeper(kind, s, u, v, styles(donor, kind)), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
+    sz = steeper(kind, styles(donor, kind)), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
     mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
@@ -242,6 +251,41 @@ class Writer {
         for (std::size_t l = 0; l < kin(); ++l)
           differ(traced_.cells[others[k].second], traced_.cells[others[l].second]);
     }
+    put("\n\n# To each neuron another, whose stems of one kind it has: as alike as can be when each is "
+        "another's "
+        "only once.\nsample mates(cell = -> cell) =");
+    const std::vector<std::size_t> mate = mates(apart);
+    for (std::size_t i = 0; i < mate.size(); ++i) {
+      row(!i);
+      put("{} -> {}", i, mate[i]);
+    }
+  }
+
+  // A permutation of the neurons that leaves none where it is: pairs change partners as long as this makes them more alike.
+  std::vector<std::size_t> mates(auto&& apart) const {
+    const std::size_t n = traced_.cells.size();
+    std::vector<double> between(n * n, 1e9);  // of itself: never
+    const auto basal = [](const Stem& s) { return s.kind == int(SectionKind::basal); };
+    for (std::size_t i = 0; i < n; ++i)
+      for (std::size_t j = 0; j < n; ++j)
+        if (const Cell& a = traced_.cells[i], &b = traced_.cells[j]; j != i)
+          between[i * n + j] = std::ranges::all_of(a.stems, basal) && std::ranges::none_of(b.stems, basal)
+                                   ? 1e6  // there would be no stem at all
+                                   : apart(a, b);
+    std::vector<std::size_t> mate(n);
+    for (std::size_t i = 0; i < n; ++i) mate[i] = (i + 1) % n;
+    for (bool better = true; std::exchange(better, false);)
+      for (std::size_t i = 0; i < n; ++i)
+        for (std::size_t j = 0; j < i; ++j)
+          if (between[i * n + mate[j]] + between[j * n + mate[i]] + 1e-9 <
+              between[i * n + mate[i]] + between[j * n + mate[j]])
+            std::swap(mate[i], mate[j]), better = true;
+    return mate;
+  }
+  // The kind of sections that come from the mate: basal dendrites, where there are others.
+  int others_kind() const {
+    const int basal = int(SectionKind::basal);
+    return traced_.means.size() > 1 && traced_.means.contains(basal) ? basal : -1;
   }
 
   void differ(const Cell& one, const Cell& other) {
@@ -373,10 +417,12 @@ class Writer {
         "two neurons alike to it differ.\n"
         "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
+        "cell mate = mates.cell(mates(me))\n#define others_kind {}  # of the stems that are the mate's, -1: "
+        "none\n"
         "cell thin_as = one\n#define stray {:.4g}\n"
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
-        traced_.cells.size(), kin(), options_.smoothing, kept());
+        traced_.cells.size(), kin(), others_kind(), options_.smoothing, kept());
     for (const auto& [name, style] : {std::pair{"forks", number},
                                       {"extent", extent},
                                       {"wander", wander},
@@ -399,10 +445,10 @@ class Writer {
     put("table sways = {}\n", fmt::join(bins, ", "));
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
-      style += fmt::format(
-          fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
+      style += fmt::format(fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
+                                        : habit(i)                  ? ", styles.{0}(t)"
                                                    : ", own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
-          style_names[i]);
+                           style_names[i]);
     put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"
@@ -416,7 +462,7 @@ class Writer {
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
-        options_.familiar, options_.jitter);
+        others_kind() < 0 ? options_.familiar : options_.familiar_to_two, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);

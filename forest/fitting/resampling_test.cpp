@@ -185,6 +185,73 @@ TEST(Resampling, StemsTurnAboutTheLineAcrossTheSliceByAShareOfHowMuchTheyDiffer)
   }
 }
 
+// Two small neurons and two large ones with basal and apical dendrites, each pair traced in long steps (8 µm) and in short ones
+// (2 µm). How high above the soma stems leave says whose they are.
+std::vector<Morphology> of_two_tracers() {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    Random random(9, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const double step = i % 2 ? 2. : 8., size = i < 2 ? 1. : 2.;
+    const auto path = [&](Point from, double angle) {
+      std::vector<Point> points{from};
+      for (double way = 0.; way < 40. * size; way += step) {
+        Point p = points.back();
+        const double turned = angle + .2 * random.normal();
+        p.x += float(step * std::cos(turned)), p.y += float(step * std::sin(turned));
+        points.push_back(p);
+      }
+      return points;
+    };
+    for (int stem = 0; stem < 3; ++stem) {
+      const SectionKind kind = stem ? SectionKind::basal : SectionKind::apical;
+      const double angle = 1.57 + 2.1 * stem;
+      const auto first =
+          path({float(5. * std::cos(angle)), float(5. * std::sin(angle)), float(i), float(.5 * size)}, angle);
+      const SectionId root = builder.add_section({}, kind, first);
+      for (const double side : {-.5, .5}) builder.add_section(root, kind, path(first.back(), angle + side));
+    }
+    models.push_back(builder.build());
+  }
+  return models;
+}
+
+// Whose the stems of this kind are.
+int whose(const Morphology& n, SectionKind kind) {
+  for (const SectionId root : n.roots())
+    if (n.section(root).kind == kind) return int(std::lround(n.points(root).front().z - n.soma().sphere().z));
+  return -1;
+}
+
+TEST(Resampling, BasalDendritesAreThoseOfAnotherNeuronAndEachOnesComeOnce) {
+  const std::vector<Morphology> models = of_two_tracers();
+  const lsystem::Grammar grammar =
+      lsystem::parse(resampling_grammar(models, "t", Resampling{.sway = 0.}), "t");
+  std::set<int> apical, basal;
+  for (const Morphology& n : lsystem::grow_population(grammar, models.size(), 3)) {
+    EXPECT_EQ(n.roots().size(), 3u);
+    EXPECT_NE(whose(n, SectionKind::apical), whose(n, SectionKind::basal));
+    apical.insert(whose(n, SectionKind::apical)), basal.insert(whose(n, SectionKind::basal));
+  }
+  EXPECT_EQ(apical, (std::set<int>{0, 1, 2, 3}));
+  EXPECT_EQ(basal, apical);
+}
+
+// Those of the same size are mates, who were traced by another; the points of both kinds are set as in one.
+TEST(Resampling, PointsAreAsFarApartInBasalAsInApicalDendrites) {
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(of_two_tracers(), "t"), "t");
+  const auto step = [](const Morphology& n, SectionKind kind) {
+    return statistics::mean(statistics::find_metric("segment_lengths")->values(Arbors(n, {kind})));
+  };
+  for (const Morphology& n : lsystem::grow_population(grammar, 40, 3)) {
+    const int apical = whose(n, SectionKind::apical), basal = whose(n, SectionKind::basal);
+    EXPECT_NE(apical % 2, basal % 2);
+    EXPECT_NEAR(step(n, SectionKind::apical), apical % 2 ? 2. : 8., apical % 2 ? 1. : 3.);
+    EXPECT_NEAR(step(n, SectionKind::basal), apical % 2 ? 2. : 8., apical % 2 ? 1. : 3.);
+  }
+}
+
 // A trunk with twigs and a tuft, which lean to one side, another in each; the longest branch of the tuft goes to any side.
 std::vector<Morphology> tufted(std::size_t count) {
   const lsystem::Grammar grammar = lsystem::parse(R"(
@@ -284,7 +351,8 @@ TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
     }
     models.push_back(builder.build());
   }
-  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const lsystem::Grammar grammar =
+      lsystem::parse(resampling_grammar(models, "t", Resampling{.jitter = 0.}), "t");
   for (const Morphology& m : lsystem::grow_population(grammar, 12, 1)) {
     ASSERT_EQ(m.roots().size(), 3u);
     std::size_t single = 0;
