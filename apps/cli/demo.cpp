@@ -129,19 +129,20 @@ void run(const Options& options, Console& console) {
                  picture = options.out / "forest.png", walk = options.out / "walk.mp4";
 
   // Everything is made anew, so that the same command gives the same files; but only what a demo made is replaced.
+  constexpr std::string_view told =
+      "Made by 'brainforest demo', which replaces all of it when it is run again:\n"
+      "neurons.db       neurons grown, and traced ones given to it, in a repository\n"
+      "circuit/         a column of them, a SONATA circuit\n"
+      "forest.forest    the column, packed for drawing\n"
+      "forest.png       a picture of it\n"
+      "walk.mp4         a film of a walk into it\n";
   const fs::path about = options.out / "about.txt";
-  if (!fs::exists(about, error))
-    for (const fs::path& file : {fs::path(repo), circuit_folder, forest_file, picture, walk})
+  if (!fs::exists(about, error) || MappedFile(about).text() != told)
+    for (const fs::path& file : {about, fs::path(repo), circuit_folder, forest_file, picture, walk})
       if (fs::exists(file, error))
         throw Error(fmt::format(
             "{} is there and no demo made it, so nothing was written; choose another --out", file.string()));
-  write_file(about,
-             "Made by 'brainforest demo', which replaces all of it when it is run again:\n"
-             "neurons.db       neurons grown, and traced ones given to it, in a repository\n"
-             "circuit/         a column of them, a SONATA circuit\n"
-             "forest.forest    the column, packed for drawing\n"
-             "forest.png       a picture of it\n"
-             "walk.mp4         a film of a walk into it\n");
+  write_file(about, told);
   for (const char* end : {"", "-wal", "-shm", "-journal"}) fs::remove(repo + end, error);
   Figures figures;
   grow_into(repo, options, console, figures);

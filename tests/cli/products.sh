@@ -51,7 +51,9 @@ refuses '--force' "$program" cortex grid swan -o swan.svg
 # A demo replaces what a demo made, and no repository of that name.
 mkdir demo && cp r.db demo/neurons.db
 refuses 'no demo made it' "$program" demo --out demo
-cmp r.db demo/neurons.db
+echo mine >demo/about.txt
+refuses 'no demo made it' "$program" demo --out demo
+cmp r.db demo/neurons.db && grep -q mine demo/about.txt
 
 # Nobody may see more of a file than the mask leaves, and what cannot be said is no success.
 (umask 077 && "$program" convert traced.swc secret.asc >/dev/null && "$program" plant --recipe column-1000 --repo r.db --out secret >/dev/null)
