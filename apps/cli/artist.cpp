@@ -11,6 +11,7 @@
 #include "forest/io/film.h"
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
+#include "forest/scene/scale_bar.h"
 
 #include "apps/cli/clock.h"
 
@@ -91,7 +92,9 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   return drawn;
 }
 
-void Artist::explain(const scene::View& view, frame::Image& image) const {
+void Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
+  if (marks.scale) scene::paint_scale(image, view.camera, view.background);
+  if (!marks.legend) return;
   std::vector<scene::ColourBar> bars;
   if (playback_) {
     const scene::ActivityView look = view.activity.value_or(playback_->view());
@@ -131,7 +134,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
     Drawn drawn = artist.draw(view, plan.width, plan.height);
     segments += drawn.segments;
     figures.covered += drawn.image.covered / count;
-    if (plan.legend) artist.explain(view, drawn.image);
+    artist.explain(view, plan.marks, drawn.image);
     film.add(drawn.image.pixels);
     if (!plan.pictures.empty())
       io::write_png(plan.pictures / fmt::format("{:05}.png", i), plan.width, plan.height, drawn.image.pixels);
@@ -171,9 +174,10 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
   view.activity->time = time;
 }
 
-void add_legend(CLI::App& command, bool& legend) {
-  command.add_flag("!--no-legend", legend,
+void add_marks(CLI::App& command, Marks& marks) {
+  command.add_flag("!--no-legend", marks.legend,
                    "Leave out what the colours of values mean (small pictures do so by themselves)");
+  command.add_flag("--scale", marks.scale, "Draw a scale bar, true at the depth of what the camera looks at");
 }
 
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text) {

@@ -31,6 +31,12 @@ struct Drawn {
   frame::Image image;
 };
 
+/// What stands in a picture so that it can be read.
+struct Marks {
+  bool legend = true;  // what colours of values mean, of the simulation and of surfaces
+  bool scale = false;  // how long some µm are
+};
+
 class Artist {
  public:
   /// @param sets  names that targets of views may use
@@ -39,8 +45,8 @@ class Artist {
   /// A view with a gaze is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
-  /// Draws into a picture what its colours mean: values of the simulation and of surfaces. Small pictures stay as they are.
-  void explain(const scene::View& view, frame::Image& image) const;
+  /// Draws into a picture how it is to be read. Small pictures stay as they are.
+  void explain(const scene::View& view, const Marks& marks, frame::Image& image) const;
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
   /// From now on these surfaces are in the pictures, too.
@@ -85,10 +91,10 @@ struct FilmPlan {
   std::uint32_t width = 1280, height = 720, samples = 4;
   int frames_per_second = 25;
   double seconds = 5.;
-  std::optional<scene::Scanpath> gaze;     // replayed from its begin; none: that of the views
-  std::filesystem::path pictures;          // when not empty: a folder for the single pictures as PNG files
-  bool legend = false;                     // Artist::explain
-  std::vector<scene::Appearance> targets;  // after those of the path's views
+  std::optional<scene::Scanpath> gaze;  // replayed from its begin; none: that of the views
+  std::filesystem::path pictures;       // when not empty: a folder for the single pictures as PNG files
+  Marks marks{.legend = false};
+  std::vector<scene::Appearance> targets;        // after those of the path's views
   std::optional<scene::SynapseColour> synapses;  // none: as the path's views say
   double from = 0., rate = 0.;                   // of activity: ms at the first picture, ms a second of film
 };
@@ -110,8 +116,8 @@ void add_activity(CLI::App& command, ActivityOptions& options, const char* name,
 /// Error when it is not, or when the activity is of another circuit.
 void play(Artist& artist, const ActivityOptions& options, scene::View& view);
 
-/// --no-legend, where pictures may have one.
-void add_legend(CLI::App& command, bool& legend);
+/// --no-legend and --scale.
+void add_marks(CLI::App& command, Marks& marks);
 
 /// "1920x1080" to numbers; throws Error.
 std::pair<std::uint32_t, std::uint32_t> parse_size(const std::string& text);

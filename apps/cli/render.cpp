@@ -66,7 +66,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
     std::filesystem::path forest, out;
     std::string view, size = "1920x1080";
     std::vector<float> gaze;
-    bool outline = false, legend = true;
+    bool outline = false;
+    Marks marks;
     SurfaceOptions surfaces;
     bool skin = false;
     SynapseOptions synapses;
@@ -99,7 +100,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
       ->check(CLI::Range(0., 1.))
       ->type_name("X Y");
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
-  add_legend(command, options->legend);
+  add_marks(command, options->marks);
   add_renderer(command, options->drawer);
   return [options, &console] {
     must_take(options->out, png_picture);
@@ -130,7 +131,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     play(artist, options->activity, view);
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
-    if (options->legend) artist.explain(view, drawn.image);
+    artist.explain(view, options->marks, drawn.image);
     io::write_png(options->out, width, height, drawn.image.pixels);
     nlohmann::ordered_json activity;
     if (artist.playback())
@@ -207,8 +208,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       ->check(CLI::Range(1, 256))
       ->capture_default_str();
   command.add_option("--pictures", options->plan.pictures, "Also write every picture into this folder");
-  options->plan.legend = true;
-  add_legend(command, options->plan.legend);
+  options->plan.marks.legend = true;
+  add_marks(command, options->plan.marks);
   add_renderer(command, options->drawer);
   command.add_option("-o,--out", options->out, "The film, an MP4 file")->required();
   return [options, &console] {

@@ -5,8 +5,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "forest/core/round_numbers.h"
 #include "forest/scene/colour_bar.h"
+#include "forest/scene/scale_bar.h"
 
 #include "apps/studio/selection.h"
 
@@ -35,14 +35,11 @@ QColor to_screen(const Vec3& linear) {
 }
 
 void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink) {
-  const float micrometres_a_point =
-      camera.pixel_size(float(area.height()), (camera.eye - camera.target).norm());
-  const float length = float(round_below(double(micrometres_a_point) * 160.));
-  const qreal width = qreal(length / micrometres_a_point);
+  const scene::ScaleBar bar = scene::scale_bar(camera, float(area.height()), 160.f);
+  const auto width = qreal(bar.length);
   const QPointF left(area.left() + margin + 10, area.bottom() - margin - 10),
       right = left + QPointF(width, 0);
-  const QString label =
-      length < 1000.f ? QString("%1 µm").arg(length) : QString("%1 mm").arg(length / 1000.f);
+  const QString label = QString::fromStdString(bar.label);
   const qreal text_width = painter.fontMetrics().horizontalAdvance(label);
   plate(painter, QRectF(left - QPointF(10, 28), QSizeF(std::max(width, text_width) + 20, 38)), ink);
   painter.setPen(QPen(ink.text, 1.6));

@@ -71,6 +71,10 @@ assert a < .02 and .1 < c < .8 and .25 * c < b < .65 * c, (a, b, c)  # two sides
 cmp -s with.png without.png && fail "there is no colour bar"
 for wish in "" --no-legend; do "$program" render lh.pial -o no_values$wish.png --size 640x480 --renderer cpu $wish >/dev/null; done
 cmp no_values.png no_values--no-legend.png || fail "a surface without values has a colour bar"
+"$program" render lh.pial -o scale.png --size 640x480 --renderer cpu --scale >/dev/null
+cmp -s scale.png no_values.png && fail "there is no scale bar"
+for wish in "" --scale; do "$program" render lh.pial -o tiny$wish.png --size 64x48 --renderer cpu $wish >/dev/null; done
+cmp tiny.png tiny--scale.png || fail "a picture of 64 pixels has a scale bar"
 
 refuses "cut off" "$program" render lh.short -o x.png
 refuses "2 values and the surface has" "$program" render lh.pial --overlay few.txt -o x.png
