@@ -10,6 +10,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/fit_faces.h"
 #include "forest/cortex/shape.h"
 #include "forest/cortex/sulci.h"
 #include "forest/geometry/isosurface.h"
@@ -198,12 +199,12 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   });
   progress.end();
   cortex.w_angle = spread_of(angles);
-  fit_faces(cortex.elements, outer_tree, inner_tree);
+  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::mean);
   const Shaping shaping{.volume = options.volume};
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
   improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
-  fit_faces(cortex.elements, outer_tree, inner_tree);
+  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::mean);
   // The few that are badly shaped still may take room from others and leave a creased surface farther.
   const Shaping last{.enough = .36,
                      .wanted = .5,
@@ -216,18 +217,11 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
                      .rounds = 4,
                      .iterations = 400};
   improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
-  // A heap that is tangled still begins anew, where that leaves less of it.
-  for (const int rings : {2, 1, 3}) {
-    const auto tangled = uncertified(cortex.elements);
-    if (tangled.empty()) break;
-    const std::vector<Depths> before = cortex.elements.curves;
-    even_out(cortex.elements, tangled, rings);
-    improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
-    if (uncertified(cortex.elements).size() >= tangled.size()) cortex.elements.curves = before;
-  }
   constexpr double least_jacobian = .2;
+  begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
+  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }

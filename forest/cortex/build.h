@@ -9,6 +9,7 @@
 
 #include "forest/cortex/elements.h"
 #include "forest/cortex/lines.h"
+#include "forest/cortex/mending.h"
 
 namespace forest::cortex {
 

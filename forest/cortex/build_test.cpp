@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/cortex/fit_faces.h"
 
 namespace forest::cortex {
 namespace {
@@ -219,6 +220,57 @@ TEST_F(Shell, WhatIsTangledBeginsAnewAndTheRestStays) {
     EXPECT_GT(moved, 100u);
     EXPECT_LT(moved, before.size() / 3);
   }
+}
+
+TEST_F(Shell, AHeapThatCannotBeMendedDoesNotKeepOthersFromBeginningAnew) {
+  Elements elements = made().cortex.elements;
+  constexpr std::uint32_t mendable = 7, hopeless = 450;
+  const auto corners = elements.corners_of(mendable);
+  std::swap(elements.curves[corners[0]], elements.curves[corners[3]]);
+  elements.elements[hopeless][3] = elements.elements[hopeless][0];  // an edge without a length
+  const std::vector<Depths> before = elements.curves;
+  const auto tangled = uncertified(elements);
+  ASSERT_GT(tangled.size(), 3u);
+  begin_anew(elements, TriangleTree(outer), tree, {.volume = wanted}, .2, Progress::none());
+  EXPECT_EQ(uncertified(elements), std::vector<std::uint32_t>{hopeless});
+  std::size_t moved = 0;
+  for (std::size_t c = 0; c < before.size(); ++c) moved += elements.curves[c] != before[c];
+  EXPECT_LT(moved, before.size() / 3);
+
+  Elements well = made().cortex.elements;
+  begin_anew(well, TriangleTree(outer), tree, {.volume = wanted}, .2, Progress::none());
+  EXPECT_EQ(well.curves, made().cortex.elements.curves);
+}
+
+TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
+  const TriangleTree outer_tree(outer);
+  Elements wavy = made().cortex.elements;
+  for (Depths& curve : wavy.curves) {
+    curve[0] *= 1. + .006 * std::sin(curve[0].x() / 300.);
+    curve[3] *= 1. + .006 * std::sin(curve[3].y() / 300.);
+  }
+  const auto farthest = [&](const Elements& elements) {
+    double outside_by = 0., inside_by = 0.;
+    for (std::size_t e = 0; e < elements.size(); ++e) {
+      const Hexahedron h = elements.hexahedron(e);
+      for (const double u : {0., .2, .5, .9}) {
+        outside_by = std::max(outside_by, outer_tree.nearest(h.at(u, .3, 0.))->distance);
+        inside_by = std::max(inside_by, tree.nearest(h.at(u, .3, 1.))->distance);
+      }
+    }
+    return std::pair{outside_by, inside_by};
+  };
+  ASSERT_GT(farthest(wavy).first, 50.);
+  ASSERT_GT(farthest(wavy).second, 40.);
+  ASSERT_TRUE(uncertified(wavy).empty());
+  Elements as_a_whole = wavy;
+  fit_faces(as_a_whole, outer_tree, tree, Fit::mean);
+  for (std::size_t c = 0; c < wavy.corners; ++c) EXPECT_EQ(as_a_whole.curves[c], wavy.curves[c]);
+  fit_faces(wavy, outer_tree, tree, Fit::places);
+  EXPECT_LT(farthest(wavy).first, 10.);
+  EXPECT_LT(farthest(wavy).second, 10.);
+  EXPECT_TRUE(uncertified(wavy).empty());
+  EXPECT_LT(farthest(wavy).first, farthest(as_a_whole).first);
 }
 
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {

@@ -47,30 +47,4 @@ Elements make_elements(const Ribbon& ribbon, const Quads& quads, std::span<const
 std::vector<std::uint32_t> uncertified(const Elements& elements, std::span<const std::uint32_t> of);
 std::vector<std::uint32_t> uncertified(const Elements& elements);
 
-/// Moves the faces on both surfaces, by some µm, until they lie outside of these as much as inside: patches through places
-/// on a creased surface cut its convex creases off. An element that would lose its validity or a good
-/// shape by that stays as it was.
-void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner);
-
-struct Mending {
-  std::size_t before = 0, after = 0;  // elements not certified
-  std::size_t moved = 0;              // curves that were moved
-  double farthest = 0.;               // µm, the longest such way
-};
-/// Makes elements valid that are not, by straightening their sides first and then moving their corners towards the middle
-/// of those around; what lies on a surface stays on it.
-Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress);
-
-struct LeftOut {
-  std::size_t elements = 0;
-  double volume = 0.;  // µm³
-};
-/// What stays tangled although it was mended begins anew: within so many rings of elements around it, every corner lies in the
-/// middle of its neighbours, off the surfaces, and sides are straight; the rim stays. A start for shaping.
-void even_out(Elements& elements, std::span<const std::uint32_t> tangled, int rings);
-
-/// By the wall, where the surfaces meet at an edge, there may be no room for an element, and none where they touch: elements
-/// there that are not valid, or whose scaled Jacobian is less than `least` somewhere, go to the wall.
-LeftOut leave_out(Elements& elements, double least);
-
 }  // namespace forest::cortex

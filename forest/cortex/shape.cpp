@@ -12,6 +12,7 @@
 #include "forest/core/clones.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/minimise.h"
+#include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
 namespace {
@@ -29,15 +30,17 @@ Places places_of(const Elements& elements, std::size_t element) {
 
 // ---- Jacobians at samples³ places, and back ---------------------------------------------------------------------------------
 
-constexpr int samples = 5;  // along each parameter, evenly from 0 to 1
-constexpr int all = samples * samples * samples;
+// Samples lie evenly from 0 to 1 along each parameter: 5, or 9 where an element folds between these.
+constexpr int cube(int samples) { return samples * samples * samples; }
 
 // By the four places of a line, the place and the slope of the cubic through them at each sample.
+template <int samples>
 struct Weights {
   double value[samples][4], slope[samples][4];
 };
-constexpr Weights weights() {
-  Weights w{};
+template <int samples>
+constexpr Weights<samples> weights() {
+  Weights<samples> w{};
   for (int s = 0; s < samples; ++s)
     for (int m = 0; m < 4; ++m) {
       const double t = double(s) / (samples - 1);
@@ -54,33 +57,36 @@ constexpr Weights weights() {
     }
   return w;
 }
-constexpr Weights by_place = weights();
+template <int samples>
+constexpr Weights<samples> by_place = weights<samples>();
 
 // Which of the two along a parameter, for the slopes along an axis.
+template <int samples>
 constexpr const double (&rows(int axis, int of))[samples][4] {
-  return axis == of ? by_place.slope : by_place.value;
+  return axis == of ? by_place<samples>.slope : by_place<samples>.value;
 }
 
 // Nine numbers of every sample: columns of J (axis), coordinates in each; samples with w fastest, then v.
-using Nine = double[3][3][all];
+template <int samples>
+using Nine = double[3][3][cube(samples)];
 // Places of an element by coordinate; k (w) fastest, then j (v).
 using Coordinates = double[3][64];
 
 // The slopes at all samples, by tensor products.
-FOREST_CLONES
-void jacobians(const Coordinates& places, Nine& out) {
+template <int samples>
+FOREST_CLONES void jacobians(const Coordinates& places, Nine<samples>& out) {
   constexpr int square = samples * samples;
   for (int one = 0; one < 3; ++one) {
     double along_u[2][samples][16];  // of slopes, and of values
     for (int s = 0; s < samples; ++s)
       for (int of = 0; of < 2; ++of) {
-        const double* const u = of == 0 ? by_place.slope[s] : by_place.value[s];
+        const double* const u = of == 0 ? by_place<samples>.slope[s] : by_place<samples>.value[s];
         for (int line = 0; line < 16; ++line)
           along_u[of][s][line] = u[0] * places[one][line] + u[1] * places[one][16 + line] +
                                  u[2] * places[one][32 + line] + u[3] * places[one][48 + line];
       }
     for (int axis = 0; axis < 3; ++axis) {
-      const auto &v = rows(axis, 1), &w = rows(axis, 2);
+      const auto &v = rows<samples>(axis, 1), &w = rows<samples>(axis, 2);
       const auto& lines = along_u[axis == 0 ? 0 : 1];
       double along_v[4][square];  // k, then u and v
       for (int s = 0; s < samples; ++s)
@@ -97,13 +103,13 @@ void jacobians(const Coordinates& places, Nine& out) {
 }
 
 // The other way: adds to each place what the slopes at all samples ask of it.
-FOREST_CLONES
-void pull_back(const Nine& in, Coordinates& gradient) {
+template <int samples>
+FOREST_CLONES void pull_back(const Nine<samples>& in, Coordinates& gradient) {
   constexpr int square = samples * samples;
   for (int one = 0; one < 3; ++one) {
     double along_u[2][samples][16] = {};
     for (int axis = 0; axis < 3; ++axis) {
-      const auto &v = rows(axis, 1), &w = rows(axis, 2);
+      const auto &v = rows<samples>(axis, 1), &w = rows<samples>(axis, 2);
       double along_v[square][4];
       for (int k = 0; k < 4; ++k) {
         double sum[square] = {};
@@ -120,19 +126,20 @@ void pull_back(const Nine& in, Coordinates& gradient) {
     for (int s = 0; s < samples; ++s)
       for (int i = 0; i < 4; ++i)
         for (int line = 0; line < 16; ++line)
-          gradient[one][16 * i + line] +=
-              by_place.slope[s][i] * along_u[0][s][line] + by_place.value[s][i] * along_u[1][s][line];
+          gradient[one][16 * i + line] += by_place<samples>.slope[s][i] * along_u[0][s][line] +
+                                          by_place<samples>.value[s][i] * along_u[1][s][line];
   }
 }
 
 // det J, the product of the lengths of its columns, and these squared, each a little more so that none is nothing.
+template <int samples>
 struct Measures {
-  double det[all], lengths[all], squares[3][all];
+  double det[cube(samples)], lengths[cube(samples)], squares[3][cube(samples)];
 };
-FOREST_CLONES
-void measure(const Nine& j, Measures& out) {
+template <int samples>
+FOREST_CLONES void measure(const Nine<samples>& j, Measures<samples>& out) {
   constexpr double tiny = 5. * 5.;  // µm²
-  for (int n = 0; n < all; ++n) {
+  for (int n = 0; n < cube(samples); ++n) {
     const double ux = j[0][0][n], uy = j[0][1][n], uz = j[0][2][n], vx = j[1][0][n], vy = j[1][1][n],
                  vz = j[1][2][n], wx = j[2][0][n], wy = j[2][1][n], wz = j[2][2][n];
     out.det[n] = ux * (vy * wz - vz * wy) + uy * (vz * wx - vx * wz) + uz * (vx * wy - vy * wx);
@@ -145,10 +152,10 @@ void measure(const Nine& j, Measures& out) {
 
 // What each sample lacks, lack² / χ(s), where χ(s) is s where that is well above 0 and never 0; and in place of J, the slope
 // of that and of the volume by its columns. fold: how softly it begins to weigh that an element is nearly folded.
-FOREST_CLONES
-void lacks(const Measures& m, const double (&shares)[all], double wanted, double fold, double by_volume,
-           Nine& j, double (&value)[all]) {
-  for (int n = 0; n < all; ++n) {
+template <int samples>
+FOREST_CLONES void lacks(const Measures<samples>& m, const double (&shares)[cube(samples)], double wanted,
+                         double fold, double by_volume, Nine<samples>& j, double (&value)[cube(samples)]) {
+  for (int n = 0; n < cube(samples); ++n) {
     const double scaled = m.det[n] / m.lengths[n], lack = wanted > scaled ? wanted - scaled : 0.;
     const double root = std::sqrt(scaled * scaled + fold * fold);
     const double size = scaled > 0. ? scaled : -scaled;
@@ -170,17 +177,24 @@ void lacks(const Measures& m, const double (&shares)[all], double wanted, double
 }
 
 // Of the volume, what det J at a sample counts (Boole's rule along each parameter).
+template <int samples>
 struct Shares {
-  double of[all];
+  double of[cube(samples)];
 };
-constexpr Shares shares() {
-  constexpr double boole[samples] = {7. / 90., 32. / 90., 12. / 90., 32. / 90., 7. / 90.};
-  Shares result{};
-  for (int n = 0; n < all; ++n)
-    result.of[n] = boole[n % samples] * boole[n / samples % samples] * boole[n / samples / samples];
+template <int samples>
+constexpr Shares<samples> shares() {
+  constexpr double boole[] = {14. / 90., 32. / 90., 12. / 90., 32. / 90.};  // and the first one again
+  constexpr int parts = (samples - 1) / 4;
+  const auto along = [&](int i) {
+    return boole[i % 4] / (i == 0 || i == samples - 1 ? 2. * parts : double(parts));
+  };
+  Shares<samples> result{};
+  for (int n = 0; n < cube(samples); ++n)
+    result.of[n] = along(n % samples) * along(n / samples % samples) * along(n / samples / samples);
   return result;
 }
-constexpr Shares by_sample = shares();
+template <int samples>
+constexpr Shares<samples> by_sample = shares<samples>();
 
 // Of an element: what it lacks, the gradient of that by its places, its least scaled Jacobian, and its volume.
 struct Lack {
@@ -188,18 +202,19 @@ struct Lack {
   Places gradient;
 };
 
+template <int samples>
 class Gauge {
  public:
   void look(const Places& places, Lack& result) {
     Coordinates by_coordinate;
     for (int c = 0; c < 64; ++c)
       for (int one = 0; one < 3; ++one) by_coordinate[one][turned(c)] = places(one, c);
-    jacobians(by_coordinate, j_);
-    measure(j_, m_);
+    jacobians<samples>(by_coordinate, j_);
+    measure<samples>(j_, m_);
     result.least = 1., result.volume = 0.;
-    for (int n = 0; n < all; ++n) {
+    for (int n = 0; n < cube(samples); ++n) {
       result.least = std::min(result.least, m_.det[n] / m_.lengths[n]);
-      result.volume += by_sample.of[n] * m_.det[n];
+      result.volume += by_sample<samples>.of[n] * m_.det[n];
     }
   }
   void weigh(const Places& places, const Shaping& shaping, double fold, Lack& result) {
@@ -208,12 +223,13 @@ class Gauge {
     const double off = std::max(0., ratio - shaping.most) - std::max(0., shaping.least - ratio);
     result.value = 0.;
     if (off == 0. && result.least >= shaping.wanted) return;
-    double values[all];
-    lacks(m_, by_sample.of, shaping.wanted, fold, 2. * shaping.even * off / shaping.volume, j_, values);
+    double values[cube(samples)];
+    lacks<samples>(m_, by_sample<samples>.of, shaping.wanted, fold, 2. * shaping.even * off / shaping.volume,
+                   j_, values);
     result.value = shaping.even * off * off;
     for (const double v : values) result.value += v;
     Coordinates gradient{};
-    pull_back(j_, gradient);
+    pull_back<samples>(j_, gradient);
     for (int c = 0; c < 64; ++c)
       for (int one = 0; one < 3; ++one) result.gradient(one, c) = gradient[one][turned(c)];
   }
@@ -222,13 +238,14 @@ class Gauge {
   // u fastest as w fastest.
   static constexpr int turned(int c) { return 16 * (c % 4) + 4 * (c / 4 % 4) + c / 16; }
 
-  Nine j_;
-  Measures m_;
+  Nine<samples> j_;
+  Measures<samples> m_;
 };
 
+template <int samples>
 double least(const Places& places, double* volume = nullptr) {
   Lack lack;
-  Gauge().look(places, lack);
+  Gauge<samples>().look(places, lack);
   if (volume) *volume = lack.volume;
   return lack.least;
 }
@@ -242,6 +259,7 @@ struct Anchor {
 using List = std::vector<std::uint32_t>;
 
 constexpr double farthest_way = 1000.;  // µm, that a place may move at once: not to another bank
+constexpr int few = 5, many = 9;        // samples
 constexpr double very_bad = .6;         // so much of a good enough scaled Jacobian
 
 // What is shaped at once: badly shaped elements that touch one another, all whose curves may move, and all that see these.
@@ -249,28 +267,9 @@ struct Patch {
   List curves, seen;
 };
 
-// The elements of every curve, as one list.
-struct Stars {
-  List starts, list;
-
-  explicit Stars(const Elements& elements) : starts(elements.curves.size() + 1) {
-    for (const auto& e : elements.elements)
-      for (const std::uint32_t c : e) ++starts[c + 1];
-    std::partial_sum(starts.begin(), starts.end(), starts.begin());
-    list.resize(starts.back());
-    List next(starts.begin(), starts.end() - 1);
-    for (std::uint32_t e = 0; e < elements.size(); ++e)
-      for (const std::uint32_t c : elements.elements[e]) list[next[c]++] = e;
-  }
-  std::span<const std::uint32_t> of(std::uint32_t curve) const {
-    return std::span(list).subspan(starts[curve], starts[curve + 1] - starts[curve]);
-  }
-};
-
 // Patches in turns: those of one turn do not see one another's curves.
 std::vector<std::vector<Patch>> patches(const Elements& elements, const Stars& stars,
-                                        std::vector<std::uint8_t> bad) {
-  constexpr std::size_t most = 24;  // elements of a patch
+                                        std::vector<std::uint8_t> bad, std::size_t most) {
   std::vector<std::vector<Patch>> turns;
   std::vector<std::vector<std::uint8_t>> taken;  // of each turn, every element: some patch sees it
   List own;
@@ -307,10 +306,19 @@ class Shaper {
       : elements_(elements), outer_(outer), inner_(inner), shaping_(shaping) {}
 
   void operator()(const Patch& patch) const {
+    if (shaping_.finely)
+      shape<many>(patch);
+    else
+      shape<few>(patch);
+  }
+
+ private:
+  template <int samples>
+  void shape(const Patch& patch) const {
     const std::size_t n = patch.curves.size();
     // A surface may be creased more sharply than an element can be: the worst may leave it farther.
     const bool worst = std::ranges::any_of(patch.seen, [&](std::uint32_t e) {
-      return least(places_of(elements_, e)) < very_bad * shaping_.enough;
+      return least<few>(places_of(elements_, e)) < very_bad * shaping_.enough;
     });
     const double give = worst ? 4. * shaping_.off : shaping_.off;
     std::vector<std::array<Anchor, 4>> anchors(n);
@@ -334,9 +342,9 @@ class Shaper {
       }
     }
     std::vector<std::uint8_t> whole;  // elements that are not folded, and must stay so
-    for (const Places& p : places) whole.push_back(least(p) > 0.);
+    for (const Places& p : places) whole.push_back(least<samples>(p) > 0.);
     Lack lack;
-    Gauge gauge;
+    Gauge<samples> gauge;
     double fold = 0.;
     const auto sum = [&](const Vector& at, Vector& gradient) {
       gradient.setZero(at.size());
@@ -398,7 +406,6 @@ class Shaper {
     }
   }
 
- private:
   Anchor anchor(const Depths& curve, std::size_t d, double give) const {
     constexpr double reach = 500.;  // µm
     const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
@@ -422,26 +429,26 @@ class Shaper {
 }  // namespace
 
 void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                    const Shaping& shaping, Progress& progress) {
+                    const Shaping& shaping, Progress& progress, std::span<const std::uint32_t> among) {
   const Stars stars(elements);
   const Shaper shape(elements, outer, inner, shaping);
   for (int round = 0; round < shaping.rounds; ++round) {
-    std::vector<std::uint8_t> bad(elements.size(), 0), worse(elements.size(), 0);
-    parallel_for(elements.size(), 256, [&](std::size_t e) {
+    std::vector<std::uint8_t> bad(elements.size(), 0), worst(elements.size(), 0);
+    parallel_for(among.empty() ? elements.size() : among.size(), 256, [&](std::size_t i) {
+      const std::size_t e = among.empty() ? i : among[i];
       const Places places = places_of(elements, e);
       double volume = 0.;
-      const double scaled = least(places, &volume);
+      const double scaled = least<few>(places, &volume);
       bad[e] = scaled < shaping.enough || !certify(elements.hexahedron(e)).positive() ||
                volume < (shaping.least - .05) * shaping.volume ||
                volume > (shaping.most + .05) * shaping.volume;
-      worse[e] = scaled < very_bad * shaping.enough;
+      worst[e] = scaled < very_bad * shaping.enough;
     });
-    for (std::uint32_t e = 0; e < elements.size();
-         ++e)  // the worst need more room: what is around moves, too
-      if (worse[e])
-        for (const std::uint32_t c : elements.corners_of(e))
-          for (const std::uint32_t beside : stars.of(c)) bad[beside] = 1;
-    const auto turns = patches(elements, stars, std::move(bad));
+    List moving;  // the worst need room: what is around moves, too
+    for (std::uint32_t e = 0; e < elements.size(); ++e)
+      if (worst[e]) moving.push_back(e);
+    for (const std::uint32_t e : widened(elements, stars, moving, shaping.room)) bad[e] = 1;
+    const auto turns = patches(elements, stars, std::move(bad), std::size_t(shaping.patch));
     std::size_t count = 0;
     for (const auto& turn : turns) count += turn.size();
     progress.begin("shaping elements", count);

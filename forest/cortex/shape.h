@@ -4,10 +4,12 @@
 //
 //     Σ max(0, wanted − s)²  +  small · Σ (way from the place before)²  +  Σ (distance from the surface)²
 //
-// is least, where s is the scaled Jacobian at every one of the 4×4×4 places of an element (Knupp 2000, "Achieving finite element mesh
+// is least, where s is the scaled Jacobian at every one of 5×5×5 places of an element (Knupp 2000, "Achieving finite element mesh
 // quality via optimization of the Jacobian matrix norm and associated quantities. Part I", Int J Numer Meth Eng 48:401, of whose
 // measures this one is bounded and so can begin at folded elements). What is well shaped stays where it is.
 #pragma once
+
+#include <span>
 
 #include "forest/cortex/elements.h"
 
@@ -24,9 +26,13 @@ struct Shaping {
   double off = 25.;     // µm, likewise from a surface
   int rounds = 3;       // of looking for what is badly shaped, and where the surfaces are
   int iterations = 60;  // in each
+  int room = 1;         // rings of elements around the worst that move with them
+  int patch = 24;       // elements that are shaped at once
+  bool finely = false;  // what lies between is looked at, too: at 9×9×9 places of each element
 };
 
+/// @param among  elements that are looked at; none: all of them
 void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                    const Shaping& shaping, Progress& progress);
+                    const Shaping& shaping, Progress& progress, std::span<const std::uint32_t> among = {});
 
 }  // namespace forest::cortex

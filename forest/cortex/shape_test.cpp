@@ -6,6 +6,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/parallel.h"
+#include "forest/core/random.h"
 #include "forest/cortex/depth.h"
 #include "forest/cortex/slab_test.h"
 
@@ -50,6 +51,29 @@ TEST_F(Shapes, WhatIsFoldedUnfolds) {
   ASSERT_FALSE(uncertified(slab).empty());
   improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
   EXPECT_TRUE(uncertified(slab).empty());
+}
+
+TEST_F(Shapes, WhatFoldsBetweenFivePlacesUnfoldsWhereNineAreLookedAt) {
+  // The inside of an element is crumpled until it folds where 5×5×5 places do not see it.
+  constexpr std::uint32_t element = 2 + 6 * 3;
+  const std::vector<Depths> before = slab.curves;
+  bool unseen = false;
+  for (std::uint64_t seed = 1; seed < 500 && !unseen; ++seed) {
+    Random random(seed);
+    slab.curves = before;
+    for (const std::size_t c : {5u, 6u, 9u, 10u})
+      for (Place& p : slab.curves[slab.elements[element][c]])
+        p += 40. * Place(random.normal(), random.normal(), random.normal());
+    const Hexahedron h = slab.hexahedron(element);
+    unseen = scaled_jacobian(h, 4) > 0. && !certify(h).positive();
+  }
+  ASSERT_TRUE(unseen);
+  improve_shapes(slab, outer, inner, {.volume = 5e8, .finely = true}, Progress::none());
+  EXPECT_TRUE(uncertified(slab).empty());
+  double finest = 1.;
+  for (std::size_t e = 0; e < slab.size(); ++e)
+    finest = std::min(finest, scaled_jacobian(slab.hexahedron(e), 16));
+  EXPECT_GT(finest, .4);
 }
 
 TEST_F(Shapes, WhatIsWellShapedStaysBitForBit) {

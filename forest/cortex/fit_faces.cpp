@@ -1,0 +1,117 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/fit_faces.h"
+
+#include <algorithm>
+#include <array>
+
+#include <Eigen/Cholesky>
+
+#include "forest/core/parallel.h"
+#include "forest/cortex/neighbourhood.h"
+
+namespace forest::cortex {
+namespace {
+
+constexpr int along = 5, all = along * along;  // places of a face that are compared with the surface
+constexpr double parameter(int i) { return (i + .5) / along; }
+
+// How far each of a face's sixteen places goes, of the ways from its 5×5 places to the surface.
+using Shares = Eigen::Matrix<double, 16, all>;
+
+Shares shares(Fit fit) {
+  Shares result = Shares::Zero();
+  if (fit == Fit::mean) {
+    result.setConstant(1. / all);
+    for (const int corner : {0, 3, 12, 15}) result.row(corner).setZero();
+    return result;
+  }
+  // What a place weighs at each of the 5×5, and the least squares of what is left, with as little way as possible.
+  Eigen::Matrix<double, all, 16> weights;
+  for (std::size_t c = 0; c < 16; ++c) {
+    std::array<Place, 16> one;
+    one.fill(Place::Zero());
+    one[c] = Place::UnitX();
+    const Patch patch = through_lattice(one);
+    for (int k = 0; k < all; ++k)
+      weights(k, Eigen::Index(c)) = patch.at(parameter(k % along), parameter(k / along)).x();
+  }
+  constexpr double ease = .1;
+  return (weights.transpose() * weights + ease * Eigen::Matrix<double, 16, 16>::Identity())
+      .ldlt()
+      .solve(weights.transpose());
+}
+
+using Ways = Eigen::Matrix<double, all, 3>;
+
+// From the 5×5 places of a face to the surface, along its normals; none where that is far or the other bank.
+Ways ways(const Elements& elements, std::size_t element, std::size_t depth, const TriangleTree& surface) {
+  constexpr double reach = 300.;  // µm
+  const auto& own = elements.elements[element];
+  std::array<Place, 16> places;
+  for (std::size_t c = 0; c < 16; ++c) places[c] = elements.curves[own[c]][depth];
+  const Patch patch = through_lattice(places);
+  const Place outwards = elements.curves[own[slot(1, 1)]][0] - elements.curves[own[slot(1, 1)]][3];
+  Ways result = Ways::Zero();
+  for (int k = 0; k < all; ++k) {
+    const Place p = patch.at(parameter(k % along), parameter(k / along));
+    const auto hit = surface.nearest(p, reach);
+    if (!hit) continue;
+    const Place n = surface.normal(hit->triangle);
+    if (n.dot(outwards) > 0.) result.row(k) = (n * n.dot(hit->at - p)).transpose();
+  }
+  return result;
+}
+
+}  // namespace
+
+void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit) {
+  const int rounds = fit == Fit::mean ? 2 : 3;
+  const Shares by_place = shares(fit);
+  const std::vector<Depths> before = elements.curves;
+  // What an element must keep: validity, and a good shape, or the one it had.
+  constexpr double good = .5;
+  std::vector<double> least(elements.size(), -1.);
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const Hexahedron h = elements.hexahedron(e);
+    if (certify(h).positive()) least[e] = std::min(good, scaled_jacobian(h));
+  });
+  std::vector<Eigen::Matrix<double, 16, 3>> moves(elements.size());
+  for (const auto& [depth, surface] : {std::pair{std::size_t(0), &outer}, {std::size_t(3), &inner}})
+    for (int round = 0; round < rounds; ++round) {
+      parallel_for(elements.size(), 64,
+                   [&](std::size_t e) { moves[e] = by_place * ways(elements, e, depth, *surface); });
+      std::vector<Place> sum(elements.curves.size(), Place::Zero());
+      std::vector<std::uint8_t> times(elements.curves.size(), 0);
+      for (std::size_t e = 0; e < elements.size(); ++e)
+        for (std::size_t c = 0; c < 16; ++c) {
+          const std::uint32_t curve = elements.elements[e][c];
+          sum[curve] += moves[e].row(Eigen::Index(c)).transpose(), ++times[curve];
+        }
+      for (std::size_t c = 0; c < sum.size(); ++c)
+        if (times[c]) elements.curves[c][depth] += sum[c] / double(times[c]);
+    }
+
+  const std::vector<Depths> fitted = elements.curves;
+  std::vector<std::uint8_t> halved(elements.curves.size(), 0);
+  constexpr std::uint8_t most_halvings = 3;  // then it stays
+  for (bool all_well = false; !all_well;) {
+    std::vector<std::uint8_t> lost(elements.size(), 0), less(elements.curves.size(), 0);
+    parallel_for(elements.size(), 64, [&](std::size_t e) {
+      if (least[e] < 0.) return;
+      const Hexahedron h = elements.hexahedron(e);
+      lost[e] = scaled_jacobian(h) < least[e] || !certify(h).positive();
+    });
+    all_well = true;
+    for (std::size_t e = 0; e < elements.size(); ++e)
+      for (const std::uint32_t c : elements.elements[e]) less[c] |= lost[e];
+    for (std::size_t c = 0; c < less.size(); ++c) {
+      if (!less[c] || halved[c] > most_halvings) continue;
+      all_well = false;
+      const double share = ++halved[c] > most_halvings ? 0. : 1. / double(1 << halved[c]);
+      for (const std::size_t d : {std::size_t(0), std::size_t(3)})
+        elements.curves[c][d] = before[c][d] + share * (fitted[c][d] - before[c][d]);
+    }
+  }
+}
+
+}  // namespace forest::cortex

@@ -1,0 +1,19 @@
+// SPDX-License-Identifier: Apache-2.0
+// Faces of elements and the surfaces that they stand for. A patch through sixteen places on a creased surface cuts its convex creases
+// off and bridges the others, so its places have to lie beside the surface for the patch to lie on it.
+#pragma once
+
+#include "forest/cortex/elements.h"
+
+namespace forest::cortex {
+
+enum class Fit {
+  mean,  // each face as a whole, by some µm, until it lies outside of the surface as much as inside; corners stay
+  places  // all places of it, by least squares over 5×5 places of the face
+};
+
+/// Moves the faces on both surfaces towards these, along the surface's normals. What would cost an element its validity
+/// or a good shape goes half of its way, a quarter, … or stays.
+void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit);
+
+}  // namespace forest::cortex

@@ -1,0 +1,316 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/cortex/mending.h"
+
+#include <algorithm>
+#include <array>
+#include <numeric>
+#include <utility>
+
+#include "forest/core/parallel.h"
+#include "forest/core/random.h"
+#include "forest/cortex/neighbourhood.h"
+
+namespace forest::cortex {
+namespace {
+
+void towards(Place& place, double share, const Place& aim) { place += share * (aim - place); }
+
+// Of some elements, those that are not valid or badly shaped, and how badly: 0 is well, from 2 on it is not valid.
+struct Faults {
+  std::vector<std::uint32_t> elements;
+  std::vector<double> how;  // of every one that was asked
+
+  Faults(const Elements& all, std::span<const std::uint32_t> of, double least) : how(of.size()) {
+    parallel_for(of.size(), 64, [&](std::size_t i) {
+      const Hexahedron h = all.hexahedron(of[i]);
+      const double scaled = scaled_jacobian(h);
+      const bool valid = certify(h).positive();
+      how[i] = valid ? std::max(0., least - scaled) : 3. - std::max(-1., scaled);
+    });
+    for (std::size_t i = 0; i < of.size(); ++i)
+      if (how[i] > 0.) elements.push_back(of[i]);
+  }
+};
+
+// What moved since `before` is pieces: elements that share a curve that moved. Each that did not gain goes back.
+void keep_gains(Elements& elements, std::vector<Depths> before, double least) {
+  const auto moved = [&](std::uint32_t c) { return elements.curves[c] != before[c]; };
+  std::vector<std::uint32_t> piece(before.size());  // of a curve: another one of it, or itself
+  std::iota(piece.begin(), piece.end(), 0u);
+  const auto root = [&](std::uint32_t c) {
+    while (piece[c] != c) c = piece[c] = piece[piece[c]];
+    return c;
+  };
+  std::vector<std::uint32_t> changed, curves;  // elements, and a curve that moved of each
+  for (std::uint32_t e = 0; e < elements.size(); ++e) {
+    const auto& own = elements.elements[e];
+    const auto first = std::ranges::find_if(own, moved);
+    if (first == own.end()) continue;
+    for (const std::uint32_t c : own)
+      if (moved(c)) piece[root(c)] = root(*first);
+    changed.push_back(e), curves.push_back(*first);
+  }
+  const Faults now(elements, changed, least);
+  elements.curves.swap(before);
+  const Faults then(elements, changed, least);
+  elements.curves.swap(before);
+  std::vector<double> gain(before.size(), 0.);
+  for (std::size_t i = 0; i < changed.size(); ++i) gain[root(curves[i])] += then.how[i] - now.how[i];
+  for (std::uint32_t c = 0; c < before.size(); ++c)
+    if (!(gain[root(c)] > 0.)) elements.curves[c] = before[c];
+}
+
+}  // namespace
+
+Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress) {
+  constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
+  constexpr double farthest_way = 1e3;  // µm
+  Mending result;
+  const Stars stars(elements);
+  const std::vector<Depths> before = elements.curves;
+  progress.begin("untangling", 0);
+  std::vector<std::uint32_t> bad = uncertified(elements);
+  result.before = bad.size();
+
+  // Not to the other bank of a sulcus or a gyrus: near, and facing the same way.
+  const auto keep_on_surface = [&](Depths& curve) {
+    constexpr double reach = 500.;
+    const Place outwards = curve[0] - curve[3];
+    if (const auto hit = outer.nearest(curve[0], reach);
+        hit && outer.normal(hit->triangle).dot(outwards) > 0.)
+      curve[0] = hit->at;
+    if (const auto hit = inner.nearest(curve[3], reach);
+        hit && inner.normal(hit->triangle).dot(outwards) > 0.)
+      curve[3] = hit->at;
+  };
+  // Half way to straight sides, three quarters, … and wholly.
+  std::vector<std::uint8_t> times(elements.size(), 0);
+  const auto straighten = [&](std::uint32_t element) {
+    const double much = ++times[element] < 4 ? .5 : 1.;
+    const auto& e = elements.elements[element];
+    for (const auto& side : sides)
+      for (std::size_t k = 1; k < 3; ++k) {
+        const double share = double(k) / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          towards(elements.curves[e[side[k]]][d], much,
+                  (1. - share) * elements.curves[e[side[0]]][d] + share * elements.curves[e[side[3]]][d]);
+      }
+    for (int j = 1; j < 3; ++j)
+      for (int i = 1; i < 3; ++i) {
+        const double u = i / 3., v = j / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          towards(elements.curves[e[slot(i, j)]][d], much,
+                  (1. - u) * (1. - v) * elements.curves[e[slot(0, 0)]][d] +
+                      u * (1. - v) * elements.curves[e[slot(3, 0)]][d] +
+                      (1. - u) * v * elements.curves[e[slot(0, 3)]][d] +
+                      u * v * elements.curves[e[slot(3, 3)]][d]);
+      }
+  };
+  const auto spread = [&](std::span<const std::uint32_t> list) { return widened(elements, stars, list); };
+  for (int round = 0; round < rounds_of_sides && !bad.empty(); ++round) {
+    for (const std::uint32_t e : bad) straighten(e);
+    bad = uncertified(elements, spread(bad));
+    progress.advance();
+  }
+
+  // What is left is few: corners look for a better place each, as long as the worst element around them gains.
+  const std::vector<std::uint8_t> rim = by_the_wall(elements);
+  const double mean_volume = [&] {
+    double sum = 0.;
+    for (std::uint32_t e = 0; e < elements.size(); e += 1 + std::uint32_t(elements.size() / 1000))
+      sum += elements.hexahedron(e).volume();
+    return sum / std::min<double>(double(elements.size()), 1000.);
+  }();
+  const auto worth = [&](std::span<const std::uint32_t> star) {
+    double least = 1e300;
+    for (const std::uint32_t e : star) {
+      const Hexahedron h = elements.hexahedron(e);
+      const Coefficients c = determinant(h);
+      least = std::min(
+          least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume));
+    }
+    return least;
+  };
+  for (int round = 0; round < rounds_of_corners && !bad.empty(); ++round) {
+    for (const std::uint32_t e : bad)
+      straighten(e);  // a neighbour's sides became straight, and its own inside is not
+    bad = uncertified(elements, spread(bad));
+    std::vector<std::uint32_t> corners;
+    for (const std::uint32_t e : bad)
+      for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
+    for (const std::uint32_t c : distinct(std::move(corners))) {
+      const auto star = stars.of(c);
+      std::vector<std::uint32_t> own;  // all curves that a move of this corner may change
+      for (const std::uint32_t e : star)
+        own.insert(own.end(), elements.elements[e].begin(), elements.elements[e].end());
+      own = distinct(std::move(own));
+      std::vector<Depths> kept;
+      for (const std::uint32_t k : own) kept.push_back(elements.curves[k]);
+      const Depths start = elements.curves[c];
+      double best = worth(star);
+      Depths mean{Place::Zero(), Place::Zero(), Place::Zero(), Place::Zero()};
+      double count = 0.;
+      for (const std::uint32_t e : star) {
+        const auto at = elements.corners_of(e);
+        const std::size_t k = std::size_t(std::find(at.begin(), at.end(), c) - at.begin());
+        for (const std::size_t other : {k ^ 1u, k ^ 2u}) {
+          for (std::size_t d = 0; d < 4; ++d) mean[d] += elements.curves[at[other]][d];
+          count += 1.;
+        }
+      }
+      for (std::size_t d = 0; d < 4; ++d) mean[d] /= count;
+      const double reach = (mean[1] - start[1]).norm() + .1 * (start[0] - start[3]).norm();
+      Random random(1, c, std::uint32_t(round));
+      std::vector<Depths> better;
+      constexpr int tries = 40;
+      for (int t = 0; t < tries; ++t) {
+        Depths next = start;
+        if (t < 4 && !rim[c])
+          for (std::size_t d = 0; d < 4; ++d) towards(next[d], .25 * double(t + 1), mean[d]);
+        else if (t < 7) {  // less bent from depth to depth
+          const Place one = (2. * next[0] + next[3]) / 3., two = (next[0] + 2. * next[3]) / 3.;
+          if (t == 4) calm(next[0], next[1], next[2], next[3]);
+          towards(next[1],
+                  t == 5   ? .5
+                  : t == 6 ? 1.
+                           : 0.,
+                  one),
+              towards(next[2],
+                      t == 5   ? .5
+                      : t == 6 ? 1.
+                               : 0.,
+                      two);
+        } else {
+          const Place way(random.normal(), random.normal(), random.normal());
+          const Place turn(random.normal(), random.normal(), random.normal());
+          // All depths alike and turned, or only some: those near one surface, or a single one.
+          const std::size_t first = t % 3 == 0 ? 0 : std::size_t(random.below(4));
+          const std::size_t last = t % 3 == 0 ? 3 : t % 3 == 1 ? first : first < 2 ? 1 : 3;
+          const double size = (t & 1) ? .15 : .04;
+          for (std::size_t d = std::min(first, last); d <= last; ++d)
+            next[d] += size * reach * (way + (double(d) / 1.5 - 1.) * turn);
+        }
+        keep_on_surface(next);
+        bool near = true;
+        for (std::size_t d = 0; d < 4; ++d) near = near && (next[d] - before[c][d]).norm() < farthest_way;
+        if (!near) continue;
+        elements.curves[c] = next;
+        for (const std::uint32_t e : star) times[e] = 4, straighten(e);
+        if (const double now = worth(star); now > best) {
+          best = now, better.clear();
+          for (const std::uint32_t k : own) better.push_back(elements.curves[k]);
+        }
+        for (std::size_t k = 0; k < own.size(); ++k) elements.curves[own[k]] = kept[k];
+      }
+      for (std::size_t k = 0; k < better.size(); ++k) elements.curves[own[k]] = better[k];
+    }
+    bad = uncertified(elements, spread(spread(bad)));  // sides of the stars' rims changed, too
+    progress.advance();
+  }
+  progress.end();
+  result.after = bad.size();
+  return result;
+}
+
+void even_out(Elements& elements, std::span<const std::uint32_t> heap, int rings) {
+  constexpr int rounds = 300;
+  const Stars stars(elements);
+  const std::vector<std::uint32_t> around = widened(elements, stars, heap, rings);
+  std::vector<std::uint8_t> is_around(elements.size(), 0);
+  for (const std::uint32_t e : around) is_around[e] = 1;
+  const std::vector<std::uint8_t> rim = by_the_wall(elements);
+  const auto inside = [&](std::uint32_t c) {
+    return std::ranges::all_of(stars.of(c), [&](std::uint32_t e) { return is_around[e] != 0; });
+  };
+  std::vector<std::uint32_t> corners;
+  for (const std::uint32_t e : around)
+    for (const std::uint32_t c : elements.corners_of(e))
+      if (!rim[c] && inside(c)) corners.push_back(c);
+  corners = distinct(std::move(corners));
+  std::vector<std::vector<std::uint32_t>> near(corners.size());
+  for (std::size_t i = 0; i < corners.size(); ++i) {
+    for (const std::uint32_t e : stars.of(corners[i]))
+      for (const auto& side : sides) {
+        const std::uint32_t a = elements.elements[e][side[0]], b = elements.elements[e][side[3]];
+        if (a == corners[i]) near[i].push_back(b);
+        if (b == corners[i]) near[i].push_back(a);
+      }
+    near[i] = distinct(std::move(near[i]));
+  }
+  for (int round = 0; round < rounds; ++round)
+    for (std::size_t i = 0; i < corners.size(); ++i)
+      for (std::size_t d = 0; d < 4; ++d) {
+        Place sum = Place::Zero();
+        for (const std::uint32_t c : near[i]) sum += elements.curves[c][d];
+        elements.curves[corners[i]][d] = sum / double(near[i].size());
+      }
+  for (const std::uint32_t e : around) {
+    const auto& own = elements.elements[e];
+    for (int j = 0; j < 4; ++j)
+      for (int i = 0; i < 4; ++i) {
+        const std::uint32_t c = own[slot(i, j)];
+        const bool corner = i % 3 == 0 && j % 3 == 0, middle = i % 3 != 0 && j % 3 != 0;
+        if (corner || (!middle && (stars.of(c).size() < 2 || !inside(c)))) continue;
+        const double u = i / 3., v = j / 3.;
+        for (std::size_t d = 0; d < 4; ++d)
+          elements.curves[c][d] =
+              (1. - v) *
+                  ((1. - u) * elements.curves[own[slot(0, 0)]][d] + u * elements.curves[own[slot(3, 0)]][d]) +
+              v * ((1. - u) * elements.curves[own[slot(0, 3)]][d] + u * elements.curves[own[slot(3, 3)]][d]);
+      }
+  }
+}
+
+void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
+                const Shaping& shaping, double least, Progress& progress) {
+  struct Try {
+    int evened, room;  // rings: that are evened out, and around these that move, too
+  };
+  constexpr std::array tries{Try{0, 1}, Try{0, 3}, Try{2, 1}, Try{1, 1}, Try{3, 1}, Try{0, 4}};
+  Shaping wide = shaping;
+  wide.patch = 200;
+  wide.finely = true;
+  const Stars stars(elements);
+  std::vector<std::uint32_t> all(elements.size());
+  std::iota(all.begin(), all.end(), 0u);
+  for (const auto& [evened, room] : tries) {
+    const std::vector<std::uint32_t> heaps = Faults(elements, all, least).elements;
+    if (heaps.empty()) return;
+    std::vector<Depths> before = elements.curves;
+    if (evened > 0) even_out(elements, heaps, evened);
+    wide.room = room;
+    improve_shapes(elements, outer, inner, wide, progress, widened(elements, stars, heaps, evened + room));
+    keep_gains(elements, std::move(before), least);
+  }
+}
+
+LeftOut leave_out(Elements& elements, double least) {
+  constexpr double no_tissue = 400.;  // µm: cortex is nowhere so thin
+  LeftOut result;
+  std::vector<std::uint8_t> rim = by_the_wall(elements);
+  for (std::uint32_t c = 0; c < elements.corners; ++c)
+    if ((elements.curves[c][0] - elements.curves[c][3]).norm() < no_tissue) rim[c] = 1;
+  std::vector<std::uint8_t> bad(elements.size(), 0), gone(elements.size(), 0);
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const Hexahedron h = elements.hexahedron(e);
+    bad[e] = scaled_jacobian(h) < least || !certify(h).positive();
+  });
+  for (bool more = true; more;) {
+    more = false;
+    for (std::size_t e = 0; e < elements.size(); ++e) {
+      const auto corners = elements.corners_of(e);
+      if (!bad[e] || gone[e] || std::ranges::none_of(corners, [&](std::uint32_t c) { return rim[c] != 0; }))
+        continue;
+      gone[e] = 1, more = true;
+      for (const std::uint32_t c : corners) rim[c] = 1;
+      ++result.elements, result.volume += elements.hexahedron(e).volume();
+    }
+  }
+  std::size_t kept = 0;
+  for (std::size_t e = 0; e < elements.size(); ++e)
+    if (!gone[e]) elements.elements[kept++] = elements.elements[e];
+  elements.elements.resize(kept);
+  return result;
+}
+
+}  // namespace forest::cortex
