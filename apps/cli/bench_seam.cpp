@@ -283,7 +283,7 @@ void run(const Options& options, Console& console) {
              {"quick_samples", quick.samples},
              {"disconnected", quick.drawn.disconnected},
              {"disconnected_cut", quick.of_cut.disconnected}};
-    if (!options.error) row["milliseconds"] = quick.milliseconds;
+    row["milliseconds"] = quick.milliseconds;
     const bool step = before && before->picture + 1 == picture;
     const double should = step ? frame::change(before->reference, now.reference) : 0.;
     if (step) row["change_reference"] = should, reference.change.offer(should, before->picture);
