@@ -76,10 +76,6 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, colouring, cut, width, height, lines);
   chooser_.complete(frame);
-  if (past_ && frame.subframes == 16) {
-    frame.past = 1;
-    frame.first_subframe = past_ * picture_++ % 16, frame.last_subframe = frame.first_subframe + past_;
-  }
   start = Clock::now();
   dressing_.put_on(frame, view, cut, eye, colouring, coloured, painter);
   drawn.cull += milliseconds_since(start);

@@ -50,8 +50,6 @@ class Artist {
   /// From now on these synapses are in the pictures, unless the view says otherwise.
   void show(scene::Synapses synapses) { dressing_.synapses.emplace(std::move(synapses)); }
   const scene::Skin& skin() const { return dressing_.skin; }
-  /// From now on each picture draws so many of its samples, 1 or 4, and takes the others from those before (frame::Frame::past).
-  void set_past(std::uint32_t samples) { past_ = samples; }
   /// ms that each picture stands for, for pictures that leave out steps.
   void set_window(double milliseconds) { window_ = milliseconds; }
   const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
@@ -65,7 +63,6 @@ class Artist {
   scene::Chooser chooser_;
   std::optional<scene::Playback> playback_;
   double window_ = 0.;
-  std::uint32_t past_ = 0, picture_ = 0;
   std::unique_ptr<render::Renderer> renderer_;
   Foveated foveated_;
   std::vector<frame::Overlay> outline_;

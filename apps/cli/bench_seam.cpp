@@ -38,7 +38,6 @@ struct Options {
   std::uint64_t seed = 1;
   std::string size = "640x360";
   bool causes = false;
-  std::uint32_t past = 0;
   Drawer drawer = Drawer::automatic;
   std::filesystem::path out;
 };
@@ -79,7 +78,6 @@ class Walk {
         connectedness_(artist_.forest()),
         budget_(options.budget),
         pictures_(std::max(2u, std::uint32_t(std::lround(options.seconds * options.rate)))) {
-    artist_.set_past(options.past);
     exact_->load(artist_.forest().geometry());
     reference_.load(artist_.forest().geometry());
   }
@@ -95,17 +93,11 @@ class Walk {
     Quick quick;
     quick.error = options_.error.value_or(budget_.error());
     quick.samples = options_.quick_samples.value_or(options_.error ? 16u : budget_.samples());
-    float thinnest = options_.error ? 0.f : budget_.thinnest();
-    if (options_.past) {
-      quick.error = options_.error.value_or(error_), quick.samples = 16;
-      thinnest = std::max(0.f, .25f * (quick.error - 1.f));
-    }
-    const scene::View view = view_at(picture, quick.error, quick.samples, options_.thinnest.value_or(thinnest));
+    const scene::View view = view_at(picture, quick.error, quick.samples,
+                                     options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
     budget_.took(quick.milliseconds);
-    error_ = std::clamp(error_ * float(std::sqrt(std::clamp(quick.milliseconds / options_.budget, .5, 16.))), .5f, 6.f);
-    cull_ += drawn.cull, draw_ += drawn.draw, resolve_ += drawn.resolve, ++count_;
     if (drawn.image.covered < .005)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
@@ -165,11 +157,6 @@ class Walk {
   scene::Budget budget_;
   std::uint32_t pictures_;
   double reference_seconds_ = 0.;
-  float error_ = 1.f;
-
- public:
-  double cull_ = 0., draw_ = 0., resolve_ = 0.;
-  int count_ = 0;
 };
 
 /// The pictures that are compared: all, or `count` in pairs of neighbours, spread evenly.
@@ -283,7 +270,7 @@ void run(const Options& options, Console& console) {
              {"quick_samples", quick.samples},
              {"disconnected", quick.drawn.disconnected},
              {"disconnected_cut", quick.of_cut.disconnected}};
-    row["milliseconds"] = quick.milliseconds;
+    if (!options.error) row["milliseconds"] = quick.milliseconds;
     const bool step = before && before->picture + 1 == picture;
     const double should = step ? frame::change(before->reference, now.reference) : 0.;
     if (step) row["change_reference"] = should, reference.change.offer(should, before->picture);
@@ -336,7 +323,6 @@ void run(const Options& options, Console& console) {
                {"samples", options.samples},
                {"reference_seconds", walk.reference_seconds() / double(chosen.size())},
                {"renderer", walk.renderer()},
-               {"cull", walk.cull_ / walk.count_}, {"draw", walk.draw_ / walk.count_}, {"resolve", walk.resolve_ / walk.count_},
                {"every", std::move(every)}});
   console.print(json);
 
@@ -371,7 +357,6 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
             "Pictures compared with the reference, in pairs of neighbours spread over the dolly; 0: all", 0,
             100'000);
   add_whole(command, "--samples", options->samples, "Samples a pixel of the reference", 1, 1024);
-  add_whole(command, "--past", options->past, "Samples a pixel drawn anew, the others from before; 0: all", 0, 4);
   must_be_whole(*command.add_option("--quick-samples", options->quick_samples,
                                     "Samples a pixel of the product, instead of what the budget says"),
                 1, 1024);

@@ -181,10 +181,6 @@ struct Frame : Lists {
   // A still picture may be drawn in parts, so that nobody waits for it: of its subframes only [first, last) are drawn,
   // and the image is the mean of all so far. The frames of the parts before must have shown the same.
   std::uint32_t first_subframe = 0, last_subframe = 1024;
-  // Moving pictures: those of one number other than 0 show the same things, each from its own camera, so that of the subframes that
-  // are not drawn in this one a renderer may show what it saw of them in those before, where this camera sees it; the image is the
-  // mean of all. 0: nothing counts but what is drawn now.
-  std::uint64_t past = 0;
   Style style;
   Palette palette = black_palette();
   Opacities opacities = opaque();

@@ -5,7 +5,6 @@
 
 #include "forest/core/parallel.h"
 #include "forest/frame/constants.h"
-#include "forest/render/cpu/past.h"
 #include "forest/render/cpu/resolve.h"
 #include "forest/render/cpu/splat.h"
 #include "forest/render/cpu/triangles.h"
@@ -27,7 +26,6 @@ struct CpuRenderer::State {
   cpu::Splatter splatter;
   cpu::SurfaceDrawer surfaces;
   frame::DepthMap seen;
-  cpu::Past past;
   cpu::Sums sums;
   frame::Image image;
 };
@@ -45,9 +43,8 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   s.picture.transparent = frame::transparent(f);
   const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
   frame::Timing timing;
-  const bool past = cpu::Past::serves(f);
   const std::uint32_t end = std::min(f.last_subframe, f.subframes),
-                      at_once = past ? end - f.first_subframe : frame::drawn_together(f.subframes);
+                      at_once = frame::drawn_together(f.subframes);
   for (std::uint32_t next = f.first_subframe; next < end;) {
     auto start = Clock::now();
     const std::uint32_t begin = next / at_once * at_once, until = std::min(begin + at_once, end);
@@ -55,8 +52,8 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
     next = until;
     frame::Constants& c = s.picture.constants;
     c = frame::constants_of(f, begin);
-    if (at_once > 1 || f.subframes == 1) c.centre_x = .5f * float(f.width), c.centre_y = .5f * float(f.height);
-    s.picture.spread = at_once > 1 ? .5f : 0.f;
+    c.centre_x = .5f * float(f.width), c.centre_y = .5f * float(f.height);
+    s.picture.spread = f.subframes > 1 ? .5f : 0.f;
     s.picture.to_camera << c.right_x, c.right_y, c.right_z, c.up_x, c.up_y, c.up_z, c.forward_x, c.forward_y,
         c.forward_z;
     s.picture.eye = {c.eye_x, c.eye_y, c.eye_z};
@@ -78,22 +75,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
     s.splatter.draw(s.picture, f.overlays, s.canvas);
     timing.draw += milliseconds_since(start);
     start = Clock::now();
-    if (past) {
-      s.past.take(s.canvas, f, begin);
-      timing.draw += milliseconds_since(start), start = Clock::now();
-      c.subframe = 0;
-      const cpu::Sampled all{s.canvas.width(), s.canvas.height(), int(cpu::Past::samples), (1u << cpu::Past::samples) - 1u,
-                             [&](std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys) {
-                               s.past.read_row(y, from, to, keys);
-                             }};
-      cpu::resolve(all, s.picture, f.palette, area, cpu::Past::samples, true, s.sums, s.image);
-    } else {
-      const cpu::Sampled drawn{s.canvas.width(), s.canvas.height(), s.canvas.samples(), s.canvas.wanted(),
-                               [&](std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys) {
-                                 s.canvas.read_row(y, from, to, keys);
-                               }};
-      cpu::resolve(drawn, s.picture, f.palette, area, until, until == end, s.sums, s.image);
-    }
+    cpu::resolve(s.canvas, s.picture, f.palette, area, until, until == end, s.sums, s.image);
     timing.resolve += milliseconds_since(start);
   }
   return timing;

@@ -150,7 +150,7 @@ struct Edges {
 
 // As draw_line in render/opengl/shaders/common.glsl.
 template <int S>
-[[gnu::always_inline]] inline void draw(const Picture& picture, const Samples<S>& samples, const Stroke& r,
+[[gnu::always_inline]] inline void draw(const Picture&, const Samples<S>& samples, const Stroke& r,
                                         auto& window) {
   const bool steep = r.steep;
   const Edges edges(window.square(), steep);
@@ -160,23 +160,13 @@ template <int S>
   const float nearest = r.nearest_code(),
               farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
   if constexpr (S == 1) {
-    // Of one sample of several: as of all of them, below.
-    const bool single = picture.constants.subframes == 1;
-    const float noise = fraction(r.rank * 7.f + golden * float(picture.constants.subframe % most_samples));
-    const auto shaded = [&](std::uint32_t key, std::int32_t across, float y) {
-      const float t = (float(across) - y) / half,
-                  shade = .5f + t * r.lit_side + std::sqrt(larger(1.f - t * t, 0.f)) * r.lit_front;
-      return (key & ~4095u) | payload_of(r.payload >> 5, shade, noise);
-    };
     for (std::int32_t x = begin; x < end; ++x) {
       const float steps = float(x - first), y = r.y + steps * slope;
       const std::int32_t low = clipped(std::ceil(y - half), edges.low, edges.high),
                          high = clipped(std::ceil(y + half), edges.low, edges.high);
       const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), r.payload);
-      for (std::int32_t across = low; across < high; ++across) {
-        const std::uint32_t its = single ? key : shaded(key, across, y);
-        steep ? window.put(across, x, {its}) : window.put(x, across, {its});
-      }
+      for (std::int32_t across = low; across < high; ++across)
+        steep ? window.put(across, x, {key}) : window.put(x, across, {key});
     }
   } else {
     const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;

@@ -261,11 +261,11 @@ struct Scratch {
 
 }  // namespace
 
-void resolve(const Sampled& canvas, const Picture& picture, const frame::Palette& palette,
+void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette& palette,
              const frame::Area& area, std::uint32_t so_far, bool last, Sums& sums, frame::Image& image) {
   const frame::Constants& c = picture.constants;
-  const std::int32_t width = canvas.width, height = canvas.height, samples = canvas.samples;
-  const std::uint32_t wanted = canvas.wanted;
+  const std::int32_t width = canvas.width(), height = canvas.height(), samples = canvas.samples();
+  const std::uint32_t wanted = canvas.wanted();
   const bool first = so_far <= std::uint32_t(std::popcount(wanted)), at_once = so_far == c.subframes && first;
   if (!at_once) sums.resize(std::size_t(width) * std::size_t(height) * 4);
   image.width = c.width, image.height = c.height;

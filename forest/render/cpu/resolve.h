@@ -2,8 +2,6 @@
 // From keys to colour: as render/opengl/shaders/resolve.glsl.
 #pragma once
 
-#include <functional>
-
 #include "forest/render/cpu/canvas.h"
 #include "forest/render/cpu/run.h"
 
@@ -13,22 +11,13 @@ namespace forest::render::cpu {
 /// come together.
 using Sums = std::vector<std::int32_t>;
 
-/// Where the samples of pixels are read.
-struct Sampled {
-  std::int32_t width, height;
-  int samples;           // of a pixel
-  std::uint32_t wanted;  // bit k: sample k counts
-  /// The keys of pixels of one row, sample by sample.
-  std::function<void(std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys)> read_row;
-};
-
 /// Adds the samples of the canvas to the sums of those before them, and after the last ones makes the image: palette × shade,
 /// a dark rim where something nearer stands beside (after eye-dome lighting, Boucheny 2009), fog, the mean over samples, sRGB.
 /// @param last  whether the image is wanted now
 /// @param area  the pixels that are wanted; those beside it stay as they are
 /// @param so_far  samples in the sums, with those of the canvas
 /// @param sums  used when a picture is not drawn at once
-void resolve(const Sampled& canvas, const Picture& picture, const frame::Palette& palette,
+void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette& palette,
              const frame::Area& area, std::uint32_t so_far, bool last, Sums& sums, frame::Image& image);
 
 }  // namespace forest::render::cpu

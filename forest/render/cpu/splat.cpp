@@ -354,7 +354,7 @@ void draw_squares(const Picture& picture, const Splatter::Sorted& sorted, Canvas
   };
   switch (canvas.samples()) {
     case 1:
-      return each(draw_1, Samples<1>(c.subframe, 1));
+      return each(draw_1, Samples<1>(c.subframe, c.subframes));
     case 4:
       return each(draw_4, Samples<4>(c.subframe, c.subframes));
     default:
