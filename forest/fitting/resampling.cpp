@@ -8,6 +8,7 @@
 #include <map>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <utility>
 #include <vector>
 
@@ -22,6 +23,9 @@ namespace forest::fitting {
 namespace {
 
 using Out = std::back_insert_iterator<std::string>;
+
+// Degrees between basal and other stems that count as much as a standard deviation of a style, where mates are chosen.
+constexpr double near_angle = 6.;
 
 // What is a tracer's habit rather than a neuron's.
 constexpr bool habit(std::size_t style) { return style == grain || style == slope || style == kink; }
@@ -261,6 +265,29 @@ class Writer {
     }
   }
 
+  // Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
+  // where there are not both.
+  static std::optional<double> angle_between(const Cell& others, const Cell& basal) {
+    std::vector<double> least;
+    for (const Stem& s : basal.stems)
+      for (bool first = s.kind == int(SectionKind::basal); const Stem& o : others.stems)
+        if (s.kind == int(SectionKind::basal) && o.kind != s.kind) {
+          const double angle =
+              std::atan2(double(s.place.cross(o.place).norm()), double(s.place.dot(o.place))) * 180. /
+              std::numbers::pi;
+          if (std::exchange(first, false))
+            least.push_back(angle);
+          else
+            least.back() = std::min(least.back(), angle);
+        }
+    return least.empty() ? std::nullopt : std::optional(statistics::mean(least));
+  }
+  // By how much that angle changes in a neuron when its basal stems are those of another, degrees.
+  static double widened(const Cell& neuron, const Cell& mate) {
+    const std::optional<double> was = angle_between(neuron, neuron), is = angle_between(neuron, mate);
+    return was && is ? *is - *was : 0.;
+  }
+
   // A permutation of the neurons that leaves none where it is: pairs change partners as long as this makes them more alike.
   std::vector<std::size_t> mates(auto&& apart) const {
     const std::size_t n = traced_.cells.size();
@@ -271,7 +298,7 @@ class Writer {
         if (const Cell& a = traced_.cells[i], &b = traced_.cells[j]; j != i)
           between[i * n + j] = std::ranges::all_of(a.stems, basal) && std::ranges::none_of(b.stems, basal)
                                    ? 1e6  // there would be no stem at all
-                                   : apart(a, b);
+                                   : apart(a, b) + std::pow(widened(a, b) / near_angle, 2);
     std::vector<std::size_t> mate(n);
     for (std::size_t i = 0; i < n; ++i) mate[i] = (i + 1) % n;
     for (bool better = true; std::exchange(better, false);)

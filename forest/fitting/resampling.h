@@ -11,7 +11,8 @@
 //   slice; daughters bear this together, so that a tuft stays over its trunk;
 // - a neuron has a style of its own, how long, winding, thick, finely and steeply traced its branches are, and forks of
 //   neurons of a like style are drawn for it: else neurons would be more alike than traced ones;
-// - where neurons have basal and other dendrites, the basal ones are those of another neuron alike, so that none is like one
+// - where neurons have basal and other dendrites, the basal ones are those of another neuron alike, whose stems leave as far from
+//   the others as its own did, so that none is like one
 //   traced neuron all over; but how a tracer sets points is the same in both.
 #pragma once
 

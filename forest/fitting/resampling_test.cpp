@@ -238,6 +238,33 @@ TEST(Resampling, BasalDendritesAreThoseOfAnotherNeuronAndEachOnesComeOnce) {
   EXPECT_EQ(basal, apical);
 }
 
+// Four neurons alike but for where their basal stems leave: of two beside the apical one, of two opposite to it.
+TEST(Resampling, BasalDendritesOfAnotherLeaveAsFarFromTheApicalOne) {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 4; ++i) {
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const auto add = [&](SectionKind kind, double angle) {
+      const auto at = [&](double way, double turn) {
+        return Point{float(way * std::sin(angle + turn)), float(way * std::cos(angle + turn)), float(i), .5f};
+      };
+      const double length = 30. + double((i * 7) % 4);  // of no two the same, and not by pairs
+      const SectionId root = builder.add_section({}, kind, std::array{at(5., 0.), at(length, 0.)});
+      for (const double side : {-.2, .3})
+        builder.add_section(root, kind, std::array{at(length, 0.), at(70., side)});
+    };
+    add(SectionKind::apical, 0.);
+    for (const double side : {-1., 1.}) add(SectionKind::basal, side * (i % 2 ? 2.8 : 1.3));
+    models.push_back(builder.build());
+  }
+  const lsystem::Grammar grammar =
+      lsystem::parse(resampling_grammar(models, "t", Resampling{.sway = 0.}), "t");
+  for (const Morphology& n : lsystem::grow_population(grammar, models.size(), 3)) {
+    EXPECT_NE(whose(n, SectionKind::apical), whose(n, SectionKind::basal));
+    EXPECT_EQ(whose(n, SectionKind::apical) % 2, whose(n, SectionKind::basal) % 2);
+  }
+}
+
 // Those of the same size are mates, who were traced by another; the points of both kinds are set as in one.
 TEST(Resampling, PointsAreAsFarApartInBasalAsInApicalDendrites) {
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(of_two_tracers(), "t"), "t");
