@@ -21,6 +21,13 @@ float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 
 }  // namespace
 
+Writing writing_in(const frame::Image& image, Background background) {
+  const bool dark = background == Background::dark;
+  return {{.height = std::max(7.f, std::round(float(image.height) / 80.f)),
+           .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)},
+          dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f)};
+}
+
 ColourBar bar_of(const ActivityView& activity, double time, const std::string& units) {
   return {.map = activity.map,
           .low = activity.low,
@@ -57,10 +64,8 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
 }
 
 bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background) {
-  const bool dark = background == Background::dark;
-  const Vec3 ground = dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f);
-  const float h = std::max(7.f, std::round(float(image.height) / 80.f));
-  const Lettering letters{.height = h, .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)};
+  const auto [letters, ground] = writing_in(image, background);
+  const float h = letters.height;
   float tall = 0.f;
   for (const ColourBar& bar : bars)
     tall += h * (margin + 2.f * padding + thick_of(bar) + line * float(lines_of(bar)));

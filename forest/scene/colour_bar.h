@@ -13,6 +13,13 @@
 
 namespace forest::scene {
 
+/// Letters as large as a picture allows, and the colour (sRGB 0–1) that lies behind them.
+struct Writing {
+  Lettering letters;
+  Vec3 ground;
+};
+Writing writing_in(const frame::Image& image, Background background);
+
 struct ColourBar {
   const ColourMap* map = &colour_maps().front();  // null: a dot of `mark` before the note instead of a bar
   Vec3 mark = Vec3::Ones();                       // sRGB 0–1

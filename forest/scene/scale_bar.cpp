@@ -7,7 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/round_numbers.h"
-#include "forest/scene/lettering.h"
+#include "forest/scene/colour_bar.h"
 
 namespace forest::scene {
 
@@ -21,20 +21,19 @@ ScaleBar scale_bar(const frame::Camera& camera, float height, float most) {
 bool paint_scale(frame::Image& image, const frame::Camera& camera, Background background) {
   // In heights of a letter, as colour bars have them.
   constexpr float margin = 1.6f, padding = 1.1f, most = 16.f;
-  const bool dark = background == Background::dark;
-  const float h = std::max(7.f, std::round(float(image.height) / 80.f));
+  const Writing writing = writing_in(image, background);
+  const float h = writing.letters.height;
   if (h * (most + 2.f * (margin + padding)) > .8f * float(image.width) || 12.f * h > float(image.height))
     return false;
   const ScaleBar bar = scale_bar(camera, float(image.height), h * most);
-  const Lettering letters{.height = h, .colour = dark ? Vec3(.89f, .91f, .94f) : Vec3(.13f, .16f, .20f)};
   const float left = h * (margin + padding), bottom = float(image.height) - h * (margin + padding);
-  const float wide = std::max(bar.length, letters.width(bar.label)), thick = std::max(1.5f, .18f * h);
+  const float wide = std::max(bar.length, writing.letters.width(bar.label)), thick = std::max(1.5f, .18f * h);
   const float tick = .35f * h;
-  const auto ink = [&](const Box& box) { fill(image, box, letters.colour); };
+  const auto ink = [&](const Box& box) { fill(image, box, writing.letters.colour); };
   fill(image,
        {left - h * padding, bottom - h * (2.2f + padding), left + wide + h * padding, bottom + h * padding},
-       dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f), .62f);
-  letters.write(image, bar.label, left, bottom - h * 1.f);
+       writing.ground, .62f);
+  writing.letters.write(image, bar.label, left, bottom - h);
   ink({left, bottom - thick, left + bar.length, bottom});
   for (const float end : {left, left + bar.length - thick})
     ink({end, bottom - thick - tick, end + thick, bottom + tick});
