@@ -1,4 +1,4 @@
-# forest_module([DEPENDS <module>...] [PRIVATE <target>...])
+# forest_module([VECTOR_LOOPS] [DEPENDS <module>...] [PRIVATE <target>...])
 #
 # A module is a folder of .h/.cpp pairs with their *_test.cpp beside them. From
 # the folder follow: library forest_<name> (alias forest::<name>), one test
@@ -12,25 +12,48 @@ if(FOREST_SANITIZE) # but not `vptr`: SOCI keeps its type information to itself
   add_link_options(-fsanitize=${FOREST_SANITIZE})
 endif()
 
+# Headers that nearly everything reads are compiled once for all libraries, and once for all tests. Sanitized builds do without those
+# of libraries, so that a file that forgets to include what it uses is found there.
+function(forest_precompiled name)
+  file(CONFIGURE OUTPUT ${name}.cpp CONTENT "// Its precompiled headers are all that is wanted of it.\n")
+  add_library(${name} OBJECT EXCLUDE_FROM_ALL ${CMAKE_CURRENT_BINARY_DIR}/${name}.cpp)
+  target_compile_features(${name} PRIVATE cxx_std_20)
+  target_include_directories(${name} SYSTEM PRIVATE ${EIGEN_INCLUDE_DIRS})
+  target_precompile_headers(${name} PRIVATE ${ARGN})
+endfunction()
+# For ccache; and GCC 12 warns falsely of std::vector when its headers come precompiled.
+set(FOREST_PRECOMPILED $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess> $<$<CXX_COMPILER_ID:GNU>:-Wno-stringop-overflow>)
+set(FOREST_TEST_OPTIONS ${FOREST_WARNINGS} ${FOREST_PRECOMPILED} -O1) # building them at -O3 takes longer than running them
+if(FOREST_SANITIZE) # what a test calls is looked at in full; the test itself for its memory alone, which is sooner built
+  list(APPEND FOREST_TEST_OPTIONS -fno-sanitize=undefined)
+endif()
+forest_precompiled(precompiled_tests <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core> <Eigen/Geometry>)
+target_compile_options(precompiled_tests PRIVATE ${FOREST_TEST_OPTIONS})
+target_compile_definitions(precompiled_tests PRIVATE FOREST_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
+target_link_libraries(precompiled_tests PRIVATE GTest::gtest GTest::gmock)
+# In rooms with VECTOR_LOOPS, loops are written so that the compiler makes vectors of them, one copy for each kind of processor
+# (forest/core/clones.h); without contraction, all of them and clang give the same bits.
+set(FOREST_VECTOR_LOOPS -fno-math-errno -fno-trapping-math -ffp-contract=off)
+if(NOT FOREST_SANITIZE)
+  foreach(name precompiled precompiled_vector_loops)
+    forest_precompiled(${name} <algorithm> <array> <cmath> <map> <optional> <span> <string> <vector> <Eigen/Core> <Eigen/Geometry>
+                       <fmt/format.h>)
+    target_compile_options(${name} PRIVATE ${FOREST_WARNINGS} ${FOREST_PRECOMPILED})
+    target_link_libraries(${name} PRIVATE fmt::fmt)
+  endforeach()
+  target_compile_options(precompiled_vector_loops PRIVATE ${FOREST_VECTOR_LOOPS})
+endif()
+
 # A test program that ctest runs, told where the project and the real data are.
 function(forest_test target)
   target_compile_definitions(${target} PRIVATE FOREST_SOURCE_DIR="${PROJECT_SOURCE_DIR}")
-  target_compile_options(${target} PRIVATE ${FOREST_WARNINGS} -O1) # building them at -O3 takes longer than running them
-  if(FOREST_SANITIZE) # what a test calls is looked at in full; the test itself for its memory alone, which is sooner built
-    target_compile_options(${target} PRIVATE -fno-sanitize=undefined)
-  endif()
+  target_compile_options(${target} PRIVATE ${FOREST_TEST_OPTIONS})
   target_link_libraries(${target} PRIVATE GTest::gtest_main GTest::gmock rapidcheck)
-  get_target_property(sources ${target} SOURCES)
-  list(LENGTH sources count)
-  if(count GREATER 5) # fewer are sooner without
-    target_precompile_headers(${target} PRIVATE <gmock/gmock.h> <gtest/gtest.h> <Eigen/Core>)
-    # For ccache; and GCC 12 warns falsely of std::vector when its headers come precompiled.
-    target_compile_options(${target} PRIVATE $<$<CXX_COMPILER_ID:GNU>:-fpch-preprocess -Wno-stringop-overflow>)
-  endif()
+  target_precompile_headers(${target} REUSE_FROM precompiled_tests)
 endfunction()
 
 function(forest_module)
-  cmake_parse_arguments(PARSE_ARGV 0 arg "" "" "DEPENDS;PRIVATE")
+  cmake_parse_arguments(PARSE_ARGV 0 arg "VECTOR_LOOPS" "" "DEPENDS;PRIVATE")
   file(RELATIVE_PATH name ${PROJECT_SOURCE_DIR}/forest ${CMAKE_CURRENT_SOURCE_DIR})
   string(REPLACE "/" "_" name ${name})
   string(REPLACE "/" "_" depends "${arg_DEPENDS}")
@@ -47,6 +70,15 @@ function(forest_module)
     set(scope PUBLIC)
     target_compile_options(forest_${name} PRIVATE ${FOREST_WARNINGS})
     target_link_libraries(forest_${name} PRIVATE ${arg_PRIVATE})
+    set(precompiled precompiled)
+    if(arg_VECTOR_LOOPS)
+      set(precompiled precompiled_vector_loops)
+      target_compile_options(forest_${name} PRIVATE ${FOREST_VECTOR_LOOPS})
+    endif()
+    if(TARGET ${precompiled} AND "fmt::fmt" IN_LIST arg_PRIVATE) # whose definitions it has
+      target_compile_options(forest_${name} PRIVATE ${FOREST_PRECOMPILED})
+      target_precompile_headers(forest_${name} REUSE_FROM ${precompiled})
+    endif()
   else()
     add_library(forest_${name} INTERFACE)
     set(scope INTERFACE)
