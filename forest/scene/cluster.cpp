@@ -602,31 +602,24 @@ std::vector<std::uint32_t> branch_numbers(const Morphology& m, std::span<const d
   return numbers;
 }
 
-}  // namespace
+// How the branches of a neuron are ordered, and how thick they are; of every section.
+struct Branches {
+  std::vector<std::uint32_t> numbers;
+  std::vector<std::uint32_t>
+      ranks;                 // the share of the neuron's length in branches of smaller number, in 256ths
+  std::vector<float> means;  // radius along the branch; never more than that of the branch it leaves
+};
 
-std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
-  return branch_numbers(m, sizes_of(m).lengths);
-}
-
-ClusterTree build_clusters(const Morphology& m) {
+Branches branches_of(const Morphology& m) {
   const std::size_t sections = m.sections().size();
-  const Point soma = m.soma().sphere();
-  Vec3 origin = soma.position();
-  if (m.soma().kind == SomaKind::none && !m.points().empty()) origin = m.points()[0].position();
-  const auto vertex = [&](const Point& p) {
-    return Vec4(p.x - origin.x(), p.y - origin.y(), p.z - origin.z(), p.radius);
-  };
-
-  ClusterTree tree;
-  tree.soma_radius = soma.radius;
-
-  // Ranks: the share of the neuron's length that lies in branches of smaller number.
   const Sizes sizes = sizes_of(m);
-  const std::vector<std::uint32_t> numbers = branch_numbers(m, sizes.lengths);
-  std::vector<double> lengths(sections + 1);
-  for (std::size_t i = 0; i < sections; ++i) lengths[numbers[i] + 1] += sizes.lengths[i];
-  std::vector<double> means(sections);  // of the radius along each branch
-  for (std::size_t i = 0; i < sections; ++i) means[numbers[i]] += sizes.areas[i] / (2. * std::numbers::pi);
+  Branches branches{branch_numbers(m, sizes.lengths), {}, {}};
+  const auto& numbers = branches.numbers;
+  std::vector<double> lengths(sections + 1), means(sections);  // of branches; lengths of all before
+  for (std::size_t i = 0; i < sections; ++i) {
+    lengths[numbers[i] + 1] += sizes.lengths[i];
+    means[numbers[i]] += sizes.areas[i] / (2. * std::numbers::pi);
+  }
   for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
   // A branch that is thicker than the one it leaves must not be seen without it.
   for (std::size_t i = 0; i < sections; ++i)
@@ -634,79 +627,108 @@ ClusterTree build_clusters(const Morphology& m) {
       means[numbers[i]] = std::min(means[numbers[i]], means[numbers[parent.value()]]);
   std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
   const double total = std::max(lengths.back(), 1e-9);
-  const auto rank_of = [&](std::size_t i) {
-    return std::uint32_t(std::min(255., 256. * lengths[numbers[i]] / total));
-  };
+  for (const std::uint32_t number : numbers) {
+    branches.ranks.push_back(std::uint32_t(std::min(255., 256. * lengths[number] / total)));
+    branches.means.push_back(float(means[number]));
+  }
+  return branches;
+}
 
-  // Depth first, the longest path first, so that a run of segments follows a branch; leaves are runs of at most `limit`
-  // segments, sections cut where a leaf is full. Node 0 is the soma, node s + 1 the end of section s; nodes beyond are
-  // where a section is cut.
-  Drawing drawing;
-  auto& drafts = drawing.drafts;
-  const std::size_t guess = m.points().size() + sections;
-  drawing.vertices.reserve(3 * guess), drawing.places.reserve(3 * guess),
-      drawing.strips.reserve(3 * sections);
-  std::uint32_t nodes = std::uint32_t(sections + 1);
-  std::size_t filled = limit;
+// The leaves: depth first, the longest path first, so that a run of segments follows a branch; runs of at most `limit` segments,
+// sections cut where a leaf is full. Node 0 is the soma, node s + 1 the end of section s; nodes beyond are where a section is
+// cut.
+class Leaves {
+ public:
+  Leaves(const Morphology& m, Drawing& drawing)
+      : m_(m),
+        drawing_(drawing),
+        soma_(m.soma().sphere()),
+        origin_(soma_.position()),
+        branches_(branches_of(m)),
+        ways_(m.sections().size()),
+        nodes_(std::uint32_t(m.sections().size() + 1)) {
+    if (m.soma().kind == SomaKind::none && !m.points().empty()) origin_ = m.points()[0].position();
+    const std::size_t guess = m.points().size() + m.sections().size();
+    drawing.vertices.reserve(3 * guess), drawing.places.reserve(3 * guess);
+    drawing.strips.reserve(3 * m.sections().size());
+    add_soma();
+    std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
+    while (!open.empty()) {
+      const SectionId id = open.back();
+      open.pop_back();
+      if (!m.section(id).parent.valid()) add_stem(vertex(m.points(id).front()));
+      add_section(id);
+      const auto next = m.children(id);
+      open.insert(open.end(), next.begin(), next.end());
+      std::sort(open.end() - std::ptrdiff_t(next.size()), open.end(), [&](SectionId a, SectionId b) {
+        return branches_.numbers[a.value()] > branches_.numbers[b.value()];
+      });
+    }
+  }
+
+  std::uint32_t nodes() const { return nodes_; }
+  std::uint32_t segments() const { return segments_; }
+  std::vector<float> ways() && { return std::move(ways_); }  // along the points of each section
+
+ private:
+  Vec4 vertex(const Point& p) const {
+    return {p.x - origin_.x(), p.y - origin_.y(), p.z - origin_.z(), p.radius};
+  }
+  std::uint32_t here() const { return std::uint32_t(drawing_.vertices.size()); }
+  void put(const Vec4& v) {
+    drawing_.vertices.push_back(v);
+    drawing_.places.emplace_back();
+  }
+
   // The strip runs over the last vertices of the drawing, from `run.first` on.
-  const auto add = [&](Strip run) {
-    const auto last = std::uint32_t(drawing.vertices.size() - 1);
-    const std::uint32_t end = run.end;
+  void add(Strip run) {
+    auto& drafts = drawing_.drafts;
+    const std::uint32_t last = here() - 1, end = run.end;
     while (run.first < last) {
-      if (filled == limit) {
-        drafts.push_back({.first_strip = std::uint32_t(drawing.strips.size()),
-                          .sphere = {},
-                          .leaf_first = tree.original_count});
-        filled = 0;
+      if (filled_ == limit) {
+        drafts.push_back(
+            {.first_strip = std::uint32_t(drawing_.strips.size()), .sphere = {}, .leaf_first = segments_});
+        filled_ = 0;
       }
-      const auto take = std::min(std::uint32_t(limit - filled), last - run.first);
+      const auto take = std::min(std::uint32_t(limit - filled_), last - run.first);
       run.count = take + 1;
-      run.end = run.first + take == last ? end : nodes++;
-      drawing.strips.push_back(run);
+      run.end = run.first + take == last ? end : nodes_++;
+      drawing_.strips.push_back(run);
       ++drafts.back().strip_count;
       drafts.back().leaf_count += take;
-      tree.original_count += take;
-      filled += take;
+      segments_ += take;
+      filled_ += take;
       run.first += take;
       run.begin = run.end;
     }
-  };
-  const auto put = [&](const Vec4& v, const reports::Place& place) {
-    drawing.vertices.push_back(v);
-    drawing.places.emplace_back(place);
-  };
-  const auto here = [&] { return std::uint32_t(drawing.vertices.size()); };
-  if (soma.radius > 0.f) {
-    const Vec4 centre(soma.x - origin.x(), soma.y - origin.y(), soma.z - origin.z(), soma.radius);
-    put(centre, {}), put(centre, {});
+  }
+
+  void add_soma() {
+    if (!(soma_.radius > 0.f)) return;
+    put(vertex(soma_)), put(vertex(soma_));
     add({.first = 0, .kind = 1});
   }
-  std::vector<SectionId> open(m.roots().rbegin(), m.roots().rend());
-  std::vector<float> ways(sections);  // along the points of each section
-  while (!open.empty()) {
-    const SectionId id = open.back();
-    open.pop_back();
-    const auto points = m.points(id);
-    const Section& section = m.section(id);
-    const Vec4 first = vertex(points.front());
-    if (const float gap = first.head<3>().norm();
-        !section.parent.valid() && soma.radius > 0.f && gap < 6.f * soma.radius) {
-      // A cone from inside the soma to the stem, when it begins near enough to belong there.
-      const float inside = .3f * soma.radius;
-      const Vec3 direction = first.head<3>() / gap;
-      const float width = std::clamp(2.2f * first.w(), .2f * soma.radius, .75f * soma.radius);
-      Vec4 start;
-      start << direction * inside, width;
-      if (gap > inside) {
-        const std::uint32_t at = here();
-        put(start, {}), put(first, {});
-        add({.first = at, .kind = 1});
-      }
-    }
+
+  // A cone from inside the soma to where a stem begins, when that is near enough to belong there.
+  void add_stem(const Vec4& first) {
+    const float gap = first.head<3>().norm(), inside = .3f * soma_.radius;
+    if (!(soma_.radius > 0.f && gap < 6.f * soma_.radius && gap > inside)) return;
+    Vec4 start;
+    start << first.head<3>() / gap * inside,
+        std::clamp(2.2f * first.w(), .2f * soma_.radius, .75f * soma_.radius);
+    const std::uint32_t at = here();
+    put(start), put(first);
+    add({.first = at, .kind = 1});
+  }
+
+  void add_section(SectionId id) {
+    const auto points = m_.points(id);
+    if (points.size() < 2) return;
+    const Section& section = m_.section(id);
     const std::uint32_t begin = here();
-    drawing.vertices.resize(begin + points.size()), drawing.places.resize(begin + points.size());
-    const auto vertices = std::span(drawing.vertices).subspan(begin);
-    const auto places = std::span(drawing.places).subspan(begin);
+    drawing_.vertices.resize(begin + points.size()), drawing_.places.resize(begin + points.size());
+    const auto vertices = std::span(drawing_.vertices).subspan(begin);
+    const auto places = std::span(drawing_.places).subspan(begin);
     float way = 0.f;
     for (std::size_t i = 0; i < points.size(); ++i) {
       vertices[i] = vertex(points[i]);
@@ -714,84 +736,97 @@ ClusterTree build_clusters(const Morphology& m) {
       places[i] = {id.value(), way};
     }
     for (reports::Place& place : places) place.position = way > 0.f ? place.position / way : .5f;
-    ways[id.value()] = way;
-    if (points.size() >= 2)
-      add({.first = begin,
-           .kind = std::uint32_t(section.kind),
-           .rank = rank_of(id.value()),
-           .mean = float(means[numbers[id.value()]]),
-           .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
-           .end = id.value() + 1});
-    else
-      drawing.vertices.pop_back(), drawing.places.pop_back();
-    const auto next = m.children(id);
-    open.insert(open.end(), next.begin(), next.end());
-    std::sort(open.end() - std::ptrdiff_t(next.size()), open.end(),
-              [&](SectionId a, SectionId b) { return numbers[a.value()] > numbers[b.value()]; });
+    ways_[id.value()] = way;
+    add({.first = begin,
+         .kind = std::uint32_t(section.kind),
+         .rank = branches_.ranks[id.value()],
+         .mean = branches_.means[id.value()],
+         .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
+         .end = id.value() + 1});
   }
-  if (drafts.empty()) return tree;
 
-  // Which leaves touch each node, from the first to the last of them.
-  constexpr std::uint32_t nowhere = 0xffffffffu;
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> touching(nodes, {nowhere, 0});
-  for (std::uint32_t i = 0; i < drafts.size(); ++i) {
-    Draft& d = drafts[i];
+  const Morphology& m_;
+  Drawing& drawing_;
+  Point soma_;
+  Vec3 origin_;
+  Branches branches_;
+  std::vector<float> ways_;
+  std::uint32_t nodes_, segments_ = 0;
+  std::size_t filled_ = limit;  // segments of the last leaf
+};
+
+// From the first to the last leaf that touches a node.
+struct Touching {
+  std::uint32_t first = 0xffffffffu, last = 0;
+};
+
+// Finds the spheres of the leaves, and which of them touch each node.
+std::vector<Touching> surround(Drawing& drawing, std::uint32_t nodes) {
+  std::vector<Touching> touching(nodes);
+  for (std::uint32_t i = 0; i < drawing.drafts.size(); ++i) {
+    Draft& d = drawing.drafts[i];
     d.first_leaf = i, d.last_leaf = i + 1;
     d.sphere = around(drawing.vertices_of(d, d));
     for (const Strip& s : drawing.strips_of(d))
       for (const std::uint32_t node : {s.begin, s.end})
-        touching[node] = {std::min(touching[node].first, i), std::max(touching[node].second, i)};
+        touching[node] = {std::min(touching[node].first, i), std::max(touching[node].last, i)};
   }
+  return touching;
+}
 
-  // Merge neighbours in pairs, level by level.
+// Merges neighbours in pairs, level by level, until one is left.
+void merge(Drawing& drawing, std::uint32_t nodes) {
+  auto& drafts = drawing.drafts;
+  const std::vector<Touching> touching = surround(drawing, nodes);
   std::vector<std::uint8_t> numbers_in_sketch(nodes, Sketch::unnumbered);
+  const auto merged = [&](std::uint32_t left, std::uint32_t right) {
+    const Draft &a = drafts[left], &b = drafts[right];
+    const auto outside = [&](std::uint32_t node) {  // nothing is joined through the soma
+      return node == 0 || touching[node].first < a.first_leaf || touching[node].last >= b.last_leaf;
+    };
+    Sketch sketch(drawing, a, b, outside, numbers_in_sketch);
+    float error = std::max(a.error, b.error);
+    if (sketch.segment_count() > limit) sketch.coarsen(std::max(first_tolerance, .5f * error));
+    error = sketch.measured_error(drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]), error);
+    Draft parent{.sphere = around(a.sphere, b.sphere),
+                 .error = error,
+                 .leaf_first = a.leaf_first,
+                 .leaf_count = a.leaf_count + b.leaf_count,
+                 .first_leaf = a.first_leaf,
+                 .last_leaf = b.last_leaf,
+                 .children = {left, right}};
+    sketch.write(drawing, parent);
+    return parent;
+  };
   std::vector<std::uint32_t> level(drafts.size());
   std::iota(level.begin(), level.end(), 0u);
   while (level.size() > 1) {
     std::vector<std::uint32_t> above;
-    for (std::size_t i = 0; i < level.size(); i += 2) {
-      if (i + 1 == level.size()) {
-        above.push_back(level[i]);
-        continue;
-      }
-      const Draft &a = drafts[level[i]], &b = drafts[level[i + 1]];
-      const auto outside = [&](std::uint32_t node) {  // nothing is joined through the soma
-        return node == 0 || touching[node].first < a.first_leaf || touching[node].second >= b.last_leaf;
-      };
-      Sketch sketch(drawing, a, b, outside, numbers_in_sketch);
-      float error = std::max(a.error, b.error);
-      if (sketch.segment_count() > limit) sketch.coarsen(std::max(first_tolerance, .5f * error));
-      error =
-          sketch.measured_error(drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]), error);
-      Draft parent{.sphere = around(a.sphere, b.sphere),
-                   .error = error,
-                   .leaf_first = a.leaf_first,
-                   .leaf_count = a.leaf_count + b.leaf_count,
-                   .first_leaf = a.first_leaf,
-                   .last_leaf = b.last_leaf,
-                   .children = {level[i], level[i + 1]}};
-      sketch.write(drawing, parent);
+    for (std::size_t i = 0; i + 1 < level.size(); i += 2) {
       above.push_back(std::uint32_t(drafts.size()));
-      drafts.push_back(parent);
+      drafts.push_back(merged(level[i], level[i + 1]));
     }
+    if (level.size() % 2) above.push_back(level.back());
     level = std::move(above);
   }
+}
 
-  // Out: leaf segments first and in order, then the coarser ones; clusters root first.
-  const Middle middle{m.sections(), std::move(ways)};
+// As the forest file has them: leaf segments first and in order, then the coarser ones; clusters root first.
+void write(const Drawing& drawing, const Middle& middle, ClusterTree& tree) {
+  const auto& drafts = drawing.drafts;
+  const std::size_t count = drafts.size();
   std::size_t segments = 0;
   for (const Draft& d : drafts) segments += drawing.segment_count(d);
   tree.segments.reserve(segments), tree.places.resize(segments);
-  std::vector<Drawn> drawn(drafts.size());
-  std::vector<std::uint32_t> first(drafts.size());
-  for (std::size_t i = 0; i < drafts.size(); ++i) {
+  std::vector<Drawn> drawn(count);
+  std::vector<std::uint32_t> first(count);
+  for (std::size_t i = 0; i < count; ++i) {
     first[i] = std::uint32_t(tree.segments.size());
     drawn[i] = emit(drawing, drafts[i], middle, tree);
   }
   tree.section.reserve(tree.original_count);
-  tree.clusters.reserve(drafts.size());
   for (std::uint32_t i = 0; i < tree.original_count; ++i) tree.section.push_back(tree.places[i].section);
-  const std::size_t count = drafts.size();
+  tree.clusters.reserve(count);
   const auto index = [&](std::int64_t draft) {
     return draft < 0 ? 0u : std::uint32_t(count - 1 - std::size_t(draft));
   };
@@ -814,6 +849,23 @@ ClusterTree build_clusters(const Morphology& m) {
     std::ranges::copy(drawn[i].visible, c.visible);
     tree.clusters.push_back(c);
   }
+}
+
+}  // namespace
+
+std::vector<std::uint32_t> branch_numbers(const Morphology& m) {
+  return branch_numbers(m, sizes_of(m).lengths);
+}
+
+ClusterTree build_clusters(const Morphology& m) {
+  Drawing drawing;
+  Leaves leaves(m, drawing);
+  ClusterTree tree;
+  tree.soma_radius = m.soma().sphere().radius;
+  tree.original_count = leaves.segments();
+  if (drawing.drafts.empty()) return tree;
+  merge(drawing, leaves.nodes());
+  write(drawing, {m.sections(), std::move(leaves).ways()}, tree);
   return tree;
 }
 

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/cut.h"
 
+#include <map>
 #include <set>
 
 #include <gtest/gtest.h>
@@ -57,12 +58,13 @@ TEST(Eye, TheGazeIsSharpAndTheRestGrowsWithEccentricity) {
   EXPECT_GT(before, 2.f * detail.error);
 }
 
-// A scene of which a picture of one sample takes so long, of many five times as long, and less with a larger error; how often
-// the number of samples changes.
+// A scene of which a picture of one sample takes so long, of four twice and of sixteen five times as long, and less with a larger
+// error; how often the number of samples changes.
 std::uint32_t watch(Budget& budget, double milliseconds, int pictures) {
+  const std::map<std::uint32_t, double> longer{{1, 1.}, {4, 2.}, {16, 5.}};
   std::uint32_t changes = 0, before = budget.samples();
   for (int i = 0; i < pictures; ++i) {
-    budget.took(milliseconds * (budget.samples() > 1 ? 5. : 1.) / double(budget.error()));
+    budget.took(milliseconds * longer.at(budget.samples()) / double(budget.error()));
     changes += budget.samples() != before, before = budget.samples();
   }
   return changes;
@@ -92,8 +94,23 @@ TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   EXPECT_NEAR(budget.error(), 2.f, .1f);
   EXPECT_NEAR(budget.thinnest(), .25f, .05f);
   EXPECT_EQ(watch(budget, 40., 60), 1u);
+  EXPECT_EQ(budget.samples(), 4u);
+  EXPECT_NEAR(budget.error(), 1.6f, .1f);
+  EXPECT_EQ(watch(budget, 20., 60), 0u);  // sixteen would take too long again
+  EXPECT_EQ(watch(budget, 150., 60), 1u);
   EXPECT_EQ(budget.samples(), 1u);
-  EXPECT_EQ(watch(budget, 20., 60), 0u);  // many would take too long again
+  EXPECT_NEAR(budget.error(), 3.f, .1f);
+}
+
+// What was tried in vain is not given up for good.
+TEST(Budget, AQuickSceneHasItsSamplesAfterAnyNumberOfSlowOnes) {
+  Budget budget(50.);
+  for (int i = 0; i < 20; ++i) {
+    watch(budget, 4., 3000);
+    EXPECT_EQ(budget.samples(), 16u) << i;
+    watch(budget, 300., 60);
+    EXPECT_EQ(budget.samples(), 1u) << i;
+  }
 }
 
 // Beside the forest there is time for anything, and a second later there is none.

@@ -87,28 +87,59 @@ float Eye::acceptable(const Seen& seen) const {
   return detail_.error * std::max(1.f, gaze_.resolved(eccentricity, detail_));
 }
 
-// Pixels of error that many samples are drawn with at most.
-static float most_of_many(float worst) { return std::min(3.f, worst); }
+namespace {
+
+/// What a budget may choose, and where it begins when it comes to it.
+struct Step {
+  std::uint32_t samples;         // of a pixel
+  float finest, coarsest;        // acceptable error, pixels
+  float from_below, from_above;  // the error that takes about as long as the step left
+  double longer;  // times what a picture at the finest error takes: one of the next step as it begins
+};
+// Most time goes to segments and not to samples, so that four samples at an error of five pixels take little more than one at
+// one, and are as much like the truth (docs/scene/seam.md); so are sixteen at three and four at two.
+constexpr std::array<Step, 3> steps{
+    {{1, 1.f, 6.f, 1.f, 1.f, 1.4}, {4, .5f, 5.f, 4.f, 2.f, 1.3}, {16, .5f, 3.f, 1.f, 1.f, 1.}}};
+
+}  // namespace
+
+std::uint32_t Budget::samples() const { return steps[step_].samples; }
+
+// The highest step for which a picture of the present one at its finest leaves time.
+std::size_t Budget::upwards(double milliseconds) const {
+  std::size_t to = step_;
+  for (std::size_t i = step_; i < doubt_.size(); ++i) {
+    milliseconds *= steps[i].longer * doubt_[i];
+    if (milliseconds < milliseconds_) to = i + 1;
+  }
+  return to;
+}
 
 void Budget::took(double milliseconds) {
-  // Many samples at their largest error still show more than one at its smallest, in about twice the time. Changing back and
-  // forth would be seen, so several pictures must agree, for more samples those of a second and a half: a gaze that jumps
-  // rests beside the forest for less. What was in vain is not tried again so soon.
-  constexpr std::uint32_t many = 16, several = 3;
+  // Changing back and forth would be seen, so several pictures must agree, for more samples those of a second and a half: a gaze
+  // that jumps rests beside the forest for less. What was left again soon was tried in vain, and is not tried again so soon;
+  // that is forgotten in a minute.
+  constexpr std::uint32_t several = 3;
   constexpr double long_enough = 1500.;  // milliseconds
-  const bool one = samples_ == 1;
-  const float least = one ? 1.f : .5f, most = one ? worst_ : most_of_many(worst_);
-  const bool other = one ? error_ <= least && longer_ * milliseconds < milliseconds_
-                         : error_ >= most && milliseconds > 1.1 * milliseconds_;
-  agreed_ = other ? agreed_ + 1 : 0;
-  if (agreed_ >= several && (!one || agreed_ * milliseconds_ >= long_enough)) {
-    if (!one) longer_ *= 2.;
-    samples_ = one ? many : 1, error_ = one ? most_of_many(worst_) : 1.f, agreed_ = 0;
+  constexpr double most_doubt = 8., fading = .999;
+  for (double& doubt : doubt_) doubt = std::max(1., fading * doubt);
+  ++since_;
+  const Step& now = steps[step_];
+  const bool too_long = step_ > 0 && error_ >= now.coarsest && milliseconds > 1.1 * milliseconds_;
+  const std::size_t above = error_ <= now.finest ? upwards(milliseconds) : step_;
+  agreed_ = too_long || above > step_ ? agreed_ + 1 : 0;
+  if (agreed_ >= several && too_long) {
+    --step_, error_ = steps[step_].from_above, agreed_ = 0;
+    if (since_ * milliseconds_ < long_enough) doubt_[step_] = std::min(2. * doubt_[step_], most_doubt);
+    return;
+  }
+  if (agreed_ >= several && agreed_ * milliseconds_ >= long_enough) {
+    step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
     return;
   }
   const double ratio =
       std::clamp(milliseconds / milliseconds_, .5, 16.);  // the first picture of a large forest may take long
-  error_ = std::clamp(error_ * float(std::sqrt(ratio)), least, most);
+  error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);
 }
 
 }  // namespace forest::scene

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <optional>
 
@@ -128,9 +129,8 @@ class Eye {
   float most_acceptable_;  // error anywhere in what is wanted, pixels
 };
 
-/// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as stills have
-/// where there is time for them, else one; and the acceptable error, which pictures that took too long make larger and quick
-/// ones smaller.
+/// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as there is time for,
+/// and within them the acceptable error, which pictures that took too long make larger and quick ones smaller.
 class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
@@ -138,22 +138,23 @@ class Budget {
   /// The same for pictures that follow a gaze: sixty a second.
   static constexpr double with_gaze = 15.5;
 
-  /// @param worst  error that is accepted at most, pixels
-  explicit Budget(double milliseconds = usual, float worst = 6.f)
-      : milliseconds_(milliseconds), worst_(worst) {}
-  std::uint32_t samples() const { return samples_; }
+  explicit Budget(double milliseconds = usual) : milliseconds_(milliseconds) {}
+  std::uint32_t samples() const;
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.
-  float thinnest() const { return samples_ == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
+  float thinnest() const { return step_ == 0 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
   /// To be told of every picture that was drawn so.
   void took(double milliseconds);
 
  private:
+  std::size_t upwards(double milliseconds) const;
+
   double milliseconds_;
-  double longer_ =
-      1.8;  // times the one sample's that many are taken to need; more where they were tried in vain
-  float worst_, error_ = 1.f;
-  std::uint32_t samples_ = 1, agreed_ = 0;  // pictures that have asked for the other number of samples
+  std::size_t step_ = 0;  // 0: one sample
+  float error_ = 1.f;
+  std::array<double, 2> doubt_{1., 1.};  // of each step but the last: the next was tried in vain
+  std::uint32_t agreed_ = 0;             // pictures that have asked for another step
+  std::uint32_t since_ = 0;              // pictures since the step was gone up to
 };
 
 }  // namespace forest::scene
