@@ -51,6 +51,25 @@ circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
 
 }  // namespace
 
+namespace {
+
+constexpr const char* again = "; pack the circuit again";
+
+// What a file is refused with.
+struct Refuse {
+  const std::string& name;  // of the file
+
+  void unless(bool good, const char* sentence) const {
+    if (!good) throw InputError(name, 0, std::string(sentence) + again);
+  }
+  // A right checksum over wrong numbers is possible: every index is looked at before it is used.
+  void unless(bool good) const { unless(good, "names things that are not in it"); }
+};
+
+bool within(std::uint64_t first, std::uint64_t count, std::size_t size) { return first + count <= size; }
+
+}  // namespace
+
 struct Forest::Data {
   std::optional<MappedFile> file;
   std::vector<std::byte> memory;
@@ -66,6 +85,19 @@ struct Forest::Data {
   std::span<const T> as(Part part) const {
     return {reinterpret_cast<const T*>(parts[part].data()), parts[part].size() / sizeof(T)};
   }
+  std::size_t original_and_coarser() const {
+    return as<reports::Place>(Part::places).size();
+  }  // segments, straws aside
+
+  // Each throws InputError when the file is not what it should be; in this order.
+  void find_parts(std::span<const std::byte> bytes, const Refuse& refuse);
+  void read_description(const Refuse& refuse);
+  void read_attributes(const Refuse& refuse);
+  void check_clusters(const Refuse& refuse) const;
+  void check_neurons(const Refuse& refuse) const;
+  void check_bricks(const Refuse& refuse) const;
+  void take_instances(const Refuse& refuse);
+  void number_nodes(const Refuse& refuse);
 };
 
 std::span<const frame::Segment> Forest::segments() const { return data_->as<frame::Segment>(Part::segments); }
@@ -109,163 +141,195 @@ Forest Forest::from_bytes(std::vector<std::byte> memory, const std::string& name
 }
 
 Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> bytes, const std::string& name) {
-  const auto require = [&](bool good, const std::string& sentence) {
-    if (!good) throw InputError(name, 0, sentence);
-  };
-  const std::string again = "; pack the circuit again";
+  const Refuse refuse{name};
+  data->find_parts(bytes, refuse);
+  data->read_description(refuse);
+  data->read_attributes(refuse);
+  data->check_clusters(refuse);
+  data->check_neurons(refuse);
+  data->check_bricks(refuse);
+  data->take_instances(refuse);
+  data->number_nodes(refuse);
+  return Forest(std::move(data));
+}
+
+void Forest::Data::find_parts(std::span<const std::byte> whole, const Refuse& refuse) {
   Header header{};
   constexpr std::size_t shorter = sizeof header - sizeof(Entry);
-  require(bytes.size() >= shorter, "is too short to be a forest file" + again);
-  std::memcpy(&header, bytes.data(), std::min(sizeof header, bytes.size()));
-  require(header.magic == magic, "is not a forest file; make one with 'brainforest pack'");
+  refuse.unless(whole.size() >= shorter, "is too short to be a forest file");
+  std::memcpy(&header, whole.data(), std::min(sizeof header, whole.size()));
+  if (header.magic != magic)
+    throw InputError(refuse.name, 0, "is not a forest file; make one with 'brainforest pack'");
   const bool older = header.version == without_attributes && header.parts == part_count - 1;
-  require(older || (header.version == version && header.parts == part_count),
-          fmt::format("has version {} of the forest file and this program reads version {}", header.version,
-                      version) +
-              again);
-  require(header.file_size == bytes.size(),
-          fmt::format("is cut short or has grown: {} bytes instead of {}", bytes.size(), header.file_size) +
-              again);
+  if (!older && (header.version != version || header.parts != part_count))
+    throw InputError(refuse.name, 0,
+                     fmt::format("has version {} of the forest file and this program reads version {}{}",
+                                 header.version, version, again));
+  if (header.file_size != whole.size())
+    throw InputError(refuse.name, 0,
+                     fmt::format("is cut short or has grown: {} bytes instead of {}{}", whole.size(),
+                                 header.file_size, again));
   const auto table = std::span(header.table).first(header.parts);
-  require(bytes.size() >= (older ? shorter : sizeof header) &&
-              hash64(std::as_bytes(table), header.file_size) == header.table_hash,
-          "has a damaged table of contents" + again);
-  std::uint64_t end =
-      older ? shorter
-            : sizeof header;  // of what has been looked at; gaps hold zeros, so that no byte goes unchecked
+  refuse.unless(whole.size() >= (older ? shorter : sizeof header) &&
+                    hash64(std::as_bytes(table), header.file_size) == header.table_hash,
+                "has a damaged table of contents");
+  // Up to where it has been looked at; gaps hold zeros, so that no byte goes unchecked.
+  std::uint64_t end = older ? shorter : sizeof header;
   for (std::uint32_t p = 0; p < header.parts; ++p) {
     const Entry& e = header.table[p];
-    require(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
-                e.offset <= bytes.size() && e.count <= (bytes.size() - e.offset) / e.element_size,
-            "has a wrong table of contents" + again);
-    require(e.offset >= end && e.offset - end < alignment &&
-                std::ranges::all_of(bytes.subspan(end, e.offset - end),
-                                    [](std::byte b) { return b == std::byte{0}; }),
-            "is damaged between its parts" + again);
+    refuse.unless(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
+                      e.offset <= whole.size() && e.count <= (whole.size() - e.offset) / e.element_size,
+                  "has a wrong table of contents");
+    refuse.unless(e.offset >= end && e.offset - end < alignment &&
+                      std::ranges::all_of(whole.subspan(end, e.offset - end),
+                                          [](std::byte b) { return b == std::byte{0}; }),
+                  "is damaged between its parts");
     end = e.offset + e.count * e.element_size;
-    data->parts[p] = bytes.subspan(e.offset, e.count * e.element_size);
-    require(block_hash(data->parts[p]) == e.hash,
-            fmt::format("is damaged: part {} does not match its checksum", p) + again);
+    parts[p] = whole.subspan(e.offset, e.count * e.element_size);
+    if (block_hash(parts[p]) != e.hash)
+      throw InputError(refuse.name, 0,
+                       fmt::format("is damaged: part {} does not match its checksum{}", p, again));
   }
-  // A right checksum over wrong numbers is possible too: every index is looked at before it is used.
-  const std::string wrong = "names things that are not in it" + again;
-  const auto within = [](std::uint64_t first, std::uint64_t count, std::size_t size) {
-    return first + count <= size;
-  };
-  const Forest f(data);
+  bytes = whole.size();
+}
+
+void Forest::Data::read_description(const Refuse& refuse) {
+  const auto text = parts[Part::text];
   try {
-    const auto text = data->parts[Part::text];
-    data->circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()}, data->nodes);
+    circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()}, nodes);
   } catch (const nlohmann::json::exception&) {
-    throw InputError(name, 0, "has a damaged description" + again);
+    refuse.unless(false, "has a damaged description");
   }
-  require(f.neurons().size() == data->circuit.morphologies.size() &&
-              f.places().size() + f.owners().size() == f.segments().size() &&
-              f.types().size() == f.instances().size() && f.layers().size() == f.instances().size(),
-          wrong);
-  std::span<const std::byte> told = data->parts[Part::attributes];
-  const auto take = [&](void* to, std::size_t size) {
-    require(size <= told.size(), wrong);
-    if (size) std::memcpy(to, told.data(), size);
-    told = told.subspan(size);
+  const std::size_t instances = as<frame::Instance>(Part::instances).size();
+  refuse.unless(as<Neuron>(Part::neurons).size() == circuit.morphologies.size() &&
+                original_and_coarser() + as<frame::Owner>(Part::owners).size() ==
+                    as<frame::Segment>(Part::segments).size() &&
+                as<std::uint32_t>(Part::types).size() == instances &&
+                as<std::uint32_t>(Part::layers).size() == instances);
+}
+
+void Forest::Data::read_attributes(const Refuse& refuse) {
+  std::span<const std::byte> told = parts[Part::attributes];
+  const std::size_t count = as<frame::Instance>(Part::instances).size();
+  const auto take = [&](auto& to) {
+    refuse.unless(count <= told.size() / sizeof to[0]);
+    to.resize(count);
+    if (count) std::memcpy(to.data(), told.data(), count * sizeof to[0]);
+    told = told.subspan(count * sizeof to[0]);
   };
-  for (auto& [name_of, of] : data->nodes.attributes) {
-    const std::size_t count = f.instances().size();
-    require(count <= told.size() / 4, wrong);
+  for (auto& [name, of] : nodes.attributes) {
     if (of.words.empty()) {
-      of.numbers.resize(count);
-      take(of.numbers.data(), count * sizeof of.numbers[0]);
-    } else {
-      of.index.resize(count);
-      take(of.index.data(), count * sizeof of.index[0]);
-      for (const std::uint32_t i : of.index)
-        require(i == circuit::Attribute::unknown || i < of.words.size(), wrong);
+      take(of.numbers);
+      continue;
     }
+    take(of.index);
+    for (const std::uint32_t i : of.index)
+      refuse.unless(i == circuit::Attribute::unknown || i < of.words.size());
   }
-  require(told.empty(), wrong);
-  const auto clusters = f.clusters();
+  refuse.unless(told.empty());
+}
+
+void Forest::Data::check_clusters(const Refuse& refuse) const {
+  const auto clusters = as<Cluster>(Part::clusters);
+  const std::size_t segments = original_and_coarser();
   parallel_for(clusters.size(), 1024, [&](std::size_t own) {
     const Cluster& c = clusters[own];
-    require(c.segment_count <= frame::cluster_size &&
-                within(c.first_segment, c.segment_count, f.places().size()) &&
-                within(c.leaf_first, c.leaf_count, f.places().size()),
-            wrong);
+    refuse.unless(c.segment_count <= frame::cluster_size &&
+                  within(c.first_segment, c.segment_count, segments) &&
+                  within(c.leaf_first, c.leaf_count, segments));
     for (const auto child : c.children)  // children come later, so a walk ends
-      require(c.is_leaf() ? child == 0 : child > own && child < clusters.size(), wrong);
-    require(std::isfinite(c.x + c.y + c.z + c.radius + c.error) && c.radius >= 0.f, wrong);
+      refuse.unless(c.is_leaf() ? child == 0 : child > own && child < clusters.size());
+    refuse.unless(std::isfinite(c.x + c.y + c.z + c.radius + c.error) && c.radius >= 0.f);
   });
-  parallel_for(f.neurons().size(), 16, [&](std::size_t number) {
-    const Neuron& n = f.neurons()[number];
-    const Neuron before = number ? f.neurons()[number - 1] : Neuron{};
-    require(n.first_cluster == before.first_cluster + before.cluster_count &&  // one after the other
-                n.first_original == before.first_original + before.original_count &&
-                n.first_section == before.first_section + before.section_count &&
-                within(n.first_cluster, n.cluster_count, clusters.size()) &&
-                within(n.first_segment, n.original_count, f.places().size()) &&
-                within(n.first_original, n.original_count, f.section_of_segment().size()) &&
-                within(n.first_section, n.section_count, f.sections().size()) && std::isfinite(n.soma_radius),
-            wrong);
+}
+
+void Forest::Data::check_neurons(const Refuse& refuse) const {
+  const auto neurons = as<Neuron>(Part::neurons);
+  const auto clusters = as<Cluster>(Part::clusters);
+  const auto originals = as<std::uint32_t>(Part::section_of_segment);
+  const auto sections = as<SectionFacts>(Part::sections);
+  const auto places = as<reports::Place>(Part::places);
+  parallel_for(neurons.size(), 16, [&](std::size_t number) {
+    const Neuron& n = neurons[number];
+    const Neuron before = number ? neurons[number - 1] : Neuron{};
+    refuse.unless(n.first_cluster == before.first_cluster + before.cluster_count &&  // one after the other
+                  n.first_original == before.first_original + before.original_count &&
+                  n.first_section == before.first_section + before.section_count &&
+                  within(n.first_cluster, n.cluster_count, clusters.size()) &&
+                  within(n.first_segment, n.original_count, places.size()) &&
+                  within(n.first_original, n.original_count, originals.size()) &&
+                  within(n.first_section, n.section_count, sections.size()) && std::isfinite(n.soma_radius));
     const auto is_section = [&](std::uint32_t s) { return s == soma_section || s < n.section_count; };
-    require(
-        std::ranges::all_of(f.section_of_segment().subspan(n.first_original, n.original_count), is_section),
-        wrong);
+    refuse.unless(std::ranges::all_of(originals.subspan(n.first_original, n.original_count), is_section));
     for (const Cluster& c : clusters.subspan(n.first_cluster, n.cluster_count)) {
       bool good = true;  // of all, without a branch for each
-      for (const reports::Place& p : f.places().subspan(c.first_segment, c.segment_count))
+      for (const reports::Place& p : places.subspan(c.first_segment, c.segment_count))
         good &= is_section(p.section) & (p.position >= 0.f) & (p.position <= 1.f);
-      require(good, wrong);
+      refuse.unless(good);
     }
     for (std::uint32_t i = 0; i < n.section_count; ++i) {
-      const std::uint32_t parent = f.sections()[n.first_section + i].parent;
-      require(parent == 0xffffffffu || parent < i, wrong);
+      const std::uint32_t parent = sections[n.first_section + i].parent;
+      refuse.unless(parent == 0xffffffffu || parent < i);
     }
   });
-  for (std::size_t i = 0; i < f.instances().size(); ++i) {
-    const frame::Instance& instance = f.instances()[i];
-    require(instance.morphology < f.neurons().size() && f.types()[i] < data->circuit.types.size() &&
-                f.layers()[i] < data->circuit.layers.size() &&
-                std::isfinite(instance.x + instance.y + instance.z) &&
-                std::isfinite(instance.qx + instance.qy + instance.qz + instance.qw),
-            wrong);
-    data->soma_bounds.add({instance.x, instance.y, instance.z});
-    data->segment_total += f.neurons()[instance.morphology].original_count;
-  }
-  const auto bricks = f.bricks();
+}
+
+void Forest::Data::check_bricks(const Refuse& refuse) const {
+  const auto bricks = as<Brick>(Part::bricks);
+  const auto owners = as<frame::Owner>(Part::owners);
+  const std::size_t segments = original_and_coarser(), all = as<frame::Segment>(Part::segments).size(),
+                    instances = as<frame::Instance>(Part::instances).size();
   parallel_for(bricks.size(), 1024, [&](std::size_t own) {
     const Brick& b = bricks[own];
-    require(b.segment_count <= Brick::straws && b.first_segment >= f.places().size() &&
-                within(b.first_segment, b.segment_count, f.segments().size()) &&
-                within(b.first_child, b.child_count, bricks.size()) &&
-                (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
-                std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) &&
-                b.radius >= 0.f && b.width > 0.f && b.length > 0.f,
-            wrong);
+    refuse.unless(b.segment_count <= Brick::straws && b.first_segment >= segments &&
+                  within(b.first_segment, b.segment_count, all) &&
+                  within(b.first_child, b.child_count, bricks.size()) &&
+                  (b.child_count == 0 || b.first_child > own) && b.child_count <= 8 &&
+                  std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) &&
+                  b.radius >= 0.f && b.width > 0.f && b.length > 0.f);
   });
-  parallel_for(f.owners().size(), 4096, [&](std::size_t i) {
-    require(f.owners()[i].instance < f.instances().size() && f.owners()[i].segment < f.places().size(),
-            wrong);
+  parallel_for(owners.size(), 4096, [&](std::size_t i) {
+    refuse.unless(owners[i].instance < instances && owners[i].segment < segments);
   });
-  data->spheres.resize(f.instances().size());
-  parallel_for(f.instances().size(), 1024, [&](std::size_t i) {
-    const Placed placed(f.instances()[i]);
-    const Neuron& n = f.neurons()[f.instances()[i].morphology];
-    data->spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
+}
+
+// Checks the neurons' places, and finds what follows from them.
+void Forest::Data::take_instances(const Refuse& refuse) {
+  const auto instances = as<frame::Instance>(Part::instances);
+  const auto neurons = as<Neuron>(Part::neurons);
+  const auto clusters = as<Cluster>(Part::clusters);
+  const auto types = as<std::uint32_t>(Part::types), layers = as<std::uint32_t>(Part::layers);
+  for (std::size_t i = 0; i < instances.size(); ++i) {
+    const frame::Instance& instance = instances[i];
+    refuse.unless(instance.morphology < neurons.size() && types[i] < circuit.types.size() &&
+                  layers[i] < circuit.layers.size() && std::isfinite(instance.x + instance.y + instance.z) &&
+                  std::isfinite(instance.qx + instance.qy + instance.qz + instance.qw));
+    soma_bounds.add({instance.x, instance.y, instance.z});
+    segment_total += neurons[instance.morphology].original_count;
+  }
+  spheres.resize(instances.size());
+  parallel_for(instances.size(), 1024, [&](std::size_t i) {
+    const Placed placed(instances[i]);
+    const Neuron& n = neurons[instances[i].morphology];
+    spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
   });
-  data->groves = Groves(data->spheres);
-  circuit::NodeNames& nodes = data->nodes;
+  groves = Groves(spheres);
+}
+
+// Runs of nodes cover all neurons, one after the other; a file that names none is one population.
+void Forest::Data::number_nodes(const Refuse& refuse) {
+  const std::size_t instances = as<frame::Instance>(Part::instances).size();
   if (nodes.runs.empty()) {
-    nodes.populations = {data->circuit.name};
-    nodes.runs = {{0, 0, 0, std::uint32_t(f.instances().size())}};
+    nodes.populations = {circuit.name};
+    nodes.runs = {{0, 0, 0, std::uint32_t(instances)}};
   }
   std::uint64_t named = 0;
   for (circuit::NodeRun& run : nodes.runs) {
-    require(run.population < nodes.populations.size() && run.count <= f.instances().size() - named, wrong);
+    refuse.unless(run.population < nodes.populations.size() && run.count <= instances - named);
     run.first_instance = std::uint32_t(named);
     named += run.count;
   }
-  require(named == f.instances().size(), wrong);
-  data->bytes = bytes.size();
-  return f;
+  refuse.unless(named == instances);
 }
 
 }  // namespace forest::scene
