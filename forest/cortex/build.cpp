@@ -50,14 +50,15 @@ Place normal_around(const TriangleTree& tree, const Place& at, const Place& outw
   return sum;
 }
 
-// Volume between the surfaces outside the wall, µm³: under the triangles of the outer surface, down to the inner one. What lies
-// between that and the ribbon's inner triangles, which cut its folds, is measured at the middle of each.
-double covered(const Ribbon& ribbon, const TriangleTree& inner) {
+// Volume under the wall, µm³: under its triangles of the outer surface, down to the inner one. What lies between that and the
+// ribbon's inner triangles, which cut its folds, is measured at the middle of each. Not as what the rest leaves of all that the
+// surfaces enclose: a hundred times the volume, of which folds cut as much as the wall has.
+double under_wall(const Ribbon& ribbon, const TriangleTree& inner) {
   constexpr double reach = 500.;  // µm
   std::vector<double> under(ribbon.triangles.size(), 0.);
   parallel_for(under.size(), 256, [&](std::size_t i) {
     const Triangle& t = ribbon.triangles[i];
-    if (ribbon.is_wall(t)) return;
+    if (!ribbon.is_wall(t)) return;
     under[i] = volume_under(ribbon, t);
     const Place &a = ribbon.inner[t[0]], &b = ribbon.inner[t[1]], &c = ribbon.inner[t[2]];
     const Place middle = (a + b + c) / 3., normal = .5 * (b - a).cross(c - a);
@@ -167,7 +168,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   Cortex cortex;
   cortex.oddities = oddities;
   cortex.between = volume(outer) - volume(inner);
-  cortex.wall = cortex.between - covered(dropped, inner_tree);
+  cortex.wall = under_wall(dropped, inner_tree);
   const Ribbon ribbon = unfolded(dropped, curves, progress);
   progress.begin("looking for crests and valleys", 0);
   const auto bent = curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles),

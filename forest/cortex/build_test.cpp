@@ -188,6 +188,16 @@ TEST_F(Shell, AnIslandInTheWallIsWall) {
   EXPECT_LT(larger.first, whole.first - 100);
 }
 
+TEST_F(Shell, TheWallHasTheVolumeUnderIt) {
+  // Towards +x the surfaces are .3 mm apart.
+  const Mesh thin = star(6, [](const Vec3& d) { return d.x() > .8f ? inside + 300. : outside; });
+  const Mesh even = ball(inside, 6);
+  const double wall = build_cortex(thin, even, {.volume = wanted, .spacing = 400.}, Progress::none()).wall;
+  const double cap = 2. * double(pi) / 3. * .2 * (std::pow(inside + 300., 3) - std::pow(inside, 3));
+  EXPECT_GT(wall, cap);  // and triangles at its rim, which reach up 1.7 mm
+  EXPECT_LT(wall, 3. * cap);
+}
+
 TEST_F(Shell, ACoarserRibbonIsTheOneOfTheTrianglesBeforeTheyWereHalved) {
   const Ribbon once = make_ribbon(outer, curves, {.edge = 200.}, Progress::none());
   ASSERT_EQ(once.halvings, 1);

@@ -4,8 +4,11 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numeric>
 #include <tuple>
 #include <utility>
+
+#include "forest/core/parallel.h"
 
 namespace forest::cortex {
 namespace {
@@ -55,23 +58,34 @@ void hold_to_line(const LatticeSite& site, Place& point) {
   if (side.squaredNorm() > 0.) point += side * side.dot(site.line->at - point) / side.squaredNorm();
 }
 
-void settle(Level& level, int rounds) {
+// To where the lattices of its neighbours agree with it.
+void settle(Level& level, std::uint32_t i) {
+  LatticeSite& site = level.sites[i];
+  Place sum = site.point;
+  double weights = 0.;
+  for (std::uint32_t e = level.starts[i]; e < level.starts[i + 1]; ++e) {
+    const LatticeSite& other = level.sites[level.list[e]];
+    const Agreement agreed = agree(site, sum, other, other.point);
+    const double w = double(level.weights[e]);
+    sum = (weights * agreed.one + w * agreed.other) / (weights + w);
+    weights += w;
+    sum -= site.normal * site.normal.dot(sum - site.at);
+  }
+  if (weights == 0.) return;
+  hold_to_line(site, sum);
+  site.point = site.rounded(sum, site.at);
+}
+
+void settle(Level& level, const Waves& waves, int rounds) {
+  constexpr std::uint32_t few = 64;  // sites, that other threads would only come too late for
   for (int round = 0; round < rounds; ++round)
-    for (std::size_t i = 0; i < level.sites.size(); ++i) {
-      LatticeSite& site = level.sites[i];
-      Place sum = site.point;
-      double weights = 0.;
-      for (std::uint32_t e = level.starts[i]; e < level.starts[i + 1]; ++e) {
-        const LatticeSite& other = level.sites[level.list[e]];
-        const Agreement agreed = agree(site, sum, other, other.point);
-        const double w = double(level.weights[e]);
-        sum = (weights * agreed.one + w * agreed.other) / (weights + w);
-        weights += w;
-        sum -= site.normal * site.normal.dot(sum - site.at);
-      }
-      if (weights == 0.) continue;
-      hold_to_line(site, sum);
-      site.point = site.rounded(sum, site.at);
+    for (std::size_t k = 0; k + 1 < waves.starts.size(); ++k) {
+      const std::uint32_t* const sites = &waves.sites[waves.starts[k]];
+      const std::uint32_t count = waves.starts[k + 1] - waves.starts[k];
+      if (count < 2 * few)
+        for (std::uint32_t n = 0; n < count; ++n) settle(level, sites[n]);
+      else
+        parallel_for(count, few, [&](std::size_t n) { settle(level, sites[n]); });
     }
 }
 
@@ -98,7 +112,7 @@ Level coarser(Level& fine) {
       const double area = a.area + b.area, wa = a.area / area, wb = b.area / area;
       s.at = wa * a.at + wb * b.at;
       s.normal = (wa * a.normal + wb * b.normal).normalized();
-      s.spacing = wa * a.spacing + wb * b.spacing, s.area = area;
+      s.area = area;
       s.line = a.line && (a.line->holds() || !b.line) ? a.line : b.line;
       // The arm of b's cross nearest to a's.
       Place best = b.along;
@@ -113,7 +127,7 @@ Level coarser(Level& fine) {
     }
     s.point = s.at;
     fine.coarser[i] = fine.coarser[j] = std::uint32_t(level.sites.size());
-    level.sites.push_back(s);
+    level.sites.push_back(s), level.parts.push_back({i, j});
   };
   for (const auto& [order, i, j] : pairs)
     if (fine.coarser[i] == none && fine.coarser[j] == none) merge(i, j);
@@ -142,27 +156,57 @@ Level coarser(Level& fine) {
 
 }  // namespace
 
-void settle(Level& finest) {
-  std::vector<Level> levels;
-  levels.push_back(std::move(finest));
-  while (levels.back().sites.size() > 64 && levels.size() < 40) {
-    Level next = coarser(levels.back());
-    if (next.sites.size() == levels.back().sites.size()) break;
-    levels.push_back(std::move(next));
+Waves waves(const Level& level) {
+  const std::size_t n = level.sites.size();
+  std::vector<std::uint32_t> wave(n, 0);
+  Waves result{{0}, std::vector<std::uint32_t>(n)};
+  for (std::size_t i = 0; i < n; ++i) {
+    for (std::uint32_t e = level.starts[i]; e < level.starts[i + 1] && level.list[e] < i; ++e)
+      wave[i] = std::max(wave[i], wave[level.list[e]] + 1);
+    if (wave[i] + 2 > result.starts.size()) result.starts.resize(wave[i] + 2, 0);
+    ++result.starts[wave[i] + 1];
   }
-  for (std::size_t l = levels.size(); l-- > 0;) {
-    Level& level = levels[l];
-    if (l + 1 < levels.size())
-      for (std::size_t i = 0; i < level.sites.size(); ++i) {
+  std::partial_sum(result.starts.begin(), result.starts.end(), result.starts.begin());
+  std::vector<std::uint32_t> next = result.starts;
+  for (std::uint32_t i = 0; i < n; ++i) result.sites[next[wave[i]]++] = i;
+  return result;
+}
+
+Lattice::Lattice(Level finest) {
+  levels_.push_back(std::move(finest));
+  while (levels_.back().sites.size() > 64 && levels_.size() < 40) {
+    Level next = coarser(levels_.back());
+    if (next.sites.size() == levels_.back().sites.size()) break;
+    levels_.push_back(std::move(next));
+  }
+  for (const Level& level : levels_) waves_.push_back(waves(level));
+}
+
+const Level& Lattice::settle(std::span<const double> spacings) {
+  for (std::size_t i = 0; i < spacings.size(); ++i) levels_[0].sites[i].spacing = spacings[i];
+  for (std::size_t l = 1; l < levels_.size(); ++l)
+    for (std::size_t i = 0; i < levels_[l].sites.size(); ++i) {
+      LatticeSite& site = levels_[l].sites[i];
+      const auto [one, other] = levels_[l].parts[i];
+      const LatticeSite &a = levels_[l - 1].sites[one], &b = levels_[l - 1].sites[other];
+      const double area = a.area + b.area;
+      site.spacing = one == other ? a.spacing : (a.area / area) * a.spacing + (b.area / area) * b.spacing;
+    }
+  for (LatticeSite& site : levels_.back().sites) site.point = site.at;
+  constexpr int rounds = 8;
+  for (std::size_t l = levels_.size(); l-- > 0;) {
+    Level& level = levels_[l];
+    if (l + 1 < levels_.size())
+      parallel_for(level.sites.size(), 1024, [&](std::size_t i) {
         LatticeSite& site = level.sites[i];
-        const Place from = levels[l + 1].sites[level.coarser[i]].point;
+        const Place from = levels_[l + 1].sites[level.coarser[i]].point;
         Place point = from - site.normal * site.normal.dot(from - site.at);
         hold_to_line(site, point);
         site.point = site.rounded(point, site.at);
-      }
-    settle(level, 8);
+      });
+    cortex::settle(level, waves_[l], rounds);
   }
-  finest = std::move(levels.front());
+  return levels_.front();
 }
 
 Eigen::Vector2i step_between(const LatticeSite& a, const LatticeSite& b) {

@@ -4,8 +4,10 @@
 // field-aligned meshes", ACM Trans Graph 34:189). Private to this room.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
+#include <span>
 #include <vector>
 
 #include "forest/cortex/crosses.h"
@@ -33,10 +35,31 @@ struct Level {
   std::vector<std::uint32_t> starts, list;
   std::vector<float> weights;
   std::vector<std::uint32_t> coarser;  // of each site, in the next level
+  std::vector<std::array<std::uint32_t, 2>>
+      parts;  // of each site, in the finer level: twice the same where it is one
 };
 
-/// Settles the lattice of the finest level, from a guess.
-void settle(Level& finest);
+// Sites in waves, one after the other: each site in a later one than its neighbours of lower numbers, and in an earlier one than
+// those of higher numbers. Sites of one wave are no neighbours.
+struct Waves {
+  std::vector<std::uint32_t> starts, sites;  // those of wave k from starts[k] on
+};
+Waves waves(const Level& level);
+
+/// The sites of a surface, and fewer and fewer that stand for them.
+class Lattice {
+ public:
+  explicit Lattice(Level finest);
+
+  /// Settles it anew for a spacing at each of the finest sites. Sites are settled one after the other, in their order; those
+  /// that do not see one another at the same time, so that the number of threads makes no difference.
+  /// @return the finest level
+  const Level& settle(std::span<const double> spacings);
+
+ private:
+  std::vector<Level> levels_;  // the finest first
+  std::vector<Waves> waves_;   // of each level
+};
 
 /// The step of a lattice from the point of one site to that of another, in the frame of the first: none where they have one
 /// point in common.

@@ -77,8 +77,6 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     throw Error(fmt::format("the cortex has {:.3g} mm³, too little for elements of {:.3g} mm³", volume / 1e9,
                             options.volume / 1e9));
   const Neighbours own = neighbours(vertices.size(), triangles);
-  Level finest;
-  finest.starts = own.starts, finest.list = own.list, finest.weights.assign(own.list.size(), 1.f);
   std::vector<double> areas(ribbon.size(), 0.);
   for (const Triangle& t : ribbon.triangles)
     for (const std::uint32_t v : t)
@@ -87,26 +85,32 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
                       .norm() /
                   6.;
 
+  progress.begin("laying the lattice of elements", 0);
+  Level finest;
+  finest.starts = own.starts, finest.list = own.list, finest.weights.assign(own.list.size(), 1.f);
+  for (const std::uint32_t v : vertices)
+    finest.sites.push_back({.at = ribbon.middle[v],
+                            .normal = curvature[v].normal,
+                            .along = arms[v],
+                            .spacing = 0.,
+                            .area = areas[v],
+                            .point = ribbon.middle[v],
+                            .line = by[v]});
+  Lattice lattice(std::move(finest));
+  progress.end();
+
   Quads quads;
   const double count = std::round(volume / options.volume);
   double factor = 1., nearest = 1e300;
   for (int attempt = 0; attempt < 6; ++attempt) {
     progress.begin("laying the lattice of elements", 0);
-    finest.sites.clear();
-    for (const std::uint32_t v : vertices) {
-      LatticeSite s{.at = ribbon.middle[v],
-                    .normal = curvature[v].normal,
-                    .along = arms[v],
-                    .spacing = 2. * std::sqrt(factor * options.volume / height[v]),
-                    .area = areas[v],
-                    .point = ribbon.middle[v],
-                    .line = by[v]};
-      finest.sites.push_back(s);
-    }
-    settle(finest);
+    std::vector<double> spacings;
+    for (const std::uint32_t v : vertices)
+      spacings.push_back(2. * std::sqrt(factor * options.volume / height[v]));
+    const Level& settled = lattice.settle(spacings);
     progress.end();
     progress.begin("collapsing triangles to the lattice", 0);
-    Quads laid = halved(collapsed(finest, triangles));
+    Quads laid = halved(collapsed(settled, triangles));
     even_valences(laid);
     progress.end();
     const double off = double(laid.quads.size()) / count;
