@@ -6,6 +6,8 @@
 
 #include <CLI/App.hpp>
 
+#include "apps/choice.h"
+
 namespace forest {
 
 void add_renderer(CLI::App& command, Drawer& drawer) {
@@ -15,7 +17,7 @@ void add_renderer(CLI::App& command, Drawer& drawer) {
       .add_option(
           "--renderer", drawer,
           "Who draws: opengl (a graphics card or Mesa's llvmpipe), cpu, or auto: the card where there is one")
-      ->transform(CLI::CheckedTransformer(names))
+      ->transform(one_of(names))
       ->option_text("auto|opengl|cpu");
 }
 

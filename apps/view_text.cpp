@@ -22,6 +22,8 @@ scene::View view_of(std::string_view text, const std::string& name) {
                      fmt::format("is no JSON from column {} on; correct what stands there or before, as "
                                  "docs/scene/view.md shows",
                                  column));
+  } catch (const nlohmann::json::exception&) {
+    throw InputError(name, 1, "holds a number too large for any view; write it smaller");
   }
   return scene::parse_view(text, name);
 }

@@ -14,6 +14,7 @@
 #include "forest/scene/scale_bar.h"
 
 #include "apps/cli/clock.h"
+#include "apps/cli/console.h"
 
 namespace forest::cli {
 
@@ -35,6 +36,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     coloured_by_ = view.colour_by, coloured_for_ = view.background, shown_as_ = view.targets;
   }
   Drawn drawn;
+  if (playback_) playback_->begin_picture();
   std::vector<frame::Overlay> marks;
   if (with_outline) marks = outline_;
   const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
@@ -68,12 +70,12 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;
     drawn.segments = f.segments, drawn.reached = f.drawn, drawn.neurons = f.neurons;
+    if (playback_) drawn.activity = playback_->figures();
     return drawn;
   }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
   const scene::Cut& cut = chooser_.choose(eye, viewport, colouring.shown(), painter);
-  if (playback_) drawn.activity = playback_->figures();
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, colouring, cut, width, height, lines);
   chooser_.complete(frame);
@@ -89,6 +91,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   start = Clock::now();
   drawn.image = renderer_->read();
   drawn.read = milliseconds_since(start);
+  if (playback_) drawn.activity = playback_->figures();
   return drawn;
 }
 
@@ -160,10 +163,12 @@ void add_activity(CLI::App& command, ActivityOptions& options, const char* name,
   command.add_option(name, options.time, help)->needs(activity);
 }
 
-void play(Artist& artist, const ActivityOptions& options, scene::View& view) {
+void play(Artist& artist, const ActivityOptions& options, scene::View& view, Console& console) {
   if (options.file.empty()) return;
   artist.play(scene::Playback::open(artist.forest(), options.file));
   const scene::Playback& playback = *artist.playback();
+  if (playback.has_values() && !playback.numbers())
+    console.warn(options.file.string() + ": no value of it is a number (NaN); branches are grey for that");
   if (!view.activity) view.activity = playback.view();
   if (options.time) view.activity->time = options.time;
   const double time = view.activity->time.value_or(playback.has_values() ? playback.begin()

@@ -20,6 +20,8 @@
 
 namespace forest::cli {
 
+class Console;
+
 /// What one picture took and showed.
 struct Drawn {
   double cull = 0., draw = 0., resolve = 0., read = 0.;  // milliseconds
@@ -113,8 +115,8 @@ struct ActivityOptions {
 /// @param name  of the option for the time, with its help
 void add_activity(CLI::App& command, ActivityOptions& options, const char* name, const char* help);
 /// Lets the artist play the file, if one was given; and the view, which may say how, be of a time that the file holds. Throws
-/// Error when it is not, or when the activity is of another circuit.
-void play(Artist& artist, const ActivityOptions& options, scene::View& view);
+/// Error when it is not, or when the activity is of another circuit. Says so when there is nothing to see in it.
+void play(Artist& artist, const ActivityOptions& options, scene::View& view, Console& console);
 
 /// --no-legend and --scale.
 void add_marks(CLI::App& command, Marks& marks);

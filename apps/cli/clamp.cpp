@@ -5,6 +5,7 @@
 #include <chrono>
 #include <cmath>
 #include <filesystem>
+#include <limits>
 #include <memory>
 
 #include <CLI/App.hpp>
@@ -125,7 +126,11 @@ void run(const Options& options, Console& console) {
   std::vector<std::vector<std::string>> lines;
   for (const reports::Trace& trace : traces) {
     const Told t = told(trace);
-    const double when = facts.time(t.highest);
+    const bool any = t.numbers > 0;
+    const double when = any ? facts.time(t.highest) : NAN;
+    const auto figure = [any](const char* form, double value) {
+      return any ? fmt::format(fmt::runtime(form), value) : std::string("none");
+    };
     list.push_back({{"neuron", trace.node},
                     {"section", trace.section == reports::soma_run ? nlohmann::ordered_json(soma)
                                                                    : nlohmann::ordered_json(trace.section)},
@@ -136,8 +141,8 @@ void run(const Options& options, Console& console) {
                     {"mean", t.mean},
                     {"not_numbers", facts.steps - t.numbers}});
     lines.push_back({std::to_string(trace.node), trace.section_name(), fmt::format("{:.3g}", trace.position),
-                     fmt::format("{:.1f}", t.low), fmt::format("{:.1f}", t.high), fmt::format("{:.4g}", when),
-                     fmt::format("{:.1f}", t.mean)});
+                     figure("{:.1f}", double(t.low)), figure("{:.1f}", double(t.high)),
+                     figure("{:.4g}", when), figure("{:.1f}", t.mean)});
   }
   console.print({{"file", options.file.string()},
                  {"csv", options.csv.string()},
@@ -157,7 +162,9 @@ void run(const Options& options, Console& console) {
 std::function<void()> clamp(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("activity", options->file, "Activity file")->required();
-  command.add_option("--neuron", options->neurons, "Nodes, as the report numbers them")->required();
+  must_be_whole(
+      *command.add_option("--neuron", options->neurons, "Nodes, as the report numbers them")->required(), 0,
+      std::numeric_limits<std::uint64_t>::max());
   command
       .add_option("--section", options->sections,
                   "Their sections, numbered from 0 as the studio's selection shows them; or 'soma'")

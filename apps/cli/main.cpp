@@ -70,7 +70,9 @@ int main(int argc, char** argv) {
       throw forest::Error("what was to be said cannot be written; check that the disk has room");
     return 0;
   } catch (const std::bad_alloc&) {
-    console.warn("brainforest: there is not enough memory for this; use fewer or smaller neurons");
+    console.warn(
+        "brainforest: there is not enough memory for this; make less at once: a smaller picture (--size), "
+        "fewer or smaller neurons");
   } catch (const std::filesystem::filesystem_error& error) {
     console.warn(fmt::format("brainforest: {}: {}; check the path, and who may read and write there",
                              repository::escaped(error.path1().string()), error.code().message()));

@@ -114,6 +114,11 @@ void run(const Options& options, Console& console) {
                             options.range[1]));
   const auto activity = reports::Activity::open(options.file);
   const reports::Facts& facts = activity.facts();
+  if (facts.not_numbers == activity.width(reports::Level::compartment) * facts.steps)
+    throw InputError(options.file.string(), 0,
+                     "holds no value that is a number, so a raster would be grey; spikes alone are drawn by "
+                     "'brainforest render "
+                     "--activity'");
   const auto step_at = [&](double ms) {
     return std::uint64_t(
         std::clamp(std::ceil((ms - facts.start) / facts.step - 1e-6), 0., double(facts.steps)));

@@ -12,6 +12,7 @@
 #include "forest/core/file.h"
 #include "forest/io/png.h"
 
+#include "apps/choice.h"
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -50,13 +51,15 @@ scene::View default_view(const scene::Forest& forest, const scene::Surfaces& sur
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.
 std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
   if (artist.forest().instances().empty()) return "the forest has no neurons, so the picture shows none";
-  return drawn.segments
-             ? fmt::format(
-                   "the picture shows nothing though {} segments were drawn; they may be hidden or lie "
-                   "just beside it, or {} is at fault: try --renderer cpu",
-                   drawn.segments, artist.renderer())
-             : "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by "
-               "--view";
+  if (!drawn.segments)
+    return "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by --view";
+  const bool processor = artist.renderer() == "the processor";
+  return fmt::format(
+      "the picture shows nothing though {} segments were drawn: they are transparent, nearer than 'near', "
+      "smaller than a "
+      "pixel, hidden, or just beside it{}",
+      drawn.segments,
+      processor ? "" : fmt::format("; or {} is at fault: try --renderer cpu", artist.renderer()));
 }
 
 }  // namespace
@@ -84,7 +87,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
                    "Neurons near the eye have a smooth skin and spines (takes seconds)");
   add_synapses(command, options->synapses);
   command.add_option("--from", options->side, "Show all of the surfaces, from this side of the brain")
-      ->transform(CLI::CheckedTransformer(sides))
+      ->transform(one_of(sides))
       ->option_text("left|right|front|back|above|below")
       ->excludes(one_view);
   add_targets(command, options->targets);
@@ -92,13 +95,13 @@ std::function<void()> render(CLI::App& command, Console& console) {
                "Its moment that is shown, ms; by default the first, of spikes alone the busiest");
   add_size(command, options->size);
   command.add_option("-o,--out", options->out, "The picture, a PNG file")->required();
-  command
-      .add_option(
-          "--gaze", options->gaze,
-          "Where one looks, as shares of width and height: detail falls off around it (docs/scene/gaze.md)")
-      ->expected(2)
-      ->check(CLI::Range(0., 1.))
-      ->type_name("X Y");
+  auto* gaze = command
+                   .add_option("--gaze", options->gaze,
+                               "Where one looks, as shares of width and height: detail falls off around it "
+                               "(docs/scene/gaze.md)")
+                   ->expected(2)
+                   ->type_name("X Y");
+  must_be_within(*gaze, 0., 1.);
   command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
   add_marks(command, options->marks);
   add_renderer(command, options->drawer);
@@ -128,7 +131,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (auto synapses = open_synapses(options->synapses, options->forest, forest))
       artist.show(std::move(*synapses));
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
-    play(artist, options->activity, view);
+    play(artist, options->activity, view, console);
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     artist.explain(view, options->marks, drawn.image);
@@ -237,7 +240,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();
-      play(artist, options->activity, *look);
+      play(artist, options->activity, *look, console);
       plan.from = *look->activity->time;
       plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
     }

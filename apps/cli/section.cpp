@@ -118,6 +118,8 @@ void run(const Options& options, Console& console) {
   for (std::size_t i = 0; i < std::size(ways); ++i)
     if (options.colour_by == ways[i]) view.colour_by = scene::ColourBy(i);
   const scene::Colouring colouring = scene::colour(forest, view.colour_by, picture.background);
+  if (extension == ".mp4" && options.depth == 0.)
+    throw Error("a film moves the plane; say how far by --through, in µm");
   if (extension == ".mp4") return film(options, forest, plane, colouring, picture, console);
   if (options.depth != 0.) throw Error("--through makes a film; give its name with the ending .mp4");
 

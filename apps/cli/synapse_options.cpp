@@ -7,6 +7,8 @@
 
 #include "forest/core/error.h"
 
+#include "apps/choice.h"
+
 namespace forest::cli {
 
 void add_synapses(CLI::App& command, SynapseOptions& options) {
@@ -19,7 +21,7 @@ void add_synapses(CLI::App& command, SynapseOptions& options) {
       .add_option("--synapse-colour", options.colour,
                   "What their colours mean: whether they excite or inhibit, or whose they are; by default as "
                   "the view says")
-      ->transform(CLI::CheckedTransformer(colours))
+      ->transform(one_of(colours))
       ->option_text("sign|target");
 }
 

@@ -162,7 +162,12 @@ int main(int argc, char** argv) {
       ->allow_extra_args(false);
   app.add_option("--size", options.size, "Size of the window in pixels, for example 1280x800");
   forest::add_renderer(app, options.drawer);
-  app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end");
+  app.add_option("--screenshot", options.screenshot, "Write a PNG of the window once it is drawn, and end")
+      ->check([](const std::string& name) {
+        return name.ends_with(".png")
+                   ? std::string()
+                   : "'" + name + "' is no picture that can be written; end its name in .png";
+      });
   app.add_flag("--report", options.report, "Print selections and views as lines of JSON on standard output");
   app.set_version_flag("--version", FOREST_VERSION);
   app.footer(

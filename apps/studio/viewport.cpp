@@ -337,6 +337,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
                          const DressingLimits& limits) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
+  if (playback_) playback_->begin_picture();
   scene::Chooser::Painter painter;
   const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
   if (coloured)

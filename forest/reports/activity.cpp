@@ -590,7 +590,8 @@ Activity Activity::check(std::shared_ptr<Data> data, std::span<const std::byte> 
   std::memcpy(&head, bytes.data(), sizeof head);
   if (head.magic != magic)
     throw InputError(name, 0, "is not an activity file; make one with 'brainforest activity'");
-  require(head.version == version && head.zero == 0,
+  require(head.zero == 0, "is damaged at its beginning");
+  require(head.version == version,
           fmt::format("has version {} of the activity file and this program reads version {}", head.version,
                       version));
   Foot foot;

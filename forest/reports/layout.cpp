@@ -263,10 +263,11 @@ PlacedSpikes place(std::span<const Spikes> spikes, const Nodes& nodes) {
         refuse(fmt::format("the time of spike {} of population {} is no number; write the file again", i,
                            of.population));
       if (of.nodes[i] >= nodes.ends[population])
-        refuse(fmt::format(
-            "node {} of population {} spikes and is not in the circuit, whose nodes end at {}; name the "
-            "circuit that was simulated",
-            of.nodes[i], of.population, nodes.ends[population]));
+        refuse(
+            fmt::format("node {} of population {} spikes and is not in the circuit, which has {} nodes, "
+                        "numbered from 0; name the "
+                        "circuit that was simulated",
+                        of.nodes[i], of.population, nodes.ends[population]));
       if (const auto found = instance.find(of.nodes[i]); found != instance.end())
         placed.spikes.push_back({of.times[i], found->second});
       else

@@ -160,6 +160,8 @@ void Forest::Data::find_parts(std::span<const std::byte> whole, const Refuse& re
   std::memcpy(&header, whole.data(), std::min(sizeof header, whole.size()));
   if (header.magic != magic)
     throw InputError(refuse.name, 0, "is not a forest file; make one with 'brainforest pack'");
+  refuse.unless(header.version != version || header.parts == part_count,
+                "is damaged: it has a wrong number of parts");
   const bool older = header.version == without_attributes && header.parts == part_count - 1;
   if (!older && (header.version != version || header.parts != part_count))
     throw InputError(refuse.name, 0,

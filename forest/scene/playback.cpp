@@ -167,6 +167,7 @@ Playback::Playback(Forest forest, reports::Activity activity, const std::string&
       table.length[level] = std::max(table.length[level], table.length[level - 1]);
   });
   shown_.resize(forest_.instances().size());
+  counted_.resize(forest_.instances().size());
 }
 
 Playback Playback::open(const Forest& forest, const std::filesystem::path& path) {
@@ -208,7 +209,6 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   const double time = view.time.value_or(begin());
   for (const std::uint32_t i : in_sight_) shown_[i] = {};
   in_sight_.clear();
-  figures_ = {};
   const frame::Geometry geometry = forest_.geometry();
   for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
     for (const frame::Item& item : *list) {
@@ -222,7 +222,8 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
     }
   read(eye, options, step_at(time));
   find_spikes(time, view, options);
-  figures_.gather = milliseconds_since(start);
+  for (const std::uint32_t i : in_sight_) counted_[i] = true;
+  figures_.gather += milliseconds_since(start);
 
   start = Clock::now();
   const auto entry_of = entries_of(activity_.facts().range, view);
@@ -241,7 +242,7 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   paint_list(cut.dots, 1, entries.dots);
   paint_list(cut.lines, frame::cluster_size, entries.lines);
   paint_list(cut.capsules, frame::cluster_size, entries.capsules);
-  figures_.paint = milliseconds_since(start);
+  figures_.paint += milliseconds_since(start);
 }
 
 // Reads the values of what is in sight, each neuron's in its level: a matter of the eye and the neuron alone, so that what
@@ -265,7 +266,7 @@ void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_
     s.first = values;
     want(row, s.level);
     if (s.level == Level::neuron) want(row, Level::soma);
-    ++figures_.neurons;
+    figures_.neurons += !counted_[i];
   }
   std::size_t time_level = 0;
   for (double span = activity_.facts().step * double(reports::time_factor);
@@ -274,7 +275,7 @@ void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_
     ++time_level, step /= reports::time_factor;
   codes_.resize(values);
   activity_.gather(wanted_, time_level, step, codes_);
-  figures_.values = values;
+  figures_.values += values;
 }
 
 // The spikes whose flashes are still on their way.
@@ -292,10 +293,13 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
     if (s.spikes_end == 0) s.spikes = i;
     s.spikes_end = i + 1;
   }
-  figures_.flashes = spikes_.size();
+  figures_.flashes += std::uint64_t(
+      std::ranges::count_if(spikes_, [&](const reports::Spike& s) { return !counted_[s.instance]; }));
 }
 
-bool Playback::has_values() const {
+bool Playback::has_values() const { return numbers() || activity_.spikes(-INFINITY, INFINITY).empty(); }
+
+bool Playback::numbers() const {
   return activity_.facts().not_numbers < activity_.width(Level::compartment) * activity_.facts().steps;
 }
 
@@ -317,7 +321,6 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
                                               const Colouring& colouring, const ActivityView& view,
                                               const PlaybackOptions& options) {
   const auto start = Clock::now();
-  figures_ = {};
   std::vector<frame::Overlay> marks;
   if (!(view.speed > 0.f)) return marks;
   const double time = view.time.value_or(begin());
@@ -364,8 +367,8 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
     }
     figures_.flashes += marks.size() > before;
   }
-  figures_.segments = marks.size();
-  figures_.gather = milliseconds_since(start);
+  figures_.segments += marks.size();
+  figures_.gather += milliseconds_since(start);
   return marks;
 }
 

@@ -33,8 +33,10 @@ class Playback {
   ActivityView view() const;
   double begin() const { return activity_.facts().start; }  // ms, of the first step and of the last
   double end() const { return activity_.facts().time(activity_.facts().steps - 1); }
-  /// Whether there is any; else there are spikes alone, and a picture shows `flashes` instead of `colour`.
+  /// Else there are spikes alone, and a picture shows `flashes` instead of `colour`.
   bool has_values() const;
+  /// Whether any value is a number; else branches show that there is none.
+  bool numbers() const;
   /// ms: a moment at which as many flashes as ever are to be seen; the first one when there are no spikes.
   double busiest(const ActivityView& view) const;
   /// The step that is shown at a time, the last one not after it; the first or the last for times beyond.
@@ -61,13 +63,17 @@ class Playback {
   };
   std::optional<Compartment> compartment(std::uint32_t instance, std::uint32_t segment) const;
 
-  /// Of the last call of `colour` or `flashes`.
+  /// Of all calls of `colour` and `flashes` since `begin_picture`.
   struct Figures {
     std::uint64_t neurons = 0, values = 0, segments = 0,
                   flashes = 0;       // neurons reported and in the cut; values read
     double gather = 0., paint = 0.;  // milliseconds
   };
   const Figures& figures() const { return figures_; }
+  void begin_picture() {
+    figures_ = {};
+    counted_.assign(shown_.size(), false);
+  }
 
  private:
   static constexpr std::size_t levels = 4;
@@ -104,6 +110,7 @@ class Playback {
   float farthest_ = 0.f;                 // of all places where spikes run, µm
   std::vector<Shown> shown_;             // of each instance
   std::vector<std::uint32_t> in_sight_;  // instances
+  std::vector<bool> counted_;            // of each instance, in this picture; it may come in several parts
   std::vector<reports::Wanted> wanted_;
   std::vector<reports::Code> codes_;
   std::vector<reports::Spike> spikes_;  // of neurons in sight, by neuron

@@ -198,6 +198,7 @@ TEST(Playback, FarNeuronsAreColouredByMeansThatAreNearTheirCompartments) {
     const Eye eye = eye_at(camera, 1.f);
     Cut means = choose(sample.forest, eye, viewport), exact = means;
     playback.colour(exact, eye, view, {.pixels = 0.f});
+    playback.begin_picture();
     playback.colour(means, eye, view);
     EXPECT_LE(playback.figures().values, values);
     values = playback.figures().values;
@@ -382,6 +383,23 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
   for (const std::uint32_t entry : all_entries(cut)) EXPECT_LT(entry, flash_entry);
 }
 
+// … and are not taken for spikes alone.
+TEST(Playback, ValuesThatAreNoNumbersAreShownAsSuch) {
+  const Cable cable;
+  const Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
+  const auto nodes = reports::nodes_of(cable.circuit);
+  const std::vector<reports::Spikes> spikes{
+      {"spikes", nodes.populations[0], {5.}, {nodes.of_instance[0].id}}};
+  Playback playback(forest, Activity::from_bytes(packed_activity(reports::without_values(spikes, nodes),
+                                                                 cable.circuit, cable.neurons, {})));
+  EXPECT_TRUE(playback.has_values());
+  EXPECT_FALSE(playback.numbers());
+  Cut cut = choose(forest, eye_at(overview(forest).camera, 1.f), viewport);
+  playback.colour(cut, eye_at(overview(forest).camera, 1.f), playback.view());
+  ASSERT_FALSE(all_entries(cut).empty());
+  for (const std::uint32_t entry : all_entries(cut)) EXPECT_EQ(entry, no_value_entry);
+}
+
 TEST(Playback, SpikesAloneRunAsMarksThatAreWideAtAnySizeOfPicture) {
   const Cable cable;
   const Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
@@ -422,6 +440,7 @@ TEST(Playback, SpikesAloneRunAsMarksThatAreWideAtAnySizeOfPicture) {
   // What is hidden does not flash.
   view.time = 6.;
   for (frame::State& state : colouring.states) state.flags = 0;
+  playback.begin_picture();
   EXPECT_TRUE(playback.flashes(camera, 200.f, colouring, view).empty());
   EXPECT_EQ(playback.figures().flashes, 0u);
 }

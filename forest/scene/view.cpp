@@ -325,7 +325,11 @@ void read_gaze(View& v, const Json& json, const std::string& file) {
   if (!json.is_array() || json.size() != 2 || !json[0].is_number() || !json[1].is_number())
     throw InputError(file, 0,
                      "'gaze' must be two shares of the picture's width and height, for example [0.5, 0.5]");
-  v.detail.gaze = Vec2(json[0].get<float>(), json[1].get<float>());
+  const Vec2 gaze(json[0].get<float>(), json[1].get<float>());
+  if (!((gaze.array() >= 0.f) && (gaze.array() <= 1.f)).all())
+    throw InputError(file, 0,
+                     "'gaze' lies beside the picture; give shares of its width and height from 0 to 1");
+  v.detail.gaze = gaze;
 }
 
 void read_targets(View& v, const Json& json, const std::string& file) {
@@ -512,6 +516,7 @@ View parse_view(std::string_view text, const std::string& name) {
   read_all(v, json, keys_of_view(), name, "");
   if (v.camera.eye == v.camera.target)
     throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
+  if (v.camera.up.isZero()) throw InputError(name, 0, "'up' has no direction; give one such as [0, 1, 0]");
   return v;
 }
 

@@ -86,6 +86,10 @@ TEST(View, SaysWhichKeyIsWrong) {
   EXPECT_NE(error_of(R"({"eye":[0,0,1]})").find("target"), std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0],"target":[0,0,0]})").find("eye"), std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,1]})").find("same point"), std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"up":[0,0,0]})").find("no direction"),
+            std::string::npos);
+  EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"gaze":[2,0.5]})").find("beside the picture"),
+            std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"field_of_view":900})").find("field_of_view"),
             std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":"mood"})").find("layer"),

@@ -53,6 +53,7 @@ time = numpy.arange(steps)[:, None]
 column = numpy.arange(7 * 11)[None, :]
 data = (-65 + 10 * numpy.sin(.05 * time + column) + 90 * ((time + 3 * column) % 97 == 0)).astype(numpy.float32)
 if "nan" in change: data[7, 5] = numpy.nan
+if "empty" in change: data[:] = numpy.nan
 if "high" in change: data[8, 6] = float(change["high"])
 with h5py.File(path, "w") as file:
     group = file.create_group("report/" + change.get("population", "few_cells"))
@@ -120,6 +121,16 @@ grep -q '^3.5,$' odd.csv
 [ "$(grep -c beyond err.txt)" = 0 ]
 "$program" clamp odd.activity --neuron 6 --section 0 --position 0.5 >out.txt
 grep -qE ' (69.[6-9]|70.[0-4]) ' out.txt
+
+# A report without a single number is one all the same: it is said, and nothing is taken for spikes or for a colour.
+$python report.py empty.h5 40 empty=1
+"$program" activity empty.h5 --circuit column --out empty.activity >/dev/null 2>&1
+refuses 'holds no value that is a number' "$program" raster empty.activity --out no.png
+"$program" clamp empty.activity --neuron 6 --section 0 >out.txt
+grep -q none out.txt
+"$program" pack column -o empty.forest >/dev/null
+"$program" render empty.forest --activity empty.activity --size 160x120 -o empty.png 2>told >/dev/null
+grep -q 'no value of it is a number' told
 
 # Mismatches are named, and leave what was there.
 cp run.activity kept.activity
@@ -250,7 +261,7 @@ fovea = [240 * y + x for y in range(94, 106) for x in range(114, 126)]
 assert all(gazed[i] == first[i] for i in fovea)
 assert sum(a != b for a, b in zip(gazed, plain)) > .3 * covered
 told = json.load(open("at30.json"))
-assert 0 < told["activity"]["neurons"] <= 7 and told["activity"]["flashes"] >= 1, told
+assert 0 < told["activity"]["neurons"] <= 7 and told["activity"]["values"] > 0 and told["activity"]["flashes"] >= 1, told
 assert told["view"]["activity"]["time"] == 30 and json.load(open("plain.json"))["activity"] is None
 film = [pixels(f"film/{i:05}.png") for i in range(4)]
 assert all(a != b for a, b in zip(film, film[1:]))

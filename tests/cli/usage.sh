@@ -17,6 +17,7 @@ fails_with 2 'with --format' $program convert a.swc --out x
 
 for seed in -1 18446744073709551616 1e3 7x ''; do
   fails_with 2 'is no whole number from 0 to 18446744073709551615' $program grow --grammar motoneuron --out x --seed "$seed"
+  fails_with 2 'is no whole number from 0 to 18446744073709551615' $program clamp x.activity --neuron "$seed"
   fails_with 2 'is no whole number from 0 to 18446744073709551615' $program plant --recipe column-1000 --repo x.db --out x --seed "$seed"
   fails_with 2 'is no whole number from 0 to 18446744073709551615' $program demo --out x --seed "$seed"
   fails_with 2 'is no whole number from 0 to 18446744073709551615' $program bench column --seed "$seed"
@@ -24,6 +25,9 @@ done
 [ ! -e x ]
 $program grow --grammar motoneuron --out x --seed 18446744073709551615 --json | grep -q '"seed": 18446744073709551615'
 fails_with 2 "'-1' is no whole number from 0 to 4096" $program list --repo x.db --threads -1
+fails_with 2 "'foo' is none of auto, cpu, opengl" $program render x.forest -o x.png --renderer foo
+fails_with 2 "'blue' is none of sign, target" $program render x.forest -o x.png --synapse-colour blue
+fails_with 2 "'nan' is no number from 0 to 1" $program render x.forest -o x.png --gaze nan .5
 for size in 12by9 0x9 12x9x3 -1x5 20000x1; do
   fails_with 2 'is no size of a picture' $program render x.forest -o x.png --size "$size"
   fails_with 2 'is no size of a picture' $program bench column --size "$size"
