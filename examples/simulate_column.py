@@ -26,9 +26,12 @@ import sys
 import tempfile
 
 os.environ.pop("DISPLAY", None)  # NEURON opens windows where there is one
-import h5py
-import numpy
-from neuron import h
+try:
+    import h5py
+    import numpy
+    from neuron import h
+except ImportError as missing:
+    sys.exit("%s; Debian has it: apt-get install python3-neuron python3-h5py, and run this by /usr/bin/python3" % missing)
 
 h.load_file("stdrun.hoc")
 ROWS = 50  # of the report that are kept in memory
@@ -209,11 +212,20 @@ def write_spikes(path, circuit, times, ids):
 
 def main():
     options = arguments()
-    options.out.mkdir(parents=True, exist_ok=True)
-    circuit = Circuit(options.circuit)
+    if not all(0. < value < math.inf for value in (options.ms, options.step, options.dt, options.rate)):
+        sys.exit("--ms, --step, --dt and --rate must be numbers above zero")
     every, rows = round(options.step / options.dt), round(options.ms / options.step)
     if every < 1 or rows < 1:
         sys.exit("--step must be --dt or more, and --ms as long as a step")
+    try:
+        circuit = Circuit(options.circuit)
+    except (OSError, KeyError, ValueError) as error:
+        sys.exit("%s is no circuit that can be simulated (%s); name a folder that 'brainforest plant' made" %
+                 (options.circuit, error))
+    try:
+        options.out.mkdir(parents=True, exist_ok=True)
+    except OSError as error:
+        sys.exit("%s cannot be made (%s); name another --out" % (options.out, error.strerror))
     with tempfile.TemporaryDirectory() as folder:
         network = Network(circuit, circuit.classes(folder), options)
     times, ids = network.record_spikes()
