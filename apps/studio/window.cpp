@@ -19,6 +19,7 @@
 #include <QStatusBar>
 #include <QTextBrowser>
 #include <QVBoxLayout>
+#include <cstdio>
 
 #include <nlohmann/json.hpp>
 
@@ -113,10 +114,16 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
   connect(viewport_, &Viewport::moved, this, [this] { activity_panel_->follow(); });
   connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
   connect(viewport_, &Viewport::lost, this, &Window::renew, Qt::QueuedConnection);
-  connect(viewport_, &Viewport::recovered, this, [this](const QString& sentence) {
-    show_figures();
-    statusBar()->showMessage(sentence, 15'000);
-  });
+  // Queued: a status bar that is not shown yet would write over its figures.
+  connect(
+      viewport_, &Viewport::recovered, this,
+      [this](const QString& sentence) {
+        show_figures();
+        statusBar()->showMessage(sentence, 15'000);
+        renderer_->setToolTip(sentence);
+        std::fputs(("brainforest-studio: " + sentence + "\n").toUtf8().constData(), stderr);
+      },
+      Qt::QueuedConnection);
 
   resize(1280, 800);
   QSettings kept;
