@@ -383,15 +383,24 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
   for (const std::uint32_t entry : all_entries(cut)) EXPECT_LT(entry, flash_entry);
 }
 
+// A cable whose soma spikes at 5 ms, or does not, and of which no value is a number.
+struct WithoutValues {
+  Cable cable;
+  Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
+  reports::Nodes nodes = reports::nodes_of(cable.circuit);
+  std::vector<reports::Spikes> spikes{{"spikes", nodes.populations[0], {5.}, {nodes.of_instance[0].id}}};
+
+  Playback played(const std::vector<reports::Spikes>& told) const {
+    return {forest, Activity::from_bytes(packed_activity(reports::without_values(spikes, nodes),
+                                                         cable.circuit, cable.neurons, told))};
+  }
+};
+
 // … and are not taken for spikes alone.
 TEST(Playback, ValuesThatAreNoNumbersAreShownAsSuch) {
-  const Cable cable;
-  const Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
-  const auto nodes = reports::nodes_of(cable.circuit);
-  const std::vector<reports::Spikes> spikes{
-      {"spikes", nodes.populations[0], {5.}, {nodes.of_instance[0].id}}};
-  Playback playback(forest, Activity::from_bytes(packed_activity(reports::without_values(spikes, nodes),
-                                                                 cable.circuit, cable.neurons, {})));
+  const WithoutValues sample;
+  const Forest& forest = sample.forest;
+  Playback playback = sample.played({});
   EXPECT_TRUE(playback.has_values());
   EXPECT_FALSE(playback.numbers());
   Cut cut = choose(forest, eye_at(overview(forest).camera, 1.f), viewport);
@@ -401,13 +410,9 @@ TEST(Playback, ValuesThatAreNoNumbersAreShownAsSuch) {
 }
 
 TEST(Playback, SpikesAloneRunAsMarksThatAreWideAtAnySizeOfPicture) {
-  const Cable cable;
-  const Forest forest = Forest::from_bytes(pack(cable.circuit, cable.neurons));
-  const auto nodes = reports::nodes_of(cable.circuit);
-  const std::vector<reports::Spikes> spikes{
-      {"spikes", nodes.populations[0], {5.}, {nodes.of_instance[0].id}}};
-  Playback playback(forest, Activity::from_bytes(packed_activity(reports::without_values(spikes, nodes),
-                                                                 cable.circuit, cable.neurons, spikes)));
+  const WithoutValues sample;
+  const Forest& forest = sample.forest;
+  Playback playback = sample.played(sample.spikes);
   EXPECT_FALSE(playback.has_values());
   frame::Camera camera;
   camera.eye = {900.f, 0.f, 0.f}, camera.target = Vec3::Zero(), camera.field_of_view = 90.f;
