@@ -424,9 +424,9 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
     palette[i] = (*a.map)(float(i) / float(map_steps - 1)) * (light ? .85f : 1.f);
   palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x2A303A);
   palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x3C4450);
-  // A flash fades through a colour that no map has, for between white and the grey of what has no value lies grey.
+  // On dark ground a flash fades through a colour of its own, for between white and the grey of what has no value lies grey.
   const Vec3 dim = palette[no_value_entry], bright = light ? light_of(0xC00010) : Vec3(1.f, 1.f, .92f),
-             fading = light ? light_of(0xE8602C) : light_of(0x2FD6FF);
+             fading = light ? Vec3(.5f * (dim + bright)) : light_of(0x2FD6FF);
   for (std::uint32_t i = 0; i < flash_steps; ++i) {
     const float share = 2.f * float(i + 1) / float(flash_steps);
     palette[flash_entry + i] =
