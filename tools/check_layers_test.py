@@ -52,6 +52,11 @@ class CheckLayers(unittest.TestCase):
         self.append("core/error.cpp", '#include "../morphology/morphology.h"')
         self.assert_refused("error.cpp", "from the root")
 
+    def test_a_source_whose_header_does_not_come_first_is_refused(self):
+        source = self.project / "forest/core/error.cpp"
+        source.write_text("#include <vector>\n" + source.read_text())
+        self.assert_refused("error.cpp:1:", "include forest/core/error.h first")
+
     def test_a_second_type_of_one_name_is_refused(self):
         self.append("statistics/two_samples.h", "namespace forest::statistics {\nstruct Metric {\n};\n}")
         self.assert_refused("forest::statistics::Metric is another type in", "name them apart")

@@ -3,6 +3,7 @@
 
 #include "forest/circuit/recipe.h"
 #include "forest/circuit/toml_node.h"
+#include "forest/core/error.h"
 #include "forest/core/file.h"
 
 namespace forest::circuit {
@@ -45,7 +46,7 @@ std::vector<cortex::Slab> slabs(std::span<const cortex::Column::Layer> layers) {
 }  // namespace
 
 cortex::Environment parse_environment(std::string_view text, const std::string& file) {
-  const toml::value value = parse_toml(text, file);
+  const toml::table value = parse_toml(text, file);
   const Node root(value, file, "the environment");
   if (root.find("type")) {
     const cortex::Column tissue = column(parse_recipe(text, file));

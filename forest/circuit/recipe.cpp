@@ -37,7 +37,8 @@ CellType read_type(const Node& node) {
 
 std::vector<double> read_mix(const Node& node, std::span<const CellType> types, const std::string& layer) {
   std::vector<double> mix(types.size());
-  for (const auto& [name, unused] : node.table()) {
+  for (const auto& [key, unused] : node.table()) {
+    const std::string_view name = key.str();
     const auto type = std::ranges::find(types, name, &CellType::name);
     if (type == types.end())
       node.at(name).refuse(fmt::format(
@@ -110,7 +111,7 @@ Recipe read_root(const Node& root) {
 }  // namespace
 
 Recipe parse_recipe(std::string_view text, const std::string& file) {
-  const toml::value root = parse_toml(text, file);
+  const toml::table root = parse_toml(text, file);
   return read_root(Node(root, file, "the recipe"));
 }
 

@@ -2,83 +2,123 @@
 #include "forest/circuit/toml_node.h"
 
 #include <algorithm>
+#include <cmath>
 #include <cstddef>
-#include <exception>
-#include <sstream>
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include "forest/core/error.h"
 
 namespace forest::circuit {
 namespace {
 
-// toml11 draws its message over several lines with a picture of the source; the first line holds the reason.
-std::string reason(const std::exception& error) {
-  std::string text = error.what();
-  text.erase(std::min(text.find('\n'), text.size()));
-  for (const std::string_view prefix : {"[error] ", "toml::"})
-    if (text.starts_with(prefix)) text.erase(0, prefix.size());
-  if (const auto colon = text.find(": "); colon != std::string::npos && text.find(' ') > colon)
-    text.erase(0, colon + 2);
-  return text.empty() ? "it cannot be parsed" : text;
-}
+std::size_t line(const toml::node& node) { return node.source().begin.line; }
 
-// The parser recurses; text that opens brackets without end would exhaust the stack.
-void refuse_deep_nesting(std::string_view text, const std::string& file) {
-  constexpr int deepest = 64;
-  int depth = 0;
+// The parser bounds how deep brackets nest, and not how many tables a dotted key opens; letting go of them recurses.
+void refuse_deep_keys(std::string_view text, const std::string& file) {
+  constexpr int deepest = 256;
+  int dots = 0;
   std::size_t line = 1;
-  for (const char c : text) {
-    if (c == '\n') ++line;
-    if (c == '[' || c == '{') ++depth;
-    if (c == ']' || c == '}') depth = std::max(0, depth - 1);
-    if (depth > deepest) throw InputError(file, line, "brackets are nested too deeply; close them");
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    if (text[i] == '\n') ++line;
+    if (text[i] == '\n' || text[i] == ',' || text[i] == '=') dots = 0;
+    if (text[i] == '.' && (i == 0 || text[i - 1] != '.') && ++dots > deepest)
+      throw InputError(file, line, "a key has too many parts; take dots out of it");
   }
-}
-
-// Of a text the first byte that belongs to no character of UTF-8 (RFC 3629: shortest forms, no surrogates, up to 10FFFF).
-std::size_t valid_utf8(std::string_view text) {
-  const auto byte = [&](std::size_t i) { return i < text.size() ? static_cast<unsigned char>(text[i]) : 0u; };
-  std::size_t i = 0;
-  while (i < text.size()) {
-    const unsigned lead = byte(i);
-    const std::size_t more = lead < 0x80                    ? 0
-                             : lead >= 0xc2 && lead <= 0xdf ? 1
-                             : lead >= 0xe0 && lead <= 0xef ? 2
-                                                            : 3;
-    if (more == 3 && (lead < 0xf0 || lead > 0xf4)) return i;
-    const unsigned low = lead == 0xe0   ? 0xa0
-                         : lead == 0xf0 ? 0x90
-                                        : 0x80,
-                   high = lead == 0xed   ? 0x9f
-                          : lead == 0xf4 ? 0x8f
-                                         : 0xbf;  // of the second byte
-    for (std::size_t k = 1; k <= more; ++k)
-      if (byte(i + k) < (k == 1 ? low : 0x80) || byte(i + k) > (k == 1 ? high : 0xbf)) return i;
-    i += more + 1;
-  }
-  return i;
-}
-
-// The parser, when it tells where a text is not UTF-8, reads beyond it (toml11 3.7, parse_literal_string).
-void refuse_other_than_utf8(std::string_view text, const std::string& file) {
-  const std::size_t end = valid_utf8(text);
-  if (end == text.size()) return;
-  const auto line = 1 + std::count(text.begin(), text.begin() + std::ptrdiff_t(end), '\n');
-  throw InputError(file, std::size_t(line),
-                   "this is not TOML: a byte belongs to no character of UTF-8; save it as UTF-8");
 }
 
 }  // namespace
 
-toml::value parse_toml(std::string_view text, const std::string& file) {
-  refuse_other_than_utf8(text, file);
-  refuse_deep_nesting(text, file);
+toml::table parse_toml(std::string_view text, const std::string& file) {
+  refuse_deep_keys(text, file);
   try {
-    std::istringstream stream{std::string(text)};
-    return toml::parse(stream, file);
-  } catch (const toml::exception& error) {
-    throw InputError(file, error.location().line(), "this is not TOML: " + reason(error) + "; correct it");
-  } catch (const std::exception& error) {
-    throw InputError(file, 0, "this is not TOML: " + reason(error) + "; correct it");
+    return toml::parse(text, std::string_view(file));
+  } catch (const toml::parse_error& error) {
+    throw InputError(file, error.source().begin.line,
+                     fmt::format("this is not TOML: {}; correct it", error.description()));
   }
+}
+
+void Node::refuse(const std::string& sentence) const { throw InputError(file_, line(value_), sentence); }
+
+std::string Node::string() const {
+  const auto* text = value_.as_string();
+  if (!text) refuse(where_ + " must be a text in quotation marks");
+  if (text->get().empty()) refuse(where_ + " is empty; give it a name");
+  return text->get();
+}
+
+bool Node::boolean() const {
+  const auto* truth = value_.as_boolean();
+  if (!truth) refuse(where_ + " must be true or false");
+  return truth->get();
+}
+
+double Node::number(double low, double high, const char* unit) const {
+  const double x = value_.value<double>().value_or(std::nan(""));
+  if (!(x >= low && x <= high))
+    refuse(
+        fmt::format("{} must be a number from {:g} to {:g}{}{}", where_, low, high, *unit ? " " : "", unit));
+  return x;
+}
+
+std::uint32_t Node::whole() const {
+  const auto* number = value_.as_integer();
+  if (!number || number->get() < 0 || double(number->get()) > most)
+    refuse(fmt::format("{} must be a whole number from 0 to {:.0f}", where_, most));
+  return std::uint32_t(number->get());
+}
+
+Vec3 Node::place() const {
+  const toml::array* numbers = value_.as_array();
+  if (!numbers || numbers->size() != 3) refuse(where_ + " must be three numbers of µm, [x, y, z]");
+  Vec3 place;
+  for (std::size_t i = 0; i < 3; ++i)
+    place[Eigen::Index(i)] = float(Node((*numbers)[i], file_, where_).number(-longest, longest, "µm"));
+  return place;
+}
+
+const toml::table& Node::table() const {
+  if (!value_.is_table()) refuse(where_ + " must be a table of keys and values");
+  return *value_.as_table();
+}
+
+void Node::allow(std::initializer_list<std::string_view> keys) const {
+  const auto allowed = [&](std::string_view key) { return std::ranges::find(keys, key) != keys.end(); };
+  // The table is in the order of the alphabet: name the first in the file.
+  const toml::table& all = table();
+  auto offender = all.cend();
+  for (auto entry = all.cbegin(); entry != all.cend(); ++entry)
+    if (!allowed(entry->first.str()) &&
+        (offender == all.cend() || line(entry->second) < line(offender->second)))
+      offender = entry;
+  if (offender != all.cend())
+    Node(offender->second, file_, where_)
+        .refuse(fmt::format("{} has no key \"{}\"; its keys are {}", where_, offender->first.str(),
+                            fmt::join(keys, ", ")));
+}
+
+std::optional<Node> Node::find(std::string_view key) const {
+  const toml::node* found = table().get(key);
+  if (!found) return std::nullopt;
+  return Node(*found, file_, fmt::format("{}'s {}", where_, key));
+}
+
+Node Node::at(std::string_view key) const {
+  if (auto node = find(key)) return *node;
+  refuse(fmt::format("{} lacks \"{}\"; add it", where_, key));
+}
+
+std::vector<Node> Node::tables(std::string_view key) const {
+  const Node list = at(key);
+  const toml::array* all = list.value_.as_array();
+  if (!all || all->empty())
+    list.refuse(fmt::format("write each {} as a table of its own, headed [[{}]]", key, key));
+  std::vector<Node> nodes;
+  for (const toml::node& value : *all)
+    nodes.emplace_back(value, file_, fmt::format("{} {}", key, nodes.size() + 1));
+  return nodes;
 }
 
 }  // namespace forest::circuit
