@@ -81,7 +81,7 @@ TEST(EnvironmentFile, WhatIsWrongIsNamedWithItsLine) {
       {with("[[soma]]", "[[soma"), 11, "not TOML"},
       {"", 0, "nothing in this environment"},
       {"name = \"x\"", 0, "nothing in this environment"},
-      {std::string(10000, '['), 1, "nested too deeply"},
+      {std::string(10000, '['), 1, "not TOML"},
       {std::string(10, '\0'), 1, ""},
   };
   for (const Case& c : cases) try {

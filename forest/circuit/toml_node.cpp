@@ -35,8 +35,11 @@ toml::table parse_toml(std::string_view text, const std::string& file) {
   try {
     return toml::parse(text, std::string_view(file));
   } catch (const toml::parse_error& error) {
+    std::string_view reason = error.description();
+    if (constexpr std::string_view start = "Error while "; reason.starts_with(start))
+      reason.remove_prefix(start.size());
     throw InputError(file, error.source().begin.line,
-                     fmt::format("this is not TOML: {}; correct it", error.description()));
+                     fmt::format("this is not TOML: {}; correct it", reason));
   }
 }
 
