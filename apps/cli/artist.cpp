@@ -99,12 +99,8 @@ void Artist::explain(const scene::View& view, const Marks& marks, frame::Image& 
   if (marks.scale) scene::paint_scale(image, view.camera, view.background);
   if (!marks.legend) return;
   std::vector<scene::ColourBar> bars;
-  if (playback_) {
-    const scene::ActivityView look = view.activity.value_or(playback_->view());
-    const double time = look.time.value_or(playback_->begin());
-    bars.push_back(playback_->has_values() ? scene::bar_of(look, time, playback_->activity().facts().units)
-                                           : scene::bar_of_spikes(look, time, view.background));
-  }
+  if (playback_)
+    bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
   if (dressing_.surfaces.has_values()) {
     const auto [low, high] = dressing_.surfaces.shown_range();
     bars.push_back({.map = dressing_.surfaces.map, .low = low, .high = high});

@@ -12,7 +12,8 @@ namespace forest::cli {
 struct Benchmark {
   const char* name;
   const char* summary;  // the question, in one line
-  Setup setup;          // as of a verb
+  const char* example;
+  Setup setup;  // as of a verb
 };
 
 std::span<const Benchmark> benchmarks();

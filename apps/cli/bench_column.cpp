@@ -87,7 +87,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
     }
     part.error += double(budget.error()) / options.frames,
         part.samples += double(view.samples) / options.frames;
-    budget.took(1000. * seconds);
+    budget.took(1000. * seconds, drawn.segments);
     if (!options.out.empty() && i + 1 == options.frames)
       io::write_png(options.out / fmt::format("{}.png", name), width, height, drawn.image.pixels);
     console.progress().advance();

@@ -143,7 +143,7 @@ class Bench {
       const double seconds = seconds_since(start);
       if (i >= settling)
         part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames;
-      budget.took(1000. * seconds);
+      budget.took(1000. * seconds, foveated_.figures().segments);
     }
   }
 

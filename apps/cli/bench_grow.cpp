@@ -107,7 +107,6 @@ std::function<void()> bench_grow(CLI::App& command, Console& console) {
       ->capture_default_str();
   command.add_option("--folder", options->folder, "For the file of cells, which is removed again")
       ->capture_default_str();
-  command.footer("Example:\n  brainforest bench grow --grammar pyramidal --json");
   return [options, &console] {
     std::vector<Result> results;
     for (const std::string& name : options->grammars.empty() ? built_in_grammars() : options->grammars) {

@@ -157,7 +157,6 @@ std::function<void()> bench_io(CLI::App& command, Console& console) {
       .add_option("files", *places,
                   "Files or folders to read; by default neurons that are grown and written in memory")
       ->check(CLI::ExistingPath);
-  command.footer("Example:\n  brainforest bench io --json traced/");
   return [places, &console] {
     WorkByFormat all = places->empty() ? grown() : collected(*places);
     nlohmann::ordered_json rates = nlohmann::ordered_json::object(),

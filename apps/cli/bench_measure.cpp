@@ -231,7 +231,6 @@ std::function<void()> bench_measure(CLI::App& command, Console& console) {
                   "Neurons to measure, files or folders; by default made-up ones of 5,000 points")
       ->type_name("FILES");
   command.add_flag("--each", *details, "How long each metric takes alone, too");
-  command.footer("Example:\n  brainforest bench measure --json\n  brainforest bench measure traced/ --each");
   return [places, details, &console] { run(*places, *details, console); };
 }
 

@@ -241,7 +241,7 @@ void draw_ours(const Options& options) {
     const Drawn drawn = artist.draw(view, width, height);
     const double seconds = seconds_since(start);
     const double core_seconds = double(std::clock() - core) / CLOCKS_PER_SEC;
-    budget.took(1000. * seconds);
+    budget.took(1000. * seconds, drawn.segments);
     if (picture == 0) first = seconds_since(begin);
     for (std::size_t i = 0; i < measured.size(); ++i) {
       if (measured[i] != picture) continue;
@@ -407,7 +407,6 @@ std::function<void()> bench_peers(CLI::App& command, Console& console) {
   command.add_option("--draw", options->draw)->group("");
   add_size(command, options->size);
   add_seed(command, options->seed, "Of the neurons and their places");
-  command.footer("Example, in full:\n  brainforest bench peers --neurons 10000 --json");
   return [options, &console] { run(*options, console); };
 }
 

@@ -228,7 +228,6 @@ std::function<void()> bench_repository(CLI::App& command, Console& console) {
   add_whole(command, "--sections", options->sections, "Sections of each", 5, 1'000'000);
   command.add_option("--folder", options->folder, "Where the repository is made, and removed again")
       ->check(CLI::ExistingDirectory);
-  command.footer("Example:\n  brainforest bench repository --neurons 10000");
   return [options, &console] { run(*options, console); };
 }
 

@@ -97,7 +97,7 @@ class Walk {
                                      options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
-    budget_.took(quick.milliseconds);
+    budget_.took(quick.milliseconds, drawn.segments);
     if (drawn.image.covered < .005)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
@@ -380,8 +380,6 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   add_renderer(command, options->drawer);
   add_size(command, options->size);
   add_seed(command, options->seed, "Of the neurons and their places");
-  command.footer(
-      "Example, in full:\n  brainforest bench seam --neurons 10000 --frames 250 --size 1280x720 --json");
   return [options, &console] { run(*options, console); };
 }
 

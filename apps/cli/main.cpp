@@ -11,6 +11,7 @@
 #include "forest/core/parallel.h"
 #include "forest/repository/names.h"
 
+#include "apps/choice.h"
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
 #include "apps/cli/verb.h"
@@ -51,6 +52,7 @@ int main(int argc, char** argv) {
     command->footer(fmt::format("Example:\n  {}", verb.example));
     cli::add_common(*command, console);
     command->callback([&run, job = verb.setup(*command, console)] { run = job; });
+    refuse_empty(*command);
   }
   try {
     app.parse(argc, argv);

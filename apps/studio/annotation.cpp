@@ -96,48 +96,40 @@ void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene:
   }
 }
 
-void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
-                    const std::string& units, const Ink& ink) {
-  constexpr qreal width = 190, bar = 12;
-  const qreal line = painter.fontMetrics().height() + 3.;
-  const bool flashes = activity.speed > 0.f;
-  const QPointF corner(area.left() + margin, area.top() + margin);
-  plate(painter, QRectF(corner, QSizeF(width + 28, bar + (flashes ? 3. : 2.) * line + 20)), ink);
-  const QPointF top = corner + QPointF(14, 6);
-  painter.setPen(ink.text);
-  painter.drawText(QRectF(top, QSizeF(width, line)), Qt::AlignLeft, QString("%1 ms").arg(time, 0, 'f', 1));
-  painter.drawText(QRectF(top, QSizeF(width, line)), Qt::AlignRight, QString::fromStdString(units));
-  painter.setPen(Qt::NoPen);
-  for (int x = 0; x < int(width); ++x) {
-    const float t = float(x) / float(width - 1), value = activity.low + t * (activity.high - activity.low);
-    const bool below = activity.threshold && value < *activity.threshold;
-    const Vec3 c = below ? Vec3(.25f, .28f, .32f) : activity.map->screen(t);
-    painter.fillRect(QRectF(top + QPointF(x, line + 2), QSizeF(1, bar)),
-                     QColor::fromRgbF(c.x(), c.y(), c.z()));
-  }
-  painter.setPen(ink.faint);
-  const QRectF below(top + QPointF(0, line + bar + 4), QSizeF(width, line));
-  painter.drawText(below, Qt::AlignLeft, QString::number(activity.low));
-  painter.drawText(below, Qt::AlignRight, QString::number(activity.high));
-  if (flashes)
-    painter.drawText(below.translated(0, line), Qt::AlignLeft,
-                     QString("spikes: %1 µm/ms").arg(activity.speed));
-}
-
-void paint_spikes(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
-                  scene::Background background, const Ink& ink) {
-  const scene::ColourBar bar = scene::bar_of_spikes(activity, time, background);
+void paint_bar(QPainter& painter, const QRect& area, const scene::ColourBar& bar, const Ink& ink) {
+  constexpr qreal width = 190, thick = 12, dot = 10;
   const qreal line = painter.fontMetrics().height() + 3.;
   const QString note = QString::fromStdString(bar.note);
-  const QPointF corner(area.left() + margin, area.top() + margin), top = corner + QPointF(14, 6);
-  const QSizeF text(painter.fontMetrics().horizontalAdvance(note) + 4, line);
-  plate(painter, QRectF(corner, QSizeF(text.width() + 44, 2. * line + 14)), ink);
+  const qreal dots = bar.marks.empty() ? 0. : dot * (qreal(bar.marks.size()) + .7);
+  const qreal wide =
+      std::max(bar.map ? width : 0., dots + painter.fontMetrics().horizontalAdvance(note) + 4.);
+  const qreal lines = 1. + (bar.map ? 1. : 0.) + (bar.note.empty() ? 0. : 1.);
+  const QPointF corner(area.left() + margin, area.top() + margin);
+  plate(painter, QRectF(corner, QSizeF(wide + 28, lines * line + (bar.map ? thick + 6. : 0.) + 14)), ink);
+  QPointF top = corner + QPointF(14, 6);
   painter.setPen(ink.text);
-  painter.drawText(QRectF(top, text), Qt::AlignLeft, QString::fromStdString(bar.title));
-  painter.drawText(QRectF(top + QPointF(18, line), text), Qt::AlignLeft, note);
+  painter.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignLeft, QString::fromStdString(bar.title));
+  painter.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignRight, QString::fromStdString(bar.units));
+  top.ry() += line;
+  if (bar.map) {
+    for (int x = 0; x < int(width); ++x) {
+      const Vec3 c = bar.at(float(x) / float(width - 1));
+      painter.fillRect(QRectF(top + QPointF(x, 2), QSizeF(1, thick)), QColor::fromRgbF(c.x(), c.y(), c.z()));
+    }
+    painter.setPen(ink.faint);
+    const QRectF below(top + QPointF(0, thick + 4), QSizeF(width, line));
+    painter.drawText(below, Qt::AlignLeft, QString::number(bar.low));
+    painter.drawText(below, Qt::AlignRight, QString::number(bar.high));
+    top.ry() += thick + 6 + line;
+  }
+  painter.setPen(bar.map ? ink.faint : ink.text);
+  painter.drawText(QRectF(top + QPointF(dots, 0), QSizeF(wide, line)), Qt::AlignLeft, note);
   painter.setPen(Qt::NoPen);
-  painter.setBrush(QColor::fromRgbF(bar.mark.x(), bar.mark.y(), bar.mark.z()));
-  painter.drawEllipse(top + QPointF(6, 1.5 * line), 5, 5);
+  for (std::size_t i = 0; i < bar.marks.size(); ++i) {
+    const Vec3& c = bar.marks[i];
+    painter.setBrush(QColor::fromRgbF(c.x(), c.y(), c.z()));
+    painter.drawEllipse(top + QPointF(.5 * dot + dot * qreal(i), .5 * line), .5 * dot, .5 * dot);
+  }
 }
 
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink) {

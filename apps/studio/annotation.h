@@ -6,6 +6,7 @@
 #include <QPointF>
 #include <QRect>
 
+#include "forest/scene/colour_bar.h"
 #include "forest/scene/view.h"
 
 class QPainter;
@@ -28,12 +29,8 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
 /// At the top left.
 void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
                   const Ink& ink);
-/// At the top left: the colours of activity with their values, and the moment that is shown.
-void paint_activity(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
-                    const std::string& units, const Ink& ink);
-/// The same of spikes without values: what a flash is.
-void paint_spikes(QPainter& painter, const QRect& area, const scene::ActivityView& activity, double time,
-                  scene::Background background, const Ink& ink);
+/// At the top left: what the colours of a simulation mean, and the moment that is shown.
+void paint_bar(QPainter& painter, const QRect& area, const scene::ColourBar& bar, const Ink& ink);
 /// A ring around the point that is looked at.
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink);
 

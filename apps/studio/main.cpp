@@ -12,6 +12,7 @@
 
 #include "forest/core/error.h"
 
+#include "apps/choice.h"
 #include "apps/drawer.h"
 #include "apps/node_set_files.h"
 #include "apps/studio/report.h"
@@ -174,6 +175,7 @@ int main(int argc, char** argv) {
       "Example:\n  brainforest-studio column.forest --view inside.json\nF1 in the window lists keys and "
       "mouse.");
   app.failure_message(CLI::FailureMessage::simple);
+  forest::refuse_empty(app);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

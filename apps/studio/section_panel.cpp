@@ -48,6 +48,7 @@ void SectionView::show_settings(const Settings& settings) {
   settings_ = settings;
   if (moved || !coloured) soon_.start();
   coloured_ = coloured;
+  if (image_.isNull()) update();  // what is written instead
 }
 
 void SectionView::draw() {
@@ -68,8 +69,9 @@ void SectionView::draw() {
 void SectionView::paintEvent(QPaintEvent*) {
   QPainter painter(this);
   if (settings_.plane && !image_.isNull()) return painter.drawImage(0, 0, image_);
-  painter.drawText(rect(), int(Qt::AlignCenter) | int(Qt::TextWordWrap),
-                   tr("K shows the plane of intersection and what it cuts"));
+  painter.drawText(
+      rect(), int(Qt::AlignCenter) | int(Qt::TextWordWrap),
+      settings_.plane ? tr("cutting …") : tr("K shows the plane of intersection and what it cuts"));
 }
 
 void SectionView::resizeEvent(QResizeEvent*) { soon_.start(); }

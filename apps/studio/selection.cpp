@@ -65,14 +65,6 @@ const Row<Subject> rows[] = {
      [](const Subject& s) { return Json(s.index()); }},
     {"type", "Cell type", "", "From the recipe of the column",
      [](const Subject& s) { return Json(s.circuit().types[s.forest.types()[s.index()]].name); }},
-    {"layer", "Layer", "", "Where its soma lies",
-     [](const Subject& s) { return Json(s.circuit().layers[s.forest.layers()[s.index()]].name); }},
-    {"morphology", "Morphology", "", "Name of the grown or traced neuron that stands here",
-     [](const Subject& s) { return Json(s.circuit().morphologies[s.instance.morphology]); }},
-    {"position", "Soma position", "µm", "x, y, z in the tissue; y points to the pia",
-     [](const Subject& s) {
-       return Json{tidy(s.instance.x), tidy(s.instance.y), tidy(s.instance.z)};
-     }},
     {"section", "Section", "", "Id of the section within its neuron, from 0",
      [](const Subject& s) { return s.section ? Json(s.selection.pick.section) : Json("soma"); }},
     {"kind", "Kind", "", "Axon, basal or apical dendrite, …",
@@ -101,6 +93,14 @@ const Row<Subject> rows[] = {
      [](const Subject& s) { return Json(s.sum([](const auto& f) { return int(f.daughters == 0); })); }},
     {"subarbor_length", "Subarbor length", "µm", "Sum over its sections",
      [](const Subject& s) { return Json(tidy(s.sum([](const auto& f) { return f.length; }))); }},
+    {"layer", "Layer", "", "Where its soma lies",
+     [](const Subject& s) { return Json(s.circuit().layers[s.forest.layers()[s.index()]].name); }},
+    {"morphology", "Morphology", "", "Name of the grown or traced neuron that stands here",
+     [](const Subject& s) { return Json(s.circuit().morphologies[s.instance.morphology]); }},
+    {"position", "Soma position", "µm", "x, y, z in the tissue; y points to the pia",
+     [](const Subject& s) {
+       return Json{tidy(s.instance.x), tidy(s.instance.y), tidy(s.instance.z)};
+     }},
 };
 
 std::string in_words(const Json& value) {

@@ -333,15 +333,18 @@ void Viewport::advance(float seconds) {
   set_camera(fly(look(settings_.view.camera, turn_pixels_a_second * seconds * turn), speed * seconds * way));
 }
 
-void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
+void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32_t last,
                          const DressingLimits& limits) {
   const auto w = std::uint32_t(std::lround(width() * devicePixelRatioF())),
              h = std::uint32_t(std::lround(height() * devicePixelRatioF()));
   if (playback_) playback_->begin_picture();
   scene::Chooser::Painter painter;
   const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
+  scene::View view = of;
+  scene::ActivityView& shown = view.activity.emplace(activity());
+  if (selection_ && settings_.dim) shown.neuron = selection_->pick.instance;
   if (coloured)
-    painter = [this, shown = activity(), window = window_](scene::Cut& cut, const scene::Eye& eye) {
+    painter = [this, shown, window = window_](scene::Cut& cut, const scene::Eye& eye) {
       playback_->colour(cut, eye, shown, {.window = window});
     };
   if (first == 0 && !layered())
@@ -354,8 +357,7 @@ void Viewport::draw_part(const scene::View& view, std::uint32_t first, std::uint
   if (settings_.outline) overlays.insert(overlays.end(), outline_.begin(), outline_.end());
   scene::Colouring colouring = colouring_;
   if (spikes_alone) {
-    const auto flashes =
-        playback_->flashes(view.camera, float(h), colouring, activity(), {.window = window_});
+    const auto flashes = playback_->flashes(view.camera, float(h), colouring, shown, {.window = window_});
     overlays.insert(overlays.end(), flashes.begin(), flashes.end());
     make_quiet(colouring.palette, view.background);
   }
@@ -438,7 +440,7 @@ void Viewport::refine() {
 }
 
 void Viewport::took(float milliseconds) {
-  budget().took(double(milliseconds));
+  budget().took(double(milliseconds), figures_.segments);
   milliseconds_ = milliseconds_ > 0.f ? .8f * milliseconds_ + .2f * milliseconds : milliseconds;
   figures_.frames_per_second = 1000.f / milliseconds_;
 }
@@ -501,10 +503,8 @@ void Viewport::annotate() {
     paint_scale(painter, rect(), settings_.view.camera, ink);
     paint_directions(painter, rect(), settings_.view.camera, ink, !forest_.instances().empty());
   }
-  if (settings_.legend && playback_ && !playback_->has_values())
-    paint_spikes(painter, rect(), activity(), time(), settings_.view.background, ink);
-  else if (settings_.legend && playback_)
-    paint_activity(painter, rect(), activity(), time(), playback_->activity().facts().units, ink);
+  if (settings_.legend && playback_)
+    paint_bar(painter, rect(), scene::bar_of(*playback_, activity(), settings_.view.background), ink);
   else if (settings_.legend)
     paint_legend(painter, rect(), legend(), ink);
   if (const auto& gaze = settings_.view.detail.gaze)

@@ -16,6 +16,7 @@
 #include "forest/cortex/slab_test.h"
 #include "forest/cortex/warp.h"
 
+#include "tests/effort.h"
 #include "tests/refused.h"
 
 namespace forest::circuit {
@@ -98,6 +99,7 @@ TEST(PlantElements, CountsAreThoseOfTheDensitiesToTheLastNeuron) {
 }
 
 TEST(PlantElements, AnElementIsTheSameWhateverElseIsPlantedAndOnAnyNumberOfThreads) {
+  LONG_TEST();
   const auto sheet = cortex::folded_sheet(2, 2);
   const ElementPlanter first(layered(), candidates, 5), second(layered(), candidates, 5),
       other(layered(), candidates, 6);
@@ -110,6 +112,7 @@ TEST(PlantElements, AnElementIsTheSameWhateverElseIsPlantedAndOnAnyNumberOfThrea
 }
 
 TEST(PlantElements, SomataKeepTheirGapInElementsAndAcrossTheirFaces) {
+  LONG_TEST();
   const auto sheet = cortex::folded_sheet(4, 2);
   for (const double scale : {1., 4.}) {
     Recipe recipe = layered();
@@ -128,6 +131,7 @@ TEST(PlantElements, SomataKeepTheirGapInElementsAndAcrossTheirFaces) {
 }
 
 TEST(PlantElements, ManyMoreSomataThanPackOneByOneFit) {
+  LONG_TEST();
   Recipe recipe;
   recipe.radius = 100.f, recipe.types = {{"c", "c"}}, recipe.layers = {{"L", 1.f, 400'000., {}, {1.}}};
   const std::vector<Candidate> wide{{"c", "c", 6.1f, 0.f}};  // 38 % of the volume

@@ -13,6 +13,8 @@
 #include "forest/core/random.h"
 #include "forest/cortex/fit_faces.h"
 
+#include "tests/effort.h"
+
 namespace forest::cortex {
 namespace {
 
@@ -64,6 +66,7 @@ struct Shell : ::testing::Test {
 };
 
 TEST_F(Shell, TheSlopeIsThatOfOneOverR) {
+  LONG_TEST();
   for (const Place& way : {Place(1., 2., 3.), Place(-1., .1, 0.), Place(.3, -.7, .2)})
     for (const double r : {8200., 8900., 9700.}) {
       const auto slope = field.gradient(r * way.normalized(), way);
@@ -140,6 +143,7 @@ TEST_F(Shell, AFoldedMiddleIsUnfoldedAndTheRestStays) {
 }
 
 TEST_F(Shell, ACrumpledSurfaceHasElementsAsEvenAsASmoothOne) {
+  LONG_TEST();
   Mesh crumpled = outer;
   Random random(1, 2, 3);
   for (Vec3& p : crumpled.positions)
@@ -189,6 +193,7 @@ TEST_F(Shell, AnIslandInTheWallIsWall) {
 }
 
 TEST_F(Shell, TheWallHasTheVolumeUnderIt) {
+  LONG_TEST();
   // Towards +x the surfaces are .3 mm apart.
   const Mesh thin = star(6, [](const Vec3& d) { return d.x() > .8f ? inside + 300. : outside; });
   const Mesh even = ball(inside, 6);
@@ -233,6 +238,7 @@ TEST_F(Shell, WhatIsTangledBeginsAnewAndTheRestStays) {
 }
 
 TEST_F(Shell, AHeapThatCannotBeMendedDoesNotKeepOthersFromBeginningAnew) {
+  LONG_TEST();
   Elements elements = made().cortex.elements;
   constexpr std::uint32_t mendable = 7, hopeless = 450;
   const auto corners = elements.corners_of(mendable);

@@ -15,6 +15,7 @@
 #include "forest/cortex/curved_elements.h"
 #include "forest/cortex/locate.h"
 
+#include "tests/effort.h"
 #include "tests/refused.h"
 
 namespace forest::cortex {
@@ -62,6 +63,7 @@ TEST(Packing, HasItsDensityAndItsSpacingEverywhere) {
 }
 
 TEST(PlacesIn, AreAllThatALocatorFindsInTheElementEachOnce) {
+  LONG_TEST();
   const auto elements = folded_sheet(3, 2);
   const Locator locator(elements, 0.);
   const Packing packing(std::make_shared<const PackedCube>(pack_cube(.8, 1)), 8e-6, 1, 0);

@@ -11,6 +11,8 @@
 #include "forest/geometry/self_intersection.h"
 #include "forest/geometry/triangle_tree.h"
 
+#include "tests/effort.h"
+
 namespace forest {
 namespace {
 
@@ -38,6 +40,7 @@ Mesh thin(const Mesh& mesh, double error, double longest = 1500.) {
 }
 
 TEST(Decimated, StaysAsNearAsIsAskedBothWays) {
+  LONG_TEST();
   const Mesh mesh = shells();
   std::size_t before = mesh.triangles.size();
   for (const double error : {5., 20., 80.}) {

@@ -15,6 +15,8 @@
 #include "forest/morphology/measure.h"
 #include "forest/morphology/validate.h"
 
+#include "tests/effort.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -139,6 +141,7 @@ double mean_extent(const std::vector<Morphology>& cells, int axis, SectionKind k
 }
 
 TEST(Tufted, TheSameModelGrowsDifferentlyNearThePiaAndNeverAboveIt) {
+  LONG_TEST();
   const Grammar g = shipped("tufted");
   const Environment& e = cortex_of_layers();
   std::vector<Morphology> cells[2];
@@ -194,6 +197,7 @@ TEST(Tufted, IsTheSameAtAnyNumberOfThreads) {
 
 // Dendrites sprout and elongate; then all but one are taken back from their tips, step by step.
 TEST(Retraction, DendritesShrinkFromTheirTipsUntilOneIsLeft) {
+  LONG_TEST();
   const Grammar g = shipped("retraction");
   Deriver deriver(g);
   double most = 0.;

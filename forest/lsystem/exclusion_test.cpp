@@ -11,6 +11,8 @@
 #include "forest/lsystem/turtle.h"
 #include "forest/morphology/measure.h"
 
+#include "tests/effort.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -129,6 +131,7 @@ std::vector<Sphere> packed(Random& random, double size, int count, const Vec3& k
 }
 
 TEST(Exclusion, NoSegmentOfAThousandCellsPassesThroughAnyOfThousandsOfSomata) {
+  LONG_TEST();
   const Grammar g = parse(wild, "wild");
   std::size_t segments = 0, bent = 0, somata = 0;
   for (std::uint64_t tissue = 0; tissue < 20; ++tissue) {

@@ -11,6 +11,8 @@
 #include "forest/morphology/measure.h"
 #include "forest/statistics/summary.h"
 
+#include "tests/effort.h"
+
 namespace forest::lsystem {
 namespace {
 
@@ -74,6 +76,7 @@ std::vector<double> cones(const Grammar& g, int steps, std::uint64_t cells) {
 }
 
 TEST(Growth, TerminalNumbersHaveTheMeanAndSpreadThatTheModelPredictsAtEveryAge) {
+  LONG_TEST();
   for (const Published& p :
        {Published{2.52, 0.73, 0.5}, Published{3.85, 0.74, 0.87}, Published{1.26, 0.106, 0.}}) {
     const Grammar g = with(p);

@@ -11,6 +11,7 @@
 #include "forest/core/hash.h"
 #include "forest/repository/schema.h"
 
+#include "tests/effort.h"
 #include "tests/every_database.h"
 
 namespace forest::repository {
@@ -234,6 +235,7 @@ bool made_older(const std::string& file, const std::string& name, int version,
 }
 
 TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
+  LONG_TEST();
   const auto& server = PostgresqlServer::get();
   std::vector<Morphology> source;
   for (std::size_t i = 0; i < 30; ++i) source.push_back(neuron(i, 60));

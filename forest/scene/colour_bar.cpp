@@ -17,6 +17,10 @@ constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide =
 std::size_t lines_of(const ColourBar& bar) {
   return (bar.map ? 1 : 0) + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
 }
+float mark_size(float letter) { return 1.1f * letter; }
+float marks_width(const ColourBar& bar, float letter) {
+  return bar.marks.empty() ? 0.f : (float(bar.marks.size()) + .7f) * mark_size(letter);
+}
 float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 
 }  // namespace
@@ -28,34 +32,45 @@ Writing writing_in(const frame::Image& image, Background background) {
           dark ? Vec3(.03f, .05f, .075f) : Vec3(1.f, 1.f, 1.f)};
 }
 
-ColourBar bar_of(const ActivityView& activity, double time, const std::string& units) {
+Vec3 ColourBar::at(float t) const {
+  const bool below = threshold && low + t * (high - low) < *threshold;
+  return below ? Vec3(.25f, .28f, .32f) : map->screen(t);
+}
+
+ColourBar bar_of(const ActivityView& activity, double time, const std::string& units, Background background) {
+  const auto [bright, fading] = flash_colours(background);
+  const bool flashes = activity.speed > 0.f;
   return {.map = activity.map,
+          .marks = flashes ? std::vector{screen_of(bright), screen_of(fading)} : std::vector<Vec3>(),
           .low = activity.low,
           .high = activity.high,
           .units = units,
           .threshold = activity.threshold,
           .title = fmt::format("{:.1f} ms", time),
-          .note = activity.speed > 0.f ? fmt::format("spikes: {:g} µm/ms", activity.speed) : ""};
+          .note = flashes ? fmt::format("a spike, {:g} µm/ms", activity.speed) : ""};
 }
 
 ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background) {
   frame::Palette palette = frame::black_palette();
   make_quiet(palette, background);
   return {.map = nullptr,
-          .mark = screen_of(palette[spike_entry]),
+          .marks = {screen_of(palette[spike_entry]), screen_of(palette[fading_entry])},
           .title = fmt::format("{:.1f} ms", time),
           .note = activity.speed > 0.f ? fmt::format("a spike, {:g} µm/ms", activity.speed)
                                        : "spikes are not shown"};
 }
 
+ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background) {
+  const double time = activity.time.value_or(playback.begin());
+  return playback.has_values() ? bar_of(activity, time, playback.activity().facts().units, background)
+                               : bar_of_spikes(activity, time, background);
+}
+
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters) {
   const float steps = std::max(1.f, std::round(place.right - place.left));
   for (float i = 0.f; i < steps; i += 1.f) {
-    const float t = (i + .5f) / steps, value = bar.low + t * (bar.high - bar.low);
-    const bool below = bar.threshold && value < *bar.threshold;
     const float left = place.left + i;
-    fill(image, {left, place.top, left + 1.f, place.bottom},
-         below ? Vec3(.25f, .28f, .32f) : bar.map->screen(t));
+    fill(image, {left, place.top, left + 1.f, place.bottom}, bar.at((i + .5f) / steps));
   }
   const float base = place.bottom + 1.7f * letters.height;
   const std::string high = fmt::format("{:.6g}", bar.high);
@@ -76,7 +91,7 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
   for (const ColourBar& bar : bars) {
     const float left = h * (margin + padding), right = left + h * wide;
     const float bottom = top + h * (2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
-    const float note = bar.map ? 0.f : 1.9f * h + letters.width(bar.note);
+    const float note = bar.note.empty() ? 0.f : marks_width(bar, h) + letters.width(bar.note);
     fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, .62f);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
@@ -84,16 +99,15 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
       letters.write(image, bar.units, right - letters.width(bar.units), base);
       base += h * line;
     }
-    if (!bar.map) {
-      const float dot = h * 1.1f;
-      fill(image, {left, base - dot, left + dot, base}, bar.mark);
-      letters.write(image, bar.note, left + 1.7f * dot, base);
-      top = bottom + h * margin;
-      continue;
+    if (bar.map) {
+      const Box place{left, base - h, right, base - h + h * thick};
+      paint(image, bar, place, letters);
+      base = place.bottom + h * (1.7f + line);
     }
-    const Box place{left, base - h, right, base - h + h * thick};
-    paint(image, bar, place, letters);
-    if (!bar.note.empty()) letters.write(image, bar.note, left, place.bottom + h * (1.7f + line));
+    const float dot = mark_size(h);
+    for (std::size_t i = 0; i < bar.marks.size(); ++i)
+      fill(image, {left + float(i) * dot, base - dot, left + float(i + 1) * dot, base}, bar.marks[i]);
+    letters.write(image, bar.note, left + marks_width(bar, h), base);
     top = bottom + h * margin;
   }
   return true;

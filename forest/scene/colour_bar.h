@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <vector>
 
 #include "forest/scene/colour_map.h"
 #include "forest/scene/colouring.h"
@@ -20,19 +21,26 @@ struct Writing {
 };
 Writing writing_in(const frame::Image& image, Background background);
 
+class Playback;
+
 struct ColourBar {
-  const ColourMap* map = &colour_maps().front();  // null: a dot of `mark` before the note instead of a bar
-  Vec3 mark = Vec3::Ones();                       // sRGB 0–1
+  const ColourMap* map = &colour_maps().front();  // null: no bar
+  std::vector<Vec3> marks{};                      // sRGB 0–1, of dots before the note
   float low = 0.f, high = 1.f;                    // values at its ends
   std::string units{};                            // of them; may be empty
   std::optional<float> threshold{};               // what is less is grey
   std::string title{}, note{};                    // above and below; may be empty
+
+  Vec3 at(float t) const;  // the colour at a share 0–1 of its length, sRGB 0–1
 };
 
 /// Of a simulation at a moment (ms).
-ColourBar bar_of(const ActivityView& activity, double time, const std::string& units);
+ColourBar bar_of(const ActivityView& activity, double time, const std::string& units, Background background);
 /// Of spikes without values: what a flash is, and how fast it runs.
 ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background);
+
+/// Whichever of them explains what is played.
+ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background);
 
 /// One below the other at the top left, on ground that lets the picture through. A picture that is too small to read them in
 /// (about 280 × 130 pixels for one bar) stays as it is.

@@ -34,15 +34,38 @@ TEST(ColourBar, OfSpikesAloneIsADotOfTheirColourAndNoMapOfValues) {
     std::size_t dot = 0;
     for (std::size_t i = 0; i < image.pixels.size(); i += 4) {
       const Vec3 pixel = Vec3(image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]) / 255.f;
-      dot += (pixel - bar.mark).norm() < .02f;
+      dot += (pixel - bar.marks.front()).norm() < .02f;
     }
     EXPECT_GT(dot, 30u);
     EXPECT_LT(dot, 400u);
   }
 }
 
+TEST(ColourBar, BesideValuesSaysWhatFlashesAreWhereThereAreSome) {
+  for (const Background background : {Background::dark, Background::light}) {
+    ActivityView view;
+    view.speed = 250.f;
+    const ColourBar bar = bar_of(view, 12.5, "mV", background);
+    EXPECT_EQ(bar.note, "a spike, 250 µm/ms");
+    frame::Image image = black(640, 480);
+    EXPECT_TRUE(paint(image, {&bar, 1}, background));
+    for (const Vec3& mark : bar.marks) {
+      std::size_t dot = 0;
+      for (std::size_t i = 0; i < image.pixels.size(); i += 4)
+        dot += (Vec3(image.pixels[i], image.pixels[i + 1], image.pixels[i + 2]) / 255.f - mark).norm() < .02f;
+      EXPECT_GT(dot, 30u);
+    }
+  }
+  ActivityView quiet;
+  quiet.speed = 0.f;
+  const ColourBar none = bar_of(quiet, 12.5, "mV", Background::dark);
+  EXPECT_EQ(none.note, "");
+  EXPECT_TRUE(none.marks.empty());
+}
+
 TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {
-  const ColourBar bars[] = {bar_of(ActivityView(), 12.5, "mV"), {.map = &colour_maps().front()}};
+  const ColourBar bars[] = {bar_of(ActivityView(), 12.5, "mV", Background::dark),
+                            {.map = &colour_maps().front()}};
   EXPECT_EQ(bars[0].title, "12.5 ms");
   frame::Image small = black(160, 100), large = black(640, 480);
   EXPECT_FALSE(paint(small, bars, Background::dark));

@@ -84,6 +84,16 @@ TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   EXPECT_EQ(budget.samples(), 1u);
 }
 
+TEST(Budget, AForestOfFewSegmentsKeepsThemWhereTheMachineIsBusy) {
+  Budget budget(50.);
+  for (int i = 0; i < 50; ++i) budget.took(400., 3000);
+  EXPECT_EQ(budget.error(), 1.f);
+  watch(budget, 1000., 50);  // a large one
+  EXPECT_GT(budget.error(), 4.f);
+  for (int i = 0; i < 50; ++i) budget.took(400., 3000);
+  EXPECT_EQ(budget.error(), 1.f);
+}
+
 TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   Budget budget(50.);
   EXPECT_EQ(watch(budget, 4., 80), 1u);

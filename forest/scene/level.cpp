@@ -115,7 +115,7 @@ std::size_t Budget::upwards(double milliseconds) const {
   return to;
 }
 
-void Budget::took(double milliseconds) {
+void Budget::took(double milliseconds, std::uint64_t segments) {
   // Changing back and forth would be seen, so several pictures must agree, for more samples those of a second and a half: a gaze
   // that jumps rests beside the forest for less. What was left again soon was tried in vain, and is not tried again so soon;
   // that is forgotten in a minute.
@@ -137,8 +137,10 @@ void Budget::took(double milliseconds) {
     step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
     return;
   }
-  const double ratio =
-      std::clamp(milliseconds / milliseconds_, .5, 16.);  // the first picture of a large forest may take long
+  constexpr std::uint64_t few = 20'000;  // two cores draw them in a millisecond or two
+  // The first picture of a large forest may take long.
+  const double most = step_ == 0 && segments < few ? .8 : 16.;
+  const double ratio = std::clamp(milliseconds / milliseconds_, .5, most);
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);
 }
 

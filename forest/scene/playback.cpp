@@ -61,7 +61,10 @@ bool within(std::uint32_t first, std::uint32_t count, std::uint32_t begin, std::
   return first >= begin && std::size_t(first - begin) + count <= size;
 }
 
-std::array<std::uint8_t, 256> entries_of(const reports::Range& range, const ActivityView& view) {
+// Of the neuron that stands out, and of all others.
+std::array<std::uint8_t, 256> entries_of(const reports::Range& range, const ActivityView& view, bool others) {
+  const std::uint32_t steps = view.neuron ? half_map_steps : map_steps,
+                      first = view.neuron && others ? steps : 0;
   std::array<std::uint8_t, 256> entries;
   entries.fill(std::uint8_t(no_value_entry));
   for (std::size_t code = 0; code < reports::no_value; ++code) {
@@ -69,7 +72,7 @@ std::array<std::uint8_t, 256> entries_of(const reports::Range& range, const Acti
     const float at = std::clamp((value - view.low) / (view.high - view.low), 0.f, 1.f);
     entries[code] = std::uint8_t(view.threshold && value < *view.threshold
                                      ? below_entry
-                                     : std::uint32_t(std::lround(at * float(map_steps - 1))));
+                                     : first + std::uint32_t(std::lround(at * float(steps - 1))));
   }
   return entries;
 }
@@ -205,6 +208,9 @@ std::optional<Playback::Compartment> Playback::compartment(std::uint32_t instanc
 }
 
 void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const PlaybackOptions& options) {
+  if (view.neuron && *view.neuron >= shown_.size())
+    throw Error(fmt::format("neuron {} is to stand out, and there are {}; name one from 0 to {}",
+                            *view.neuron, shown_.size(), shown_.size() - 1));
   auto start = Clock::now();
   const double time = view.time.value_or(begin());
   for (const std::uint32_t i : in_sight_) shown_[i] = {};
@@ -226,7 +232,8 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
   figures_.gather += milliseconds_since(start);
 
   start = Clock::now();
-  const auto entry_of = entries_of(activity_.facts().range, view);
+  const reports::Range& range = activity_.facts().range;
+  const std::array entry_of{entries_of(range, view, false), entries_of(range, view, true)};
   Cut::Entries& entries = cut.entries.emplace();
   const auto paint_list = [&](std::span<const frame::Item> list, std::size_t each,
                               std::vector<std::uint8_t>& out) {
@@ -235,7 +242,8 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
       for (std::size_t i = from; i < to; ++i)
         each_run(geometry, list[i],
                  [&](std::uint32_t at, std::uint32_t instance, std::uint32_t first, std::uint32_t count) {
-                   paint(instance, first, count, entry_of, view, time, options.window, &out[i * each + at]);
+                   paint(instance, first, count, entry_of[instance != view.neuron], view, time,
+                         options.window, &out[i * each + at]);
                  });
     });
   };

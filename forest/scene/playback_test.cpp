@@ -143,7 +143,8 @@ std::uint32_t expected(const Sample& sample, const Activity& activity, const fra
   const float value = activity.facts().range.value(code[0]);
   if (view.threshold && value < *view.threshold) return below_entry;
   const float at = std::clamp((value - view.low) / (view.high - view.low), 0.f, 1.f);
-  return std::uint32_t(std::lround(at * 95.f));
+  if (!view.neuron) return std::uint32_t(std::lround(at * 95.f));
+  return std::uint32_t(std::lround(at * 47.f)) + (instance == *view.neuron ? 0 : 48);
 }
 
 TEST(Playback, EverySegmentHasTheColourOfItsCompartmentAtEveryLevelOfShape) {
@@ -172,6 +173,41 @@ TEST(Playback, EverySegmentHasTheColourOfItsCompartmentAtEveryLevelOfShape) {
     const frame::Frame frame = compose(sample.forest, whole, colouring, cut, 320, 200);
     EXPECT_NO_THROW(frame::check(frame, sample.forest.geometry()));
   }
+}
+
+TEST(Playback, WhileANeuronStandsOutTheOthersShowTheSameInQuietColours) {
+  const Sample sample;
+  const Activity activity = sample.activity();
+  Playback playback(sample.forest, activity);
+  View whole = overview(sample.forest);
+  ActivityView& view = whole.activity.emplace(playback.view());
+  view.low = -72.f, view.high = -40.f, view.threshold = -69.f, view.time = 20., view.neuron = 1,
+  view.speed = 0.f;
+  const Eye eye = eye_at(whole.camera, 1.f);
+  Cut cut = choose(sample.forest, eye, viewport);
+  playback.colour(cut, eye, view, {.pixels = 0.f});
+  std::set<std::uint32_t> own, other;
+  for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
+    const frame::Owner source = source_of(sample, item, i);
+    ASSERT_EQ(entry, expected(sample, activity, source, 40, view));
+    if (entry < map_steps) (source.instance == 1 ? own : other).insert(entry);
+  });
+  EXPECT_GT(own.size(), 2u);
+  EXPECT_GT(other.size(), 2u);
+  const Colouring colouring = colour(sample.forest, ColourBy::type, Background::dark);
+  for (const Background background : {Background::dark, Background::light}) {
+    whole.background = background;
+    const frame::Palette palette = compose(sample.forest, whole, colouring, cut, 320, 200).palette;
+    const frame::Palette ground = [&] {
+      whole.activity->map = &colour_maps().back();
+      return compose(sample.forest, whole, colouring, cut, 320, 200).palette;
+    }();
+    for (std::uint32_t i = 0; i < half_map_steps; ++i)  // maps differ less there
+      EXPECT_NEAR((palette[half_map_steps + i] - ground[half_map_steps + i]).norm(),
+                  (background == Background::dark ? .18f : .25f) * (palette[i] - ground[i]).norm(), 1e-5f);
+  }
+  view.neuron = std::uint32_t(sample.forest.instances().size());
+  EXPECT_THROW(playback.colour(cut, eye, view), Error);
 }
 
 TEST(Playback, FarNeuronsAreColouredByMeansThatAreNearTheirCompartments) {

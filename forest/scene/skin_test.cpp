@@ -13,6 +13,7 @@
 #include "forest/core/parallel.h"
 #include "forest/scene/view.h"
 
+#include "tests/effort.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -246,6 +247,7 @@ TEST(Skin, IsTheSameAtAnyNumberOfThreads) {
 }
 
 TEST(Skin, KeepsItsLimits) {
+  LONG_TEST();
   Close close(80.f);
   close.show({.triangles = 1u << 30});
   const std::size_t all = close.skin.figures().triangles;

@@ -8,6 +8,8 @@
 #include <functional>
 #include <limits>
 #include <numbers>
+#include <set>
+#include <string>
 #include <utility>
 
 #include <fmt/format.h>
@@ -231,7 +233,10 @@ Key<Of> whole(std::string_view name, std::uint32_t low, std::uint32_t high, At a
                                fmt::format("'{}' must be a whole number from {} to {}", name, low, high));
             at(of) = std::uint32_t(value);
           },
-          [=](const Of& of) { return Json(at(of)); }};
+          [=](const Of& of) {
+            const std::optional<std::uint32_t> value = at(of);
+            return value ? Json(*value) : Json();
+          }};
 }
 template <class Of, class At>
 Key<Of> flag(std::string_view name, At at) {
@@ -316,6 +321,8 @@ Keys<ActivityView> keys_of_activity() {
            a.time = json.get<double>();
          },
          [](const A& a) { return a.time ? Json(*a.time) : Json(); }},
+        whole<A>(
+            "neuron", 0, 0xffff'fffe, [](auto& a) -> auto& { return a.neuron; }),
     };
   }();
   return keys;
@@ -420,13 +427,17 @@ std::vector<ViewKey> facts_of(Keys<Of> keys) {
 
 // The colours of activity on a background.
 void paint(frame::Palette& palette, const ActivityView& a, bool light) {
-  for (std::uint32_t i = 0; i < map_steps; ++i)
-    palette[i] = (*a.map)(float(i) / float(map_steps - 1)) * (light ? .85f : 1.f);
+  const std::uint32_t steps = a.neuron ? half_map_steps : map_steps;
+  for (std::uint32_t i = 0; i < steps; ++i)
+    palette[i] = (*a.map)(float(i) / float(steps - 1)) * (light ? .85f : 1.f);
+  const float kept = light ? .25f : .18f;
+  const Vec3 ground = light ? light_of(0xDDE3EB) : Vec3::Zero();
+  for (std::uint32_t i = steps; i < map_steps; ++i)
+    palette[i] = kept * palette[i - steps] + (1.f - kept) * ground;
   palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x2A303A);
   palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x3C4450);
-  // On dark ground a flash fades through a colour of its own, for between white and the grey of what has no value lies grey.
-  const Vec3 dim = palette[no_value_entry], bright = light ? light_of(0xC00010) : Vec3(1.f, 1.f, .92f),
-             fading = light ? Vec3(.5f * (dim + bright)) : light_of(0x2FD6FF);
+  const Vec3 dim = palette[no_value_entry];
+  const auto [bright, fading] = flash_colours(light ? Background::light : Background::dark);
   for (std::uint32_t i = 0; i < flash_steps; ++i) {
     const float share = 2.f * float(i + 1) / float(flash_steps);
     palette[flash_entry + i] =
@@ -508,7 +519,14 @@ class Enclosing {
 View parse_view(std::string_view text, const std::string& name) {
   Json json;
   try {
-    json = Json::parse(text);
+    std::vector<std::set<std::string>> open;  // objects, with the keys that each has had
+    json = Json::parse(text, [&](int, Json::parse_event_t event, Json& value) {
+      if (event == Json::parse_event_t::object_start) open.emplace_back();
+      if (event == Json::parse_event_t::object_end) open.pop_back();
+      if (event == Json::parse_event_t::key && !open.back().insert(value.get<std::string>()).second)
+        throw InputError(name, 0, fmt::format("has '{}' twice; take one out", value.get<std::string>()));
+      return true;
+    });
   } catch (const nlohmann::json::exception& e) {
     throw InputError(name, 0, fmt::format("is no view: {}; see docs/scene/view.md", e.what()));
   }
@@ -526,6 +544,13 @@ View parse_view(std::string_view text, const std::string& name) {
 }
 
 std::string to_json(const View& view) { return write_all(view, keys_of_view()).dump(); }
+
+// On dark ground through a colour of its own, for between white and the grey of what has no value lies grey.
+FlashColours flash_colours(Background background) {
+  if (background == Background::dark) return {Vec3(1.f, 1.f, .92f), light_of(0x2FD6FF)};
+  const Vec3 bright = light_of(0xC00010);
+  return {bright, .5f * (bright + light_of(0xB4BCC8))};
+}
 
 std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
 std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }

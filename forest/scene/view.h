@@ -21,8 +21,9 @@ struct ActivityView {
   std::optional<float> threshold;                 // what is less is dim and grey
   float speed =
       300.f;  // of spikes along axons, µm/ms; 0 for no flashes. Thin axons without myelin have some hundreds
-  float fade = 1.f;            // ms in which a flash falls to 1/e
-  std::optional<double> time;  // ms; none: the beginning
+  float fade = 1.f;                     // ms in which a flash falls to 1/e
+  std::optional<double> time;           // ms; none: the beginning
+  std::optional<std::uint32_t> neuron;  // that stands out: the colours of all others step back
 };
 
 struct View {
@@ -67,6 +68,14 @@ View portrait(const Forest& forest);
 /// flashes from dim to bright.
 inline constexpr std::uint32_t map_steps = 96, below_entry = 96, no_value_entry = 97, flash_entry = 98,
                                flash_steps = 16;
+/// Where a neuron stands out (ActivityView::neuron) the map has half as many steps, and after them the same for the others.
+inline constexpr std::uint32_t half_map_steps = map_steps / 2;
+
+/// Of a flash on a branch that has a value: when it is new, and half faded. Linear light.
+struct FlashColours {
+  Vec3 bright, fading;
+};
+FlashColours flash_colours(Background background);
 
 /// The picture of a view. The spans of the frame point into `cut`, `colouring` and `overlays`, which must outlive it.
 frame::Frame compose(const Forest& forest, const View& view, const Colouring& colouring, const Cut& cut,

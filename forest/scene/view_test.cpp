@@ -43,7 +43,7 @@ View full_view() {
   view.targets.resize(1);
   view.targets[0].name = "L5", view.targets[0].opacity = .4f;
   view.activity.emplace();
-  view.activity->threshold = -60.f, view.activity->time = 12.5;
+  view.activity->threshold = -60.f, view.activity->time = 12.5, view.activity->neuron = 3;
   return view;
 }
 
@@ -95,6 +95,9 @@ TEST(View, SaysWhichKeyIsWrong) {
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":"mood"})").find("layer"),
             std::string::npos);
   EXPECT_NE(error_of(R"({"eye":[0,0,1],"target":[0,0,0],"fovv":4})").find("fovv"), std::string::npos);
+  for (const char* doubled : {R"({"eye":[0,0,1],"target":[0,0,0],"eye":[0,0,1]})",
+                              R"({"eye":[0,0,1],"target":[0,0,0],"activity":{"eye":1,"eye":2}})"})
+    EXPECT_NE(error_of(doubled).find("has 'eye' twice"), std::string::npos);
   for (const char* samples : {"2.7", "0", "1025", "\"4\"", "-3"})
     EXPECT_NE(error_of(fmt::format(R"({{"eye":[0,0,1],"target":[0,0,0],"samples":{}}})", samples).c_str())
                   .find("'samples' must be a whole number from 1 to 1024"),

@@ -28,6 +28,11 @@ fails_with 2 "'-1' is no whole number from 0 to 4096" $program list --repo x.db 
 fails_with 2 "'foo' is none of auto, cpu, opengl" $program render x.forest -o x.png --renderer foo
 fails_with 2 "'blue' is none of sign, target" $program render x.forest -o x.png --synapse-colour blue
 fails_with 2 "'nan' is no number from 0 to 1" $program render x.forest -o x.png --gaze nan .5
+fails_with 2 'what is given is empty; give a value, or leave the option out' $program render x.forest -o x.png --view ''
+fails_with 2 'what is given is empty; give a value, or leave the option out' $program cortex surfaces x.svg --out ''
+for benchmark in activity pick targets; do
+  $program bench $benchmark --help | grep -q "brainforest bench $benchmark --neurons"
+done
 for size in 12by9 0x9 12x9x3 -1x5 20000x1; do
   fails_with 2 'is no size of a picture' $program render x.forest -o x.png --size "$size"
   fails_with 2 'is no size of a picture' $program bench column --size "$size"
