@@ -204,7 +204,7 @@ TEST(Playback, WhileANeuronStandsOutTheOthersShowTheSameInQuietColours) {
     }();
     for (std::uint32_t i = 0; i < half_map_steps; ++i)  // maps differ less there
       EXPECT_NEAR((palette[half_map_steps + i] - ground[half_map_steps + i]).norm(),
-                  (background == Background::dark ? .18f : .25f) * (palette[i] - ground[i]).norm(), 1e-5f);
+                  (background == Background::dark ? .05f : .25f) * (palette[i] - ground[i]).norm(), 1e-5f);
   }
   view.neuron = std::uint32_t(sample.forest.instances().size());
   EXPECT_THROW(playback.colour(cut, eye, view), Error);

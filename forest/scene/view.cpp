@@ -430,7 +430,7 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
   const std::uint32_t steps = a.neuron ? half_map_steps : map_steps;
   for (std::uint32_t i = 0; i < steps; ++i)
     palette[i] = (*a.map)(float(i) / float(steps - 1)) * (light ? .85f : 1.f);
-  const float kept = light ? .25f : .18f;
+  const float kept = light ? .25f : .05f;
   const Vec3 ground = light ? light_of(0xDDE3EB) : Vec3::Zero();
   for (std::uint32_t i = steps; i < map_steps; ++i)
     palette[i] = kept * palette[i - steps] + (1.f - kept) * ground;
