@@ -11,6 +11,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/frame/soften.h"
 #include "forest/io/png.h"
 #include "forest/reports/synthetic.h"
 
@@ -70,7 +71,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
       view.activity->time = playback->activity().facts().time(i % options.steps);
       touched = playback->activity().touched();
     }
-    const Drawn drawn = artist.draw(view, width, height);
+    Drawn drawn = artist.draw(view, width, height);
+    frame::soften(drawn.image, budget.softness());
     const double seconds = seconds_since(start);
     if (drawn.image.covered < .02)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was measured", i,

@@ -13,6 +13,7 @@
 
 #include "forest/core/error.h"
 #include "forest/frame/similarity.h"
+#include "forest/frame/soften.h"
 #include "forest/io/png.h"
 #include "forest/render/reference/reference_renderer.h"
 #include "forest/scene/connection.h"
@@ -20,6 +21,7 @@
 
 #include "apps/cli/artist.h"
 #include "apps/cli/bench.h"
+#include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/grown_column.h"
 #include "apps/cli/options.h"
@@ -33,7 +35,7 @@ struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
   double seconds = 10.;
   double budget = 70.;  // what sixteen samples a pixel take on two cores; the studio's is Budget::usual
-  std::optional<float> error, thinnest;
+  std::optional<float> error, thinnest, softness;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;
   std::string size = "640x360";
@@ -96,7 +98,10 @@ class Walk {
     const scene::View view = view_at(picture, quick.error, quick.samples,
                                      options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
-    quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve;
+    const auto softening = Clock::now();
+    const bool budgeted = !options_.error && !options_.quick_samples;
+    frame::soften(drawn.image, options_.softness.value_or(budgeted ? budget_.softness() : 0.f));
+    quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve + milliseconds_since(softening);
     budget_.took(quick.milliseconds, drawn.segments);
     if (drawn.image.covered < .005)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
@@ -373,6 +378,9 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   within(command.add_option("--thinnest", options->thinnest,
                             "Pixels that the thinnest lines measure, instead of what the budget says"),
          0., 64.);
+  within(command.add_option("--softness", options->softness,
+                            "Share that neighbouring pixels give, instead of what the budget says"),
+         0., .25);
   command.add_flag(
       "--causes", options->causes,
       "Compare, too, what the product would draw with more samples, and without levels of detail");

@@ -9,6 +9,7 @@
 #include <cmath>
 
 #include "forest/core/error.h"
+#include "forest/frame/soften.h"
 #include "forest/scene/slice_picture.h"
 
 #include "apps/studio/annotation.h"
@@ -453,12 +454,13 @@ void Viewport::paintGL() {
   try {
     QElapsedTimer clock;
     clock.start();
+    const float softness = budget().softness();  // of what is drawn now
     if (stage == Stage::moving) draw_moving();
     if (stage == Stage::refining) refine();
     QOpenGLFunctions* gl = context()->functions();
     gl->glDisable(GL_SCISSOR_TEST);
     if (card_) card_->show(defaultFramebufferObject());
-    if (processor_) paint(united_ ? *united_ : *processor_->image());
+    if (processor_) paint(united_ ? *united_ : *processor_->image(), stage == Stage::moving ? softness : 0.f);
     // The renderer's opacity says how much of a pixel is covered; the window itself is opaque.
     gl->glColorMask(GL_FALSE, GL_FALSE, GL_FALSE, GL_TRUE);
     gl->glClearColor(0, 0, 0, 1);
@@ -477,8 +479,10 @@ void Viewport::paintGL() {
   if (stage == Stage::refining && stage_ == Stage::finished) Q_EMIT settled();
 }
 
-void Viewport::paint(const frame::Image& image) {
-  if (image.pixels.empty()) return;
+void Viewport::paint(const frame::Image& drawn, float softness) {
+  if (drawn.pixels.empty()) return;
+  if (softness > 0.f) frame::soften(softened_ = drawn, softness);
+  const frame::Image& image = softness > 0.f ? softened_ : drawn;
   QOpenGLPaintDevice device(size() * devicePixelRatioF());
   QPainter painter(&device);
   painter.drawImage(

@@ -149,7 +149,7 @@ class Viewport final : public QOpenGLWidget {
                  const DressingLimits& limits);
   void refine();
   void took(float milliseconds);
-  void paint(const frame::Image& image);
+  void paint(const frame::Image& drawn, float softness);
   std::vector<scene::LegendEntry> legend() const;
   void annotate();
   bool layered() const;  // drawn layer by layer for the gaze
@@ -181,7 +181,8 @@ class Viewport final : public QOpenGLWidget {
   Stage stage_ = Stage::moving;
   std::uint32_t refined_ = 0;  // samples that are drawn of the picture that is shown
   float sample_milliseconds_ = 20.f;
-  float milliseconds_ = 0.f;                                      // of a moving picture, smoothed
+  float milliseconds_ = 0.f;  // of a moving picture, smoothed
+  frame::Image softened_;
   scene::Budget budget_, gaze_budget_{scene::Budget::with_gaze};  // of a moving picture
   int warming_up_ = 2;  // the first pictures make programs and buffers: they are no measure
   Figures figures_;

@@ -74,6 +74,7 @@ TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   Budget budget(50.);
   watch(budget, 1000., 50);
   EXPECT_FLOAT_EQ(budget.error(), 6.f);
+  EXPECT_GT(budget.softness(), 0.f);
   EXPECT_FLOAT_EQ(budget.thinnest(), 6.f);
   const float before = budget.error();
   budget.took(30.);
@@ -98,6 +99,7 @@ TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {
   Budget budget(50.);
   EXPECT_EQ(watch(budget, 4., 80), 1u);
   EXPECT_EQ(budget.samples(), 16u);
+  EXPECT_EQ(budget.softness(), 0.f);
   EXPECT_NEAR(budget.error(), .5f, .02f);
   EXPECT_EQ(budget.thinnest(), 0.f);
   EXPECT_EQ(watch(budget, 20., 60), 0u);  // less detail, as many samples

@@ -143,6 +143,8 @@ class Budget {
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.
   float thinnest() const { return step_ == 0 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
+  /// As frame::soften: what is drawn is nearer to the truth so, the more the fewer its samples.
+  float softness() const;
   /// To be told of every picture that was drawn so. One of few segments takes no less time with fewer: where it takes long the
   /// machine has other things to do, and the forest must not fall apart for that.
   void took(double milliseconds, std::uint64_t segments = all);
