@@ -12,6 +12,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/random.h"
+#include "forest/frame/soften.h"
 #include "forest/io/png.h"
 #include "forest/scene/scanpath.h"
 
@@ -139,7 +140,8 @@ class Bench {
       view.samples = budget.samples();
       view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
       const auto start = Clock::now();
-      foveated_.draw(view, size_.first, size_.second, colouring);
+      frame::Image image = foveated_.draw(view, size_.first, size_.second, colouring);
+      frame::soften(image, budget.softness());
       const double seconds = seconds_since(start);
       if (i >= settling)
         part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames;

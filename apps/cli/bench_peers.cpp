@@ -24,6 +24,7 @@
 #include "forest/core/file.h"
 #include "forest/core/half.h"
 #include "forest/frame/similarity.h"
+#include "forest/frame/soften.h"
 #include "forest/io/png.h"
 #include "forest/render/reference/reference_renderer.h"
 #include "forest/scene/whole.h"
@@ -238,7 +239,8 @@ void draw_ours(const Options& options) {
     const std::clock_t core = std::clock();
     scene::View view = view_at(dolly, picture, options.quick_samples.value_or(budget.samples()));
     view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
-    const Drawn drawn = artist.draw(view, width, height);
+    Drawn drawn = artist.draw(view, width, height);
+    if (!options.quick_samples) frame::soften(drawn.image, budget.softness());
     const double seconds = seconds_since(start);
     const double core_seconds = double(std::clock() - core) / CLOCKS_PER_SEC;
     budget.took(1000. * seconds, drawn.segments);
