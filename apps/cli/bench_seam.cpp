@@ -62,8 +62,8 @@ struct Moment {
 /// The product's state at one moment.
 struct Quick {
   frame::Image image;
-  scene::Connections drawn, of_cut;  // of what is drawn, and were nothing of the cut left out
-  float error = 0.f;                 // pixels accepted
+  scene::Connections drawn;
+  float error = 0.f;  // pixels accepted
   std::uint32_t samples = 1;
   double milliseconds = 0.;
 };
@@ -107,10 +107,7 @@ class Walk {
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
     quick.image = std::move(drawn.image);
-    quick.drawn = connectedness_(cut(view), view.camera, viewport_, scene::thinnest_of(view));
-    scene::View full = view;
-    full.samples = 2, full.detail.thinnest = 0.f;  // nothing is left out for being thin
-    quick.of_cut = connectedness_(cut(full), view.camera, viewport_, 0.f);
+    quick.drawn = connectedness_(cut(view), view.camera, viewport_);
     return quick;
   }
 
@@ -256,7 +253,7 @@ void run(const Options& options, Console& console) {
 
   std::array<Summary, way_count> summary;
   Summary reference;
-  std::uint64_t disconnected = 0, disconnected_cut = 0, runs = 0;
+  std::uint64_t disconnected = 0, runs = 0;
   Extreme most_disconnected;
   Json every = Json::array();
   std::optional<Moment> before;
@@ -264,7 +261,7 @@ void run(const Options& options, Console& console) {
   console.progress().begin("walking", walk.pictures());
   for (std::uint32_t picture = 0; picture < walk.pictures(); ++picture, console.progress().advance()) {
     Quick quick = walk.draw_quick(picture);
-    disconnected += quick.drawn.disconnected, disconnected_cut += quick.of_cut.disconnected;
+    disconnected += quick.drawn.disconnected;
     runs += quick.drawn.runs;
     most_disconnected.offer(double(quick.drawn.disconnected), picture);
     if (!std::ranges::binary_search(chosen, picture)) continue;
@@ -273,8 +270,7 @@ void run(const Options& options, Console& console) {
     Json row{{"picture", picture},
              {"error_pixels", quick.error},
              {"quick_samples", quick.samples},
-             {"disconnected", quick.drawn.disconnected},
-             {"disconnected_cut", quick.of_cut.disconnected}};
+             {"disconnected", quick.drawn.disconnected}};
     if (!options.error) row["milliseconds"] = quick.milliseconds;
     const bool step = before && before->picture + 1 == picture;
     const double should = step ? frame::change(before->reference, now.reference) : 0.;
@@ -316,7 +312,6 @@ void run(const Options& options, Console& console) {
             {"disconnected", disconnected}};
   json.update(json_of(product));
   json.update({{"largest_change_reference", reference.change.json()},
-               {"disconnected_cut", disconnected_cut},
                {"most_disconnected", most_disconnected.json()},
                {"runs", runs}});
   for (std::size_t w = 1; w < walk.ways(); ++w) json["causes"][way_names[w]] = json_of(w);
@@ -346,9 +341,8 @@ void run(const Options& options, Console& console) {
   console.table({"", "change ÷ reference's", "at", "of one step", "at", "least similarity", "at", "mean"},
                 rows);
   console.say(fmt::format(
-      "disconnected branches: {} in {} pictures (at most {:.0f}, in picture {}); {} of them by the choice of "
-      "detail",
-      disconnected, walk.pictures(), most_disconnected.value, most_disconnected.picture, disconnected_cut));
+      "disconnected branches: {} in {} pictures (at most {:.0f}, in picture {})", disconnected, walk.pictures(),
+      most_disconnected.value, most_disconnected.picture));
   console.say(fmt::format("the reference took {:.2f} s a picture of {} samples",
                           walk.reference_seconds() / double(chosen.size()), options.samples));
 }

@@ -29,6 +29,7 @@ struct Strip {
   std::uint32_t first = 0, count = 0;  // its vertices
   std::uint32_t kind = 0, rank = 0;
   float mean = 0.f;                  // radius of its branch
+  float appears = 0.f;               // from which magnification on it shows, pixels a µm
   std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
 };
 
@@ -39,6 +40,7 @@ struct Draft {
   float error = 0.f;
   std::uint32_t leaf_first = 0, leaf_count = 0;  // original segments
   std::uint32_t first_leaf = 0, last_leaf = 0;   // leaf drafts below, [first, last)
+  std::uint32_t outgrowth = 0;  // of a leaf, as Cluster::outgrowth
   std::int64_t children[2] = {-1, -1};
 };
 
@@ -136,7 +138,6 @@ class Sketch {
       if (line.kind == 1) continue;
       for (std::uint32_t v = line.first; v < line.first + line.count; ++v)
         radius_[v] = std::min(radius_[v] * widening, radius_[v] + tolerance);
-      line.mean = std::min(line.mean * widening, line.mean + tolerance);
     }
   }
 
@@ -310,7 +311,8 @@ class Sketch {
         const Line& more = old[n];
         for (std::uint32_t v = more.first + 1; v < more.first + more.count; ++v) add(v);
         line.end = more.end;
-        if (more.rank < line.rank) line.rank = more.rank, line.mean = more.mean;
+        if (more.appears < line.appears)
+          line.appears = more.appears, line.rank = more.rank, line.mean = more.mean;
       }
       if (links.next[i] != none) line.reach = -1.f;  // not known
       line.count = vertex_count_ - line.first;
@@ -471,18 +473,9 @@ class Sketch {
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
-  std::array<std::uint32_t, 8> visible{};
+  std::array<std::uint8_t, limit> appears{};
   std::array<Sphere, Cluster::group_count> groups;
 };
-
-// The magnification from which on a segment shows: see draw_line in render/opengl/shaders/common.glsl, where a line is
-// drawn when it is a pixel wide, a diagonal one 1.42 times as wide, or its branch is wider than its rank.
-float appears_at(std::uint32_t rank, float thickest, float mean) {
-  constexpr float diagonal = 2.f * 1.42f;  // widths, of radii
-  constexpr float on_the_mean = 2.f * float(FOREST_MEAN_STRETCH);
-  return std::min(float(rank) / 256.f / (on_the_mean * std::max(mean, 1e-6f)),
-                  1.f / (diagonal * std::max(thickest, 1e-6f)));
-}
 
 // Half way along the branches from one place to another, which lies on the same section or grows out of it.
 struct Middle {
@@ -515,11 +508,13 @@ struct Middle {
 Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, ClusterTree& out) {
   Drawn drawn;
   constexpr std::uint32_t size = Cluster::group_size;
+  constexpr float half_a_step = 1.044f;
   std::array<Vec4, Cluster::group_count> low, high;
   low.fill(Vec4::Constant(INFINITY)), high.fill(Vec4::Constant(-INFINITY));
   std::uint32_t count = 0;
   for (const Strip& s : drawing.strips_of(draft)) {
     const std::uint32_t meta = s.kind | s.rank << 8 | to_half(s.mean) << 16;
+    const std::uint8_t appears = Cluster::step_of(s.appears * half_a_step);
     const Vec4* a = &drawing.vertices[s.first];
     std::uint32_t radius = to_half(a->w());
     for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
@@ -529,9 +524,7 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
       out.places[out.segments.size() - 1] = middle(drawing.places[i - 1], drawing.places[i]);
       const float thickest = std::max(a->w(), b.w());
       if (*a != b) drawn.thickness = std::max(drawn.thickness, thickest);  // the soma itself is chosen apart
-      const float from = appears_at(s.rank, thickest, s.mean > 0.f ? s.mean : std::min(a->w(), b.w()));
-      for (std::size_t step = 0; step < drawn.visible.size(); ++step)
-        drawn.visible[step] |= std::uint32_t(from <= Cluster::magnifications[step]) << count;
+      drawn.appears[count] = appears;
       Vec4 &l = low[count / size], &h = high[count / size];
       l = l.cwiseMin(*a).cwiseMin(b), h = h.cwiseMax(*a).cwiseMax(b);
       a = &b;
@@ -608,12 +601,15 @@ struct Branches {
   std::vector<std::uint32_t>
       ranks;                 // the share of the neuron's length in branches of smaller number, in 256ths
   std::vector<float> means;  // radius along the branch; never more than that of the branch it leaves
+  // The magnification from which on it shows, pixels a µm, where the thinnest lines are one pixel wide: when its mean width
+  // reaches its rank, or something of it, or of what grows out of it, is half as wide again. Never before the branch it leaves.
+  std::vector<float> appears;
 };
 
 Branches branches_of(const Morphology& m) {
   const std::size_t sections = m.sections().size();
   const Sizes sizes = sizes_of(m);
-  Branches branches{branch_numbers(m, sizes.lengths), {}, {}};
+  Branches branches{branch_numbers(m, sizes.lengths), {}, {}, std::vector<float>(sections)};
   const auto& numbers = branches.numbers;
   std::vector<double> lengths(sections + 1), means(sections);  // of branches; lengths of all before
   for (std::size_t i = 0; i < sections; ++i) {
@@ -630,6 +626,15 @@ Branches branches_of(const Morphology& m) {
   for (const std::uint32_t number : numbers) {
     branches.ranks.push_back(std::uint32_t(std::min(255., 256. * lengths[number] / total)));
     branches.means.push_back(float(means[number]));
+  }
+  constexpr float never_left_out = 1.5f, wide = 2.f * float(FOREST_MEAN_STRETCH);  // widths; of radii
+  std::vector<float> thickest(sections);
+  for (std::size_t i = sections; i-- > 0;) {  // parents come first
+    for (const Point& p : m.points(SectionId(i))) thickest[i] = std::max(thickest[i], p.radius);
+    if (const SectionId parent = m.section(SectionId(i)).parent; parent.valid())
+      thickest[parent.value()] = std::max(thickest[parent.value()], thickest[i]);
+    branches.appears[i] = std::min((float(branches.ranks[i]) + .5f) / (256.f * wide * std::max(branches.means[i], 1e-6f)),
+                                   .5f * never_left_out / std::max(thickest[i], 1e-6f));
   }
   return branches;
 }
@@ -741,6 +746,7 @@ class Leaves {
          .kind = std::uint32_t(section.kind),
          .rank = branches_.ranks[id.value()],
          .mean = branches_.means[id.value()],
+         .appears = branches_.appears[id.value()],
          .begin = section.parent.valid() ? section.parent.value() + 1 : 0,
          .end = id.value() + 1});
   }
@@ -760,17 +766,27 @@ struct Touching {
   std::uint32_t first = 0xffffffffu, last = 0;
 };
 
-// Finds the spheres of the leaves, and which of them touch each node.
+// Finds the spheres of the leaves, which of them touch each node, and how far what grows out of each goes.
 std::vector<Touching> surround(Drawing& drawing, std::uint32_t nodes) {
+  auto& leaves = drawing.drafts;
   std::vector<Touching> touching(nodes);
-  for (std::uint32_t i = 0; i < drawing.drafts.size(); ++i) {
-    Draft& d = drawing.drafts[i];
+  for (std::uint32_t i = 0; i < leaves.size(); ++i) {
+    Draft& d = leaves[i];
     d.first_leaf = i, d.last_leaf = i + 1;
     d.sphere = around(drawing.vertices_of(d, d));
     for (const Strip& s : drawing.strips_of(d))
       for (const std::uint32_t node : {s.begin, s.end})
         touching[node] = {std::min(touching[node].first, i), std::max(touching[node].last, i)};
   }
+  for (std::uint32_t i = 0; i < leaves.size(); ++i)
+    for (const Strip& s : drawing.strips_of(leaves[i])) {
+      const std::uint32_t from = touching[s.begin].first;
+      if (s.begin == 0 || from == i) continue;
+      // The largest cluster that holds it and not what it grows out of: see merge.
+      const auto level = std::uint32_t(std::bit_width(from ^ i)) - 1;
+      const auto end = std::min(((i >> level) + 1) << level, std::uint32_t(leaves.size()));
+      leaves[from].outgrowth = std::max(leaves[from].outgrowth, end - from - 1);
+    }
   return touching;
 }
 
@@ -840,13 +856,14 @@ void write(const Drawing& drawing, const Middle& middle, ClusterTree& tree) {
               .error = d.error,
               .thickness = drawn[i].thickness,
               .first_segment = first[i],
-              .segment_count = drawing.segment_count(d),
+              .segment_count = drawing.segment_count(d) & 255u,
+              .outgrowth = std::min(d.outgrowth, Cluster::no_end) & Cluster::no_end,
               .children = {index(d.children[0]), index(d.children[1])},
               .leaf_first = d.leaf_first,
               .leaf_count = d.leaf_count};
     std::ranges::transform(drawn[i].groups, c.groups,
                            [&](const Sphere& g) { return packed_group(g, sphere); });
-    std::ranges::copy(drawn[i].visible, c.visible);
+    std::ranges::copy(drawn[i].appears, c.appears);
     tree.clusters.push_back(c);
   }
 }

@@ -11,7 +11,10 @@
 //   leaf, 0   leaf, 0                  leaf, 0   leaf, 0
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <cstring>
 #include <vector>
 
 #include "forest/core/bounds.h"
@@ -30,27 +33,43 @@ struct Cluster {
   float x = 0.f, y = 0.f, z = 0.f, radius = 0.f;  // bounding sphere of all that is below, µm
   float error = 0.f;                              // µm; 0 for a leaf, never less than a child's
   float thickness = 0.f;  // largest radius of a segment drawn, the soma's sphere aside, µm
-  std::uint32_t first_segment = 0, segment_count = 0;
+  std::uint32_t first_segment = 0;
+  std::uint32_t segment_count : 8 = 0;
+  // Of a leaf: the clusters that something of it grows into lie within so many leaves after it; all ones: or farther.
+  std::uint32_t outgrowth : 24 = 0;
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
   std::uint32_t leaf_count = 0;        // … and how many
   std::uint32_t groups[group_count] = {};  // the sphere around each group: see group()
-  std::uint32_t visible[8] = {};  // which segments show at each of `magnifications`: bit i is segment i
+  std::uint8_t appears[frame::cluster_size] = {};  // from which step of magnification on each segment shows
 
   Sphere sphere() const { return {{x, y, z}, radius}; }
   bool is_leaf() const { return children[0] == 0; }
 
-  /// A branch thinner than a pixel shows from the magnification (pixels a µm) on at which its width reaches its rank. Which
-  /// segments may show.
+  /// A thin branch shows from the magnification on, pixels a µm, at which its width reaches its rank, and none before the
+  /// branch that it grows out of. Which segments show where one pixel is the thinnest line.
   std::uint32_t visible_at(float magnification) const {
-    for (int i = 0; i < 8; ++i)
-      if (magnification <= magnifications[i]) return visible[i] & all();
-    return all();
+    constexpr std::uint64_t ones = 0x0101010101010101ull, high = 0x80 * ones;
+    const std::uint64_t step = step_of(magnification) * ones | high;
+    std::uint32_t shown = 0;
+    for (std::uint32_t i = 0; i < frame::cluster_size; i += 8) {  // eight at a time
+      std::uint64_t at;
+      std::memcpy(&at, appears + i, sizeof at);
+      shown |= std::uint32_t((((step - at) & high) >> 7) * 0x0102040810204080ull >> 56) << i;
+    }
+    return shown & all();
   }
   std::uint32_t all() const { return frame::first_segments(segment_count); }
   /// The sphere around the segments [8 i, 8 i + 8) drawn.
   Sphere group(std::uint32_t i) const { return unpacked_group(groups[i], sphere()); }
-  static constexpr float magnifications[8] = {.05f, .1f, .17f, .25f, .35f, .5f, .8f, 1.5f};
+  static constexpr std::uint32_t no_end = (1u << 24) - 1;
+
+  /// Eight steps an octave, from 1/2048 pixel a µm on.
+  static constexpr std::uint8_t step_of(float magnification) {
+    constexpr std::int32_t first = (127 - 11) * 8;
+    const auto step = std::int32_t(std::bit_cast<std::uint32_t>(magnification) >> 20);
+    return std::uint8_t(std::clamp(step - first, 0, 127));
+  }
 };
 static_assert(sizeof(Cluster) == 96);
 

@@ -3,9 +3,7 @@
 
 #include <algorithm>
 #include <bit>
-#include <cmath>
 
-#include "forest/core/half.h"
 #include "forest/core/parallel.h"
 
 namespace forest::scene {
@@ -36,31 +34,6 @@ struct Place {
 
 }  // namespace
 
-bool draws(const frame::Segment& segment, const frame::Instance& instance, const frame::Camera& camera,
-           float focal, bool as_line, float thinnest) {
-  const Place place(instance);
-  const Mat3 axes = camera.axes();
-  const auto seen = [&](const Vec3& p) {
-    const Vec3 v = axes.transpose() * (place(p) - camera.eye);
-    return Vec3(v.x(), v.y(), -v.z());
-  };
-  const Vec3 a = seen(begin_of(segment)), b = seen(end_of(segment));
-  if (a.z() < camera.near && b.z() < camera.near) return false;
-  const float za = std::max(a.z(), camera.near), zb = std::max(b.z(), camera.near);
-  const float ra = from_half(segment.radii), rb = from_half(segment.radii >> 16);
-  const float la = camera.orthographic() ? 1.f : za, lb = camera.orthographic() ? 1.f : zb;
-  if (!as_line && focal * std::max(ra / la, rb / lb) >= .75f) return true;
-  if (thinnest == 0.f) return true;  // drawn where samples meet it
-  const Vec2 d = (b.head<2>() / lb - a.head<2>() / la).cwiseAbs();
-  const float stretch = d.maxCoeff() > 0.f ? d.norm() / d.maxCoeff() : 1.f;
-  const float width = focal * (ra / la + rb / lb) * stretch;
-  const float mean = from_half(segment.meta >> 16);
-  const float rank = float(segment.meta >> 8 & 255u) / 256.f + 1.f / 512.f;
-  if (width < thinnest && mean > 0.f)
-    return focal * mean * (1.f / la + 1.f / lb) * float(FOREST_MEAN_STRETCH) / thinnest > rank;
-  return thinnest < 1.f || width >= rank;  // a picture of one sample draws whole pixels
-}
-
 Connectedness::Connectedness(const Forest& forest) : forest_(forest), roots_(forest.neurons().size()) {
   parallel_for(roots_.size(), 1, [&](std::size_t n) {
     const Neuron& neuron = forest.neurons()[n];
@@ -76,35 +49,32 @@ Connectedness::Connectedness(const Forest& forest) : forest_(forest), roots_(for
 }
 
 Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camera,
-                                      const frame::Viewport& viewport, float thinnest) const {
-  struct Piece {
-    const frame::Item* item;
-    bool as_line;
-  };
-  std::vector<std::vector<Piece>> pieces(forest_.instances().size());
-  for (const frame::Item& i : cut.lines)
-    if (i.instance != FOREST_IN_WORLD) pieces[i.instance].push_back({&i, true});
-  for (const frame::Item& i : cut.capsules) pieces[i.instance].push_back({&i, false});
-  const float focal = camera.focal(viewport.height);
+                                      const frame::Viewport& viewport) const {
+  std::vector<std::vector<const frame::Item*>> pieces(forest_.instances().size());
+  for (const auto* list : {&cut.lines, &cut.capsules})
+    for (const frame::Item& i : *list)
+      if (i.instance != FOREST_IN_WORLD) pieces[i.instance].push_back(&i);
+  const auto depth = [&, ahead = Vec3(-camera.axes().col(2))](const Vec3& p) { return ahead.dot(p - camera.eye); };
   std::vector<Connections> found(pieces.size());
   parallel_for(pieces.size(), 8, [&](std::size_t index) {
     const frame::Instance& instance = forest_.instances()[index];
     std::vector<Vec3> begins, ends;
-    for (const Piece& piece : pieces[index])
-      for (std::uint32_t drawn = piece.item->drawn; drawn; drawn &= drawn - 1) {
+    const Place place(instance);
+    for (const frame::Item* item : pieces[index])
+      for (std::uint32_t drawn = item->drawn; drawn; drawn &= drawn - 1) {
         const frame::Segment& s =
-            forest_.segments()[piece.item->first_segment + std::uint32_t(std::countr_zero(drawn))];
-        if (draws(s, instance, camera, focal, piece.as_line, thinnest)) {
-          begins.push_back(begin_of(s));
-          ends.push_back(end_of(s));
-        }
+            forest_.segments()[item->first_segment + std::uint32_t(std::countr_zero(drawn))];
+        const Vec3 begin = begin_of(s), end = end_of(s);
+        if (depth(place(begin)) < camera.near && depth(place(end)) < camera.near) continue;
+        begins.push_back(begin);
+        ends.push_back(end);
       }
     sort_places(ends);
     for (const Vec3& begin : begins) {
       if (holds(ends, begin)) continue;
       ++found[index].runs;
       if (holds(roots_[instance.morphology], begin)) continue;
-      const Vec3 pixel = frame::project(camera, viewport, Place(instance)(begin));
+      const Vec3 pixel = frame::project(camera, viewport, place(begin));
       found[index].disconnected += pixel.z() > camera.near && pixel.x() >= 0.f && pixel.y() >= 0.f &&
                                    pixel.x() < viewport.width && pixel.y() < viewport.height;
     }

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
-// Do the branches that a picture shows hang together? A pure function of the cut: no graphics card is asked.
+// Do the branches that a picture shows hang together? A pure function of the cut, every segment of which a renderer draws: no
+// graphics card is asked.
 #pragma once
 
 #include <vector>
@@ -7,11 +8,6 @@
 #include "forest/scene/cut.h"
 
 namespace forest::scene {
-
-/// Whether a picture whose thinnest lines are so wide (frame::Frame::thinnest) draws this segment of this item, were nothing
-/// before it: thin branches are left out by rank, after render/opengl/shaders (draw_line), which a test compares with this.
-bool draws(const frame::Segment& segment, const frame::Instance& instance, const frame::Camera& camera,
-           float focal, bool as_line, float thinnest);
 
 struct Connections {
   std::uint64_t runs = 0;  // of drawn segments, each beginning where nothing drawn of its neuron ends
@@ -24,9 +20,7 @@ struct Connections {
 class Connectedness {
  public:
   explicit Connectedness(const Forest& forest);
-  /// @param thinnest  of the picture; 0: nothing of the cut is too thin to be drawn
-  Connections operator()(const Cut& cut, const frame::Camera& camera, const frame::Viewport& viewport,
-                         float thinnest) const;
+  Connections operator()(const Cut& cut, const frame::Camera& camera, const frame::Viewport& viewport) const;
 
  private:
   const Forest& forest_;

@@ -3,7 +3,6 @@
 
 #include <gtest/gtest.h>
 
-#include "forest/core/half.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
 #include "forest/scene/whole.h"
@@ -21,7 +20,7 @@ TEST(Connection, TheWholeForestHangsTogether) {
   const Forest forest = sample();
   const Connectedness connectedness(forest);
   const frame::Camera camera = overview(forest).camera;
-  const Connections found = connectedness(whole(forest, camera, viewport), camera, viewport, 0.f);
+  const Connections found = connectedness(whole(forest, camera, viewport), camera, viewport);
   EXPECT_EQ(found.disconnected, 0u);
   EXPECT_GT(found.runs, forest.instances().size());
 }
@@ -31,11 +30,36 @@ TEST(Connection, NoChoiceOfDetailBreaksABranchOnAWholeDolly) {
   const Connectedness connectedness(forest);
   const Dolly dolly(forest);
   for (int i = 0; i <= 40; ++i)
-    for (const float error : {.5f, 1.f, 3.f, 6.f}) {
-      const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
-      const Cut cut = choose(forest, Eye(camera, viewport, {.error = error, .gaze = {}}), viewport);
-      EXPECT_EQ(connectedness(cut, camera, viewport, 0.f).disconnected, 0u) << i << " " << error;
+    for (const float error : {.5f, 1.f, 3.f, 6.f})
+      for (const float thinnest : {0.f, .5f, 1.f, 6.f}) {
+        const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
+        const Detail detail{.error = error, .gaze = {}, .thinnest = thinnest};
+        const Cut cut = choose(forest, Eye(camera, viewport, detail), viewport);
+        EXPECT_EQ(connectedness(cut, camera, viewport).disconnected, 0u) << i << " " << error << " " << thinnest;
+      }
+}
+
+// What an earlier picture hid, and what is far, is chosen later, and hangs together with the rest all the same.
+TEST(Connection, NothingComesApartBetweenTheRoundsOfAPicture) {
+  const Forest forest = sample();
+  const Connectedness connectedness(forest);
+  const Dolly dolly(forest);
+  for (int i = 0; i <= 40; i += 4) {
+    const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
+    const Eye eye(camera, viewport, {.error = 2.f, .gaze = {}, .thinnest = 4.f});
+    for (float first = 20.f; first < 2000.f; first *= 3.f) {
+      const Sight sight{eye, nullptr, first};
+      Cut all = std::move(choose(forest, std::span(&sight, 1)).front());
+      std::vector<LeftOut> left = all.left_out;
+      for (float horizon = 2.f * first; !left.empty(); horizon = horizon < 4.f * first ? 4.f * first : INFINITY) {
+        const Cut more = revealed(forest, {eye, nullptr, horizon}, left);
+        all.lines.insert(all.lines.end(), more.lines.begin(), more.lines.end());
+        all.capsules.insert(all.capsules.end(), more.capsules.begin(), more.capsules.end());
+        left = more.left_out;
+      }
+      EXPECT_EQ(connectedness(all, camera, viewport).disconnected, 0u) << i << " " << first;
     }
+  }
 }
 
 TEST(Connection, APieceThatIsMissingIsNoticed) {
@@ -47,28 +71,10 @@ TEST(Connection, APieceThatIsMissingIsNoticed) {
   for (std::size_t i = 0; i < all.capsules.size(); i += 7) {
     Cut cut = all;
     cut.capsules.erase(cut.capsules.begin() + std::ptrdiff_t(i));
-    (connectedness(cut, camera, viewport, 0.f).disconnected ? broken : last) += 1;
+    (connectedness(cut, camera, viewport).disconnected ? broken : last) += 1;
   }
   EXPECT_GT(broken, 0u);
   EXPECT_GT(last, 0u);  // without what comes last on its branch nothing comes apart
-}
-
-TEST(Connection, ABranchThatIsTooThinInTheMiddleComesApart) {
-  // Three segments in a row; each is its own branch as far as thickness goes.
-  const auto segment = [](float from, float radius) {
-    const std::uint32_t half = to_half(radius);
-    return frame::Segment{from, 0, 0, half | half << 16, from + 10.f, 0, 0, 3u | 128u << 8 | half << 16};
-  };
-  const frame::Instance instance{0, 0, 0, 0, 0, 0, 0, 1};
-  const frame::Camera camera{.eye = {0, 0, 100}};
-  const float focal = camera.focal(200.f);  // 2.75 pixels a µm
-  EXPECT_TRUE(draws(segment(0, .3f), instance, camera, focal, true, 1.f));
-  EXPECT_FALSE(draws(segment(0, .05f), instance, camera, focal, true, 1.f));
-  EXPECT_TRUE(draws(segment(0, .05f), instance, camera, focal, true, .25f));
-  EXPECT_FALSE(draws(segment(0, .3f), instance, camera, focal, true, 4.f));
-  EXPECT_TRUE(draws(segment(0, .05f), instance, camera, focal, true, 0.f));
-  EXPECT_FALSE(
-      draws(segment(0, .05f), {0, 0, 200, 0, 0, 0, 0, 1}, camera, focal, false, 0.f));  // behind the eye
 }
 
 TEST(Whole, HoldsEverySegmentOnceWhenAllIsInSight) {

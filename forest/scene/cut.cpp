@@ -131,13 +131,66 @@ struct Look {
 };
 
 // A neuron where it stands, and as its own coordinates are seen.
-struct Turned {
+class Turned {
+ public:
   std::uint32_t index;
   Placed placed;
   Cameras cameras;
 
   Turned(const Look& look, std::uint32_t instance)
-      : index(instance), placed(look.forest.instances()[instance]), cameras(look.cameras.within(placed)) {}
+      : index(instance),
+        placed(look.forest.instances()[instance]),
+        cameras(look.cameras.within(placed)),
+        look_(look),
+        first_(look.forest.neurons()[look.forest.instances()[instance].morphology].first_cluster) {}
+
+  // What decides which thin branches of a cluster are drawn: its closeness (Seen::closeness), or that of something it grows
+  // into, where that is closer. So nothing that is drawn ends where a branch goes into the depth and gets thin there. It
+  // depends on the camera alone, not on what is chosen or hidden.
+  float closeness(std::uint32_t cluster) {
+    if (!whole_) look_at_all();
+    return cluster == first_ || close_.empty() ? *whole_ : close_[cluster - first_];
+  }
+
+ private:
+  // Most neurons are so far that one end of them is as close as the other.
+  void look_at_all() {
+    constexpr float flat = .1f, deep = .2f;  // radius by distance
+    const frame::Camera& camera = look_.sights.front().eye.camera();
+    const Neuron& neuron = look_.forest.neurons()[look_.forest.instances()[index].morphology];
+    const auto clusters = look_.forest.clusters().subspan(first_, neuron.cluster_count);
+    const Seen seen = cameras.now(clusters.front().sphere());
+    whole_ = seen.closeness(camera.near);
+    const float depth = seen.at.z() > seen.radius ? seen.radius / seen.at.z() : 1.f;
+    if (seen.orthographic || depth < flat) return;
+    const float share = std::min(1.f, (depth - flat) / (deep - flat));
+    // The leaves lie behind all others, the last of them first.
+    const std::size_t count = clusters.size(), leaves = (count + 1) / 2, first_leaf = count - leaves;
+    const auto place_of = [&](std::size_t leaf) { return count - 1 - leaf; };
+    close_.resize(count);
+    thread_local std::vector<std::size_t> behind;  // of a leaf, the next that it does not lead to
+    behind.resize(leaves);
+    for (std::size_t leaf = leaves; leaf-- > 0;) {
+      const Cluster& c = clusters[place_of(leaf)];
+      const Seen one = cameras.now(c.sphere());
+      float close = 0.f;
+      if (look_.sights.front().eye.may_be_in_picture(one))
+        close = *whole_ + share * (one.closeness(camera.near) - *whole_);
+      const std::size_t end = std::min<std::size_t>(leaf + 1 + c.outgrowth, leaves);
+      std::size_t next = leaf + 1;
+      for (; next < end; next = behind[next]) close = std::max(close, close_[place_of(next)]);
+      behind[leaf] = next, close_[place_of(leaf)] = close;
+    }
+    for (std::size_t at = first_leaf; at-- > 0;) {
+      const auto [a, b] = clusters[at].children;
+      close_[at] = std::max(close_[a - first_], close_[b - first_]);
+    }
+  }
+
+  const Look& look_;
+  std::uint32_t first_;  // of its clusters
+  std::optional<float> whole_;
+  std::vector<float> close_;  // of every cluster but the first; empty: as the whole neuron
 };
 
 // Adds a run to the list that it belongs to, drawn as `kind` or, for `any`, by its width in pixels.
@@ -161,8 +214,8 @@ void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
 }
 
 // A leaf of a neuron with parts: runs of segments of one state.
-void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const Sphere& sphere, bool thin,
-               std::span<const frame::State* const> states, Cut& cut) {
+void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, std::uint32_t shown,
+               const Sphere& sphere, bool thin, std::span<const frame::State* const> states, Cut& cut) {
   const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
   const frame::State whole = look.state(index);
   const auto state_of = [&](std::uint32_t segment) -> const frame::State* {
@@ -170,11 +223,12 @@ void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, const
         look.forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
     return section == soma_section ? nullptr : states[section];
   };
-  for (std::uint32_t rest = leaf.all(), drawn; rest; rest &= ~drawn) {
+  for (std::uint32_t rest = shown, drawn; rest; rest &= ~drawn) {
     const frame::State* state = state_of(leaf.first_segment + std::uint32_t(std::countr_zero(rest)));
     drawn = 0;
     for (std::uint32_t i = 0; i < leaf.segment_count; ++i)
       drawn |= std::uint32_t(state_of(leaf.first_segment + i) == state) << i;
+    drawn &= rest;
     if (!(state ? *state : whole).is(frame::State::visible)) continue;
     frame::Item run = item(index, leaf.first_segment, drawn, sphere);
     if (state) run.state = frame::packed(*state);
@@ -215,42 +269,43 @@ void each_of(std::uint32_t sights, auto&& take) {
   for (; sights; sights &= sights - 1) take(std::size_t(std::countr_zero(sights)));
 }
 
+// Which segments of a cluster are wide enough to be drawn, or drawn for their like.
+std::uint32_t shown_of(const Sight& sight, Turned& neuron, const Cluster& c, std::uint32_t at) {
+  const float thinnest = sight.eye.detail().thinnest;
+  return thinnest > 0.f ? c.visible_at(sight.eye.magnification(neuron.closeness(at)) / thinnest) : c.all();
+}
+
 // Of a cluster that is good enough, these groups.
-void choose_groups(const Look& look, const Sight& sight, const Turned& neuron, std::uint32_t at,
+void choose_groups(const Look& look, const Sight& sight, Turned& neuron, std::uint32_t at,
                    std::uint32_t groups, const Seen& seen, Cut& cut) {
-  const auto& [index, placed, cameras] = neuron;
+  const std::uint32_t index = neuron.index;
   const Cluster& c = look.forest.clusters()[at];
   const frame::Kind kind = look.state(index).kind;
-  const auto shown = [&](const Seen& where) {
-    const float thinnest = sight.eye.detail().thinnest;
-    return thinnest > 0.f ? c.visible_at(sight.eye.magnification(where) / thinnest) : c.all();
-  };
-  const std::uint32_t all = shown(seen);
+  const std::uint32_t all = shown_of(sight, neuron, c, at);
   if (groups == every_group &&
       (std::popcount(all) <= few || seen.radius * sight.eye.magnification(seen) <= group_limit))
-    return add(cut, item(index, c.first_segment, all, placed(c)), kind, sight.eye.thin(seen, c.thickness));
+    return add(cut, item(index, c.first_segment, all, neuron.placed(c)), kind,
+               sight.eye.thin(seen, c.thickness));
   std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
-    const std::uint32_t first = g * Cluster::group_size;
-    if (!(groups >> g & 1u) || first >= c.segment_count) continue;
+    const std::uint32_t first = g * Cluster::group_size, drawn = all >> first & 255u;
+    if (!(groups >> g & 1u) || !drawn) continue;
     const Sphere around = c.group(g);
-    Judged judged(cameras, around);
+    Judged judged(neuron.cameras, around);
     if (!sight.eye.may_see(judged.seen())) continue;
-    const std::uint32_t drawn = shown(judged.seen()) >> first & 255u;
-    if (!drawn) continue;
     if (judged.hidden(sight))
       hidden |= 1u << g;
     else
-      add(cut, item(index, c.first_segment + first, drawn, placed(around)), kind,
+      add(cut, item(index, c.first_segment + first, drawn, neuron.placed(around)), kind,
           sight.eye.thin(judged.seen(), c.thickness));
   }
   if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, hidden});
 }
 
 // For each sight, from one cluster on; returns which of them may see it.
-std::uint32_t choose_clusters(const Look& look, const Turned& neuron, std::uint32_t from,
-                              std::uint32_t of_sights, std::span<Cut> cuts) {
-  const auto& [index, placed, cameras] = neuron;
+std::uint32_t choose_clusters(const Look& look, Turned& neuron, std::uint32_t from, std::uint32_t of_sights,
+                              std::span<Cut> cuts) {
+  const std::uint32_t index = neuron.index;
   const auto clusters = look.forest.clusters();
   const frame::State state = look.state(index);
   const bool parted =
@@ -269,7 +324,7 @@ std::uint32_t choose_clusters(const Look& look, const Turned& neuron, std::uint3
     const auto [at, sights] = open[next];
     const Cluster& c = clusters[at];
     const Sphere sphere = c.sphere();
-    Judged judged(cameras, sphere);
+    Judged judged(neuron.cameras, sphere);
     const Seen& seen = judged.seen();
     std::uint32_t finer = 0;
     each_of(sights, [&](std::size_t s) {
@@ -282,7 +337,8 @@ std::uint32_t choose_clusters(const Look& look, const Turned& neuron, std::uint3
       } else if (!c.is_leaf() && (parted || !look.good_enough(sight, seen, c.error))) {
         finer |= 1u << s;
       } else if (parted) {
-        add_parts(look, index, c, placed(c), sight.eye.thin(seen, c.thickness), states, cut);
+        add_parts(look, index, c, shown_of(sight, neuron, c, at), neuron.placed(c),
+                  sight.eye.thin(seen, c.thickness), states, cut);
       } else {
         choose_groups(look, sight, neuron, at, every_group, seen, cut);
       }
@@ -328,7 +384,8 @@ void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, 
     if (!(sights &= ~far)) return;
   }
   // The soma lies within its root.
-  choose_soma(look, index, choose_clusters(look, {look, index}, neuron.first_cluster, sights, cuts), cuts);
+  Turned turned(look, index);
+  choose_soma(look, index, choose_clusters(look, turned, neuron.first_cluster, sights, cuts), cuts);
 }
 
 struct Open {

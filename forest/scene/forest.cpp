@@ -155,29 +155,24 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
 
 void Forest::Data::find_parts(std::span<const std::byte> whole, const Refuse& refuse) {
   Header header{};
-  constexpr std::size_t shorter = sizeof header - sizeof(Entry);
-  refuse.unless(whole.size() >= shorter, "is too short to be a forest file");
-  std::memcpy(&header, whole.data(), std::min(sizeof header, whole.size()));
+  refuse.unless(whole.size() >= sizeof header, "is too short to be a forest file");
+  std::memcpy(&header, whole.data(), sizeof header);
   if (header.magic != magic)
     throw InputError(refuse.name, 0, "is not a forest file; make one with 'brainforest pack'");
-  refuse.unless(header.version != version || header.parts == part_count,
-                "is damaged: it has a wrong number of parts");
-  const bool older = header.version == without_attributes && header.parts == part_count - 1;
-  if (!older && (header.version != version || header.parts != part_count))
+  if (header.version != version)
     throw InputError(refuse.name, 0,
                      fmt::format("has version {} of the forest file and this program reads version {}{}",
                                  header.version, version, again));
+  refuse.unless(header.parts == part_count, "is damaged: it has a wrong number of parts");
   if (header.file_size != whole.size())
     throw InputError(refuse.name, 0,
                      fmt::format("is cut short or has grown: {} bytes instead of {}{}", whole.size(),
                                  header.file_size, again));
-  const auto table = std::span(header.table).first(header.parts);
-  refuse.unless(whole.size() >= (older ? shorter : sizeof header) &&
-                    hash64(std::as_bytes(table), header.file_size) == header.table_hash,
+  refuse.unless(hash64(std::as_bytes(std::span(header.table)), header.file_size) == header.table_hash,
                 "has a damaged table of contents");
   // Up to where it has been looked at; gaps hold zeros, so that no byte goes unchecked.
-  std::uint64_t end = older ? shorter : sizeof header;
-  for (std::uint32_t p = 0; p < header.parts; ++p) {
+  std::uint64_t end = sizeof header;
+  for (std::uint32_t p = 0; p < part_count; ++p) {
     const Entry& e = header.table[p];
     refuse.unless(e.part == p && e.element_size == element_sizes[p] && e.offset % alignment == 0 &&
                       e.offset <= whole.size() && e.count <= (whole.size() - e.offset) / e.element_size,

@@ -57,6 +57,7 @@ Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Det
     return camera.orthographic() ? 1.f : std::sqrt(1.f + slope * slope);
   };
   low_length_ = low_.unaryExpr(length), high_length_ = high_.unaryExpr(length);
+  end_ = middle_ / focal_, end_length_ = end_.unaryExpr(length);
   if (!detail.gaze) return;
   for (const Vec2& corner : {low, high, Vec2(low.x(), high.y()), Vec2(high.x(), low.y())})
     most_acceptable_ =
@@ -77,6 +78,12 @@ bool Eye::may_see(const Seen& seen) const {
   const float reach = focal_ * seen.reach() + margin;
   return !(place.x() - reach >= float(hole.left) && place.y() - reach >= float(hole.top) &&
            place.x() + reach <= float(hole.right) && place.y() + reach <= float(hole.bottom));
+}
+
+bool Eye::may_be_in_picture(const Seen& seen) const {
+  const float across = camera_.orthographic() ? 1.f : seen.at.z();
+  return seen.at.z() >= -seen.radius &&
+         (across * end_ - seen.at.head<2>().cwiseAbs()).cwiseQuotient(end_length_).minCoeff() >= -seen.radius;
 }
 
 float Eye::acceptable(const Seen& seen) const {

@@ -89,6 +89,8 @@ class Eye {
   const Viewer& viewer() const { return viewer_; }
   /// Whether anything of it may be in what is wanted of the picture.
   bool may_see(const Seen& seen) const;
+  /// … and in the picture, wanted or not.
+  bool may_be_in_picture(const Seen& seen) const;
 
   /// Depth along the view of the nearest point of a sphere, never less than the near distance, µm.
   float nearest_depth(const Sphere& sphere) const { return nearest_depth(see(sphere)); }
@@ -98,6 +100,8 @@ class Eye {
   float magnification(const Seen& seen) const {
     return camera_.orthographic() ? focal_ : focal_ / nearest_depth(seen);
   }
+  /// Pixels that a length of 1 µm covers which is so close (Seen::closeness).
+  float magnification(float closeness) const { return focal_ * closeness; }
   /// Acceptable error in pixels for what lies within the sphere: that of its point nearest to the gaze.
   float acceptable(const Sphere& sphere) const { return acceptable(see(sphere)); }
   float acceptable(const Seen& seen) const;
@@ -125,6 +129,7 @@ class Eye {
   Vec2 middle_;  // of the picture, pixels
   // What is wanted, as Seen::place has it, and what the distances from its borders are to be divided by to be µm.
   Vec2 low_, high_, low_length_, high_length_;
+  Vec2 end_, end_length_;  // the same of the whole picture, whose middle the eye looks at
   Gaze gaze_;
   float most_acceptable_;  // error anywhere in what is wanted, pixels
 };

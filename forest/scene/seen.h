@@ -2,6 +2,8 @@
 // A sphere as a camera sees it: worked out once, then asked about by everybody who decides what is drawn of it.
 #pragma once
 
+#include <algorithm>
+
 #include "forest/core/bounds.h"
 #include "forest/frame/camera.h"
 
@@ -16,6 +18,9 @@ struct Seen {
   bool known = false;      // whether it is wholly before the eye; of others nothing below is known
   bool orthographic = false;
 
+  /// What a length at its centre measures in a picture, times that picture's focal length; what lies behind the eye's near
+  /// distance is as close as that.
+  float closeness(float near) const { return orthographic ? 1.f : 1.f / std::max(at.z(), near); }
   /// In a picture of any size, times that picture's focal length (frame::Camera::focal): pixels from its middle to where the
   /// centre is seen, y downwards.
   Vec2 place() const { return Vec2(at.x(), -at.y()) * scale(); }

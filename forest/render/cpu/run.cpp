@@ -222,11 +222,13 @@ FOREST_CLONES void lengthen(const frame::Constants& c, Run& r) {
   }
 }
 
-FOREST_CLONES void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r) {
+FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float spread, Run& r) {
   const std::size_t count = whole_vectors(r.count);
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
+  const float thinnest = thinnest_of(c, straws);
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
+  const float last_rank = straws ? INFINITY : 511.f / 512.f;  // of what is drawn: which branches are was chosen before
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
@@ -234,11 +236,11 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, float thinnest, floa
     const float major = steep ? high : wide;
     const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
     const bool thin = across < thinnest && r.mean_width[i] > 0.f;
-    const float share = smaller(r.mean_width[i] * per_thinnest, 1.f), rank = r.rank[i] + 1.f / 512.f;
-    const float instead =
-        single ? std::floor(thinnest + 1.f - rank / larger(share, 1e-6f)) : across / larger(share, 1e-6f);
+    const float share = larger(smaller(r.mean_width[i] * per_thinnest, 1.f), 1e-6f);
+    const float rank = r.rank[i] + 1.f / 512.f, among = smaller(rank / share, last_rank);
+    const float instead = single ? std::floor(thinnest + 1.f - among) : across / share;
     const float whole = single ? std::floor(across + 1.f - rank) : across;
-    const float line = thin ? (share > rank ? instead : 0.f) : whole;
+    const float line = thin ? (among < 1.f ? instead : 0.f) : whole;
     // From the end of the smaller coordinate to the other.
     const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
     const bool turned = ax > bx;

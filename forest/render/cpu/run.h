@@ -91,9 +91,12 @@ bool trim(const frame::Constants& c, const Crop& crop, Run& r, std::size_t i);
 /// Straws shorter than FOREST_STRAW_LENGTH times what the thinnest line is wide get as long, and fewer of them are drawn.
 void lengthen(const frame::Constants& c, Run& r);
 
+/// Pixels: what the thinnest line measures, or the thinnest straw.
+inline float thinnest_of(const frame::Constants& c, bool straws) {
+  return (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest;
+}
 /// What lines need, after draw_line in render/opengl/shaders/common.glsl.
-/// @param thinnest  as Constants::thinnest
-void prepare_lines(const frame::Constants& c, float thinnest, float spread, Run& r);
+void prepare_lines(const frame::Constants& c, bool straws, float spread, Run& r);
 
 /// What a length at this depth is divided by to be seen.
 inline float lens(const frame::Constants& c, float z) { return c.converge * z + c.parallel; }

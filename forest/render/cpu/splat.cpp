@@ -170,15 +170,14 @@ class Gatherer {
     if (kind == Kind::capsules) return add_near(chunk);
     const bool straws = picture_.geometry.straw(item);
     if (straws) lengthen(c, r_);
-    const float thinnest = (straws ? float(FOREST_STRAW_WIDTH) : 1.f) * c.thinnest;
     Hull hull;
     for (std::size_t i = 0; i < r_.count; ++i)
       if (r_.width[i] >= 0.f)
         hull.add({std::min(r_.px[i], r_.qx[i]), std::min(r_.py[i], r_.qy[i]), std::max(r_.px[i], r_.qx[i]),
                   std::max(r_.py[i], r_.qy[i])},
                  std::min(r_.code_a[i], r_.code_b[i]), r_.width[i]);
-    if (hidden(hull.grown(reach_of_lines(thinnest, hull.widest)), hull.nearest)) return 0;
-    prepare_lines(c, thinnest, picture_.spread, r_);
+    if (hidden(hull.grown(reach_of_lines(thinnest_of(c, straws), hull.widest)), hull.nearest)) return 0;
+    prepare_lines(c, straws, picture_.spread, r_);
     for (std::size_t i = 0; i < r_.count; ++i)
       if (r_.opacity[i]) look_at_line(i);
     return add_lines(chunk);
@@ -262,7 +261,7 @@ class Gatherer {
         added += put(Solid(r_, i), chunk.solids, chunk.ranges_of_solids);
     }
     if (!any_thin) return added;
-    prepare_lines(c, c.thinnest, picture_.spread, r_);
+    prepare_lines(c, false, picture_.spread, r_);
     for (std::size_t i = 0; i < r_.count; ++i)
       if (r_.opacity[i] && r_.width[i] >= 0.f && r_.widest[i] < thin) look_at_line(i);
     return added + add_lines(chunk);

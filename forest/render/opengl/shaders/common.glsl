@@ -220,10 +220,12 @@ void draw_line(Capsule c) {
   float rank = c.rank + 1.0 / 512.0;
   bool single = view.subframes == 1u;
   if (width < thinnest && c.mean > 0.0) {
-    // A thin branch is drawn or left out as a whole, by its mean width in any direction: one that fades is not dashed.
+    // It stands for its like, by its mean width in any direction. Which branches do was chosen before, so that none comes apart
+    // (scene/cut.cpp); straws are drawn or left out here, as long as they are.
     float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / thinnest, 1.0);
-    if (share <= rank) return;
-    width = single ? floor(thinnest + 1.0 - rank / share) : width / share;
+    float among = c.straw ? rank / share : min(rank / share, 511.0 / 512.0);
+    if (among >= 1.0) return;
+    width = single ? floor(thinnest + 1.0 - among) : width / share;
   } else if (single) {
     width = floor(width + 1.0 - rank);
     if (width < 1.0) return;
