@@ -3,14 +3,11 @@
 
 #include <algorithm>
 #include <cmath>
-#include <cstring>
 #include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "forest/core/hash.h"
-#include "forest/scene/forest_layout.h"
 #include "forest/scene/pick.h"
 #include "forest/scene/view.h"
 
@@ -85,27 +82,6 @@ TEST(Targets, WhatACircuitsFilesTellOfNeuronsStaysWithTheForestAndGoesFirst) {
                 pack(testing::sample_circuit(40), testing::sample_neurons(), Progress::none(), nodes);
               }),
               HasSubstr("score"));
-}
-
-TEST(Targets, AForestFileOfTheVersionBeforeAttributesIsRead) {
-  auto bytes = pack(testing::sample_circuit(40), testing::sample_neurons());
-  layout::Header header;
-  std::memcpy(&header, bytes.data(), sizeof header);
-  const layout::Entry& last = header.table[layout::owners];
-  bytes.resize(last.offset + last.count * last.element_size);
-  header.version = layout::without_attributes, header.parts = layout::part_count - 1;
-  header.table[layout::attributes] = {};
-  header.file_size = bytes.size();
-  header.table_hash = hash64(std::as_bytes(std::span(header.table).first(header.parts)), header.file_size);
-  std::memcpy(bytes.data(), &header, sizeof header);
-  const Forest f = Forest::from_bytes(bytes);
-  EXPECT_TRUE(f.nodes().attributes.empty());
-  EXPECT_EQ(Targets(f).find("all").size(), 40u);
-  for (std::size_t size = 0; size < bytes.size(); size += size < 2000 ? 1 : 9973)
-    EXPECT_FALSE(forest::refused([&] {
-                   Forest::from_bytes({bytes.begin(), bytes.begin() + std::ptrdiff_t(size)});
-                 }).empty())
-        << size;
 }
 
 TEST(Targets, AForestHasThemByItself) {
