@@ -20,7 +20,7 @@ constexpr float margin = 4.f;      // pixels of a layer around what is shown of 
 constexpr std::size_t rows_at_once = 8;
 
 // The thinnest lines of the coarser layers, in those of the picture without a gaze: fewer, and as bright together.
-constexpr float wider = 1.5f;
+constexpr float wider = 1.6f;
 
 // A cluster of which less than this share of a square of pixels would show is left out of the coarser layers: its neighbours,
 // farther or nearer, stand for it.
