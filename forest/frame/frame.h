@@ -169,8 +169,8 @@ struct Frame : Lists {
   Camera camera;
   std::uint32_t width = 1280, height = 720;  // pixels
   std::uint32_t subframes = 1;               // averaged for anti-aliasing and exact coverage of thin branches
-  // Lines thinner than this are drawn as wide or not at all, by the rank of their branch, so that they cover their area on
-  // the mean; pixels, and 1 for a picture of a single subframe.
+  // Lines thinner than this are drawn as wide, for their like: so few of them are in a frame's lists that they cover their
+  // area on the mean; pixels, and 1 for a picture of a single subframe.
   float thinnest = 0.f;
   std::optional<Area> area;  // only these pixels are wanted, the others may show anything; none: all of them
   // Of them, 1 for each square of FOREST_TILE pixels of which nothing is wanted either, in rows from the upper left corner of the

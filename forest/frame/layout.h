@@ -67,7 +67,7 @@ struct Constants {
   // A length at depth z covers focal × length / (converge × z + parallel) pixels: 1, 0 for a perspective camera, 0, 1 for an
   // orthographic one, whose focal is pixels a µm.
   float converge, parallel, glass_opacity,
-      thinnest;  // pixels; lines that are thinner are drawn as wide, or not at all
+      thinnest;  // pixels; lines that are thinner are drawn as wide, straws also not at all
   float glass_x, glass_y, glass_z,
       glass_at;  // glass: n · p = at, p in camera axes (z depth); opacity 0: none
   float glass_right_x, glass_right_y, glass_right_z,
