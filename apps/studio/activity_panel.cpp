@@ -176,8 +176,26 @@ void TraceView::forget() {
   update();
 }
 
+std::vector<QRectF> TraceView::names() const {
+  constexpr qreal line = 14., apart = 12.;
+  const QFontMetricsF metrics(font());
+  const QRectF area = QRectF(rect()).adjusted(axis_left + 60., 1., -axis_right, 0.);  // beside the unit
+  std::vector<QRectF> places;
+  qreal x = area.left(), y = area.top();
+  for (const reports::Trace& trace : traces_) {
+    const qreal width = std::ceil(metrics.horizontalAdvance(QString::fromStdString(trace.name()))) + 2.;
+    if (x > area.left() && x + width > area.right()) x = area.left(), y += line;
+    places.emplace_back(x, y, width, line);
+    x += width + apart;
+  }
+  return places;
+}
+
 QRectF TraceView::plot() const {
-  return QRectF(rect()).adjusted(axis_left, axis_top, -axis_right, -axis_below);
+  const auto places = names();
+  const qreal above = places.empty() ? 0. : places.back().bottom() + 3.;
+  return QRectF(rect()).adjusted(axis_left, std::clamp<qreal>(above, axis_top, .5 * height()), -axis_right,
+                                 -axis_below);
 }
 
 void TraceView::draw() {
@@ -214,7 +232,7 @@ void TraceView::draw() {
                      QString::number(v));
   }
   painter.setPen(faint);
-  painter.drawText(QRectF(0, 0, area.left() + 60, area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
+  painter.drawText(QRectF(0, 0, area.left() + 50, area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
                    QString::fromStdString(facts.units));
   paint_times(painter, area, playback);
   // Of the steps under one column of pixels the least and the greatest: no spike is lost.
@@ -246,17 +264,10 @@ void TraceView::draw() {
     painter.setPen(QPen(trace_colours[t % std::size(trace_colours)], 1.3));
     painter.drawPath(path);
   }
-  // Names over a plate, so that no curve runs through them.
-  qreal widest = 0;
-  for (const reports::Trace& trace : traces_)
-    widest =
-        std::max(widest, painter.fontMetrics().horizontalAdvance(QString::fromStdString(trace.name())) + 10.);
-  const QRectF names(area.right() - widest, area.top(), widest, 14. * double(traces_.size()) + 2.);
-  painter.fillRect(names, QColor(13, 16, 22, 215));
-  for (std::size_t t = 0; t < traces_.size(); ++t) {
+  const auto places = names();
+  for (std::size_t t = 0; t < places.size() && places[t].bottom() <= area.top(); ++t) {
     painter.setPen(trace_colours[t % std::size(trace_colours)]);
-    painter.drawText(QRectF(names.left(), names.top() + 14. * double(t), widest - 5., 14), Qt::AlignRight,
-                     QString::fromStdString(traces_[t].name()));
+    painter.drawText(places[t], Qt::AlignLeft | Qt::AlignVCenter, QString::fromStdString(traces_[t].name()));
   }
 }
 

@@ -53,6 +53,8 @@ class TraceView final : public QWidget {
   QSize sizeHint() const override { return {420, 150}; }
 
  private:
+  // Where the names of the traces stand: in rows above the curves.
+  std::vector<QRectF> names() const;
   QRectF plot() const;
   void draw();
   Viewport& viewport_;

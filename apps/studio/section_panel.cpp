@@ -30,7 +30,7 @@ SectionView::SectionView(scene::Forest forest, QWidget* parent)
 
 scene::SlicePicture SectionView::picture() const {
   const qreal ratio = devicePixelRatioF();
-  return {.centre = centre_,
+  return {.centre = centre_.value_or(Place(0., 0.)),
           .height = height_,
           .width_pixels = std::uint32_t(std::max(1l, std::lround(width() * ratio))),
           .height_pixels = std::uint32_t(std::max(1l, std::lround(height() * ratio))),
@@ -59,11 +59,27 @@ void SectionView::draw() {
     coloured_ = true;
   }
   const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
+  if (!centre_) centre_ = opening(plane);
   const scene::SlicePicture drawn = picture();
   const frame::Image image = scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);
   image_ = QImage(image.pixels.data(), int(image.width), int(image.height), QImage::Format_RGBX8888).copy();
   image_.setDevicePixelRatio(devicePixelRatioF());
   update();
+}
+
+Place SectionView::opening(const Plane& plane) const {
+  const Vec3 middle = forest_.soma_bounds().centre();
+  Place best(0., 0.);
+  float least = INFINITY;
+  for (const frame::Instance& i : forest_.instances()) {
+    const Vec3 at = Vec3(i.x, i.y, i.z) - plane.origin;
+    const float off = std::abs(at.dot(plane.normal)),
+                cut = off - forest_.neurons()[i.morphology].soma_radius / 2.f;
+    // One that is cut beats one that is not, however far from the middle.
+    const float cost = (cut > 0.f ? 100.f * cut : 0.f) + (Vec3(i.x, i.y, i.z) - middle).norm();
+    if (cost < least) least = cost, best = Place(at.dot(plane.right), at.dot(plane.up));
+  }
+  return best;
 }
 
 void SectionView::paintEvent(QPaintEvent*) {
@@ -83,7 +99,7 @@ void SectionView::mouseMoveEvent(QMouseEvent* event) {
   const QPointF moved = event->position() - mouse_;
   mouse_ = event->position();
   const double pixel = height_ / std::max(1, height());
-  centre_ += Place(-moved.x() * pixel, moved.y() * pixel);
+  if (centre_) *centre_ += Place(-moved.x() * pixel, moved.y() * pixel);
   soon_.start();
 }
 
@@ -92,7 +108,7 @@ void SectionView::wheelEvent(QWheelEvent* event) {
   height_ = std::clamp(height_ * std::pow(.85, event->angleDelta().y() / 120.), least_height, most_height);
   const double after = height_ / std::max(1, height());
   const QPointF off = event->position() - QPointF(.5 * width(), .5 * height());
-  centre_ += Place(off.x(), -off.y()) * (before - after);  // what is under the mouse stays there
+  if (centre_) *centre_ += Place(off.x(), -off.y()) * (before - after);  // what is under the mouse stays there
   event->accept();
   soon_.start();
 }

@@ -6,6 +6,7 @@
 #include <QTimer>
 #include <QWidget>
 #include <functional>
+#include <optional>
 
 #include "forest/scene/slice_picture.h"
 
@@ -32,6 +33,8 @@ class SectionView final : public QWidget {
 
  private:
   void draw();
+  /// Before the soma that lies nearest to the plane and to the middle of the forest: a person sees what a cell is there.
+  Place opening(const Plane& plane) const;
   scene::SlicePicture picture() const;
 
   scene::Forest forest_;
@@ -39,7 +42,7 @@ class SectionView final : public QWidget {
   scene::Colouring colouring_;
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
   bool coloured_ = false;
-  Place centre_{0., 0.};  // along the plane's right and up
+  std::optional<Place> centre_;  // along the plane's right and up; none: nothing was cut yet
   double height_ = 200.;  // µm
   QPointF mouse_;
   QImage image_;
