@@ -97,15 +97,16 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
 
 void Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
   if (marks.scale) scene::paint_scale(image, view.camera, view.background);
-  if (!marks.legend) return;
   std::vector<scene::ColourBar> bars;
-  if (playback_)
+  if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
-  if (dressing_.surfaces.has_values()) {
+  if (marks.legend && dressing_.surfaces.has_values()) {
     const auto [low, high] = dressing_.surfaces.shown_range();
     bars.push_back({.map = dressing_.surfaces.map, .low = low, .high = high});
   }
-  scene::paint(image, bars, view.background);
+  const bool barred = scene::paint(image, bars, view.background);
+  if (marks.names && colouring_ && !playback_)  // else the simulation's colours are shown, not theirs
+    scene::paint(image, colouring_->legend, view.background, barred);
 }
 
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
@@ -178,6 +179,7 @@ void play(Artist& artist, const ActivityOptions& options, scene::View& view, Con
 void add_marks(CLI::App& command, Marks& marks) {
   command.add_flag("!--no-legend", marks.legend,
                    "Leave out what the colours of values mean (small pictures do so by themselves)");
+  command.add_flag("--legend", marks.names, "Name the colours of neurons, too: types, layers, targets …");
   command.add_flag("--scale", marks.scale, "Draw a scale bar, true at the depth of what the camera looks at");
 }
 

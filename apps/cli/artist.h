@@ -36,6 +36,7 @@ struct Drawn {
 /// What stands in a picture so that it can be read.
 struct Marks {
   bool legend = true;  // what colours of values mean, of the simulation and of surfaces
+  bool names = false;  // what colours of neurons mean
   bool scale = false;  // how long some µm are
 };
 

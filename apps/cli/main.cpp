@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", FOREST_VERSION);
   app.require_subcommand(1);
   app.failure_message([](const CLI::App* at, const CLI::Error& error) {
-    return fmt::format("brainforest: {}\nRun with {} for more information.\n", error.what(),
+    return fmt::format("brainforest: {}\nRun with {} for more information.\n", sentence_of(error),
                        at->get_help_ptr() ? at->get_help_ptr()->get_name(false, false) : "--help");
   });
   std::function<void()> run;

@@ -174,7 +174,9 @@ int main(int argc, char** argv) {
   app.footer(
       "Example:\n  brainforest-studio column.forest --view inside.json\nF1 in the window lists keys and "
       "mouse.");
-  app.failure_message(CLI::FailureMessage::simple);
+  app.failure_message([](const CLI::App*, const CLI::Error& error) {
+    return forest::sentence_of(error) + "\nRun with --help for more information.\n";
+  });
   forest::refuse_empty(app);
   try {
     app.parse(argc, argv);

@@ -22,6 +22,13 @@ float marks_width(const ColourBar& bar, float letter) {
   return bar.marks.empty() ? 0.f : (float(bar.marks.size()) + .7f) * mark_size(letter);
 }
 float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
+std::string note_of(const ActivityView& activity) {
+  return fmt::format("a spike, then fading, {:g} µm/ms", activity.speed);
+}
+// Whether a plate of this size leaves enough of a picture.
+bool fits(const frame::Image& image, float width, float height) {
+  return width <= .65f * float(image.width) && height <= .65f * float(image.height);
+}
 
 }  // namespace
 
@@ -47,7 +54,7 @@ ColourBar bar_of(const ActivityView& activity, double time, const std::string& u
           .units = units,
           .threshold = activity.threshold,
           .title = fmt::format("{:.1f} ms", time),
-          .note = flashes ? fmt::format("a spike, {:g} µm/ms", activity.speed) : ""};
+          .note = flashes ? note_of(activity) : ""};
 }
 
 ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background) {
@@ -56,8 +63,7 @@ ColourBar bar_of_spikes(const ActivityView& activity, double time, Background ba
   return {.map = nullptr,
           .marks = {screen_of(palette[spike_entry]), screen_of(palette[fading_entry])},
           .title = fmt::format("{:.1f} ms", time),
-          .note = activity.speed > 0.f ? fmt::format("a spike, {:g} µm/ms", activity.speed)
-                                       : "spikes are not shown"};
+          .note = activity.speed > 0.f ? note_of(activity) : "spikes are not shown"};
 }
 
 ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background) {
@@ -67,9 +73,10 @@ ColourBar bar_of(const Playback& playback, const ActivityView& activity, Backgro
 }
 
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters) {
-  const float steps = std::max(1.f, std::round(place.right - place.left));
+  // Whole columns: two halves of one let the ground through.
+  const float first = std::round(place.left), steps = std::max(1.f, std::round(place.right) - first);
   for (float i = 0.f; i < steps; i += 1.f) {
-    const float left = place.left + i;
+    const float left = first + i;
     fill(image, {left, place.top, left + 1.f, place.bottom}, bar.at((i + .5f) / steps));
   }
   const float base = place.bottom + 1.7f * letters.height;
@@ -84,9 +91,7 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
   float tall = 0.f;
   for (const ColourBar& bar : bars)
     tall += h * (margin + 2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
-  if (bars.empty() || h * (wide + 2.f * padding) > .65f * float(image.width) ||
-      tall > .65f * float(image.height))
-    return false;
+  if (bars.empty() || !fits(image, h * (wide + 2.f * padding), tall)) return false;
   float top = h * margin;
   for (const ColourBar& bar : bars) {
     const float left = h * (margin + padding), right = left + h * wide;
@@ -109,6 +114,26 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
       fill(image, {left + float(i) * dot, base - dot, left + float(i + 1) * dot, base}, bar.marks[i]);
     letters.write(image, bar.note, left + marks_width(bar, h), base);
     top = bottom + h * margin;
+  }
+  return true;
+}
+
+bool paint(frame::Image& image, std::span<const LegendEntry> names, Background background, bool right) {
+  const auto [letters, ground] = writing_in(image, background);
+  const float h = letters.height, dot = mark_size(h), indent = dot + .7f * h;
+  float widest = 0.f;
+  for (const LegendEntry& entry : names) widest = std::max(widest, letters.width(entry.name));
+  const float width = indent + widest + 2.f * padding * h,
+              height = h * (2.f * padding + 1.f + line * (float(names.size()) - 1.f));
+  if (names.empty() || !fits(image, width + margin * h, height + margin * h)) return false;
+  const float left = right ? float(image.width) - h * margin - width : h * margin, top = h * margin;
+  fill(image, {left, top, left + width, top + height}, ground, .62f);
+  float base = top + h * (padding + 1.f);
+  for (const LegendEntry& entry : names) {
+    const float at = std::round(left + h * padding), foot = std::round(base);
+    fill(image, {at, foot - std::round(dot), at + std::round(dot), foot}, screen_of(entry.colour));
+    letters.write(image, entry.name, at + indent, base);
+    base += h * line;
   }
   return true;
 }

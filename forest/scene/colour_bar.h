@@ -47,6 +47,10 @@ ColourBar bar_of(const Playback& playback, const ActivityView& activity, Backgro
 /// @return  whether they are in it
 bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background);
 
+/// The names of colours, one below the other, at the top left, or right, on the same ground. Left out where it does not fit.
+/// @return  whether they are in it
+bool paint(frame::Image& image, std::span<const LegendEntry> names, Background background, bool right);
+
 /// The bar alone, without ground: its colours between `place`'s edges and its values below, which need twice the letters' height.
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters);
 

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/scene/colour_bar.h"
 
+#include <algorithm>
+
 #include <gtest/gtest.h>
 
 namespace forest::scene {
@@ -22,13 +24,16 @@ TEST(ColourBar, ShowsTheMapAndGreyBelowTheThreshold) {
   EXPECT_LT((at(12) - Vec3(.25f, .28f, .32f)).norm(), .01f);
   EXPECT_LT((at(109) - map.screen(.995f)).norm(), .02f);
   EXPECT_LT((at(60) - map.screen(.505f)).norm(), .02f);
+  image = black(120, 60);  // a bar that begins within a pixel is as bright
+  paint(image, bar, {10.4f, 10.f, 110.4f, 20.f}, Lettering{.height = 8.f});
+  EXPECT_LT((at(60) - map.screen(.505f)).norm(), .02f);
 }
 
 TEST(ColourBar, OfSpikesAloneIsADotOfTheirColourAndNoMapOfValues) {
   for (const Background background : {Background::dark, Background::light}) {
     const ColourBar bar = bar_of_spikes(ActivityView(), 12.5, background);
     EXPECT_EQ(bar.map, nullptr);
-    EXPECT_EQ(bar.note, "a spike, 300 µm/ms");
+    EXPECT_EQ(bar.note, "a spike, then fading, 300 µm/ms");
     frame::Image image = black(640, 480);
     EXPECT_TRUE(paint(image, {&bar, 1}, background));
     std::size_t dot = 0;
@@ -46,7 +51,7 @@ TEST(ColourBar, BesideValuesSaysWhatFlashesAreWhereThereAreSome) {
     ActivityView view;
     view.speed = 250.f;
     const ColourBar bar = bar_of(view, 12.5, "mV", background);
-    EXPECT_EQ(bar.note, "a spike, 250 µm/ms");
+    EXPECT_EQ(bar.note, "a spike, then fading, 250 µm/ms");
     frame::Image image = black(640, 480);
     EXPECT_TRUE(paint(image, {&bar, 1}, background));
     for (const Vec3& mark : bar.marks) {
@@ -61,6 +66,28 @@ TEST(ColourBar, BesideValuesSaysWhatFlashesAreWhereThereAreSome) {
   const ColourBar none = bar_of(quiet, 12.5, "mV", Background::dark);
   EXPECT_EQ(none.note, "");
   EXPECT_TRUE(none.marks.empty());
+}
+
+TEST(ColourBar, NamesOfColoursStandAtEitherSideAndNotWhereTheyDoNotFit) {
+  const std::vector<LegendEntry> names{{"pyramidal cell", {0.f, 1.f, 0.f}}, {"basket cell", {1.f, 0.f, 0.f}}};
+  const auto greens = [](const frame::Image& image, std::uint32_t from, std::uint32_t to) {
+    std::size_t count = 0;
+    for (std::uint32_t y = 0; y < image.height; ++y)
+      for (std::uint32_t x = from; x < to; ++x) {
+        const std::uint8_t* p = &image.pixels[4 * (std::size_t(y) * image.width + x)];
+        count += p[0] == 0 && p[1] == 255 && p[2] == 0;
+      }
+    return count;
+  };
+  for (const bool right : {false, true}) {
+    frame::Image image = black(640, 360);
+    EXPECT_TRUE(paint(image, names, Background::dark, right));
+    EXPECT_GT(greens(image, right ? 320 : 0, right ? 640 : 320), 30u);
+    EXPECT_EQ(greens(image, right ? 0 : 320, right ? 320 : 640), 0u);
+  }
+  frame::Image small = black(80, 45);
+  EXPECT_FALSE(paint(small, names, Background::dark, false));
+  EXPECT_EQ(std::ranges::count(small.pixels, 0), std::ptrdiff_t(small.pixels.size()));
 }
 
 TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {

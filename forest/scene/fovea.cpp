@@ -21,13 +21,15 @@ constexpr std::size_t rows_at_once = 8;
 
 // The thinnest lines of the coarser layers, in those of the picture without a gaze: fewer, and as bright together.
 constexpr float wider = 1.6f;
+// … and never less than this: what is much thinner falls between the samples and is seen as a row of beads.
+constexpr float least_thinnest = .25f;  // pixels of the layer
 
 // A cluster of which less than this share of a square of pixels would show is left out of the coarser layers: its neighbours,
 // farther or nearer, stand for it.
 constexpr float seldom = .5f;
 
 float thinnest_in(const View& view, const Layer& layer) {
-  return thinnest_of(view) * (layer.scale > 1.f ? wider : 1.f);
+  return layer.scale > 1.f ? std::max(wider * thinnest_of(view), least_thinnest) : thinnest_of(view);
 }
 
 // A pixel of the picture as a layer counts it.

@@ -170,8 +170,11 @@ TEST(Layers, WithLargerPixelsHaveWeakerRimsAndMoreThanOneSample) {
       const View shown = view_for(view, layer);
       EXPECT_NEAR(shown.halo * layer.scale, .8f, 1e-5f);
       EXPECT_EQ(shown.samples, samples > 1 ? samples : layer.scale > 1.f ? 4u : 1u);
-      // As many branches, however many samples.
-      EXPECT_FLOAT_EQ(thinnest_of(shown), thinnest_of(view) * (layer.scale > 1.f ? 1.5f : 1.f));
+      // As many branches, however many samples; in coarse layers fewer, and none so thin that it falls between the samples.
+      if (layer.scale > 1.f)
+        EXPECT_GE(thinnest_of(shown), std::max(1.5f * thinnest_of(view), .25f));
+      else
+        EXPECT_EQ(thinnest_of(shown), thinnest_of(view));
       EXPECT_EQ(shown.camera, view.camera);
     }
   }

@@ -350,6 +350,8 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
       if (age < 0. || age > lasts) continue;
       const std::uint32_t kind = forest_.segments()[neuron.first_segment + i].meta & 7u;
       const bool soma = kind == 1;
+      // Of a soma its sphere, wholly covered; the cones that join its stems would stick out as a flower.
+      if (soma && i > 0) continue;
       if (state.kind == frame::Kind::somata && !soma) continue;
       if (colouring.opacities[8u * state.colour_class + kind] < 26 || state.opacity < 26) continue;
       const float bright = std::exp(-float(std::max(0., age - options.window)) / view.fade);
@@ -359,7 +361,7 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
       const float least =
           (soma ? least_soma : least_branch) * height * camera.pixel_size(height, std::max(depth, 0.f));
       const float own = std::max(cone.radius_a, cone.radius_b);
-      frame::Overlay mark{cone.a, cone.b, (.3f + .8f * bright) * std::max(own, least),
+      frame::Overlay mark{cone.a, cone.b, std::max(soma ? 1.05f : 0.f, .3f + .8f * bright) * std::max(own, least),
                           bright > fading ? spike_entry : fading_entry};
       // As large in the picture and nearer, so that it is seen through the tissue.
       if (camera.orthographic()) {
@@ -386,7 +388,7 @@ void make_quiet(frame::Palette& palette, Background background) {
     const Vec3 grey =
         Vec3::Constant(.2126f * palette[i].x() + .7152f * palette[i].y() + .0722f * palette[i].z());
     const Vec3 pale = .65f * palette[i] + .35f * grey;
-    palette[i] = light ? Vec3(.2f * pale + .8f * light_of(0xDDE3EB)) : Vec3(.11f * pale);
+    palette[i] = light ? Vec3(.2f * pale + .8f * light_of(0xDDE3EB)) : Vec3(.2f * pale);
   }
   palette[spike_entry] = light ? light_of(0xC00018) : Vec3(1.f, .98f, .86f);
   palette[fading_entry] = light ? light_of(0xE8602C) : light_of(0xFFA02C);
