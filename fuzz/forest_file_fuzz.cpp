@@ -21,7 +21,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     scene::View view = scene::overview(forest);
     const frame::Viewport viewport{640.f, 360.f};
     for (const float error : {.1f, 1.f, 50.f}) {
-      view.detail.error = error;
+      view.detail.error = view.detail.thinnest = error;
       (void)scene::choose(forest, scene::Eye(view.camera, viewport, view.detail), viewport);
     }
     const auto pick = scene::pick(forest, view.camera, viewport, {320.f, 180.f});

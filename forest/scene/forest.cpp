@@ -258,7 +258,12 @@ void Forest::Data::check_neurons(const Refuse& refuse) const {
                   within(n.first_section, n.section_count, sections.size()) && std::isfinite(n.soma_radius));
     const auto is_section = [&](std::uint32_t s) { return s == soma_section || s < n.section_count; };
     refuse.unless(std::ranges::all_of(originals.subspan(n.first_original, n.original_count), is_section));
-    for (const Cluster& c : clusters.subspan(n.first_cluster, n.cluster_count)) {
+    const std::size_t end = n.first_cluster + n.cluster_count;
+    for (std::size_t at = n.first_cluster; at < end; ++at) {
+      const Cluster& c = clusters[at];
+      // The leaves are its last clusters, and the tree is its own.
+      refuse.unless(c.is_leaf() == (at - n.first_cluster >= n.cluster_count / 2) &&
+                    std::ranges::all_of(c.children, [&](std::uint32_t child) { return child < end; }));
       bool good = true;  // of all, without a branch for each
       for (const reports::Place& p : places.subspan(c.first_segment, c.segment_count))
         good &= is_section(p.section) & (p.position >= 0.f) & (p.position <= 1.f);

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <atomic>
+#include <cstring>
 #include <unistd.h>
 
 #include <gtest/gtest.h>
@@ -15,6 +16,7 @@
 #include "forest/scene/view.h"
 
 #include "tests/checksums.h"
+#include "tests/refused.h"
 #include "tests/sample_forest.h"
 
 namespace forest::scene {
@@ -160,6 +162,31 @@ TEST(ForestFile, AnyChangedByteIsRefused) {
   }
 }
 
+// The walk over a neuron relies on it.
+TEST(ForestFile, ATreeOfClustersThatReachesIntoAnotherNeuronOrHasALeafAmongOthersIsRefused) {
+  const auto bytes = pack(sample_circuit(), sample_neurons());
+  layout::Header header;
+  std::memcpy(&header, bytes.data(), sizeof header);
+  const layout::Entry& part = header.table[layout::clusters];
+  const Forest whole = Forest::from_bytes(bytes);
+  const Neuron& first = whole.neurons()[0];
+  ASSERT_GT(first.cluster_count, 4u);
+  const auto refused_with = [&](std::uint32_t cluster, std::uint32_t a, std::uint32_t b) {
+    auto changed = bytes;
+    Cluster c = whole.clusters()[cluster];
+    c.children[0] = a, c.children[1] = b;
+    std::memcpy(&changed[part.offset + cluster * sizeof c], &c, sizeof c);
+    testing::put_forest_right(changed);
+    return !forest::refused([&] { Forest::from_bytes(std::move(changed)); }).empty();
+  };
+  const auto [a, b] = whole.clusters()[0].children;
+  EXPECT_FALSE(refused_with(0, a, b));
+  EXPECT_TRUE(refused_with(0, a, first.cluster_count));  // the next neuron's first
+  EXPECT_TRUE(refused_with(0, 0, 0));                    // a leaf before the others
+  const std::uint32_t last = first.cluster_count - 1;
+  EXPECT_TRUE(refused_with(last - 2, last - 1, last));  // a leaf with children
+}
+
 // Checksums tell of accidents, not of intent.
 TEST(ForestFile, WhatIsChangedBehindRightChecksumsIsRefusedOrCanBeSeen) {
   const auto bytes = pack(sample_circuit(3),
@@ -175,8 +202,11 @@ TEST(ForestFile, WhatIsChangedBehindRightChecksumsIsRefusedOrCanBeSeen) {
       testing::put_forest_right(changed);
       try {
         const Forest f = Forest::from_bytes(std::move(changed));
-        const View view = overview(f);
-        (void)choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+        View view = overview(f);
+        for (const float thinnest : {0.f, 2.f}) {
+          view.detail.thinnest = thinnest;
+          (void)choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+        }
         (void)pick(f, view.camera, {320, 200}, {160, 100});
         ++seen;
       } catch (const InputError&) {
