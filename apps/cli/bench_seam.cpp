@@ -340,9 +340,8 @@ void run(const Options& options, Console& console) {
   rows.push_back({"to reach", "1.10", "", "", "", "0.950", "", ""});
   console.table({"", "change ÷ reference's", "at", "of one step", "at", "least similarity", "at", "mean"},
                 rows);
-  console.say(fmt::format(
-      "disconnected branches: {} in {} pictures (at most {:.0f}, in picture {})", disconnected, walk.pictures(),
-      most_disconnected.value, most_disconnected.picture));
+  console.say(fmt::format("disconnected branches: {} in {} pictures (at most {:.0f}, in picture {})",
+                          disconnected, walk.pictures(), most_disconnected.value, most_disconnected.picture));
   console.say(fmt::format("the reference took {:.2f} s a picture of {} samples",
                           walk.reference_seconds() / double(chosen.size()), options.samples));
 }

@@ -108,7 +108,8 @@ void SectionView::wheelEvent(QWheelEvent* event) {
   height_ = std::clamp(height_ * std::pow(.85, event->angleDelta().y() / 120.), least_height, most_height);
   const double after = height_ / std::max(1, height());
   const QPointF off = event->position() - QPointF(.5 * width(), .5 * height());
-  if (centre_) *centre_ += Place(off.x(), -off.y()) * (before - after);  // what is under the mouse stays there
+  if (centre_)
+    *centre_ += Place(off.x(), -off.y()) * (before - after);  // what is under the mouse stays there
   event->accept();
   soon_.start();
 }

@@ -43,7 +43,7 @@ class SectionView final : public QWidget {
   scene::ColourBy coloured_by_ = scene::ColourBy::type;
   bool coloured_ = false;
   std::optional<Place> centre_;  // along the plane's right and up; none: nothing was cut yet
-  double height_ = 200.;  // µm
+  double height_ = 200.;         // µm
   QPointF mouse_;
   QImage image_;
   QTimer soon_;

@@ -40,7 +40,7 @@ struct Draft {
   float error = 0.f;
   std::uint32_t leaf_first = 0, leaf_count = 0;  // original segments
   std::uint32_t first_leaf = 0, last_leaf = 0;   // leaf drafts below, [first, last)
-  std::uint32_t outgrowth = 0;  // of a leaf, as Cluster::outgrowth
+  std::uint32_t outgrowth = 0;                   // of a leaf, as Cluster::outgrowth
   std::int64_t children[2] = {-1, -1};
 };
 
@@ -633,8 +633,9 @@ Branches branches_of(const Morphology& m) {
     for (const Point& p : m.points(SectionId(i))) thickest[i] = std::max(thickest[i], p.radius);
     if (const SectionId parent = m.section(SectionId(i)).parent; parent.valid())
       thickest[parent.value()] = std::max(thickest[parent.value()], thickest[i]);
-    branches.appears[i] = std::min((float(branches.ranks[i]) + .5f) / (256.f * wide * std::max(branches.means[i], 1e-6f)),
-                                   .5f * never_left_out / std::max(thickest[i], 1e-6f));
+    branches.appears[i] =
+        std::min((float(branches.ranks[i]) + .5f) / (256.f * wide * std::max(branches.means[i], 1e-6f)),
+                 .5f * never_left_out / std::max(thickest[i], 1e-6f));
   }
   return branches;
 }

@@ -40,7 +40,7 @@ struct Cluster {
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
   std::uint32_t leaf_count = 0;        // … and how many
-  std::uint32_t groups[group_count] = {};  // the sphere around each group: see group()
+  std::uint32_t groups[group_count] = {};          // the sphere around each group: see group()
   std::uint8_t appears[frame::cluster_size] = {};  // from which step of magnification on each segment shows
 
   Sphere sphere() const { return {{x, y, z}, radius}; }

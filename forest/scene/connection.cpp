@@ -54,7 +54,9 @@ Connections Connectedness::operator()(const Cut& cut, const frame::Camera& camer
   for (const auto* list : {&cut.lines, &cut.capsules})
     for (const frame::Item& i : *list)
       if (i.instance != FOREST_IN_WORLD) pieces[i.instance].push_back(&i);
-  const auto depth = [&, ahead = Vec3(-camera.axes().col(2))](const Vec3& p) { return ahead.dot(p - camera.eye); };
+  const auto depth = [&, ahead = Vec3(-camera.axes().col(2))](const Vec3& p) {
+    return ahead.dot(p - camera.eye);
+  };
   std::vector<Connections> found(pieces.size());
   parallel_for(pieces.size(), 8, [&](std::size_t index) {
     const frame::Instance& instance = forest_.instances()[index];

@@ -35,7 +35,8 @@ TEST(Connection, NoChoiceOfDetailBreaksABranchOnAWholeDolly) {
         const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
         const Detail detail{.error = error, .gaze = {}, .thinnest = thinnest};
         const Cut cut = choose(forest, Eye(camera, viewport, detail), viewport);
-        EXPECT_EQ(connectedness(cut, camera, viewport).disconnected, 0u) << i << " " << error << " " << thinnest;
+        EXPECT_EQ(connectedness(cut, camera, viewport).disconnected, 0u)
+            << i << " " << error << " " << thinnest;
       }
 }
 
@@ -51,7 +52,8 @@ TEST(Connection, NothingComesApartBetweenTheRoundsOfAPicture) {
       const Sight sight{eye, nullptr, first};
       Cut all = std::move(choose(forest, std::span(&sight, 1)).front());
       std::vector<LeftOut> left = all.left_out;
-      for (float horizon = 2.f * first; !left.empty(); horizon = horizon < 4.f * first ? 4.f * first : INFINITY) {
+      for (float horizon = 2.f * first; !left.empty();
+           horizon = horizon < 4.f * first ? 4.f * first : INFINITY) {
         const Cut more = revealed(forest, {eye, nullptr, horizon}, left);
         all.lines.insert(all.lines.end(), more.lines.begin(), more.lines.end());
         all.capsules.insert(all.capsules.end(), more.capsules.begin(), more.capsules.end());

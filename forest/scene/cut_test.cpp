@@ -220,7 +220,8 @@ TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
         const float width = 2.f * std::max(from_half(s.radii), from_half(s.radii >> 16)) * magnification;
         const float of_branch = 2.f * float(FOREST_MEAN_STRETCH) * from_half(s.meta >> 16) * magnification;
         EXPECT_LE(of_branch * 256.f, (float(s.meta >> 8 & 255) + .5f) * 1.2f);
-        EXPECT_LT(width, (c.is_leaf() ? 1.5f : 3.f * 1.5f) * 1.2f);  // coarse ones are widened, up to three times
+        EXPECT_LT(width,
+                  (c.is_leaf() ? 1.5f : 3.f * 1.5f) * 1.2f);  // coarse ones are widened, up to three times
       }
     }
   }

@@ -361,7 +361,8 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
       const float least =
           (soma ? least_soma : least_branch) * height * camera.pixel_size(height, std::max(depth, 0.f));
       const float own = std::max(cone.radius_a, cone.radius_b);
-      frame::Overlay mark{cone.a, cone.b, std::max(soma ? 1.05f : 0.f, .3f + .8f * bright) * std::max(own, least),
+      frame::Overlay mark{cone.a, cone.b,
+                          std::max(soma ? 1.05f : 0.f, .3f + .8f * bright) * std::max(own, least),
                           bright > fading ? spike_entry : fading_entry};
       // As large in the picture and nearer, so that it is seen through the tissue.
       if (camera.orthographic()) {

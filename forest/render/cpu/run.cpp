@@ -228,7 +228,8 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
   const bool single = c.subframes == 1;
   const float thinnest = thinnest_of(c, straws);
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
-  const float last_rank = straws ? INFINITY : 511.f / 512.f;  // of what is drawn: which branches are was chosen before
+  const float last_rank =
+      straws ? INFINITY : 511.f / 512.f;  // of what is drawn: which branches are was chosen before
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
