@@ -202,10 +202,8 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.w_angle = spread_of(angles);
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::mean);
   const Shaping shaping{.volume = options.volume};
-  improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
-  cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
-  improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
-  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::mean);
+  for (int time = 0; time < 2; ++time)
+    improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
   // The few that are badly shaped still may take room from others and leave a creased surface farther.
   const Shaping last{.enough = .36,
                      .wanted = .5,
@@ -215,11 +213,15 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
                      .even = 1.,
                      .along = 1600.,
                      .off = 100.,
+                     .worst_off = 400.,
                      .rounds = 4,
-                     .iterations = 400};
+                     .iterations = 400,
+                     .gain = .01};
   improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
   constexpr double least_jacobian = .2;
   begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
+  cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
+  if (cortex.mending.before > 0) improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);

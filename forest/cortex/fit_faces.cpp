@@ -7,7 +7,7 @@
 #include <Eigen/Cholesky>
 
 #include "forest/core/parallel.h"
-#include "forest/cortex/neighbourhood.h"
+#include "forest/cortex/go.h"
 
 namespace forest::cortex {
 namespace {
@@ -67,14 +67,9 @@ Ways ways(const Elements& elements, std::size_t element, std::size_t depth, cons
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit) {
   const int rounds = fit == Fit::mean ? 2 : 3;
   const Shares by_place = shares(fit);
+  constexpr double good = .5;  // scaled Jacobian
+  const std::vector<double> keep = to_keep(elements, good);
   const std::vector<Depths> before = elements.curves;
-  // What an element must keep: validity, and a good shape, or the one it had.
-  constexpr double good = .5;
-  std::vector<double> least(elements.size(), -1.);
-  parallel_for(elements.size(), 64, [&](std::size_t e) {
-    const Hexahedron h = elements.hexahedron(e);
-    if (certify(h).positive()) least[e] = std::min(good, scaled_jacobian(h));
-  });
   std::vector<Eigen::Matrix<double, 16, 3>> moves(elements.size());
   for (const auto& [depth, surface] : {std::pair{std::size_t(0), &outer}, {std::size_t(3), &inner}})
     for (int round = 0; round < rounds; ++round) {
@@ -91,27 +86,9 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
         if (times[c]) elements.curves[c][depth] += sum[c] / double(times[c]);
     }
 
-  const std::vector<Depths> fitted = elements.curves;
-  std::vector<std::uint8_t> halved(elements.curves.size(), 0);
-  constexpr std::uint8_t most_halvings = 3;  // then it stays
-  for (bool all_well = false; !all_well;) {
-    std::vector<std::uint8_t> lost(elements.size(), 0), less(elements.curves.size(), 0);
-    parallel_for(elements.size(), 64, [&](std::size_t e) {
-      if (least[e] < 0.) return;
-      const Hexahedron h = elements.hexahedron(e);
-      lost[e] = scaled_jacobian(h) < least[e] || !certify(h).positive();
-    });
-    all_well = true;
-    for (std::size_t e = 0; e < elements.size(); ++e)
-      for (const std::uint32_t c : elements.elements[e]) less[c] |= lost[e];
-    for (std::size_t c = 0; c < less.size(); ++c) {
-      if (!less[c] || halved[c] > most_halvings) continue;
-      all_well = false;
-      const double share = ++halved[c] > most_halvings ? 0. : 1. / double(1 << halved[c]);
-      for (const std::size_t d : {std::size_t(0), std::size_t(3)})
-        elements.curves[c][d] = before[c][d] + share * (fitted[c][d] - before[c][d]);
-    }
-  }
+  std::vector<Depths> fitted = before;
+  fitted.swap(elements.curves);
+  go(elements, fitted, keep);
 }
 
 }  // namespace forest::cortex

@@ -8,6 +8,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/cortex/go.h"
 #include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
@@ -266,7 +267,7 @@ void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTre
   struct Try {
     int evened, room;  // rings: that are evened out, and around these that move, too
   };
-  constexpr std::array tries{Try{0, 1}, Try{0, 3}, Try{2, 1}, Try{1, 1}, Try{3, 1}, Try{0, 4}};
+  constexpr std::array tries{Try{0, 1}, Try{1, 1}, Try{0, 3}, Try{1, 2}, Try{2, 1}, Try{3, 1}};
   Shaping wide = shaping;
   wide.patch = 200;
   wide.finely = true;
@@ -280,7 +281,8 @@ void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTre
     if (evened > 0) even_out(elements, heaps, evened);
     wide.room = room;
     improve_shapes(elements, outer, inner, wide, progress, widened(elements, stars, heaps, evened + room));
-    keep_gains(elements, std::move(before), least);
+    keep_gains(elements, before, least);
+    go(elements, before, to_keep(elements, shaping.enough));  // back, what need not have left
   }
 }
 

@@ -65,14 +65,16 @@ struct Unfolding {
   }
 };
 
-// Minimises f from x on; `f(x, gradient)` returns the value, which may be infinite. Returns the value.
+// Minimises f from x on; `f(x, gradient)` returns the value, which may be infinite. Returns the value. Ends after so many iterations,
+// when no coordinate moves by `enough`, or when five iterations together gain less than the share `gain` of the value.
 template <class Function>
-double minimise(Vector& x, int iterations, double enough, Function&& f) {
+double minimise(Vector& x, int iterations, double enough, Function&& f, double gain = 0.) {
   constexpr std::size_t memory = 12;
   Vector gradient, next, next_gradient, tried, tried_gradient;
   double value = f(x, gradient), next_value = value;
   if (!std::isfinite(value)) return value;
   std::vector<std::pair<Vector, Vector>> past;  // steps and changes of the gradient
+  double since = value;
   for (int iteration = 0; iteration < iterations; ++iteration) {
     Vector direction = -gradient;
     std::vector<double> alpha(past.size());
@@ -119,6 +121,10 @@ double minimise(Vector& x, int iterations, double enough, Function&& f) {
       past.emplace_back(moved, changed);
     }
     if (moved.cwiseAbs().maxCoeff() < enough) break;
+    if (iteration % 5 == 4) {
+      if (since - value < gain * since) break;
+      since = value;
+    }
   }
   return value;
 }

@@ -123,13 +123,19 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
   // Back onto the ribbon, and along it until volumes are even.
   const RibbonLocator locator(ribbon);
   const TriangleTree valley_tree(pieces(lines, Line::Kind::valley)),
-      border_tree(pieces(lines, Line::Kind::border));
+      border_tree(pieces(lines, Line::Kind::border)), crest_tree(pieces(lines, Line::Kind::crest));
+  std::vector<Place> crest_along;  // of every piece in the tree
+  for (const Line& line : lines)
+    for (std::size_t i = 0; line.kind == Line::Kind::crest && i + 1 < line.points.size(); ++i)
+      crest_along.push_back(line.direction(i));
 
   const std::size_t n = quads.middle.size();
   quads.points.resize(n);
   std::vector<double> under(n), held(n);  // held: to the directions of a line
   std::vector<Place> up(n), arm(n);
   std::vector<std::uint8_t> border(n, 0);  // sides that only one face has, of every vertex
+  constexpr double hold = .6;
+  const double by_a_crest = std::cbrt(options.volume);
   const auto put_back = [&](std::size_t v) {
     if (border[v])
       if (const auto hit = border_tree.nearest(quads.middle[v], 1.5 * std::cbrt(options.volume)))
@@ -144,7 +150,17 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     for (const std::size_t k : {1u, 2u})
       if (w[Eigen::Index(k)] > w[Eigen::Index(main)]) main = k;
     arm[v] = arms[c[main]];
-    held[v] = by[c[main]] ? .6 : 0.;
+    held[v] = by[c[main]] ? hold : 0.;
+    // By a crest sides run along it and across it, the more so the nearer.
+    if (const auto hit = border[v] ? std::nullopt : crest_tree.nearest(quads.middle[v], by_a_crest)) {
+      const Place& normal = curvature[c[main]].normal;
+      const double share = std::min(1., 2. * (1. - hit->distance / by_a_crest));
+      Place along = crest_along[hit->triangle];
+      if (std::abs(along.dot(normal.cross(arm[v]))) > std::abs(along.dot(arm[v])))
+        along = along.cross(normal);
+      arm[v] = ((1. - share) * arm[v] + std::copysign(share, along.dot(arm[v])) * along).normalized();
+      held[v] = std::max(held[v], share * hold);
+    }
     under[v] = w[0] * height[c[0]] + w[1] * height[c[1]] + w[2] * height[c[2]];
     up[v] = (w[0] * curvature[c[0]].normal + w[1] * curvature[c[1]].normal + w[2] * curvature[c[2]].normal)
                 .normalized();

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 #include <numeric>
 #include <span>
 #include <type_traits>
@@ -12,6 +13,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
 namespace {
@@ -227,24 +229,29 @@ WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& c
 }
 
 Ribbon unfolded(Ribbon ribbon, const WCurves& curves, Progress& progress) {
-  constexpr int turns = 2, passes = 30, rounds = 20;
+  constexpr int turns = 3, passes = 30, rounds = 20;
   constexpr double least_height =
       .02;  // of a triangle of the middle: twice its area by the square of its longest side
+  // What is crumpled spreads no farther than that, µm: with all its surroundings it would slide off the end of a pocket.
+  constexpr double farthest = 1200.;
   const std::size_t n = ribbon.size();
   const Neighbours near = neighbours(n, ribbon.triangles);
+  const std::vector<Place> start = ribbon.middle;
   std::vector<std::uint8_t> fixed = ribbon.wall;
   for (const Triangle& t : ribbon.triangles)
     if (ribbon.is_wall(t)) fixed[t[0]] = fixed[t[1]] = fixed[t[2]] = 1;
   std::vector<Place> up(n), next(n);
-  for (std::size_t v = 0; v < n; ++v) up[v] = (ribbon.outer[v] - ribbon.inner[v]).normalized();
-  for (int round = 0; round < 5; ++round) {
-    parallel_for(n, 1024, [&](std::size_t v) {
-      Place sum = up[v];
-      for (const std::uint32_t other : near.of(std::uint32_t(v))) sum += up[other];
-      next[v] = sum.normalized();
-    });
-    up.swap(next);
-  }
+  const auto look_up = [&] {  // where curves come from, smoothed
+    for (std::size_t v = 0; v < n; ++v) up[v] = (ribbon.outer[v] - ribbon.inner[v]).normalized();
+    for (int round = 0; round < 5; ++round) {
+      parallel_for(n, 1024, [&](std::size_t v) {
+        Place sum = up[v];
+        for (const std::uint32_t other : near.of(std::uint32_t(v))) sum += up[other];
+        next[v] = sum.normalized();
+      });
+      up.swap(next);
+    }
+  };
   const auto folded = [&](const Triangle& t) {
     const Place a = ribbon.middle[t[1]] - ribbon.middle[t[0]], b = ribbon.middle[t[2]] - ribbon.middle[t[0]];
     const double longest = std::max({a.squaredNorm(), b.squaredNorm(), (a - b).squaredNorm()});
@@ -252,22 +259,20 @@ Ribbon unfolded(Ribbon ribbon, const WCurves& curves, Progress& progress) {
   };
   progress.begin("unfolding the middle", 0);
   for (int turn = 0; turn < turns; ++turn) {
-    std::vector<std::uint8_t> moves(n, 0);
-    std::vector<std::uint32_t> moving;
-    const auto add = [&](std::uint32_t v) {
-      if (!moves[v] && !fixed[v]) moves[v] = 1, moving.push_back(v);
-    };
+    look_up();
+    std::vector<std::uint32_t> moved;
     for (int pass = 0; pass < passes; ++pass) {
-      bool any = false;
+      std::vector<std::uint32_t> moving;
       for (const Triangle& t : ribbon.triangles) {
         if (ribbon.is_wall(t) || !folded(t)) continue;
-        any = true;
         for (const std::uint32_t v : t) {
-          add(v);
-          for (const std::uint32_t other : near.of(v)) add(other);
+          moving.push_back(v);
+          std::ranges::copy(near.of(v), std::back_inserter(moving));
         }
       }
-      if (!any) break;
+      moving = distinct(std::move(moving));
+      std::erase_if(moving, [&](std::uint32_t v) { return fixed[v] != 0; });
+      if (moving.empty()) break;
       for (int round = 0; round < rounds; ++round) {
         parallel_for(moving.size(), 1024, [&](std::size_t i) {
           const std::uint32_t v = moving[i];
@@ -275,13 +280,17 @@ Ribbon unfolded(Ribbon ribbon, const WCurves& curves, Progress& progress) {
           for (const std::uint32_t other : near.of(v)) mean += ribbon.middle[other];
           const Place way = .7 * (mean / double(near.of(v).size()) - ribbon.middle[v]);
           next[v] = ribbon.middle[v] + way - up[v] * up[v].dot(way);
+          if (const Place off = next[v] - start[v]; off.norm() > farthest)
+            next[v] = start[v] + farthest * off.normalized();
         });
         for (const std::uint32_t v : moving) ribbon.middle[v] = next[v];
       }
+      std::ranges::copy(moving, std::back_inserter(moved));
       progress.advance();
     }
-    parallel_for(moving.size(), 64, [&](std::size_t i) {
-      const std::uint32_t v = moving[i];
+    moved = distinct(std::move(moved));
+    parallel_for(moved.size(), 64, [&](std::size_t i) {
+      const std::uint32_t v = moved[i];
       const auto curve = curves.through(ribbon.middle[v], -up[v]);
       if (!curve || !curve->arrived) return;
       ribbon.outer[v] = curve->points.front(), ribbon.inner[v] = curve->points.back();

@@ -300,112 +300,153 @@ std::vector<std::vector<Patch>> patches(const Elements& elements, const Stars& s
   return turns;
 }
 
+// One patch while it is shaped.
+class Work {
+ public:
+  using Anchors = std::vector<std::array<Anchor, 4>>;  // of every moving curve
+
+  Work(Elements& elements, const Patch& patch, const Shaping& shaping, Anchors anchors)
+      : elements_(elements), patch_(patch), shaping_(shaping), anchors_(std::move(anchors)) {
+    before_.resize(Eigen::Index(12 * patch.curves.size()));
+    for (std::size_t i = 0; i < patch.curves.size(); ++i)
+      for (std::size_t d = 0; d < 4; ++d)
+        before_.segment<3>(Eigen::Index(12 * i + 3 * d)) = elements.curves[patch.curves[i]][d];
+    for (const std::uint32_t e : patch.seen) {
+      const bool valid = proven(e);
+      Seen own{e, places_of(elements, e), {}, valid, shaping.finely || !valid, true};
+      own.whole = least_of(own) > 0.;
+      for (std::size_t c = 0; c < 16; ++c) {
+        const auto at = std::ranges::lower_bound(patch.curves, elements.elements[e][c]);
+        own.moving[c] =
+            at != patch.curves.end() && *at == elements.elements[e][c] ? int(at - patch.curves.begin()) : -1;
+      }
+      seen_.push_back(own);
+    }
+  }
+
+  void run() {
+    // Where something is folded also softly at first, since the way out is steep; what leaves fewer that are not valid is taken.
+    constexpr std::array schedules{std::array{.02, .02, .02}, std::array{1., .1, .02}};
+    const bool straight = std::ranges::all_of(seen_, &Seen::valid);
+    bool closer = true;
+    Vector best;
+    while (closer) {
+      std::pair least{seen_.size() + 1, 0.};  // not valid, and what is lacking
+      for (const auto& schedule : schedules) {
+        Vector trial = before_;
+        double value = 0.;
+        for (std::size_t i = straight ? schedule.size() - 1 : 0; i < schedule.size(); ++i) {
+          fold_ = schedule[i];
+          value = minimise(
+              trial, shaping_.iterations, .01,
+              [&](const Vector& at, Vector& gradient) { return lack(at, gradient); }, shaping_.gain);
+        }
+        put(trial);
+        const std::pair now{
+            std::size_t(std::ranges::count_if(seen_, [&](const Seen& s) { return !proven(s.element); })),
+            value};
+        if (now < least) least = now, best = trial;
+        if (least.first == 0) return;
+      }
+      // What was proven to be valid stays so. What did not is looked at in more places, and all is tried again.
+      put(best);
+      closer = false;
+      for (Seen& s : seen_)
+        if (s.valid && !s.finely && !proven(s.element)) s.finely = closer = true;
+    }
+    // In the end the patch goes half of its way, a quarter, … or stays.
+    for (double share = .5; lost(); share *= .5) {
+      if (share < .1) return put(before_);
+      put(before_ + share * (best - before_));
+    }
+  }
+
+ private:
+  struct Seen {  // an element that sees the patch
+    std::uint32_t element;
+    Places places;
+    std::array<int, 16> moving;  // for each of its curves which of the moving ones it is, or -1
+    bool valid;                  // proven to be, at first
+    bool finely;                 // it may fold where few samples do not see it
+    bool whole;                  // folded at no sample, which must stay so
+  };
+
+  bool proven(std::uint32_t element) const { return certify(elements_.hexahedron(element)).positive(); }
+  bool lost() const {
+    return std::ranges::any_of(seen_, [&](const Seen& s) { return s.valid && !proven(s.element); });
+  }
+  double least_of(const Seen& s) const { return s.finely ? least<many>(s.places) : least<few>(s.places); }
+
+  void put(const Vector& at) {
+    for (std::size_t i = 0; i < patch_.curves.size(); ++i)
+      for (std::size_t d = 0; d < 4; ++d)
+        elements_.curves[patch_.curves[i]][d] = at.segment<3>(Eigen::Index(12 * i + 3 * d));
+  }
+
+  // What is minimised: what all elements lack and how far places are from where they are held. Infinite where an element folds.
+  double lack(const Vector& at, Vector& gradient) {
+    gradient.setZero(at.size());
+    double value = 0.;
+    Lack lack;
+    for (Seen& s : seen_) {
+      const auto each = [&](auto&& visit) {
+        for (int c = 0; c < 16; ++c)
+          for (int d = 0; d < 4 && s.moving[std::size_t(c)] >= 0; ++d)
+            visit(16 * d + c, 12 * s.moving[std::size_t(c)] + 3 * d);
+      };
+      each([&](int column, int k) { s.places.col(column) = at.segment<3>(k); });
+      s.finely ? fine_.weigh(s.places, shaping_, fold_, lack)
+               : coarse_.weigh(s.places, shaping_, fold_, lack);
+      if (s.whole && lack.least <= 0.) return std::numeric_limits<double>::infinity();
+      if (lack.value == 0.) continue;
+      value += lack.value;
+      each([&](int column, int k) { gradient.segment<3>(k) += lack.gradient.col(column); });
+    }
+    for (std::size_t i = 0; i < anchors_.size(); ++i)
+      for (std::size_t d = 0; d < 4; ++d) {
+        const auto k = Eigen::Index(12 * i + 3 * d);
+        const Place off = at.segment<3>(k) - anchors_[i][d].at, pull = anchors_[i][d].hold * off;
+        if ((at.segment<3>(k) - before_.segment<3>(k)).squaredNorm() > farthest_way * farthest_way)
+          return std::numeric_limits<double>::infinity();
+        value += off.dot(pull);
+        gradient.segment<3>(k) += 2. * pull;
+      }
+    return value;
+  }
+
+  Elements& elements_;
+  const Patch& patch_;
+  const Shaping& shaping_;
+  Anchors anchors_;
+  Vector before_;
+  std::vector<Seen> seen_;
+  double fold_ = 0.;
+  Gauge<few> coarse_;
+  Gauge<many> fine_;
+};
+
 class Shaper {
  public:
   Shaper(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, const Shaping& shaping)
       : elements_(elements), outer_(outer), inner_(inner), shaping_(shaping) {}
 
   void operator()(const Patch& patch) const {
-    if (shaping_.finely)
-      shape<many>(patch);
-    else
-      shape<few>(patch);
+    List worst;  // curves
+    for (const std::uint32_t e : patch.seen)
+      if (least<few>(places_of(elements_, e)) < very_bad * shaping_.enough)
+        worst.insert(worst.end(), elements_.elements[e].begin(), elements_.elements[e].end());
+    worst = distinct(std::move(worst));
+    Work::Anchors anchors(patch.curves.size());
+    for (std::size_t i = 0; i < anchors.size(); ++i) {
+      const bool gives = std::ranges::binary_search(worst, patch.curves[i]);
+      for (std::size_t d = 0; d < 4; ++d)
+        anchors[i][d] =
+            anchor(elements_.curves[patch.curves[i]], d, gives ? shaping_.worst_off : shaping_.off);
+    }
+    Work(elements_, patch, shaping_, std::move(anchors)).run();
   }
 
  private:
-  template <int samples>
-  void shape(const Patch& patch) const {
-    const std::size_t n = patch.curves.size();
-    // A surface may be creased more sharply than an element can be: the worst may leave it farther.
-    const bool worst = std::ranges::any_of(patch.seen, [&](std::uint32_t e) {
-      return least<few>(places_of(elements_, e)) < very_bad * shaping_.enough;
-    });
-    const double give = worst ? 4. * shaping_.off : shaping_.off;
-    std::vector<std::array<Anchor, 4>> anchors(n);
-    Vector x(Eigen::Index(12 * n));
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t d = 0; d < 4; ++d) {
-        anchors[i][d] = anchor(elements_.curves[patch.curves[i]], d, give);
-        x.segment<3>(Eigen::Index(12 * i + 3 * d)) = elements_.curves[patch.curves[i]][d];
-      }
-    const Vector before = x;
-    // Of every element: its places, and for each of its curves which of the moving ones it is.
-    std::vector<Places> places;
-    std::vector<std::array<int, 16>> moving;
-    for (const std::uint32_t e : patch.seen) {
-      places.push_back(places_of(elements_, e));
-      auto& own = moving.emplace_back();
-      for (std::size_t c = 0; c < 16; ++c) {
-        const auto at = std::lower_bound(patch.curves.begin(), patch.curves.end(), elements_.elements[e][c]);
-        own[c] =
-            at != patch.curves.end() && *at == elements_.elements[e][c] ? int(at - patch.curves.begin()) : -1;
-      }
-    }
-    std::vector<std::uint8_t> whole;  // elements that are not folded, and must stay so
-    for (const Places& p : places) whole.push_back(least<samples>(p) > 0.);
-    Lack lack;
-    Gauge<samples> gauge;
-    double fold = 0.;
-    const auto sum = [&](const Vector& at, Vector& gradient) {
-      gradient.setZero(at.size());
-      double value = 0.;
-      for (std::size_t e = 0; e < places.size(); ++e) {
-        const auto each = [&](auto&& visit) {
-          for (int c = 0; c < 16; ++c)
-            for (int d = 0; d < 4 && moving[e][std::size_t(c)] >= 0; ++d)
-              visit(16 * d + c, 12 * moving[e][std::size_t(c)] + 3 * d);
-        };
-        each([&](int column, int k) { places[e].col(column) = at.segment<3>(k); });
-        gauge.weigh(places[e], shaping_, fold, lack);
-        if (whole[e] && lack.least <= 0.) return std::numeric_limits<double>::infinity();
-        if (lack.value == 0.) continue;
-        value += lack.value;
-        each([&](int column, int k) { gradient.segment<3>(k) += lack.gradient.col(column); });
-      }
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t d = 0; d < 4; ++d) {
-          const auto k = Eigen::Index(12 * i + 3 * d);
-          const Place off = at.segment<3>(k) - anchors[i][d].at, pull = anchors[i][d].hold * off;
-          if ((at.segment<3>(k) - before.segment<3>(k)).squaredNorm() > farthest_way * farthest_way)
-            return std::numeric_limits<double>::infinity();
-          value += off.dot(pull);
-          gradient.segment<3>(k) += 2. * pull;
-        }
-      return value;
-    };
-    const auto put = [&](const Vector& at) {
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t d = 0; d < 4; ++d)
-          elements_.curves[patch.curves[i]][d] = at.segment<3>(Eigen::Index(12 * i + 3 * d));
-    };
-    const auto proven = [&](std::uint32_t e) { return certify(elements_.hexahedron(e)).positive(); };
-    List valid;
-    for (const std::uint32_t e : patch.seen)
-      if (proven(e)) valid.push_back(e);
-    // Where something is folded also softly at first, since the way out is steep; what leaves fewer that are not valid is taken.
-    constexpr std::array schedules{std::array{.02, .02, .02}, std::array{1., .1, .02}};
-    const bool straight = valid.size() == patch.seen.size();
-    std::pair best{patch.seen.size() + 1, 0.};
-    for (const auto& schedule : schedules) {
-      Vector trial = before;
-      double value = 0.;
-      for (std::size_t i = straight ? schedule.size() - 1 : 0; i < schedule.size(); ++i) {
-        fold = schedule[i];
-        value = minimise(trial, shaping_.iterations, .01, sum);
-      }
-      put(trial);
-      const std::pair now{patch.seen.size() - std::size_t(std::ranges::count_if(patch.seen, proven)), value};
-      if (now < best) best = now, x = trial;
-      if (best.first == 0) break;
-    }
-    // What was proven to be valid stays so: otherwise the patch goes half of its way, a quarter, … or stays.
-    put(x);
-    for (double share = .5; best.first > 0 && !std::ranges::all_of(valid, proven); share *= .5) {
-      if (share < .1) return put(before);
-      put(before + share * (x - before));
-    }
-  }
-
   Anchor anchor(const Depths& curve, std::size_t d, double give) const {
     constexpr double reach = 500.;  // µm
     const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
