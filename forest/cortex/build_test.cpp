@@ -137,6 +137,7 @@ TEST_F(Shell, AFoldedMiddleIsUnfoldedAndTheRestStays) {
     if (made.middle[v].x() < 6000.) {
       EXPECT_EQ(after.middle[v], made.middle[v]);
     }
+    EXPECT_LT((after.middle[v] - ribbon.middle[v]).norm(), 1500.);  // nor off the end of a pocket
     if (near[v]) radius = std::max(radius, std::abs(after.middle[v].norm() - made.middle[v].norm()));
   }
   EXPECT_LT(radius, 150.);  // along the middle, not off it
