@@ -56,7 +56,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
       playback_->colour(cut, from, look, {.window = window_});
     };
   auto start = Clock::now();
-  if (view.detail.gaze) {
+  if (scene::layered(view)) {
     Foveated::Dresser dress;
     if (dressing_.wanted(view, colouring))
       dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {

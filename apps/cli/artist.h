@@ -45,7 +45,7 @@ class Artist {
   /// @param sets  names that targets of views may use
   explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic, circuit::NodeSets sets = {});
 
-  /// A view with a gaze is drawn in layers (apps/foveated.h).
+  /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   /// Draws into a picture how it is to be read. Small pictures stay as they are.

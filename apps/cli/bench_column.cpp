@@ -49,7 +49,7 @@ scene::View around(scene::View view, float turn) {
 struct Part {
   double values = 0., segments = 0., gather = 0., paint = 0., touched = 0.;  // of activity, means a picture
   double frames = 0., seconds = 0., cull = 0., draw = 0., resolve = 0., covered = 0., error = 0.,
-         samples = 0.;
+         samples = 0., pixel = 0.;
   double per_second() const { return frames / seconds; }
 };
 
@@ -62,9 +62,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
   console.progress().begin("drawing", options.frames);
   for (std::uint32_t i = 0; i < options.frames; ++i) {
     const auto start = Clock::now();
-    scene::View view = view_at(float(i) / float(options.frames));
-    view.samples = options.samples.value_or(budget.samples());
-    view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
+    scene::View view = scene::within(view_at(float(i) / float(options.frames)), budget);
+    view.samples = options.samples.value_or(view.samples);
     std::uint64_t touched = 0;
     if (const scene::Playback* playback = artist.playback()) {
       view.activity = playback->view();
@@ -88,7 +87,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
       part.touched += double(artist.playback()->activity().touched() - touched) / options.frames;
     }
     part.error += double(budget.error()) / options.frames,
-        part.samples += double(view.samples) / options.frames;
+        part.samples += double(view.samples) / options.frames,
+        part.pixel += double(view.detail.pixel) / options.frames;
     budget.took(1000. * seconds, drawn.segments);
     if (!options.out.empty() && i + 1 == options.frames)
       io::write_png(options.out / fmt::format("{}.png", name), width, height, drawn.image.pixels);
@@ -166,7 +166,8 @@ void run(const Options& options, Console& console) {
                               {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"resolve", p.resolve}}},
                               {"covered", p.covered},
                               {"samples", p.samples},
-                              {"error_pixels", p.error}};
+                              {"error_pixels", p.error},
+                              {"pixel", p.pixel}};
     if (options.activity)
       of["activity"] = {{"segments", p.segments}, {"values", p.values},   {"bytes_touched", p.touched},
                         {"gather_ms", p.gather},  {"colour_ms", p.paint}, {"made_up", true}};
@@ -195,12 +196,14 @@ void run(const Options& options, Console& console) {
                                     fmt::format("{:.1f}", p.resolve),
                                     fmt::format("{:.0f} %", 100. * p.covered),
                                     fmt::format("{:.0f}", p.samples),
-                                    fmt::format("{:.1f}", p.error)};
+                                    fmt::format("{:.1f}", p.error),
+                                    fmt::format("{:.2f}", p.pixel)};
   };
   console.say(fmt::format("{} neurons of {} shapes, {} segments, {}, {}", forest.instances().size(),
                           forest.neurons().size(), forest.segment_total(), options.size, artist.renderer()));
-  console.table({"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "samples", "error px"},
-                {row("around the column", outside), row("inside it", inside)});
+  console.table(
+      {"camera", "frames/s", "cull ms", "draw ms", "resolve ms", "covered", "samples", "error px", "pixel"},
+      {row("around the column", outside), row("inside it", inside)});
   if (options.activity) {
     const auto of = [](const char* name, const Part& p) {
       return std::vector<std::string>{name,

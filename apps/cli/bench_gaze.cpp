@@ -136,9 +136,8 @@ class Bench {
     const scene::Colouring colouring = scene::colour(forest_, scene::ColourBy::type, scene::Background::dark);
     scene::Budget budget(options_.budget);
     for (std::uint32_t i = 0; i < settling + std::uint32_t(part.frames); ++i) {
-      scene::View view = view_of(i < settling ? i % options_.frames : i - settling);
-      view.samples = budget.samples();
-      view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
+      const scene::View view =
+          scene::within(view_of(i < settling ? i % options_.frames : i - settling), budget);
       const auto start = Clock::now();
       frame::Image image = foveated_.draw(view, size_.first, size_.second, colouring);
       frame::soften(image, budget.softness());

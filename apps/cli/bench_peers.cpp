@@ -237,8 +237,8 @@ void draw_ours(const Options& options) {
     if (*std::ranges::lower_bound(measured, picture) > picture + settling) continue;
     const auto start = Clock::now();
     const std::clock_t core = std::clock();
-    scene::View view = view_at(dolly, picture, options.quick_samples.value_or(budget.samples()));
-    view.detail.error = budget.error(), view.detail.thinnest = budget.thinnest();
+    scene::View view = scene::within(view_at(dolly, picture, 1), budget);
+    view.samples = options.quick_samples.value_or(view.samples);
     Drawn drawn = artist.draw(view, width, height);
     if (!options.quick_samples) frame::soften(drawn.image, budget.softness());
     const double seconds = seconds_since(start);

@@ -35,7 +35,7 @@ struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
   double seconds = 10.;
   double budget = 70.;  // what sixteen samples a pixel take on two cores; the studio's is Budget::usual
-  std::optional<float> error, thinnest, softness;
+  std::optional<float> error, thinnest, softness, pixel;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;
   std::string size = "640x360";
@@ -64,6 +64,7 @@ struct Quick {
   frame::Image image;
   scene::Connections drawn;
   float error = 0.f;  // pixels accepted
+  float pixel = 1.f;  // as wide as one that was drawn
   std::uint32_t samples = 1;
   double milliseconds = 0.;
 };
@@ -94,9 +95,11 @@ class Walk {
   Quick draw_quick(std::uint32_t picture) {
     Quick quick;
     quick.error = options_.error.value_or(budget_.error());
+    quick.pixel = options_.pixel.value_or(options_.error ? 1.f : budget_.pixel());
     quick.samples = options_.quick_samples.value_or(options_.error ? 16u : budget_.samples());
-    const scene::View view = view_at(picture, quick.error, quick.samples,
-                                     options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()));
+    const scene::View view =
+        view_at(picture, quick.error, quick.samples,
+                options_.thinnest.value_or(options_.error ? 0.f : budget_.thinnest()), quick.pixel);
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     const auto softening = Clock::now();
     const bool budgeted = !options_.error && !options_.quick_samples;
@@ -112,7 +115,7 @@ class Walk {
   }
 
   Moment compare(std::uint32_t picture, Quick& quick) {
-    const scene::View view = view_at(picture, quick.error, options_.samples, 0.f);
+    const scene::View view = view_at(picture, quick.error, options_.samples, 0.f, 1.f);
     const scene::Cut all = scene::whole(artist_.forest(), view.camera, viewport_);
     const scene::Colouring colouring = scene::colour(artist_.forest(), view.colour_by, view.background);
     const frame::Frame frame =
@@ -137,9 +140,10 @@ class Walk {
   const scene::Forest& forest() const { return artist_.forest(); }
 
  private:
-  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples, float thinnest) const {
+  scene::View view_at(std::uint32_t picture, float error, std::uint32_t samples, float thinnest,
+                      float pixel) const {
     scene::View view = dolly_.at(float(picture) / float(pictures_ - 1));
-    view.detail.error = error, view.detail.thinnest = thinnest;
+    view.detail.error = error, view.detail.thinnest = thinnest, view.detail.pixel = pixel;
     view.samples = samples;
     return view;
   }
@@ -270,6 +274,7 @@ void run(const Options& options, Console& console) {
     Json row{{"picture", picture},
              {"error_pixels", quick.error},
              {"quick_samples", quick.samples},
+             {"pixel", quick.pixel},
              {"disconnected", quick.drawn.disconnected}};
     if (!options.error) row["milliseconds"] = quick.milliseconds;
     const bool step = before && before->picture + 1 == picture;
@@ -371,6 +376,9 @@ std::function<void()> bench_seam(CLI::App& command, Console& console) {
   within(command.add_option("--thinnest", options->thinnest,
                             "Pixels that the thinnest lines measure, instead of what the budget says"),
          0., 64.);
+  within(command.add_option("--pixel", options->pixel,
+                            "Pixels of the picture as wide as one drawn, instead of what the budget says"),
+         1., 8.);
   within(command.add_option("--softness", options->softness,
                             "Share that neighbouring pixels give, instead of what the budget says"),
          0., .25);

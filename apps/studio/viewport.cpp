@@ -348,7 +348,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     painter = [this, shown, window = window_](scene::Cut& cut, const scene::Eye& eye) {
       playback_->colour(cut, eye, shown, {.window = window});
     };
-  if (first == 0 && !layered())
+  if (first == 0 && !layered(view))
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
                     {float(w), float(h)}, colouring_.shown(), painter);
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
@@ -388,7 +388,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     };
   else
     dressing_.rest();
-  if (layered()) {
+  if (layered(view)) {
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
     united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter, dress);
     figures_.segments = foveated_->figures().segments, figures_.neurons = foveated_->figures().neurons;
@@ -409,12 +409,10 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   figures_.samples = last, figures_.error = view.detail.error;
 }
 
-bool Viewport::layered() const { return processor_ && settings_.view.detail.gaze; }
+bool Viewport::layered(const scene::View& view) const { return processor_ && scene::layered(view); }
 
 void Viewport::draw_moving() {
-  scene::View view = settings_.view;
-  view.samples = budget().samples();
-  view.detail.error *= budget().error(), view.detail.thinnest = budget().thinnest();
+  const scene::View view = scene::within(settings_.view, budget());
   // What is not there yet is made once the view stands still.
   draw_part(view, 0, view.samples, {.skin = {.new_pieces = 0}, .synapses = moving_synapses});
 }

@@ -152,8 +152,8 @@ class Viewport final : public QOpenGLWidget {
   void paint(const frame::Image& drawn, float softness);
   std::vector<scene::LegendEntry> legend() const;
   void annotate();
-  bool layered() const;  // drawn layer by layer for the gaze
-  scene::Budget& budget() { return layered() ? gaze_budget_ : budget_; }
+  bool layered(const scene::View& view) const;  // drawn layer by layer
+  scene::Budget& budget() { return processor_ && settings_.view.detail.gaze ? gaze_budget_ : budget_; }
   frame::Viewport in_points() const { return {float(width()), float(height())}; }
 
   scene::Forest forest_;

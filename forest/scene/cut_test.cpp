@@ -59,12 +59,12 @@ TEST(Eye, TheGazeIsSharpAndTheRestGrowsWithEccentricity) {
 }
 
 // A scene of which a picture of one sample takes so long, of four twice and of sixteen five times as long, and less with a larger
-// error; how often the number of samples changes.
+// error and larger pixels; how often the number of samples changes.
 std::uint32_t watch(Budget& budget, double milliseconds, int pictures) {
   const std::map<std::uint32_t, double> longer{{1, 1.}, {4, 2.}, {16, 5.}};
   std::uint32_t changes = 0, before = budget.samples();
   for (int i = 0; i < pictures; ++i) {
-    budget.took(milliseconds * longer.at(budget.samples()) / double(budget.error()));
+    budget.took(milliseconds * longer.at(budget.samples()) / double(budget.error() * budget.pixel()));
     changes += budget.samples() != before, before = budget.samples();
   }
   return changes;
@@ -72,7 +72,7 @@ std::uint32_t watch(Budget& budget, double milliseconds, int pictures) {
 
 TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   Budget budget(50.);
-  watch(budget, 1000., 50);
+  watch(budget, 310., 50);
   EXPECT_FLOAT_EQ(budget.error(), 6.f);
   EXPECT_GT(budget.softness(), 0.f);
   EXPECT_FLOAT_EQ(budget.thinnest(), 6.f);
@@ -85,14 +85,35 @@ TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   EXPECT_EQ(budget.samples(), 1u);
 }
 
+// … and come back; an error of two pixels as large is the same error in the world.
+TEST(Budget, WhereThereIsNoTimeForOneSampleAPixelPixelsGrow) {
+  Budget budget(50.);
+  float before = 1.f;
+  for (const double milliseconds : {300., 500., 2000.}) {
+    watch(budget, milliseconds, 50);
+    EXPECT_GE(budget.pixel(), before) << milliseconds;
+    EXPECT_EQ(budget.samples(), 1u);
+    before = budget.pixel();
+  }
+  EXPECT_EQ(before, 2.f);
+  EXPECT_FLOAT_EQ(budget.error(), 6.f);
+  EXPECT_EQ(budget.thinnest(), budget.error());
+  watch(budget, 45., 200);
+  EXPECT_EQ(budget.pixel(), 1.f);
+  EXPECT_FLOAT_EQ(budget.error(), 1.f);
+}
+
 TEST(Budget, AForestOfFewSegmentsKeepsThemWhereTheMachineIsBusy) {
   Budget budget(50.);
   for (int i = 0; i < 50; ++i) budget.took(400., 3000);
   EXPECT_EQ(budget.error(), 1.f);
+  EXPECT_EQ(budget.pixel(), 1.f);
   watch(budget, 1000., 50);  // a large one
+  EXPECT_EQ(budget.pixel(), 2.f);
   EXPECT_GT(budget.error(), 4.f);
-  for (int i = 0; i < 50; ++i) budget.took(400., 3000);
+  for (int i = 0; i < 100; ++i) budget.took(400., 3000);
   EXPECT_EQ(budget.error(), 1.f);
+  EXPECT_EQ(budget.pixel(), 1.f);
 }
 
 TEST(Budget, TimeToSpareGoesIntoSamplesThenIntoDetail) {

@@ -29,7 +29,8 @@ constexpr float least_thinnest = .25f;  // pixels of the layer
 constexpr float seldom = .5f;
 
 float thinnest_in(const View& view, const Layer& layer) {
-  return layer.scale > 1.f ? std::max(wider * thinnest_of(view), least_thinnest) : thinnest_of(view);
+  const bool finest = layer.scale <= view.detail.pixel;
+  return finest ? thinnest_of(view) : std::max(wider * thinnest_of(view), least_thinnest);
 }
 
 // A pixel of the picture as a layer counts it.
@@ -168,32 +169,34 @@ float light_on(const Vec3& a, const Vec3& b, const Vec3& light, bool parallel) {
 }  // namespace
 
 std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_t height) {
-  const frame::Area all{0, 0, width, height};
-  std::vector<Layer> layers{
-      {.width = width, .height = height, .area = all, .until = INFINITY, .gone = INFINITY}};
-  if (!view.detail.gaze) return layers;
   const float w = float(width), h = float(height);
+  const auto layer_of = [&](float pixel) {
+    Layer layer;
+    layer.height = std::uint32_t(std::ceil(h / pixel));
+    layer.scale = h / float(layer.height);
+    layer.width = std::uint32_t(std::ceil(w / layer.scale));
+    layer.area = {0, 0, layer.width, layer.height};
+    layer.until = layer.gone = INFINITY;
+    return layer;
+  };
+  std::vector<Layer> layers{layer_of(view.detail.pixel)};
+  if (!view.detail.gaze) return layers;
   const Detail& detail = view.detail;
   const Gaze gaze(view.camera, {w, h}, detail_for(view, width, height));
   float farthest = 0.f;
   for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
     farthest = std::max(farthest, gaze.eccentricity(corner));
   for (std::uint32_t k = 2; k <= coarsest && height / k >= 16; k *= 2) {
+    if (float(k) <= view.detail.pixel) continue;
     // From here on the eye resolves nothing smaller than k pixels.
     const float from =
         std::max(gaze.where_resolved(float(k), detail), layers.size() == 1 ? detail.fovea : 0.f);
     if (!(from < farthest)) break;
     layers.back().until = from;
     layers.back().gone = from + std::max(least_fade, fade * from);
-    Layer next;
-    next.height = (height + k - 1) / k;
-    next.scale = h / float(next.height);
-    next.width = std::uint32_t(std::ceil(w / next.scale));
-    next.until = next.gone = INFINITY;
-    layers.push_back(next);
+    layers.push_back(layer_of(float(k)));
   }
   for (Layer& layer : layers) {
-    layer.area = {0, 0, layer.width, layer.height};
     if (&layer != layers.data()) {
       layer.gaps = seldom;
       layer.hole = hole_of(gaze, (&layer - 1)->until, layer, w, h);
@@ -240,7 +243,7 @@ View view_for(const View& view, const Layer& layer) {
   if (layer.scale <= 1.f) return shown;
   shown.halo /= layer.scale;
   shown.detail.thinnest = thinnest_in(view, layer);
-  if (shown.samples == 1) shown.samples = coarse_samples;
+  if (shown.samples == 1 && layer.scale > view.detail.pixel) shown.samples = coarse_samples;
   return shown;
 }
 

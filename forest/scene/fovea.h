@@ -24,7 +24,10 @@ struct Layer {
   float gone = 0.f;   // … and where it is gone; the last layer never is
 };
 
-/// Finest first; one alone when the view has no gaze or all of the picture is resolved.
+/// Whether a picture of it is united from others, of another size.
+inline bool layered(const View& view) { return view.detail.gaze || view.detail.pixel > 1.f; }
+
+/// Finest first; one alone when the view has no gaze or all of the picture is resolved. None is finer than Detail::pixel.
 std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_t height);
 
 /// The view's detail for drawing a layer: the gaze in its pixels, and only its area.

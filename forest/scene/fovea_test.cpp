@@ -70,7 +70,8 @@ TEST(Layers, AreOneWithoutAGazeAndHalvedFromWhereNothingSmallerIsResolved) {
 TEST(Layers, HoldAllPixelsThatAreShownOfThemWhereverTheGazeIs) {
   Random random(8);
   for (int i = 0; i < 60; ++i) {
-    const View view = view_with_gaze({float(random.uniform(-.5, 1.5)), float(random.uniform(-.5, 1.5))});
+    View view = view_with_gaze({float(random.uniform(-.5, 1.5)), float(random.uniform(-.5, 1.5))});
+    view.detail.pixel = std::array{1.f, 1.4f, 2.f, 3.f}[random.below(4)];
     const std::uint32_t w = 200 + random.below(1900), h = 150 + random.below(1000);
     const Gaze gaze(view.camera, {float(w), float(h)}, detail_for(view, w, h));
     const auto layers = layers_of(view, w, h);
@@ -121,8 +122,36 @@ TEST(Layers, WantNothingOfWhatOthersShow) {
   }
 }
 
-TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
-  const View view = view_with_gaze({.4f, .6f});
+TEST(Layers, HaveNoSmallerPixelsThanTheView) {
+  View view = view_with_gaze({.5f, .5f});
+  for (const float pixel : {1.f, 1.4f, 2.f, 3.f, 16.f}) {
+    view.detail.pixel = pixel;
+    const auto gazed = layers_of(view, width, height);
+    View without = view;
+    without.detail.gaze.reset();
+    EXPECT_TRUE(layered(view));
+    EXPECT_EQ(layered(without), pixel > 1.f);
+    const auto alone = layers_of(without, width, height);
+    ASSERT_EQ(alone.size(), 1u);
+    EXPECT_EQ(alone[0].area, (frame::Area{0, 0, alone[0].width, alone[0].height}));
+    for (const auto& layers : {gazed, alone}) {
+      EXPECT_EQ(layers[0].height, std::uint32_t(std::ceil(height / pixel)));
+      EXPECT_NEAR(layers[0].scale, pixel, .02f * pixel);
+      for (std::size_t i = 1; i < layers.size(); ++i) EXPECT_GT(layers[i].scale, 1.1f * layers[i - 1].scale);
+    }
+    // One layer is the view at another size: with as many samples, and lines as thin in its pixels.
+    EXPECT_EQ(view_for(without, alone[0]).samples, without.samples);
+    EXPECT_EQ(thinnest_of(view_for(without, alone[0])), thinnest_of(without));
+    EXPECT_EQ(detail_for(without, alone[0], width, height).error, without.detail.error);
+  }
+}
+
+class UnitedLayers : public ::testing::TestWithParam<float> {};
+INSTANTIATE_TEST_SUITE_P(OfPixels, UnitedLayers, ::testing::Values(1.f, 1.4f, 2.f));
+
+TEST_P(UnitedLayers, AreTheFinestInTheFoveaAndShowTheSameElsewhere) {
+  View view = view_with_gaze({.4f, .6f});
+  view.detail.pixel = GetParam();
   const auto layers = layers_of(view, width, height);
   // A picture that rises evenly to the right and down, drawn by every layer.
   std::vector<frame::Image> pictures;
@@ -155,7 +184,7 @@ TEST(Layers, UnitedAreTheFinestInTheFoveaAndShowTheSameElsewhere) {
         if (e <= layers[i].until && (i == 0 || e >= layers[i - 1].gone)) {
           EXPECT_EQ(pixel[2], 40 * i) << x << " " << y;
         }
-      if (e <= layers[0].until) {
+      if (e <= layers[0].until && GetParam() == 1.f) {
         EXPECT_EQ(pixel[0], pictures[0].pixels[4 * (std::size_t(y) * width + x)]);
       }
     }

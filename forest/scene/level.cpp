@@ -98,6 +98,7 @@ namespace {
 
 /// What a budget may choose, and where it begins when it comes to it.
 struct Step {
+  float pixel;                   // as Detail::pixel
   std::uint32_t samples;         // of a pixel
   float finest, coarsest;        // acceptable error, pixels
   float from_below, from_above;  // the error that takes about as long as the step left
@@ -106,19 +107,25 @@ struct Step {
 };
 // Most time goes to segments and not to samples, so that four samples at an error of five pixels take little more than one at
 // one, and are as much like the truth (docs/scene/seam.md); so are sixteen at three and four at two.
-constexpr std::array<Step, 3> steps{{{1, 1.f, 6.f, 1.f, 1.f, 1.4, .12f},
-                                     {4, .5f, 5.f, 4.f, 2.f, 1.3, .06f},
-                                     {16, .5f, 3.f, 1.f, 1.f, 1., 0.f}}};
+constexpr std::array<Step, 5> steps{{{2.f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
+                                     {1.4f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .16f},
+                                     {1.f, 1, 1.f, 6.f, 4.f, 1.f, 1.4, .12f},
+                                     {1.f, 4, .5f, 5.f, 4.f, 2.f, 1.3, .06f},
+                                     {1.f, 16, .5f, 3.f, 1.f, 1.f, 1., 0.f}}};
 
 }  // namespace
 
+float Budget::pixel() const { return steps[step_].pixel; }
 std::uint32_t Budget::samples() const { return steps[step_].samples; }
+float Budget::thinnest() const { return samples() == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
 float Budget::softness() const { return steps[step_].softness; }
 
-// The highest step for which a picture of the present one at its finest leaves time.
+// The highest step for which a picture of the present one at its finest leaves time; from large pixels one at a time, as those
+// of the next have much detail to gain.
 std::size_t Budget::upwards(double milliseconds) const {
   std::size_t to = step_;
-  for (std::size_t i = step_; i < doubt_.size(); ++i) {
+  const std::size_t highest = step_ < plain_step ? step_ + 1 : doubt_.size();
+  for (std::size_t i = step_; i < highest; ++i) {
     milliseconds *= steps[i].longer * doubt_[i];
     if (milliseconds < milliseconds_) to = i + 1;
   }
@@ -135,8 +142,12 @@ void Budget::took(double milliseconds, std::uint64_t segments) {
   for (double& doubt : doubt_) doubt = std::max(1., fading * doubt);
   ++since_;
   const Step& now = steps[step_];
-  const bool too_long = step_ > 0 && error_ >= now.coarsest && milliseconds > 1.1 * milliseconds_;
-  const std::size_t above = error_ <= now.finest ? upwards(milliseconds) : step_;
+  constexpr std::uint64_t few = 20'000;  // two cores draw them in a millisecond or two
+  const bool of_few = samples() == 1 && segments < few;
+  const bool too_long = step_ > 0 && !of_few && error_ >= now.coarsest && milliseconds > 1.1 * milliseconds_;
+  const std::size_t above = error_ > now.finest            ? step_
+                            : of_few && step_ < plain_step ? plain_step
+                                                           : upwards(milliseconds);
   agreed_ = too_long || above > step_ ? agreed_ + 1 : 0;
   if (agreed_ >= several && too_long) {
     --step_, error_ = steps[step_].from_above, agreed_ = 0;
@@ -147,9 +158,8 @@ void Budget::took(double milliseconds, std::uint64_t segments) {
     step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
     return;
   }
-  constexpr std::uint64_t few = 20'000;  // two cores draw them in a millisecond or two
   // The first picture of a large forest may take long.
-  const double most = step_ == 0 && segments < few ? .8 : 16.;
+  const double most = of_few ? .8 : 16.;
   const double ratio = std::clamp(milliseconds / milliseconds_, .5, most);
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);
 }

@@ -30,6 +30,9 @@ struct Detail {
   // Branches thinner than this many pixels are drawn as wide, as many of them as cover the same area: whole branches stand
   // for their like. 0: all are drawn as they are. A picture of one sample cannot draw less than a pixel.
   float thinnest = 0.f;
+  // Pixels of the picture as wide as one that is drawn: a picture for which there is no time is drawn smaller and enlarged
+  // (fovea.h). All else here counts pixels that are drawn.
+  float pixel = 1.f;
   float fog =
       0.f;  // strength of the depth cue, as View::fog: what is seen through it may be wrong by more; 0: none
 };
@@ -135,7 +138,7 @@ class Eye {
 };
 
 /// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as there is time for,
-/// and within them the acceptable error, which pictures that took too long make larger and quick ones smaller.
+/// larger pixels where there is no time for one, and within them the acceptable error, which pictures that took too long make larger and quick ones smaller.
 class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
@@ -145,9 +148,11 @@ class Budget {
 
   explicit Budget(double milliseconds = usual) : milliseconds_(milliseconds) {}
   std::uint32_t samples() const;
+  /// As Detail::pixel.
+  float pixel() const;
   float error() const { return error_; }
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.
-  float thinnest() const { return step_ == 0 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
+  float thinnest() const;
   /// As frame::soften: what is drawn is nearer to the truth so, the more the fewer its samples.
   float softness() const;
   /// To be told of every picture that was drawn so. One of few segments takes no less time with fewer: where it takes long the
@@ -156,15 +161,16 @@ class Budget {
 
  private:
   static constexpr std::uint64_t all = ~std::uint64_t(0);
+  static constexpr std::size_t plain_step = 2;  // one sample of every pixel
 
   std::size_t upwards(double milliseconds) const;
 
   double milliseconds_;
-  std::size_t step_ = 0;  // 0: one sample
+  std::size_t step_ = plain_step;
   float error_ = 1.f;
-  std::array<double, 2> doubt_{1., 1.};  // of each step but the last: the next was tried in vain
-  std::uint32_t agreed_ = 0;             // pictures that have asked for another step
-  std::uint32_t since_ = 0;              // pictures since the step was gone up to
+  std::array<double, 4> doubt_{1., 1., 1., 1.};  // of each step but the last: the next was tried in vain
+  std::uint32_t agreed_ = 0;                     // pictures that have asked for another step
+  std::uint32_t since_ = 0;                      // pictures since the step was gone up to
 };
 
 }  // namespace forest::scene

@@ -607,6 +607,13 @@ float thinnest_of(const View& view) {
   return view.samples == 1 ? std::max(view.detail.thinnest, 1.f) : view.detail.thinnest;
 }
 
+View within(View view, const Budget& budget) {
+  view.samples = budget.samples();
+  view.detail.error *= budget.error();
+  view.detail.thinnest = budget.thinnest(), view.detail.pixel = budget.pixel();
+  return view;
+}
+
 float fog_strength(const View& view) {
   constexpr float on_light = .3f;
   return view.background == Background::light ? on_light * view.fog : view.fog;

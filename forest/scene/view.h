@@ -82,6 +82,9 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
                      std::uint32_t width, std::uint32_t height,
                      std::span<const frame::Overlay> overlays = {});
 
+/// The view as one of those pictures that follow one another shows it: with the detail that the budget has time for.
+View within(View view, const Budget& budget);
+
 /// How strong the fog of its picture is: light is added where the background is light, and little of it bleaches dark branches as
 /// much as much darkness dims bright ones.
 float fog_strength(const View& view);
