@@ -221,7 +221,11 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   constexpr double least_jacobian = .2;
   begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
-  if (cortex.mending.before > 0) improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
+  if (cortex.mending.before > 0) {
+    // What is still tangled has another start now.
+    improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
+    begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
+  }
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);

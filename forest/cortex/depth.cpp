@@ -9,6 +9,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/cortex/elements.h"
+#include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
 namespace {
@@ -131,6 +132,57 @@ class Growth {
   double all_ = 0.;
 };
 
+// What an element's own table has to add to those of its corners.
+Depth::Table own_table(const Elements& elements, std::size_t element,
+                       const std::vector<Depth::Table>& corners) {
+  const Footprint& f = footprint();
+  const Growth growth(elements.hexahedron(element));
+  const auto at = elements.corners_of(element);
+  Depth::Table own;
+  for (std::size_t k = 0; k < own.size(); ++k) {
+    const auto w = [&](std::size_t corner) { return double(corners[at[corner]][k]); };
+    own[k] = float(growth.solve(growth.all() * double(k + 1) / steps, -1., 1., [&](std::size_t c, double x) {
+      return (1. - f.u[c]) * (1. - f.v[c]) * w(0) + f.u[c] * (1. - f.v[c]) * w(1) +
+             (1. - f.u[c]) * f.v[c] * w(2) + f.u[c] * f.v[c] * w(3) + x * bump(f.u[c], f.v[c]);
+    }));
+  }
+  return own;
+}
+
+// Where an element narrows otherwise than those around, the mean table of its corners is so far from its own that w would have to leave
+// the element in its middle. Such corners go towards what their elements want, most towards the one that wants most.
+void calm_corners(const Elements& elements, Depth& depth) {
+  constexpr int rounds = 6;
+  constexpr float much = .08f;              // of w
+  constexpr double share = .5 * (4. / 9.);  // half of what would do: the bump's mean is 4/9
+  const Stars stars(elements);
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<std::uint32_t> corners, around;
+    for (std::size_t e = 0; e < elements.size(); ++e)
+      if (std::ranges::any_of(depth.elements[e], [](float own) { return std::abs(own) > much; }))
+        for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
+    if (corners.empty()) return;
+    corners = distinct(std::move(corners));
+    for (const std::uint32_t c : corners) {
+      Depth::Table& table = depth.corners[c];
+      for (std::size_t k = 0; k < table.size(); ++k) {
+        double cubes = 0., squares = 0.;
+        for (const std::uint32_t e : stars.of(c)) {
+          const double own = depth.elements[e][k];
+          cubes += own * own * own, squares += own * own;
+        }
+        if (squares > 0.) table[k] += float(share * cubes / squares);
+        table[k] = std::clamp(table[k], k ? table[k - 1] : 0.f, 1.f);
+      }
+      around.insert(around.end(), stars.of(c).begin(), stars.of(c).end());
+    }
+    around = distinct(std::move(around));
+    parallel_for(around.size(), 16, [&](std::size_t i) {
+      depth.elements[around[i]] = own_table(elements, around[i], depth.corners);
+    });
+  }
+}
+
 }  // namespace
 
 Depth even_depth(const Elements& elements, Progress& progress) {
@@ -161,21 +213,10 @@ Depth even_depth(const Elements& elements, Progress& progress) {
           around[c] ? result.corners[c][k] / float(around[c]) : float(k + 1) / float(steps);
   result.elements.assign(n, Depth::Table{});
   parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
-    const Footprint& f = footprint();
-    for (std::size_t e = begin; e < end; ++e) {
-      const Growth growth(elements.hexahedron(e));
-      const auto corners = elements.corners_of(e);
-      for (std::size_t k = 0; k + 1 < steps; ++k) {
-        const auto w = [&](std::size_t corner) { return double(result.corners[corners[corner]][k]); };
-        result.elements[e][k] =
-            float(growth.solve(growth.all() * double(k + 1) / steps, -1., 1., [&](std::size_t c, double x) {
-              return (1. - f.u[c]) * (1. - f.v[c]) * w(0) + f.u[c] * (1. - f.v[c]) * w(1) +
-                     (1. - f.u[c]) * f.v[c] * w(2) + f.u[c] * f.v[c] * w(3) + x * bump(f.u[c], f.v[c]);
-            }));
-      }
-    }
+    for (std::size_t e = begin; e < end; ++e) result.elements[e] = own_table(elements, e, result.corners);
     progress.advance(end - begin);
   });
+  calm_corners(elements, result);
   progress.end();
   return result;
 }

@@ -134,6 +134,24 @@ TEST(EvenDepth, IsThatOfACylinder) {
   }
 }
 
+// Its corners have the mean table of elements that widen, by which w would have to leave it in its middle.
+TEST(EvenDepth, SharesTheVolumeOfAnElementThatNarrowsWhereThoseAroundWiden) {
+  for (const double narrowed : {.6, .8, .95}) {
+    Elements elements = bent(3e4);
+    const Place middle = elements.hexahedron(5).at(.5, .5, .5);
+    for (Depths& curve : elements.curves)
+      for (std::size_t d = 0; d < 4; ++d) {
+        Eigen::Vector2d way(curve[d].x() - middle.x(), curve[d].y() - middle.y());
+        way *= 1. - narrowed * double(d) / 3. * std::exp(-way.squaredNorm() / (2. * 400. * 400.));
+        curve[d].x() = middle.x() + way.x(), curve[d].y() = middle.y() + way.y();
+      }
+    ASSERT_TRUE(certify(elements.hexahedron(5)).positive());
+    elements.depth = even_depth(elements, Progress::none());
+    for (std::size_t e = 0; e < elements.size(); ++e) EXPECT_LT(depth_error(elements, e), .001) << e;
+    for (const float own : elements.depth.elements[5]) EXPECT_LT(std::abs(own), .15f);
+  }
+}
+
 TEST(EvenDepth, GoesOnFromElementToElementAndBack) {
   Elements elements = bent(300.);
   for (Depths& curve : elements.curves)  // not the same everywhere
