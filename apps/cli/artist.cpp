@@ -51,9 +51,9 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   const scene::Colouring& colouring = quiet ? *quiet : *colouring_;
   scene::Chooser::Painter painter;
   if (coloured)
-    painter = [this, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
-                                                                       const scene::Eye& from) {
-      playback_->colour(cut, from, look, {.window = window_});
+    painter = [this, &colouring, look = view.activity.value_or(playback_->view())](scene::Cut& cut,
+                                                                                   const scene::Eye& from) {
+      playback_->colour(cut, from, look, {.window = window_, .states = colouring.states});
     };
   auto start = Clock::now();
   if (scene::layered(view)) {

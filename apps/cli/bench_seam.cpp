@@ -343,10 +343,14 @@ void run(const Options& options, Console& console) {
                     fmt::format("{:.3f}", mean(w))});
   }
   rows.push_back({"to reach", "1.10", "", "", "", "0.950", "", ""});
+  constexpr double most_change = 1.1, least_similarity = .95;
   console.table({"", "change ÷ reference's", "at", "of one step", "at", "least similarity", "at", "mean"},
                 rows);
   console.say(fmt::format("disconnected branches: {} in {} pictures (at most {:.0f}, in picture {})",
                           disconnected, walk.pictures(), most_disconnected.value, most_disconnected.picture));
+  if (ratio(product) > most_change || 1. - summary[product].difference.value < least_similarity ||
+      disconnected)
+    console.say("missed: what is to be reached is not");
   console.say(fmt::format("the reference took {:.2f} s a picture of {} samples",
                           walk.reference_seconds() / double(chosen.size()), options.samples));
 }

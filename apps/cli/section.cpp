@@ -20,6 +20,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
+#include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -32,6 +33,7 @@ struct Options {
   double depth = 0., seconds = 5.;
   int rate = 25;
   bool force = false;
+  TargetOptions targets;
 };
 
 /// Numbers between commas; throws Error.
@@ -75,6 +77,14 @@ std::string csv_of(const scene::Forest& forest, const std::vector<scene::Profile
   return text;
 }
 
+// Without the profiles of neurons that are hidden.
+scene::Slice visible(scene::Slice slice, const scene::Colouring& colouring) {
+  std::erase_if(slice.profiles, [&](const scene::Profile& p) {
+    return !colouring.states[p.instance].is(frame::State::visible);
+  });
+  return slice;
+}
+
 void film(const Options& options, const scene::Forest& forest, const Plane& plane,
           const scene::Colouring& colouring, const scene::SlicePicture& picture, Console& console) {
   const int count = std::max(2, int(std::lround(options.seconds * options.rate)));
@@ -82,7 +92,8 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
   console.progress().begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     const Plane here = plane.moved(float(options.depth * i / (count - 1)));
-    film.add(scene::paint(scene::slice(forest, here, picture.sheet()), colouring, picture).pixels);
+    film.add(scene::paint(visible(scene::slice(forest, here, picture.sheet()), colouring), colouring, picture)
+                 .pixels);
     console.progress().advance();
   }
   film.finish();
@@ -117,7 +128,11 @@ void run(const Options& options, Console& console) {
   constexpr const char* ways[] = {"type", "layer", "kind", "neuron"};
   for (std::size_t i = 0; i < std::size(ways); ++i)
     if (options.colour_by == ways[i]) view.colour_by = scene::ColourBy(i);
-  const scene::Colouring colouring = scene::colour(forest, view.colour_by, picture.background);
+  view.background = picture.background;
+  add_appearances(options.targets, view.targets);
+  const scene::Targets targets(forest, read_node_sets(forest, options.targets.node_sets, console));
+  warn_of_empty(targets, view.targets, console);
+  const scene::Colouring colouring = scene::colour(targets, view);
   if (extension == ".mp4" && options.depth == 0.)
     throw Error("a film moves the plane; say how far by --through, in µm");
   if (extension == ".mp4") return film(options, forest, plane, colouring, picture, console);
@@ -125,7 +140,8 @@ void run(const Options& options, Console& console) {
 
   // A table tells of all that the plane cuts, a picture of what is in it.
   const bool table = extension == ".csv";
-  const scene::Slice slice = scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet());
+  const scene::Slice slice =
+      visible(scene::slice(forest, plane, table ? scene::Sheet{} : picture.sheet()), colouring);
   const auto areas = scene::areas(slice);
   if (table)
     write_unless_there(options.out, csv_of(forest, areas), options.force);
@@ -137,7 +153,7 @@ void run(const Options& options, Console& console) {
   if (slice.profiles.empty())
     console.warn(
         "the plane cuts no neuron where one looks; without --plane, --centre and --height it goes through "
-        "the middle of the forest");
+        "the middle of the forest, and --only and --hide leave neurons out");
   double total = 0.;
   std::size_t neurons = 0;
   for (std::size_t i = 0; i < areas.size(); ++i) {
@@ -174,6 +190,7 @@ std::function<void()> section(CLI::App& command, Console& console) {
       .add_option("--centre", options->centre,
                   "The middle of the picture, µm along the section's right and up")
       ->type_name("RIGHT,UP");
+  add_targets(command, options->targets);
   command.add_option("--colour-by", options->colour_by, "What a colour means")
       ->check(CLI::IsMember({"type", "layer", "kind", "neuron"}))
       ->capture_default_str();

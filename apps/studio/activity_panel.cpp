@@ -16,6 +16,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/error.h"
 #include "forest/core/round_numbers.h"
 
 #include "apps/studio/annotation.h"
@@ -130,7 +131,11 @@ void RasterView::paintEvent(QPaintEvent*) {
   if (!playback || plot().isEmpty()) return;
   const reports::Activity& activity = playback->activity();
   const QRectF area = plot();
-  if (drawn_.size() != plot().size()) draw();
+  try {
+    if (drawn_.size() != plot().size()) draw();
+  } catch (const InputError& error) {
+    return viewport_.put_away_playback(QString::fromUtf8(error.what()));
+  }
   painter.drawImage(plot().topLeft(), drawn_);
   paint_axes(painter);
   const double x = area.left() + share_of(*playback, viewport_.time()) * area.width();
@@ -445,7 +450,11 @@ void ActivityPanel::show_selection() {
     return t.row == compartment->row && t.compartment == compartment->index;
   });
   if (traces_.size() == most) traces_.erase(traces_.begin());
-  traces_.push_back(reports::trace(playback->activity(), compartment->row, compartment->index));
+  try {
+    traces_.push_back(reports::trace(playback->activity(), compartment->row, compartment->index));
+  } catch (const InputError& error) {
+    return viewport_.put_away_playback(QString::fromUtf8(error.what()));
+  }
   plot_->forget();
   clamped_(double(clock.nsecsElapsed()) * 1e-6);
 }

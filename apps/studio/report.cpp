@@ -79,6 +79,9 @@ void report(Window& window) {
            {"renderer", viewport->renderer_name().toStdString()},
            {"why", sentence.toStdString()}});
   });
+  QObject::connect(viewport, &Viewport::put_away, viewport, [](const QString& why) {
+    print({{"event", "put_away"}, {"why", why.toStdString()}});
+  });
   QObject::connect(&window, &Window::clamped, &window, [&window](double milliseconds) {
     Json names = Json::array();
     for (const reports::Trace& trace : window.traces()) names.push_back(trace.name());

@@ -174,7 +174,7 @@ TargetsPanel::TargetsPanel(Changes changes, QWidget* parent) : QWidget(parent), 
   QSizePolicy keeps_place = simulated_->sizePolicy();
   keeps_place.setRetainSizeWhenHidden(true);
   simulated_->setSizePolicy(keeps_place);
-  simulated_->setToolTip(tr("Kept for simulators; changes nothing of the picture"));
+  simulated_->setToolTip(tr("Whether it shows the simulation, where one plays"));
   connect(simulated_, &QCheckBox::clicked, this, [this](bool on) {
     scene::Appearance what;
     what.simulated = on;

@@ -198,6 +198,16 @@ void Viewport::play(scene::Playback playback) {
   Q_EMIT changed();
 }
 
+void Viewport::put_away_playback(const QString& why) {
+  if (!playback_) return;
+  playback_.reset();
+  playing_ = false;
+  settings_.view.activity.reset();
+  touch();
+  Q_EMIT put_away(why);
+  Q_EMIT changed();
+}
+
 scene::ActivityView Viewport::activity() const {
   return settings_.view.activity.value_or(playback_ ? playback_->view() : scene::ActivityView());
 }
@@ -346,7 +356,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   if (selection_ && settings_.dim) shown.neuron = selection_->pick.instance;
   if (coloured)
     painter = [this, shown, window = window_](scene::Cut& cut, const scene::Eye& eye) {
-      playback_->colour(cut, eye, shown, {.window = window});
+      playback_->colour(cut, eye, shown, {.window = window, .states = colouring_.states});
     };
   if (first == 0 && !layered(view))
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
@@ -467,6 +477,9 @@ void Viewport::paintGL() {
     annotate();
     if (stage == Stage::moving && --warming_up_ < 0) took(float(clock.nsecsElapsed()) * 1e-6f);
   } catch (const std::exception& error) {
+    // All that is drawn was checked when it was opened, but for values of a simulation, which are as they are read.
+    if (playback_ && dynamic_cast<const InputError*>(&error))
+      return put_away_playback(QString::fromUtf8(error.what()));
     if (card_) return recover(error.what());
     renderer_.reset();
     Q_EMIT failed(QString::fromUtf8(error.what()));

@@ -59,6 +59,8 @@ class Viewport final : public QOpenGLWidget {
 
   /// Shows a simulation on the branches, at its first moment and standing still.
   void play(scene::Playback playback);
+  /// Shows none any more, as what it was read from is damaged; `why` says so.
+  void put_away_playback(const QString& why);
   const scene::Playback* playback() const { return playback_ ? &*playback_ : nullptr; }
   /// How it is shown, and the moment (View::activity).
   scene::ActivityView activity() const;
@@ -97,11 +99,12 @@ class Viewport final : public QOpenGLWidget {
   QString renderer_name() const { return renderer_name_; }
 
  Q_SIGNALS:
-  void changed();     // the settings, by hand or otherwise
-  void recoloured();  // how neurons are shown
-  void selected();    // something else, or nothing
-  void opened();      // another simulation
-  void moved();       // its moment, or whether it plays
+  void changed();                     // the settings, by hand or otherwise
+  void recoloured();                  // how neurons are shown
+  void selected();                    // something else, or nothing
+  void opened();                      // another simulation
+  void put_away(const QString& why);  // the simulation
+  void moved();                       // its moment, or whether it plays
   void drawn();
   void settled();  // the picture is finished
   /// The OpenGL context is of no use any more: whoever shows this widget must give it a new window (Window::renew). Its

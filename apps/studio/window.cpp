@@ -112,6 +112,14 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
     activity_dock_->raise();
   });
   connect(viewport_, &Viewport::moved, this, [this] { activity_panel_->follow(); });
+  connect(
+      viewport_, &Viewport::put_away, this,
+      [this](const QString& why) {
+        activity_panel_->clear_traces();
+        activity_panel_->follow();
+        tell(tr("The simulation is shown no more: %1").arg(why));
+      },
+      Qt::QueuedConnection);
   connect(viewport_, &Viewport::drawn, this, &Window::show_figures);
   connect(viewport_, &Viewport::lost, this, &Window::renew, Qt::QueuedConnection);
   // Queued: a status bar that is not shown yet would write over its figures.
@@ -119,9 +127,8 @@ Window::Window(scene::Forest forest, const scene::View& view, const QString& tit
       viewport_, &Viewport::recovered, this,
       [this](const QString& sentence) {
         show_figures();
-        statusBar()->showMessage(sentence, 15'000);
+        tell(sentence);
         renderer_->setToolTip(sentence);
-        std::fputs(("brainforest-studio: " + sentence + "\n").toUtf8().constData(), stderr);
       },
       Qt::QueuedConnection);
 
@@ -409,6 +416,11 @@ void Window::save_picture(bool as_seen) {
 const std::vector<reports::Trace>& Window::traces() const { return activity_panel_->traces(); }
 
 QRect Window::raster() const { return activity_panel_->raster(); }
+
+void Window::tell(const QString& sentence) {
+  statusBar()->showMessage(sentence, 15'000);
+  std::fputs(("brainforest-studio: " + sentence + "\n").toUtf8().constData(), stderr);
+}
 
 void Window::open_activity() {
   open_with(tr("Open activity"), tr("Activity files (*.activity)"), [this](const std::string& path) {

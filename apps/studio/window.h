@@ -51,6 +51,7 @@ class Window final : public QMainWindow {
   bool surfaces_alone() const;  // there is no forest: nothing to select, no targets
   QString panels_key() const;
   void add_docks();
+  void tell(const QString& sentence);  // in the status bar, and where the program was started
   void add_menus();
   void show_figures();
   void show_targets();

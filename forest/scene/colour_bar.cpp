@@ -68,8 +68,10 @@ ColourBar bar_of_spikes(const ActivityView& activity, double time, Background ba
 
 ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background) {
   const double time = activity.time.value_or(playback.begin());
-  return playback.has_values() ? bar_of(activity, time, playback.activity().facts().units, background)
-                               : bar_of_spikes(activity, time, background);
+  if (!playback.has_values()) return bar_of_spikes(activity, time, background);
+  ActivityView shown = activity;
+  if (playback.activity().spikes().empty()) shown.speed = 0.f;
+  return bar_of(shown, time, playback.activity().facts().units, background);
 }
 
 void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Lettering& letters) {
@@ -80,8 +82,8 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
     fill(image, {left, place.top, left + 1.f, place.bottom}, bar.at((i + .5f) / steps));
   }
   const float base = place.bottom + 1.7f * letters.height;
-  const std::string high = fmt::format("{:.6g}", bar.high);
-  letters.write(image, fmt::format("{:.6g}", bar.low), place.left, base);
+  const std::string high = fmt::format("{:.4g}", bar.high);
+  letters.write(image, fmt::format("{:.4g}", bar.low), place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
 }
 

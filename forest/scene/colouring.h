@@ -38,7 +38,7 @@ struct Appearance {
   std::optional<frame::Kind> kind;
   std::optional<float> opacity;                      // 0–1
   std::array<std::optional<float>, 8> opacity_of{};  // by section kind (1: the soma), times that
-  std::optional<bool> simulated;                     // stored and told; nothing simulates yet
+  std::optional<bool> simulated;                     // whether it shows a simulation that plays
 
   bool operator==(const Appearance&) const = default;
 };

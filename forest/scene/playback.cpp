@@ -222,6 +222,7 @@ void Playback::colour(Cut& cut, const Eye& eye, const ActivityView& view, const 
       each_run(geometry, item, [&](std::uint32_t, std::uint32_t instance, std::uint32_t, std::uint32_t) {
         if (Shown& s = shown_[instance]; !s.in_sight) {
           s.in_sight = true;
+          s.simulated = options.states.empty() || options.states[instance].is(frame::State::simulated);
           in_sight_.push_back(instance);
         }
       });
@@ -264,8 +265,8 @@ void Playback::read(const Eye& eye, const PlaybackOptions& options, std::uint64_
   };
   for (const std::uint32_t i : in_sight_) {
     const std::uint32_t row = row_of_[i];
-    if (row == none) continue;
     Shown& s = shown_[i];
+    if (row == none || !s.simulated) continue;
     const frame::Instance& instance = forest_.instances()[i];
     const Cluster& root = forest_.clusters()[forest_.neurons()[instance.morphology].first_cluster];
     const Quat turn(instance.qw, instance.qx, instance.qy, instance.qz);
@@ -294,7 +295,8 @@ void Playback::find_spikes(double time, const ActivityView& view, const Playback
       double(farthest_ / view.speed) + double(view.fade) * std::log(double(flash_steps)) + options.window;
   for (const reports::Spike& s :
        activity_.spikes(time - under_way, std::nextafter(time, std::numeric_limits<double>::infinity())))
-    if (s.instance < shown_.size() && shown_[s.instance].in_sight) spikes_.push_back(s);
+    if (s.instance < shown_.size() && shown_[s.instance].in_sight && shown_[s.instance].simulated)
+      spikes_.push_back(s);
   std::ranges::stable_sort(spikes_, {}, &reports::Spike::instance);
   for (std::uint32_t i = 0; i < spikes_.size(); ++i) {
     Shown& s = shown_[spikes_[i].instance];
@@ -340,7 +342,7 @@ std::vector<frame::Overlay> Playback::flashes(const frame::Camera& camera, float
     const std::uint32_t instance = spikes[k].instance;
     if (instance >= shown_.size()) continue;
     const frame::State& state = colouring.states[instance];
-    if (!state.is(frame::State::visible)) continue;
+    if (!state.is(frame::State::visible) || !state.is(frame::State::simulated)) continue;
     const Neuron& neuron = forest_.neurons()[forest_.instances()[instance].morphology];
     const Shape& shape = shapes_[forest_.instances()[instance].morphology];
     const std::size_t before = marks.size();
@@ -402,7 +404,7 @@ void Playback::paint(std::uint32_t instance, std::uint32_t first_segment, std::u
   const Shape& shape = shapes_[forest_.instances()[instance].morphology];
   if (!within(first_segment, count, shape.first_segment, shape.distance.size())) return;
   const std::size_t first = first_segment - shape.first_segment;
-  if (const std::uint32_t row = row_of_[instance]; row != none) {
+  if (const std::uint32_t row = row_of_[instance]; row != none && s.simulated) {
     const auto& value = tables_[activity_.rows()[row].layout].value[std::size_t(s.level)];
     for (std::uint32_t i = 0; i < count; ++i)
       if (const std::uint32_t v = value[first + i]; v != none) out[i] = entry_of[codes_[s.first + v]];

@@ -19,6 +19,8 @@ struct PlaybackOptions {
   double window =
       0.;  // ms that a picture stands for, up to its moment: of the steps within, the greatest is shown
   float pixels = 16.f;  // that one value may stand for, along a branch
+  // One an instance: those that are not simulated have no value and no spike. None: all are.
+  std::span<const frame::State> states = {};
 };
 
 class Playback {
@@ -89,7 +91,7 @@ class Playback {
         distance;  // of each segment along the branches from the soma; negative where no spike runs
   };
   struct Shown {
-    bool in_sight = false;
+    bool in_sight = false, simulated = true;
     reports::Level level = reports::Level::compartment;
     std::uint64_t first = 0;                   // in codes_
     std::uint32_t spikes = 0, spikes_end = 0;  // in spikes_

@@ -204,7 +204,7 @@ TEST(Playback, WhileANeuronStandsOutTheOthersShowTheSameInQuietColours) {
     }();
     for (std::uint32_t i = 0; i < half_map_steps; ++i)  // maps differ less there
       EXPECT_NEAR((palette[half_map_steps + i] - ground[half_map_steps + i]).norm(),
-                  (background == Background::dark ? .05f : .25f) * (palette[i] - ground[i]).norm(), 1e-5f);
+                  (background == Background::dark ? .15f : .25f) * (palette[i] - ground[i]).norm(), 1e-5f);
   }
   view.neuron = std::uint32_t(sample.forest.instances().size());
   EXPECT_THROW(playback.colour(cut, eye, view), Error);
@@ -329,6 +329,40 @@ TEST(Playback, WhatIsNoNumberAndWhoWasNotReportedIsNeutral) {
   EXPECT_GT(other, 500u);
   const std::uint32_t shape = sample.forest.instances()[29].morphology;
   EXPECT_FALSE(playback.compartment(29, sample.forest.neurons()[shape].first_segment));
+}
+
+// Their values are not read, and no flash runs on them.
+TEST(Playback, WhatIsNotSimulatedIsNeutral) {
+  const Sample sample;
+  std::vector<frame::State> states(sample.forest.instances().size());
+  for (std::size_t i = 0; i < states.size(); i += 2)
+    states[i].flags &= std::uint8_t(~frame::State::simulated);
+  const reports::Nodes nodes = reports::nodes_of(sample.circuit);
+  reports::Spikes spikes{.source = "spikes", .population = nodes.populations[0], .times = {}, .nodes = {}};
+  for (std::uint32_t i = 0; i < states.size(); ++i)
+    spikes.times.push_back(.5), spikes.nodes.push_back(nodes.of_instance[i].id);
+  const Eye eye = eye_at(overview(sample.forest).camera, 1.f);
+  const auto entries = [&](std::span<const frame::State> of, std::uint64_t& values, std::uint64_t& flashes) {
+    Playback playback(sample.forest, sample.activity({spikes}));
+    ActivityView view = playback.view();
+    view.time = .7;
+    Cut cut = choose(sample.forest, eye, viewport);
+    playback.colour(cut, eye, view, {.pixels = 0.f, .states = of});
+    values = playback.figures().values, flashes = playback.figures().flashes;
+    std::vector<std::pair<std::uint32_t, std::uint32_t>> all;
+    for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
+      all.push_back({source_of(sample, item, i).instance, entry});
+    });
+    return all;
+  };
+  std::uint64_t values = 0, flashes = 0, fewer_values = 0, fewer_flashes = 0;
+  const auto all = entries({}, values, flashes), some = entries(states, fewer_values, fewer_flashes);
+  ASSERT_EQ(all.size(), some.size());
+  for (std::size_t k = 0; k < all.size(); ++k)
+    EXPECT_EQ(some[k].second, all[k].first % 2 ? all[k].second : std::uint32_t(no_value_entry));
+  EXPECT_LT(fewer_values, values);
+  EXPECT_EQ(flashes, states.size());
+  EXPECT_EQ(fewer_flashes, states.size() / 2);
 }
 
 // One neuron with a straight axon of 600 µm and a dendrite.

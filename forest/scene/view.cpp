@@ -430,7 +430,7 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
   const std::uint32_t steps = a.neuron ? half_map_steps : map_steps;
   for (std::uint32_t i = 0; i < steps; ++i)
     palette[i] = (*a.map)(float(i) / float(steps - 1)) * (light ? .85f : 1.f);
-  const float kept = light ? .25f : .05f;
+  const float kept = light ? .25f : .15f;
   const Vec3 ground = light ? light_of(0xDDE3EB) : Vec3::Zero();
   for (std::uint32_t i = steps; i < map_steps; ++i)
     palette[i] = kept * palette[i - steps] + (1.f - kept) * ground;
@@ -532,11 +532,11 @@ View parse_view(std::string_view text, const std::string& name) {
   }
   if (!json.is_object())
     throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
+  View v;
+  read_all(v, json, keys_of_view(), name, "");  // what is misspelt first
   for (const char* needed : {"eye", "target"})
     if (!json.contains(needed))
       throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
-  View v;
-  read_all(v, json, keys_of_view(), name, "");
   if (v.camera.eye == v.camera.target)
     throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");
   if (v.camera.up.isZero()) throw InputError(name, 0, "'up' has no direction; give one such as [0, 1, 0]");

@@ -294,6 +294,17 @@ class Playing : public Window {
   double time() const { return activity_.at("time").get<double>(); }
 };
 
+// What was written whole is damaged later, by a disk or on its way: the header is right, values are not.
+class PlayingDamaged : public Window {
+ protected:
+  std::vector<std::string> more() const override {
+    std::string bytes = std::string(MappedFile(sample_activity()).text());
+    for (std::size_t i = bytes.size() / 3; i < bytes.size() / 2; ++i) bytes[i] = char(~bytes[i]);
+    write_file(folder / "damaged.activity", bytes);
+    return {"--activity", folder / "damaged.activity"};
+  }
+};
+
 struct Target {
   Vec2 pixel;
   std::optional<scene::Pick> pick;
@@ -660,6 +671,16 @@ TEST_F(Playing, SpacePlaysAndStopsAndStepsGoBothWays) {
   settle();
   EXPECT_EQ(time(), 0.);
   EXPECT_EQ(saved("moment_again.png").pixels, first.pixels);
+}
+
+TEST_F(PlayingDamaged, PutsTheSimulationAwayAndGoesOn) {
+  EXPECT_TRUE(activity_.is_null());  // its raster was to be drawn
+  key("space period");               // nothing plays
+  settle();
+  const scene::View before = view_;
+  drag(1, {100, 150}, {160, 160});
+  EXPECT_NE(view_.camera.eye, before.camera.eye);
+  key("ctrl+Home");
 }
 
 TEST_F(Playing, AClickShowsTheWholeHistoryOfTheCompartmentAndTracesAreSaved) {
