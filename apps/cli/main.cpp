@@ -1,5 +1,4 @@
 // SPDX-License-Identifier: Apache-2.0
-#include <csignal>
 #include <cstdio>
 #include <filesystem>
 #include <memory>
@@ -9,6 +8,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/core/signals.h"
 #include "forest/repository/names.h"
 
 #include "apps/choice.h"
@@ -37,7 +37,7 @@ std::string missing_verb(const CLI::App& app) {
 
 int main(int argc, char** argv) {
   using namespace forest;
-  std::signal(SIGXFSZ, SIG_IGN);  // a file that may not grow is a full disk: an error with a sentence
+  say_signals("brainforest");
   cli::Console console;
   CLI::App app{"Brain Forest: from traced neurons to a forest one can walk through.", "brainforest"};
   app.set_version_flag("--version", FOREST_VERSION);

@@ -11,6 +11,7 @@
 #include <CLI/CLI.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/signals.h"
 
 #include "apps/choice.h"
 #include "apps/drawer.h"
@@ -143,6 +144,7 @@ int run(const Options& options, int& argc, char** argv) {
 
 int main(int argc, char** argv) {
   using namespace forest::studio;
+  forest::say_signals("brainforest-studio");
   Options options;
   CLI::App app{"A window on a forest: orbit, fly, and ask any branch what it is.", "brainforest-studio"};
   app.add_option("FOREST", options.forest,
