@@ -12,6 +12,7 @@
 
 #include "forest/core/half.h"
 #include "forest/morphology/measure.h"
+#include "forest/morphology/soma_shape.h"
 
 namespace forest::scene {
 namespace {
@@ -711,8 +712,19 @@ class Leaves {
 
   void add_soma() {
     if (!(soma_.radius > 0.f)) return;
-    put(vertex(soma_)), put(vertex(soma_));
+    const auto shape = soma_shape(m_.soma());
+    Vec4 ball = vertex(soma_);
+    float thickest = 0.f;
+    for (const auto& run : shape)
+      for (const Point& p : run) thickest = std::max(thickest, p.radius);
+    if (!shape.empty()) ball.w() = std::min(ball.w(), thickest);  // within the shape
+    put(ball), put(ball);
     add({.first = 0, .kind = 1});
+    for (const auto& run : shape) {
+      const std::uint32_t at = here();
+      for (const Point& p : run) put(vertex(p));
+      add({.first = at, .kind = 1});
+    }
   }
 
   // A cone from inside the soma to where a stem begins, when that is near enough to belong there.
