@@ -229,6 +229,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
+  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }

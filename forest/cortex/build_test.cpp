@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <numeric>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -12,6 +13,7 @@
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
 #include "forest/cortex/fit_faces.h"
+#include "forest/cortex/gaps.h"
 
 #include "tests/effort.h"
 
@@ -288,6 +290,30 @@ TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
   EXPECT_LT(farthest(wavy).second, 10.);
   EXPECT_TRUE(uncertified(wavy).empty());
   EXPECT_LT(farthest(wavy).first, farthest(as_a_whole).first);
+}
+
+TEST_F(Shell, GapsAreTheVolumeThatElementsLackAndFacesTakeIt) {
+  const TriangleTree outer_tree(outer);
+  Elements thin = made().cortex.elements;
+  for (Depths& curve : thin.curves)
+    curve[0] *= .99, curve[3] *= 1.005 + .005 * std::sin(curve[3].x() / 3000.);
+  const auto missing = [&] {
+    double sum = made().cortex.between;
+    for (std::size_t e = 0; e < thin.size(); ++e) sum -= thin.hexahedron(e).volume();
+    return sum;
+  };
+  const auto sum_of = [](const std::vector<double>& of) { return std::accumulate(of.begin(), of.end(), 0.); };
+  const double before = missing(), above = sum_of(gaps(thin, 0, outer_tree)),
+               below = sum_of(gaps(thin, 3, tree));
+  ASSERT_GT(before, .02 * made().cortex.between);
+  EXPECT_GT(above, .1 * before);
+  EXPECT_GT(below, .1 * before);
+  EXPECT_NEAR(above + below, before, .03 * before);
+  const ThreadLimit one(1);
+  EXPECT_EQ(sum_of(gaps(thin, 0, outer_tree)), above);
+  fit_faces(thin, outer_tree, tree, Fit::volume);
+  EXPECT_LT(std::abs(missing()), .03 * before);
+  EXPECT_TRUE(uncertified(thin).empty());
 }
 
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {

@@ -7,6 +7,7 @@
 #include <Eigen/Cholesky>
 
 #include "forest/core/parallel.h"
+#include "forest/cortex/gaps.h"
 #include "forest/cortex/go.h"
 
 namespace forest::cortex {
@@ -41,6 +42,9 @@ Shares shares(Fit fit) {
       .solve(weights.transpose());
 }
 
+// How far each of a face's sixteen places goes.
+using Moves = Eigen::Matrix<double, 16, 3>;
+
 using Ways = Eigen::Matrix<double, all, 3>;
 
 // From the 5×5 places of a face to the surface, along its normals; none where that is far or the other bank.
@@ -62,19 +66,42 @@ Ways ways(const Elements& elements, std::size_t element, std::size_t depth, cons
   return result;
 }
 
+// What is missing between a face and the surface, as a height over all of it.
+Moves raised(const Elements& elements, std::size_t element, std::size_t depth, double gap) {
+  constexpr double most = 300.;  // µm
+  const auto& own = elements.elements[element];
+  const auto at = [&](int i, int j) -> const Place& { return elements.curves[own[slot(i, j)]][depth]; };
+  double area = 0.;
+  for (int j = 0; j < 3; ++j)
+    for (int i = 0; i < 3; ++i)
+      area += .5 * (at(i + 1, j + 1) - at(i, j)).cross(at(i, j + 1) - at(i + 1, j)).norm();
+  const double height = area > 0. ? std::clamp(gap / area, -most, most) : 0.;
+  const std::size_t next = depth == 0 ? 1 : 2;
+  Moves result;
+  for (std::size_t c = 0; c < 16; ++c) {
+    const Depths& curve = elements.curves[own[c]];
+    result.row(Eigen::Index(c)) = height * (curve[depth] - curve[next]).normalized().transpose();
+  }
+  return result;
+}
+
 }  // namespace
 
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit) {
-  const int rounds = fit == Fit::mean ? 2 : 3;
+  const int rounds = fit == Fit::places ? 3 : 2;
   const Shares by_place = shares(fit);
   constexpr double good = .5;  // scaled Jacobian
   const std::vector<double> keep = to_keep(elements, good);
   const std::vector<Depths> before = elements.curves;
-  std::vector<Eigen::Matrix<double, 16, 3>> moves(elements.size());
+  std::vector<Moves> moves(elements.size());
   for (const auto& [depth, surface] : {std::pair{std::size_t(0), &outer}, {std::size_t(3), &inner}})
     for (int round = 0; round < rounds; ++round) {
-      parallel_for(elements.size(), 64,
-                   [&](std::size_t e) { moves[e] = by_place * ways(elements, e, depth, *surface); });
+      std::vector<double> gap;
+      if (fit == Fit::volume) gap = gaps(elements, depth, *surface);
+      parallel_for(elements.size(), 64, [&](std::size_t e) {
+        moves[e] = fit == Fit::volume ? raised(elements, e, depth, gap[e])
+                                      : Moves(by_place * ways(elements, e, depth, *surface));
+      });
       std::vector<Place> sum(elements.curves.size(), Place::Zero());
       std::vector<std::uint8_t> times(elements.curves.size(), 0);
       for (std::size_t e = 0; e < elements.size(); ++e)

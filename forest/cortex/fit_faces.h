@@ -9,7 +9,8 @@ namespace forest::cortex {
 
 enum class Fit {
   mean,  // each face as a whole, by some µm, until it lies outside of the surface as much as inside; corners stay
-  places  // all places of it, by least squares over 5×5 places of the face
+  places,  // all places of it, by least squares over 5×5 places of the face
+  volume  // all places along their curves, until there is as much on one side of the surface as on the other (gaps.h)
 };
 
 /// Moves the faces on both surfaces towards these, along the surface's normals. What would cost an element its validity

@@ -3,6 +3,7 @@
 // boxes, split at the median of the centres along the widest side.
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <optional>
 #include <vector>
@@ -33,6 +34,10 @@ class TriangleTree {
 
   /// Unit, of a triangle; zero where it has no area.
   Place normal(std::uint32_t triangle) const;
+  std::array<Place, 3> corners(std::uint32_t triangle) const {
+    const Triangle& t = triangles_[triangle];
+    return {positions_[t[0]], positions_[t[1]], positions_[t[2]]};
+  }
   std::size_t size() const { return triangles_.size(); }
 
   /// Calls visit(triangle) for all whose boxes touch the box from `low` to `high`.
