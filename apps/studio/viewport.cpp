@@ -402,7 +402,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     if (!foveated_) foveated_.emplace(forest_, [] { return std::make_unique<render::CpuRenderer>(); });
     united_ = &foveated_->draw(view, w, h, colouring, overlays, glass, first, last, painter, dress);
     figures_.segments = foveated_->figures().segments, figures_.neurons = foveated_->figures().neurons;
-    figures_.samples = last, figures_.error = view.detail.error;
+    figures_.samples = last, figures_.error = view.detail.error * view.detail.pixel;
     return;
   }
   united_ = nullptr;
