@@ -226,9 +226,16 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
     improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
     begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   }
+  // Where nothing is tangled any more volumes can be evened, and what is sheared still has room.
+  Shaping even{
+      .enough = .5, .wanted = .62, .volume = options.volume, .even = 16., .worst_off = 100., .gain = .01};
+  improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
+  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
+  even.along = 1600., even.off = 50., even.worst_off = 400.;
+  improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
+  begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
-  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
