@@ -52,7 +52,8 @@ scene::View default_view(const scene::Forest& forest, const scene::Surfaces& sur
 std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
   if (artist.forest().instances().empty()) return "the forest has no neurons, so the picture shows none";
   if (!drawn.segments)
-    return "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by --view, or "
+    return "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by "
+           "--view, or "
            "hide less";
   const bool processor = artist.renderer() == "the processor";
   return fmt::format(
