@@ -342,8 +342,9 @@ void run(const Options& options, Console& console) {
                     fmt::format("{:.3f}", 1. - s.difference.value), fmt::format("{}", s.difference.picture),
                     fmt::format("{:.3f}", mean(w))});
   }
-  rows.push_back({"to reach", "1.10", "", "", "", "0.950", "", ""});
   constexpr double most_change = 1.1, least_similarity = .95;
+  rows.push_back({"to reach", fmt::format("{:.2f}", most_change), "", "", "",
+                  fmt::format("{:.3f}", least_similarity), "", ""});
   console.table({"", "change ÷ reference's", "at", "of one step", "at", "least similarity", "at", "mean"},
                 rows);
   console.say(fmt::format("disconnected branches: {} in {} pictures (at most {:.0f}, in picture {})",

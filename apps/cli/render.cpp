@@ -53,8 +53,7 @@ std::string nothing_shown(const Artist& artist, const Drawn& drawn) {
   if (artist.forest().instances().empty()) return "the forest has no neurons, so the picture shows none";
   if (!drawn.segments)
     return "the picture shows nothing: no neuron that is visible lies in this view; look elsewhere by "
-           "--view, or "
-           "hide less";
+           "--view, or hide less";
   const bool processor = artist.renderer() == "the processor";
   return fmt::format(
       "the picture shows nothing though {} segments were drawn: they are transparent, nearer than 'near', "

@@ -71,13 +71,14 @@ double under_wall(const Ribbon& ribbon, const TriangleTree& inner) {
   return sum;
 }
 
+bool as_wanted(double volume, double wanted) { return volume >= .8 * wanted && volume <= 1.25 * wanted; }
+
 // Whether 95 of 100 have about the wanted volume, and 99 of 100 a scaled Jacobian of .5.
 bool even_and_well_shaped(const Elements& elements, double volume) {
   std::vector<std::uint8_t> odd(elements.size()), sheared(elements.size());
   parallel_for(elements.size(), 64, [&](std::size_t e) {
     const Hexahedron h = elements.hexahedron(e);
-    const double own = h.volume();
-    odd[e] = own < .8 * volume || own > 1.25 * volume, sheared[e] = scaled_jacobian(h) < .5;
+    odd[e] = !as_wanted(h.volume(), volume), sheared[e] = scaled_jacobian(h) < .5;
   });
   return 20 * std::ranges::count(odd, 1) <= long(elements.size()) &&
          100 * std::ranges::count(sheared, 1) <= long(elements.size());
@@ -286,7 +287,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   for (std::size_t e = 0; e < n; ++e) {
     total += volumes[e];
     result.uncertified += bad[e];
-    result.volume_within += volumes[e] >= .8 * wanted && volumes[e] <= 1.25 * wanted;
+    result.volume_within += as_wanted(volumes[e], wanted);
   }
   result.volume_within /= double(n), result.volume_mean = total / double(n);
   result.volume_error =

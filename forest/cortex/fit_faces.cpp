@@ -51,9 +51,7 @@ using Ways = Eigen::Matrix<double, all, 3>;
 Ways ways(const Elements& elements, std::size_t element, std::size_t depth, const TriangleTree& surface) {
   constexpr double reach = 300.;  // µm
   const auto& own = elements.elements[element];
-  std::array<Place, 16> places;
-  for (std::size_t c = 0; c < 16; ++c) places[c] = elements.curves[own[c]][depth];
-  const Patch patch = through_lattice(places);
+  const Patch patch = face_of(elements, element, depth);
   const Place outwards = elements.curves[own[slot(1, 1)]][0] - elements.curves[own[slot(1, 1)]][3];
   Ways result = Ways::Zero();
   for (int k = 0; k < all; ++k) {

@@ -2,7 +2,6 @@
 #include "forest/cortex/gaps.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include <Eigen/LU>
@@ -30,7 +29,7 @@ Mesh mesh_of(const Elements& elements, std::size_t depth) {
   return mesh;
 }
 
-struct Heights {
+struct Gap {
   std::uint32_t element = 0;
   double volume = 0.;  // µm³
 };
@@ -41,21 +40,18 @@ class Faces {
       : elements_(elements), depth_(depth), tree_(mesh_of(elements, depth)) {}
 
   /// What a small piece of the surface, its area as a vector, adds to the nearest face.
-  Heights above(const Place& at, const Place& area) const {
+  Gap above(const Place& at, const Place& area) const {
     constexpr double reach = 3e3;  // µm: no fold hides more
     const auto hit = tree_.nearest(at, reach);
     if (!hit) return {};
     const std::uint32_t element = hit->triangle / per_face;
     const Eigen::Vector2d uv = parameters(*hit);
-    const auto& own = elements_.elements[element];
-    std::array<Place, 16> places;
-    for (std::size_t c = 0; c < 16; ++c) places[c] = elements_.curves[own[c]][depth_];
-    const Patch patch = through_lattice(places);
+    const Patch patch = face_of(elements_, element, depth_);
     constexpr double step = 1e-3;
     Place normal = (patch.at(uv[0] + step, uv[1]) - patch.at(uv[0] - step, uv[1]))
                        .cross(patch.at(uv[0], uv[1] + step) - patch.at(uv[0], uv[1] - step))
                        .normalized();
-    const Depths& middle = elements_.curves[own[slot(1, 1)]];
+    const Depths& middle = elements_.curves[elements_.elements[element][slot(1, 1)]];
     if (normal.dot(middle[depth_] - middle[3 - depth_]) < 0.) normal = -normal;  // out of the element
     const Place way = at - patch.at(uv[0], uv[1]);
     const double height = way.dot(normal);
@@ -92,7 +88,7 @@ class Faces {
 std::vector<double> gaps(const Elements& elements, std::size_t depth, const TriangleTree& surface) {
   constexpr double piece = 300.;  // µm, a side of what is looked at as one
   const Faces faces(elements, depth);
-  std::vector<std::vector<Heights>> found(surface.size());
+  std::vector<std::vector<Gap>> found(surface.size());
   parallel_for(surface.size(), 64, [&](std::size_t t) {
     const auto [a, b, c] = surface.corners(std::uint32_t(t));
     const double longest = std::max({(b - a).norm(), (c - b).norm(), (a - c).norm()});
@@ -107,7 +103,7 @@ std::vector<double> gaps(const Elements& elements, std::size_t depth, const Tria
   });
   std::vector<double> result(elements.size(), 0.);
   for (const auto& of : found)
-    for (const Heights& h : of) result[h.element] += h.volume;
+    for (const Gap& h : of) result[h.element] += h.volume;
   return result;
 }
 

@@ -7,6 +7,12 @@
 
 namespace forest::cortex {
 
+Patch face_of(const Elements& elements, std::size_t element, std::size_t depth) {
+  std::array<Place, 16> places;
+  for (std::size_t c = 0; c < 16; ++c) places[c] = elements.curves[elements.elements[element][c]][depth];
+  return through_lattice(places);
+}
+
 Stars::Stars(const Elements& elements) : starts_(elements.curves.size() + 1) {
   for (const auto& e : elements.elements)
     for (const std::uint32_t c : e) ++starts_[c + 1];

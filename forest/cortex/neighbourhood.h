@@ -21,6 +21,9 @@ inline constexpr std::array<std::array<std::size_t, 4>, 4> sides{
      {slot(0, 0), slot(0, 1), slot(0, 2), slot(0, 3)},
      {slot(3, 0), slot(3, 1), slot(3, 2), slot(3, 3)}}};
 
+/// The face of an element at a depth of its curves.
+Patch face_of(const Elements& elements, std::size_t element, std::size_t depth);
+
 /// The elements of every curve, as one list.
 class Stars {
  public:

@@ -84,8 +84,10 @@ Run of_outline(std::span<const Point> loop) {
   return run.size() > 1 ? run : Run();
 }
 
-Run of_stack(const Soma& soma) {
-  Run run;
+}  // namespace
+
+std::vector<Point> outline_discs(const Soma& soma) {
+  std::vector<Point> discs;
   for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
     const std::span<const Point> loop = soma.contour(i);
     if (loop.empty()) continue;
@@ -93,17 +95,15 @@ Run of_stack(const Soma& soma) {
     for (const Point& p : loop) middle += p.position() / float(loop.size());
     float radius = 0.f;
     for (const Point& p : loop) radius += (p.position() - middle).norm() / float(loop.size());
-    run.push_back(point(middle, radius));
+    discs.push_back(point(middle, radius));
   }
-  return run;
+  return discs;
 }
-
-}  // namespace
 
 std::vector<std::vector<Point>> soma_shape(const Soma& soma) {
   if (soma.kind == SomaKind::cylinders) return of_cylinders(soma);
   if (soma.kind != SomaKind::contours || soma.contour_starts.empty()) return {};
-  Run run = soma.contour_starts.size() == 1 ? of_outline(soma.contour(0)) : of_stack(soma);
+  Run run = soma.contour_starts.size() == 1 ? of_outline(soma.contour(0)) : outline_discs(soma);
   return run.size() > 1 ? std::vector<Run>(1, std::move(run)) : std::vector<Run>();
 }
 

@@ -14,4 +14,7 @@ namespace forest {
 /// sphere and for none.
 std::vector<std::vector<Point>> soma_shape(const Soma& soma);
 
+/// The middle and mean radius of each outline, in their order.
+std::vector<Point> outline_discs(const Soma& soma);
+
 }  // namespace forest

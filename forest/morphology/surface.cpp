@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "forest/geometry/polygonise.h"
+#include "forest/morphology/soma_shape.h"
 
 namespace forest {
 namespace {
@@ -19,21 +20,6 @@ struct SomaPiece {
 
 Vec4 vec4(const Point& p) { return {p.x, p.y, p.z, p.radius}; }
 
-/// The middle and mean radius of each outline, in their order.
-std::vector<Vec4> outlines(const Soma& soma) {
-  std::vector<Vec4> discs;
-  for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
-    const std::span<const Point> loop = soma.contour(i);
-    if (loop.empty()) continue;
-    Vec3 middle = Vec3::Zero();
-    for (const Point& p : loop) middle += p.position() / float(loop.size());
-    float radius = 0.f;
-    for (const Point& p : loop) radius += (p.position() - middle).norm() / float(loop.size());
-    discs.emplace_back(middle.x(), middle.y(), middle.z(), radius);
-  }
-  return discs;
-}
-
 std::vector<SomaPiece> pieces(const Soma& soma) {
   std::vector<SomaPiece> list;
   const Vec4 mean = vec4(soma.sphere());
@@ -42,8 +28,8 @@ std::vector<SomaPiece> pieces(const Soma& soma) {
       if (soma.parents[i] >= 0)
         list.push_back({vec4(soma.points[std::size_t(soma.parents[i])]), vec4(soma.points[i])});
   } else if (soma.kind == SomaKind::contours) {
-    const std::vector<Vec4> discs = outlines(soma);
-    for (std::size_t i = 1; i < discs.size(); ++i) list.push_back({discs[i - 1], discs[i]});
+    const std::vector<Point> discs = outline_discs(soma);
+    for (std::size_t i = 1; i < discs.size(); ++i) list.push_back({vec4(discs[i - 1]), vec4(discs[i])});
   }
   if (list.empty() && soma.kind != SomaKind::none && mean.w() > 0.f) list.push_back({mean, mean});
   return list;

@@ -89,7 +89,8 @@ inline constexpr std::uint32_t soma_section = 0xffffffffu;
 std::vector<std::uint32_t> branch_numbers(const Morphology& morphology);
 
 /// Positions are relative to the centre of the soma (or the first point when there is none). The soma is one segment,
-/// the very first, when it has a size: a sphere; where it has a shape of its own (morphology/soma_shape.h), cones beside it; each stem is joined to it by a cone. A neuron without any segment has no cluster.
+/// the very first, when it has a size: a sphere; where it has a shape of its own (morphology/soma_shape.h), cones beside it. Each
+/// stem is joined to it by a cone. A neuron without any segment has no cluster.
 ClusterTree build_clusters(const Morphology& morphology);
 
 }  // namespace forest::scene

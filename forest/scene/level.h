@@ -138,7 +138,8 @@ class Eye {
 };
 
 /// A frame-time budget that moves the detail of pictures that follow one another: as many samples a pixel as there is time for,
-/// larger pixels where there is no time for one, and within them the acceptable error, which pictures that took too long make larger and quick ones smaller.
+/// larger pixels where there is no time for one, and within them the acceptable error, which pictures that took too long make
+/// larger and quick ones smaller.
 class Budget {
  public:
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
