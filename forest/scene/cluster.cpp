@@ -714,10 +714,15 @@ class Leaves {
     if (!(soma_.radius > 0.f)) return;
     const auto shape = soma_shape(m_.soma());
     Vec4 ball = vertex(soma_);
-    float thickest = 0.f;
+    float room = .1f * ball.w();  // for a ball within the shape, that shall not stick out of it
     for (const auto& run : shape)
-      for (const Point& p : run) thickest = std::max(thickest, p.radius);
-    if (!shape.empty()) ball.w() = std::min(ball.w(), thickest);  // within the shape
+      for (std::size_t i = 1; i < run.size(); ++i) {
+        const Vec4 a = vertex(run[i - 1]), way = vertex(run[i]) - a, to = ball - a;
+        const float length = way.head<3>().squaredNorm();
+        const float t = length > 0.f ? std::clamp(to.head<3>().dot(way.head<3>()) / length, 0.f, 1.f) : 0.f;
+        room = std::max(room, a.w() + t * way.w() - (to - t * way).head<3>().norm());
+      }
+    if (!shape.empty()) ball.w() = std::min(ball.w(), room);
     put(ball), put(ball);
     add({.first = 0, .kind = 1});
     for (const auto& run : shape) {
