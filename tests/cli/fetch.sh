@@ -141,13 +141,15 @@ fails_with 1 'not JSON' fetch --query species:broken --limit 200 --out broken --
 import glob, json, os, signal, subprocess, time
 command = [os.environ["BRAINFOREST"], "fetch", "slow-1", "--out", "killed", "--from", "http://127.0.0.1:" + open("port").read()]
 size, rounds = os.path.getsize("cells/slow-1.swc"), 0
+def received():  # bytes of the part, none where it has just become the cell
+    try: return max(map(os.path.getsize, glob.glob("cache_home/brainforest/*.part")), default=0)
+    except FileNotFoundError: return 0
 while True:
     child = subprocess.Popen(command, stdout=subprocess.DEVNULL, stderr=subprocess.DEVNULL)
     begin = time.monotonic()
-    part = max(map(os.path.getsize, glob.glob("cache_home/brainforest/*.part")), default=0)
+    part = received()
     while child.poll() is None and time.monotonic() - begin < 30:  # a fourth of it, then the axe
-        now = max(map(os.path.getsize, glob.glob("cache_home/brainforest/*.part")), default=0)
-        if now - part > size // 4: break
+        if received() - part > size // 4: break
         time.sleep(.02)
     if child.poll() is not None: break
     child.send_signal(signal.SIGKILL)
