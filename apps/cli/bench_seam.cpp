@@ -89,7 +89,8 @@ class Walk {
 
   /// Stands still until the budget knows what the first picture costs.
   void settle() {
-    for (int i = 0; i < 32; ++i) draw_quick(0);
+    constexpr double long_enough = 3000.;  // milliseconds, for a budget takes its time to go up a step
+    for (double stood = 0.; stood < long_enough; stood += budget_.milliseconds()) draw_quick(0);
   }
   /// To be called for every picture in turn: the budget learns from each.
   Quick draw_quick(std::uint32_t picture) {

@@ -148,6 +148,7 @@ class Budget {
   static constexpr double with_gaze = 15.5;
 
   explicit Budget(double milliseconds = usual) : milliseconds_(milliseconds) {}
+  double milliseconds() const { return milliseconds_; }  // that a picture may take
   std::uint32_t samples() const;
   /// As Detail::pixel.
   float pixel() const;
