@@ -240,12 +240,14 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
     begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   }
   // Where nothing is tangled any more volumes can be evened, and what is sheared still has room.
-  Shaping even{
+  const Shaping even{
       .enough = .5, .wanted = .62, .volume = options.volume, .even = 16., .worst_off = 100., .gain = .01};
-  if (!even_and_well_shaped(cortex.elements, options.volume)) {
+  Shaping roomy = even;
+  roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
+  constexpr int evenings = 3;
+  for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, options.volume); ++time) {
     improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
-    even.along = 1600., even.off = 50., even.worst_off = 400.;
-    improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
+    improve_shapes(cortex.elements, outer_tree, inner_tree, roomy, progress);
     begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
   }
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
