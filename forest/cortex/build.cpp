@@ -244,7 +244,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
       .enough = .5, .wanted = .62, .volume = options.volume, .even = 16., .worst_off = 100., .gain = .01};
   Shaping roomy = even;
   roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  constexpr int evenings = 3;
+  constexpr int evenings = 2, last_evenings = 3;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, options.volume); ++time) {
     improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
     improve_shapes(cortex.elements, outer_tree, inner_tree, roomy, progress);
@@ -254,6 +254,11 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.wall += cortex.left_out.volume;
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
   fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
+  // Faces that take what they lacked make volumes uneven again.
+  for (int time = 0; time < last_evenings && !even_and_well_shaped(cortex.elements, options.volume); ++time) {
+    improve_shapes(cortex.elements, outer_tree, inner_tree, roomy, progress);
+    fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
+  }
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }
