@@ -84,6 +84,56 @@ bool even_and_well_shaped(const Elements& elements, double volume) {
          100 * std::ranges::count(sheared, 1) <= long(elements.size());
 }
 
+// From elements as they are dropped to those that are valid, well shaped, of even volumes, and lie on both surfaces.
+void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner, double volume,
+           Progress& progress) {
+  fit_faces(cortex.elements, outer, inner, Fit::mean);
+  const Shaping shaping{.volume = volume};
+  for (int time = 0; time < 2; ++time) improve_shapes(cortex.elements, outer, inner, shaping, progress);
+  // The few that are badly shaped still may take room from others and leave a creased surface farther.
+  const Shaping last{.enough = .36,
+                     .wanted = .5,
+                     .volume = volume,
+                     .least = .6,
+                     .most = 1.6,
+                     .even = 1.,
+                     .along = 1600.,
+                     .off = 100.,
+                     .worst_off = 400.,
+                     .rounds = 4,
+                     .iterations = 400,
+                     .gain = .01};
+  improve_shapes(cortex.elements, outer, inner, last, progress);
+  constexpr double least_jacobian = .2;
+  begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
+  cortex.mending = mend(cortex.elements, outer, inner, progress);
+  if (cortex.mending.before > 0) {
+    // What is still tangled has another start now.
+    improve_shapes(cortex.elements, outer, inner, last, progress);
+    begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
+  }
+  // Where nothing is tangled any more volumes can be evened, and what is sheared still has room.
+  const Shaping even{
+      .enough = .5, .wanted = .62, .volume = volume, .even = 16., .worst_off = 100., .gain = .01};
+  Shaping roomy = even;
+  roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
+  constexpr int evenings = 2, last_evenings = 3;
+  for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
+    improve_shapes(cortex.elements, outer, inner, even, progress);
+    improve_shapes(cortex.elements, outer, inner, roomy, progress);
+    begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
+  }
+  cortex.left_out = leave_out(cortex.elements, least_jacobian);
+  cortex.wall += cortex.left_out.volume;
+  fit_faces(cortex.elements, outer, inner, Fit::places);
+  fit_faces(cortex.elements, outer, inner, Fit::volume);
+  // Faces that take what they lacked make volumes uneven again.
+  for (int time = 0; time < last_evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
+    improve_shapes(cortex.elements, outer, inner, roomy, progress);
+    fit_faces(cortex.elements, outer, inner, Fit::volume);
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
@@ -213,52 +263,7 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   });
   progress.end();
   cortex.w_angle = spread_of(angles);
-  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::mean);
-  const Shaping shaping{.volume = options.volume};
-  for (int time = 0; time < 2; ++time)
-    improve_shapes(cortex.elements, outer_tree, inner_tree, shaping, progress);
-  // The few that are badly shaped still may take room from others and leave a creased surface farther.
-  const Shaping last{.enough = .36,
-                     .wanted = .5,
-                     .volume = options.volume,
-                     .least = .6,
-                     .most = 1.6,
-                     .even = 1.,
-                     .along = 1600.,
-                     .off = 100.,
-                     .worst_off = 400.,
-                     .rounds = 4,
-                     .iterations = 400,
-                     .gain = .01};
-  improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
-  constexpr double least_jacobian = .2;
-  begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
-  cortex.mending = mend(cortex.elements, outer_tree, inner_tree, progress);
-  if (cortex.mending.before > 0) {
-    // What is still tangled has another start now.
-    improve_shapes(cortex.elements, outer_tree, inner_tree, last, progress);
-    begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
-  }
-  // Where nothing is tangled any more volumes can be evened, and what is sheared still has room.
-  const Shaping even{
-      .enough = .5, .wanted = .62, .volume = options.volume, .even = 16., .worst_off = 100., .gain = .01};
-  Shaping roomy = even;
-  roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  constexpr int evenings = 2, last_evenings = 3;
-  for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, options.volume); ++time) {
-    improve_shapes(cortex.elements, outer_tree, inner_tree, even, progress);
-    improve_shapes(cortex.elements, outer_tree, inner_tree, roomy, progress);
-    begin_anew(cortex.elements, outer_tree, inner_tree, last, least_jacobian, progress);
-  }
-  cortex.left_out = leave_out(cortex.elements, least_jacobian);
-  cortex.wall += cortex.left_out.volume;
-  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::places);
-  fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
-  // Faces that take what they lacked make volumes uneven again.
-  for (int time = 0; time < last_evenings && !even_and_well_shaped(cortex.elements, options.volume); ++time) {
-    improve_shapes(cortex.elements, outer_tree, inner_tree, roomy, progress);
-    fit_faces(cortex.elements, outer_tree, inner_tree, Fit::volume);
-  }
+  shape(cortex, outer_tree, inner_tree, options.volume, progress);
   cortex.elements.depth = even_depth(cortex.elements, progress);
   return cortex;
 }
