@@ -78,19 +78,14 @@ struct Look {
   bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
 
   std::uint32_t all() const { return frame::first_segments(std::uint32_t(sights.size())); }
-  // What is read of a neuron first, into the cache; and then.
-  void fetch(std::uint32_t index) const {
-    __builtin_prefetch(&forest.instances()[index]);
-    __builtin_prefetch(&forest.spheres()[index]);
-    if (!shown.states.empty()) __builtin_prefetch(&shown.states[index]);
-  }
-  void fetch_root(std::uint32_t index) const {
-    const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
+  // What is read of a neuron, into the cache.
+  void fetch(const Standing& one) const {
+    const Neuron& neuron = neuron_of(one);
     if (neuron.cluster_count) __builtin_prefetch(&forest.clusters()[neuron.first_cluster]);
+    if (!plain) __builtin_prefetch(&shown.states[one.index]);
   }
-  frame::State state(std::uint32_t index) const {
-    return shown.states.empty() ? frame::State{} : shown.states[index];
-  }
+  const Neuron& neuron_of(const Standing& one) const { return forest.neurons()[one.instance.morphology]; }
+  frame::State state(std::uint32_t index) const { return plain ? frame::State{} : shown.states[index]; }
   bool in_sight(const Sight& sight, const Seen& seen) const {
     return seen.nearest < fog.end() && sight.eye.may_see(seen);
   }
@@ -111,12 +106,12 @@ struct Look {
     return has_straws() && straws_do(sight, seen, forest.bricks().back().error());
   }
   // For which of some sights a neuron is drawn by straws.
-  std::uint32_t far(std::uint32_t index, std::uint32_t of_sights) const {
+  std::uint32_t far(std::uint32_t index, const Sphere& sphere, std::uint32_t of_sights) const {
     const frame::State s = state(index);
     if (!has_straws() || !s.is(frame::State::visible) || s.is(frame::State::parted)) return 0;
     if (s.kind == frame::Kind::bricks) return of_sights;
     if (s.kind != frame::Kind::any) return 0;
-    const Seen seen = sights.front().eye.see(forest.spheres()[index]);
+    const Seen seen = sights.front().eye.see(sphere);
     std::uint32_t result = 0;
     for (std::uint32_t rest = of_sights; rest; rest &= rest - 1)
       if (const auto i = std::size_t(std::countr_zero(rest)); straws_do(sights[i], seen)) result |= 1u << i;
@@ -133,16 +128,18 @@ struct Look {
 // A neuron where it stands, and as its own coordinates are seen.
 class Turned {
  public:
-  std::uint32_t index;
+  std::uint32_t standing, index;  // of the instance
   Placed placed;
   Cameras cameras;
 
-  Turned(const Look& look, std::uint32_t instance)
-      : index(instance),
-        placed(look.forest.instances()[instance]),
+  Turned(const Look& look, std::uint32_t number)
+      : standing(number),
+        index(look.forest.standing()[number].index),
+        placed(look.forest.standing()[number].instance),
         cameras(look.cameras.within(placed)),
         look_(look),
-        first_(look.forest.neurons()[look.forest.instances()[instance].morphology].first_cluster) {}
+        neuron_(look.neuron_of(look.forest.standing()[number])),
+        first_(neuron_.first_cluster) {}
 
   // What decides which thin branches of a cluster are drawn: its closeness (Seen::closeness), or that of something it grows
   // into, where that is closer. So nothing that is drawn ends where a branch goes into the depth and gets thin there. It
@@ -157,8 +154,7 @@ class Turned {
   void look_at_all() {
     constexpr float flat = .1f, deep = .2f;  // radius by distance
     const frame::Camera& camera = look_.sights.front().eye.camera();
-    const Neuron& neuron = look_.forest.neurons()[look_.forest.instances()[index].morphology];
-    const auto clusters = look_.forest.clusters().subspan(first_, neuron.cluster_count);
+    const auto clusters = look_.forest.clusters().subspan(first_, neuron_.cluster_count);
     const Seen seen = cameras.now(clusters.front().sphere());
     whole_ = seen.closeness(camera.near);
     const float depth = seen.at.z() > seen.radius ? seen.radius / seen.at.z() : 1.f;
@@ -188,6 +184,7 @@ class Turned {
   }
 
   const Look& look_;
+  const Neuron& neuron_;
   std::uint32_t first_;  // of its clusters
   std::optional<float> whole_;
   std::vector<float> close_;  // of every cluster but the first; empty: as the whole neuron
@@ -299,7 +296,7 @@ void choose_groups(const Look& look, const Sight& sight, Turned& neuron, std::ui
       add(cut, item(index, c.first_segment + first, drawn, neuron.placed(around)), kind,
           sight.eye.thin(judged.seen(), c.thickness));
   }
-  if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, index, at, hidden});
+  if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, neuron.standing, at, hidden});
 }
 
 // For each sight, from one cluster on; returns which of them may see it.
@@ -333,7 +330,7 @@ std::uint32_t choose_clusters(const Look& look, Turned& neuron, std::uint32_t fr
       // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
       if (!sight.eye.may_see(seen)) return;
       if (at == from) may_see |= 1u << s;
-      if (judged.left_out(look, sight, {LeftOut::cluster, index, at, 0}, cut)) {
+      if (judged.left_out(look, sight, {LeftOut::cluster, neuron.standing, at, 0}, cut)) {
       } else if (!c.is_leaf() && (parted || !look.good_enough(sight, seen, c.error))) {
         finer |= 1u << s;
       } else if (parted) {
@@ -352,9 +349,10 @@ std::uint32_t choose_clusters(const Look& look, Turned& neuron, std::uint32_t fr
   return may_see;
 }
 
-void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
-  const frame::Instance& instance = look.forest.instances()[index];
-  const Neuron& neuron = look.forest.neurons()[instance.morphology];
+void choose_soma(const Look& look, std::uint32_t number, std::uint32_t sights, std::span<Cut> cuts) {
+  const Standing& one = look.forest.standing()[number];
+  const auto& [around, instance, index] = one;
+  const Neuron& neuron = look.neuron_of(one);
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
   if (!(neuron.soma_radius > 0.f)) return;
   frame::Item ball = item(index, neuron.first_segment, 1, sphere);
@@ -368,24 +366,25 @@ void choose_soma(const Look& look, std::uint32_t index, std::uint32_t sights, st
   each_of(sights, [&](std::size_t s) {
     const Sight& sight = look.sights[s];
     if (!look.in_sight(sight, judged.seen())) return;
-    if (judged.left_out(look, sight, {LeftOut::soma, index, 0, 0}, cuts[s])) return;
+    if (judged.left_out(look, sight, {LeftOut::soma, number, 0, 0}, cuts[s])) return;
     const bool large = neuron.soma_radius * sight.eye.magnification(judged.seen()) > dot_limit;
     (large ? cuts[s].capsules : cuts[s].dots).push_back(ball);
     ++cuts[s].segments;
   });
 }
 
-void choose_neuron(const Look& look, std::uint32_t index, std::uint32_t sights, std::span<Cut> cuts) {
-  if (!(look.state(index).flags & (frame::State::visible | frame::State::parted))) return;
-  const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
+void choose_neuron(const Look& look, std::uint32_t number, std::uint32_t sights, std::span<Cut> cuts) {
+  const Standing& one = look.forest.standing()[number];
+  if (!(look.state(one.index).flags & (frame::State::visible | frame::State::parted))) return;
+  const Neuron& neuron = look.neuron_of(one);
   if (!neuron.cluster_count) return;
-  if (const std::uint32_t far = look.far(index, sights)) {
+  if (const std::uint32_t far = look.far(one.index, one.sphere, sights)) {
     each_of(far, [&](std::size_t s) { ++cuts[s].far; });
     if (!(sights &= ~far)) return;
   }
   // The soma lies within its root.
-  Turned turned(look, index);
-  choose_soma(look, index, choose_clusters(look, turned, neuron.first_cluster, sights, cuts), cuts);
+  Turned turned(look, number);
+  choose_soma(look, number, choose_clusters(look, turned, neuron.first_cluster, sights, cuts), cuts);
 }
 
 struct Open {
@@ -414,12 +413,10 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     if (!within) continue;
     for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back({node.first_child + c, within});
     if (node.child_count) continue;
-    // They are neighbours in space, not in memory.
-    const auto members = groves.members().subspan(node.first, node.count);
-    for (const std::uint32_t i : members) look.fetch(i);
-    for (std::size_t k = 0; k < members.size(); ++k) {
-      if (k + 2 < members.size()) look.fetch_root(members[k + 2]);
-      choose_neuron(look, members[k], within, cuts);
+    const auto standing = look.forest.standing();
+    for (std::uint32_t i = node.first, end = node.first + node.count; i < end; ++i) {
+      if (i + 2 < end) look.fetch(standing[i + 2]);
+      choose_neuron(look, i, within, cuts);
     }
   }
 }
@@ -435,7 +432,7 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
   if (!look.plain || !look.straws_do(sight, sight.eye.see(wide))) {
     const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
     for (std::uint32_t rest = shown; rest; rest &= rest - 1)
-      if (const int i = std::countr_zero(rest); !look.far(owners[std::size_t(i)].instance, 1u << s))
+      if (const int i = std::countr_zero(rest); !look.far(owners[std::size_t(i)].instance, look.forest.spheres()[owners[std::size_t(i)].instance], 1u << s))
         shown &= ~(1u << i);
   }
   const auto put = [&](std::uint32_t drawn, const Sphere& around) {
@@ -631,7 +628,7 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
     for (std::size_t n = begin; n < end; ++n) {
       if (const LeftOut& soon = left_out[std::min(n + 4, left_out.size() - 1)];
           soon.what == LeftOut::cluster) {
-        look.fetch(soon.instance);
+        look.fetch(look.forest.standing()[soon.standing]);
         fetch(forest.clusters()[soon.number]);
       }
       const LeftOut& l = left_out[n];
@@ -640,14 +637,14 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
           choose_grove(look, {l.number, 1}, cuts);
           break;
         case LeftOut::soma:
-          choose_soma(look, l.instance, 1, cuts);
+          choose_soma(look, l.standing, 1, cuts);
           break;
         case LeftOut::brick:
           l.groups ? choose_straws(look, 0, l.number, l.groups, cuts.front())
                    : choose_bricks(look, {l.number, 1}, cuts);
           break;
         case LeftOut::cluster:
-          if (!turned || turned->index != l.instance) turned.emplace(look, l.instance);
+          if (!turned || turned->standing != l.standing) turned.emplace(look, l.standing);
           if (l.groups)
             choose_groups(look, now, *turned, l.number, l.groups,
                           turned->cameras.now(forest.clusters()[l.number].sphere()), cuts.front());

@@ -19,7 +19,7 @@ namespace forest::scene {
 struct LeftOut {
   enum What : std::uint32_t { cluster, soma, grove, brick };
   What what = cluster;
-  std::uint32_t instance = 0;  // of a cluster or a soma
+  std::uint32_t standing = 0;  // of a cluster or a soma: whose, in Forest::standing()
   std::uint32_t number = 0;    // of the cluster, the grove or the brick
   std::uint32_t groups = 0;    // bit i: group i; 0: all of it, and all below
 };

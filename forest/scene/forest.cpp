@@ -79,6 +79,7 @@ struct Forest::Data {
   Bounds soma_bounds;
   std::vector<Sphere> spheres;
   Groves groves;
+  std::vector<Standing> standing;
   std::uint64_t segment_total = 0, bytes = 0;
 
   template <class T>
@@ -115,6 +116,7 @@ std::span<const Brick> Forest::bricks() const { return data_->as<Brick>(Part::br
 std::span<const frame::Owner> Forest::owners() const { return data_->as<frame::Owner>(Part::owners); }
 std::span<const Sphere> Forest::spheres() const { return data_->spheres; }
 const Groves& Forest::groves() const { return data_->groves; }
+std::span<const Standing> Forest::standing() const { return data_->standing; }
 std::span<const std::uint32_t> Forest::types() const { return data_->as<std::uint32_t>(Part::types); }
 std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::uint32_t>(Part::layers); }
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
@@ -316,6 +318,11 @@ void Forest::Data::take_instances(const Refuse& refuse) {
     spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
   });
   groves = Groves(spheres);
+  standing.resize(instances.size());
+  parallel_for(standing.size(), 1024, [&](std::size_t m) {
+    const std::uint32_t i = groves.members()[m];
+    standing[m] = {spheres[i], instances[i], i};
+  });
 }
 
 // Runs of nodes cover all neurons, one after the other; a file that names none is one population.

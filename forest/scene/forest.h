@@ -44,6 +44,13 @@ struct SectionFacts {
 
 static_assert(sizeof(Neuron) == 32 && sizeof(SectionFacts) == 32);
 
+/// A planted neuron, with what is asked of it first.
+struct Standing {
+  Sphere sphere;  // around all that belongs to it
+  frame::Instance instance;
+  std::uint32_t index;  // of the instance
+};
+
 /// Packs a circuit. `neurons[i]` is the one named circuit.morphologies[i]. The same input gives the same bytes.
 /// @param nodes  what SONATA calls the instances; without runs: 0, 1, 2, … of a population named as the circuit
 std::vector<std::byte> pack(const circuit::Circuit& circuit, std::span<const Morphology> neurons,
@@ -91,6 +98,7 @@ class Forest {
   const Bounds& soma_bounds() const;        // of all soma centres
   std::span<const Sphere> spheres() const;  // of every instance: around all that belongs to it
   const Groves& groves() const;             // of these spheres
+  std::span<const Standing> standing() const;  // of every member of the groves: neighbours lie together in memory
   std::uint64_t segment_total() const;      // original segments of all instances, as if each were stored
   std::uint64_t bytes() const;              // of the file
   frame::Geometry geometry() const { return {segments(), instances(), owners()}; }
