@@ -98,9 +98,10 @@ class Forest {
   const Bounds& soma_bounds() const;        // of all soma centres
   std::span<const Sphere> spheres() const;  // of every instance: around all that belongs to it
   const Groves& groves() const;             // of these spheres
-  std::span<const Standing> standing() const;  // of every member of the groves: neighbours lie together in memory
-  std::uint64_t segment_total() const;      // original segments of all instances, as if each were stored
-  std::uint64_t bytes() const;              // of the file
+  std::span<const Standing> standing()
+      const;                            // of every member of the groves: neighbours lie together in memory
+  std::uint64_t segment_total() const;  // original segments of all instances, as if each were stored
+  std::uint64_t bytes() const;          // of the file
   frame::Geometry geometry() const { return {segments(), instances(), owners()}; }
 
  private:

@@ -1,0 +1,350 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/scene/sketch.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace forest::scene {
+namespace {
+
+constexpr float tolerance_step = 1.3f;
+constexpr float hopeless = 1e4f;  // µm; no neuron needs a larger tolerance
+constexpr float widest = 3.f;     // a coarse segment is at most this many times as thick as the original
+
+using Four = Eigen::Array4f;  // computed side by side
+
+}  // namespace
+
+Sketch::Sketch(const Drawing& drawing, const Draft& a, const Draft& b, const std::function<bool(std::uint32_t)>& outside, std::vector<std::uint8_t>& numbers) {
+  for (const Draft* d : {&a, &b})
+    for (const Strip& s : drawing.strips_of(*d)) {
+      Line& line = lines_[line_count_++];
+      static_cast<Strip&>(line) = s;
+      for (std::uint32_t* node : {&line.begin, &line.end}) {
+        std::uint8_t& number = numbers[*node];
+        if (number == unnumbered) {
+          number = std::uint8_t(node_count_);
+          if (outside(*node)) outside_.add(node_count_);
+          nodes_[node_count_++] = *node;
+        }
+        *node = number;
+      }
+    }
+  for (std::uint32_t i = 0; i < node_count_; ++i) numbers[nodes_[i]] = unnumbered;
+  Links links;
+  link(links);
+  gather(links, [&](std::uint32_t from) {
+    const Vec4& v = drawing.vertices[from];
+    x_[vertex_count_] = v.x(), y_[vertex_count_] = v.y(), z_[vertex_count_] = v.z();
+    radius_[vertex_count_] = v.w();
+    places_[vertex_count_++] = drawing.places[from];
+  });
+}
+
+void Sketch::coarsen(float tolerance) {
+  const float before = area();
+  std::fill_n(dropped_reach_.begin(), node_count_, -1.f);
+  for (std::uint32_t i = 0; i < line_count_; ++i) measure(lines_[i], tolerance * tolerance);
+  for (float next_tip = 0.f;; tolerance *= tolerance_step) {
+    if (tolerance >= next_tip) next_tip = drop_tips(tolerance);
+    if (heavier(tolerance * tolerance) - line_count_ <= limit || tolerance > hopeless) break;
+  }
+  keep([&, least = tolerance * tolerance](std::uint32_t, std::uint32_t v) { return weight_[v] > least; });
+  if (segment_count() > limit) keep_largest();
+  const float after = area();
+  const float widening = after > 0.f ? std::clamp(before / after, 1.f, widest) : 1.f;
+  for (std::uint32_t i = 0; i < line_count_; ++i) {
+    Line& line = lines_[i];
+    if (line.kind == 1) continue;
+    for (std::uint32_t v = line.first; v < line.first + line.count; ++v)
+      radius_[v] = std::min(radius_[v] * widening, radius_[v] + tolerance);
+  }
+}
+
+void Sketch::write(Drawing& drawing, Draft& draft) const {
+  draft.first_strip = std::uint32_t(drawing.strips.size());
+  draft.strip_count = line_count_;
+  const auto first = std::uint32_t(drawing.vertices.size());
+  for (std::uint32_t i = 0; i < line_count_; ++i) {
+    Strip strip = lines_[i];
+    strip.first += first;
+    strip.begin = nodes_[strip.begin], strip.end = nodes_[strip.end];
+    drawing.strips.push_back(strip);
+  }
+  for (std::uint32_t v = 0; v < vertex_count_; ++v)
+    drawing.vertices.emplace_back(x_[v], y_[v], z_[v], radius_[v]);
+  drawing.places.insert(drawing.places.end(), places_.begin(), places_.begin() + vertex_count_);
+}
+
+float Sketch::measured_error(std::span<const Vec4> points, float worst) const {
+  struct Group {  // four segments
+    Four x, y, z, dx, dy, dz, inverse;
+
+    [[gnu::always_inline]] Four squared_distance(const Vec4& point) const {
+      const Four px = point.x() - x, py = point.y() - y, pz = point.z() - z;
+      const Four at = ((px * dx + py * dy + pz * dz) * inverse).max(0.f).min(1.f);
+      return (px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square();
+    }
+  };
+  std::array<Group, limit / 4> groups;
+  std::uint32_t count = 0;
+  const auto set = [&](std::uint32_t a, std::uint32_t b) {
+    Group& g = groups[count / 4];
+    const std::uint32_t i = count++ % 4;
+    g.x[i] = x_[a], g.y[i] = y_[a], g.z[i] = z_[a];
+    g.dx[i] = x_[b] - x_[a], g.dy[i] = y_[b] - y_[a], g.dz[i] = z_[b] - z_[a];
+  };
+  for (std::uint32_t i = 0; i < line_count_; ++i)
+    for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v) set(v - 1, v);
+  while (count % 4) set(vertex_count_ - 1, vertex_count_ - 1);
+  const std::uint32_t group_count = count / 4;
+  for (Group& g : std::span(groups).first(group_count)) {
+    const Four squared = g.dx.square() + g.dy.square() + g.dz.square();
+    g.inverse = (squared > 0.f).select(squared.inverse(), 0.f);
+  }
+  float worst_squared = worst * worst;
+  std::uint32_t near = 0;  // the segment that is asked first
+  for (std::size_t i = 0; i < points.size();) {
+    const std::size_t end = std::min(i + 4, points.size());
+    if (end == i + 4) {  // four points to one segment, and to the next few, as the branch goes on
+      Mat4 four = Eigen::Map<const Mat4>(points[i].data());
+      four.transposeInPlace();
+      Four squared = Four::Constant(INFINITY);
+      bool all = false;
+      for (const std::uint32_t beyond = std::min(near + 4, count); near < beyond && !all; ++near) {
+        const Group& g = groups[near / 4];
+        const std::uint32_t n = near % 4;
+        const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
+        const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
+                   pz = four.col(2).array() - g.z[n];
+        const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
+        squared = squared.min((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square());
+        all = (squared <= worst_squared).all();
+      }
+      --near;
+      if (all) {
+        i = end;
+        continue;
+      }
+    }
+    for (; i < end; ++i) {  // one point to four segments; they follow one another as the points do
+      std::uint32_t at = near / 4;
+      Four squared = groups[at].squared_distance(points[i]);
+      float nearest = squared.minCoeff();
+      for (std::uint32_t asked = 1, g = at; asked < group_count && nearest > worst_squared; ++asked) {
+        g = g + 1 < group_count ? g + 1 : 0;
+        const Four other = groups[g].squared_distance(points[i]);
+        if (const float least = other.minCoeff(); least < nearest) nearest = least, squared = other, at = g;
+      }
+      near = 4 * at;
+      while (near % 4 < 3 && squared[near % 4] != nearest) ++near;
+      worst_squared = std::max(worst_squared, nearest);
+    }
+  }
+  return std::sqrt(worst_squared);
+}
+
+float Sketch::distance(std::uint32_t a, std::uint32_t b) const {
+  const float x = x_[a] - x_[b], y = y_[a] - y_[b], z = z_[a] - z_[b];
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+float Sketch::area() const {
+  float sum = 0.f;
+  for (std::uint32_t i = 0; i < line_count_; ++i) sum += area(lines_[i]);
+  return sum;
+}
+
+float Sketch::area(const Line& line) const {
+  Four sum = Four::Zero();
+  for (std::uint32_t v = line.first + 1, end = line.first + line.count; v < end; v += 4) {
+    const auto rise = [v](const OfVertices<float>& list) {
+      return Four(Eigen::Map<const Four>(&list[v]) - Eigen::Map<const Four>(&list[v - 1]));
+    };
+    const Four radii = Eigen::Map<const Four>(&radius_[v]) + Eigen::Map<const Four>(&radius_[v - 1]);
+    const Four of = (rise(x_).square() + rise(y_).square() + rise(z_).square()).sqrt() * radii;
+    sum += (Four(0.f, 1.f, 2.f, 3.f) < float(end - v)).select(of, 0.f);
+  }
+  return sum.sum();
+}
+
+void Sketch::link(Links& links) const {
+  Nodes begun, begun_again, ended, ended_again;
+  std::array<std::uint8_t, most_nodes> beginner;
+  for (std::uint32_t i = 0; i < line_count_; ++i) {
+    const Line& line = lines_[i];
+    (begun.has(line.begin) ? begun_again : begun).add(line.begin);
+    (ended.has(line.end) ? ended_again : ended).add(line.end);
+    beginner[line.begin] = std::uint8_t(i);
+  }
+  for (std::uint32_t i = 0; i < line_count_; ++i) {
+    const std::uint32_t node = lines_[i].end;
+    links.next[i] = none;
+    if (!begun.has(node) || begun_again.has(node) || ended_again.has(node) || outside_.has(node)) continue;
+    const std::uint8_t follower = beginner[node];
+    if (follower == i || lines_[follower].kind != lines_[i].kind) continue;
+    links.next[i] = follower;
+    links.swallowed |= 1ull << follower;
+  }
+}
+
+template <class Add>
+void Sketch::gather(const Links& links, Add&& add) {
+  std::array<Line, most_lines> old;
+  const std::uint32_t count = line_count_;
+  std::copy_n(lines_.begin(), count, old.begin());
+  line_count_ = 0;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    if (links.swallowed >> i & 1) continue;
+    Line& line = lines_[line_count_++];
+    line = old[i];
+    line.first = vertex_count_;
+    for (std::uint32_t v = old[i].first; v < old[i].first + old[i].count; ++v) add(v);
+    for (std::uint8_t n = links.next[i]; n != none; n = links.next[n]) {
+      const Line& more = old[n];
+      for (std::uint32_t v = more.first + 1; v < more.first + more.count; ++v) add(v);
+      line.end = more.end;
+      if (more.appears < line.appears)
+        line.appears = more.appears, line.rank = more.rank, line.mean = more.mean;
+    }
+    if (links.next[i] != none) line.reach = -1.f;  // not known
+    line.count = vertex_count_ - line.first;
+  }
+}
+
+void Sketch::join(float least_weight) {
+  Links links;
+  link(links);
+  if (!links.swallowed) return;
+  const auto old = [count = vertex_count_](const auto& list) {
+    std::remove_cvref_t<decltype(list)> copy;
+    std::copy_n(list.begin(), count, copy.begin());
+    return copy;
+  };
+  const auto x = old(x_), y = old(y_), z = old(z_), radius = old(radius_), weight = old(weight_);
+  const auto places = old(places_);
+  vertex_count_ = 0;
+  gather(links, [&](std::uint32_t from) {
+    x_[vertex_count_] = x[from], y_[vertex_count_] = y[from], z_[vertex_count_] = z[from];
+    radius_[vertex_count_] = radius[from];
+    weight_[vertex_count_] = weight[from];
+    places_[vertex_count_++] = places[from];
+  });
+  for (std::uint32_t i = 0; i < line_count_; ++i)
+    if (lines_[i].reach < 0.f) measure(lines_[i], least_weight);
+}
+
+void Sketch::measure(Line& line, float least) {
+  const std::uint32_t begin = line.first, end = line.first + line.count - 1;
+  weight_[begin] = weight_[end] = INFINITY;
+  if (line.count == 2) {
+    line.reach = distance(begin, end);
+    return;
+  }
+  float reach = 0.f;
+  for (std::uint32_t v = begin + 1; v <= end; ++v) {
+    const float x = x_[v] - x_[begin], y = y_[v] - y_[begin], z = z_[v] - z_[begin];
+    reach = std::max(reach, x * x + y * y + z * z);
+  }
+  line.reach = std::sqrt(reach);
+  std::array<std::pair<std::uint32_t, std::uint32_t>, most_vertices> open;
+  std::size_t waiting = 0;
+  open[waiting++] = {begin, end};
+  OfVertices<float> deviation;
+  while (waiting) {
+    const auto [a, b] = open[--waiting];
+    if (b - a < 2) continue;
+    const float dx = x_[b] - x_[a], dy = y_[b] - y_[a], dz = z_[b] - z_[a], dr = radius_[b] - radius_[a];
+    const float squared = dx * dx + dy * dy + dz * dz, inverse = squared > 0.f ? 1.f / squared : 0.f;
+    for (std::uint32_t v = a + 1; v < b; v += 4) {
+      const auto four = [v](const OfVertices<float>& list) {
+        return Four(Eigen::Map<const Four>(&list[v]));
+      };
+      const Four x = four(x_) - x_[a], y = four(y_) - y_[a], z = four(z_) - z_[a],
+                 r = four(radius_) - radius_[a];
+      const Four at = ((x * dx + y * dy + z * dz) * inverse).max(0.f).min(1.f);
+      Eigen::Map<Four> out(&deviation[v]);
+      out = ((x - at * dx).square() + (y - at * dy).square() + (z - at * dz).square())
+                .max((r - at * dr).square());
+    }
+    const std::uint32_t split =
+        std::uint32_t(std::max_element(&deviation[a + 1], &deviation[b]) - deviation.data());
+    // The lighter end of the range is the one at which was split to come to it.
+    const float weight = std::min({deviation[split], weight_[a], weight_[b]});
+    if (!(weight > least)) {
+      std::fill(&weight_[a + 1], &weight_[b], 0.f);
+      continue;
+    }
+    weight_[split] = weight;
+    open[waiting++] = {a, split};
+    open[waiting++] = {split, b};
+  }
+}
+
+std::uint32_t Sketch::heavier(float weight) const {
+  std::int32_t count = 0;
+  for (std::uint32_t v = 0; v < vertex_count_; ++v) count += weight_[v] > weight;
+  return std::uint32_t(count);
+}
+
+float Sketch::drop_tips(float tolerance) {
+  while (line_count_ > 1) {
+    Nodes open = outside_;  // where something goes on
+    for (std::uint32_t i = 0; i < line_count_; ++i) open.add(lines_[i].begin);
+    std::uint64_t dropped = 0;
+    float next = INFINITY;
+    for (std::uint32_t i = 0; i < line_count_; ++i) {
+      const Line& line = lines_[i];
+      if (line.kind == 1 || open.has(line.end)) continue;
+      float reach = line.reach;
+      if (const float below = dropped_reach_[line.end]; below >= 0.f)
+        reach = std::max(reach, below + distance(line.first + line.count - 1, line.first));
+      if (reach > tolerance) {
+        next = std::min(next, reach);
+        continue;
+      }
+      dropped |= 1ull << i;
+      dropped_reach_[line.begin] = std::max(dropped_reach_[line.begin], reach);
+    }
+    if (std::uint32_t(std::popcount(dropped)) == line_count_) dropped &= ~1ull;
+    if (!dropped) return next;
+    keep([&](std::uint32_t i, std::uint32_t) { return !(dropped >> i & 1); });
+    join(tolerance * tolerance);
+  }
+  return INFINITY;
+}
+
+void Sketch::keep_largest() {
+  std::array<std::pair<float, std::uint32_t>, most_lines> order;
+  for (std::uint32_t i = 0; i < line_count_; ++i) order[i] = {-area(lines_[i]), i};
+  std::sort(order.begin(), order.begin() + line_count_);
+  std::uint64_t stays = 0;
+  std::uint32_t room = limit;
+  for (std::uint32_t i = 0; i < line_count_ && lines_[order[i].second].count - 1 <= room; ++i) {
+    room -= lines_[order[i].second].count - 1;
+    stays |= 1ull << order[i].second;
+  }
+  keep([&](std::uint32_t i, std::uint32_t) { return stays >> i & 1; });
+}
+
+template <class Stays>
+void Sketch::keep(Stays&& stays) {
+  std::uint32_t lines = 0, vertices = 0;
+  for (std::uint32_t i = 0; i < line_count_; ++i) {
+    Line line = lines_[i];
+    const std::uint32_t first = vertices;
+    for (std::uint32_t v = line.first; v < line.first + line.count; ++v) {
+      if (!stays(i, v)) continue;
+      x_[vertices] = x_[v], y_[vertices] = y_[v], z_[vertices] = z_[v];
+      radius_[vertices] = radius_[v];
+      places_[vertices] = places_[v];
+      weight_[vertices++] = weight_[v];
+    }
+    line.first = first, line.count = vertices - first;
+    if (line.count) lines_[lines++] = line;
+  }
+  line_count_ = lines, vertex_count_ = vertices;
+}
+
+}  // namespace forest::scene
