@@ -16,7 +16,8 @@ using Four = Eigen::Array4f;  // computed side by side
 
 }  // namespace
 
-Sketch::Sketch(const Drawing& drawing, const Draft& a, const Draft& b, const std::function<bool(std::uint32_t)>& outside, std::vector<std::uint8_t>& numbers) {
+Sketch::Sketch(const Drawing& drawing, const Draft& a, const Draft& b,
+               const std::function<bool(std::uint32_t)>& outside, std::vector<std::uint8_t>& numbers) {
   for (const Draft* d : {&a, &b})
     for (const Strip& s : drawing.strips_of(*d)) {
       Line& line = lines_[line_count_++];
@@ -258,9 +259,7 @@ void Sketch::measure(Line& line, float least) {
     const float dx = x_[b] - x_[a], dy = y_[b] - y_[a], dz = z_[b] - z_[a], dr = radius_[b] - radius_[a];
     const float squared = dx * dx + dy * dy + dz * dz, inverse = squared > 0.f ? 1.f / squared : 0.f;
     for (std::uint32_t v = a + 1; v < b; v += 4) {
-      const auto four = [v](const OfVertices<float>& list) {
-        return Four(Eigen::Map<const Four>(&list[v]));
-      };
+      const auto four = [v](const OfVertices<float>& list) { return Four(Eigen::Map<const Four>(&list[v])); };
       const Four x = four(x_) - x_[a], y = four(y_) - y_[a], z = four(z_) - z_[a],
                  r = four(radius_) - radius_[a];
       const Four at = ((x * dx + y * dy + z * dz) * inverse).max(0.f).min(1.f);
