@@ -95,8 +95,9 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   return drawn;
 }
 
-void Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
-  if (marks.scale) scene::paint_scale(image, view.camera, view.background);
+std::string Artist::explain(const scene::View& view, const Marks& marks, frame::Image& image) const {
+  std::string missing;
+  if (marks.scale && !scene::paint_scale(image, view.camera, view.background)) missing = "scale bar";
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
@@ -105,8 +106,14 @@ void Artist::explain(const scene::View& view, const Marks& marks, frame::Image& 
     bars.push_back({.map = dressing_.surfaces.map, .low = low, .high = high});
   }
   const bool barred = scene::paint(image, bars, view.background);
-  if (marks.names && colouring_ && !playback_)  // else the simulation's colours are shown, not theirs
-    scene::paint(image, colouring_->legend, view.background, barred);
+  if (marks.names && colouring_ && !playback_) {  // else the simulation's colours are shown, not theirs
+    if (colouring_->legend.empty()) return "the colours of neurons mean nothing here, so there is no legend";
+    if (!scene::paint(image, colouring_->legend, view.background, barred))
+      missing += missing.empty() ? "legend" : " nor a legend";
+  }
+  return missing.empty()
+             ? missing
+             : fmt::format("the picture has no room for a {}; draw it larger, by --size", missing);
 }
 
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,

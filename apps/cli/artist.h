@@ -49,7 +49,8 @@ class Artist {
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
   /// Draws into a picture how it is to be read. Small pictures stay as they are.
-  void explain(const scene::View& view, const Marks& marks, frame::Image& image) const;
+  /// @return  what was asked for and is not in it, a sentence; or nothing
+  std::string explain(const scene::View& view, const Marks& marks, frame::Image& image) const;
   /// From now on branches show the simulation, at the time of View::activity.
   void play(scene::Playback playback) { playback_.emplace(std::move(playback)); }
   /// From now on these surfaces are in the pictures, too.

@@ -244,7 +244,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
                  .1, 20.);
   add_force(command, o->force);
   return [o, &console] {
-    if (!o->force) refuse_existing({o->out});
+    must_take_files({o->out}, o->force);
     const auto begin = Clock::now();
     const Mesh outer = read_mesh(o->outer), inner = read_mesh(o->inner);
     const cortex::Cortex built = cortex::build_cortex(

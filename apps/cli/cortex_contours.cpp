@@ -88,10 +88,22 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options) {
   return volume;
 }
 
+// What contours would cross, before they are found.
+void check_threshold(const cortex::Volume& volume, const fs::path& path, double threshold) {
+  float least = INFINITY, most = -INFINITY;
+  for (const float v : volume.values)
+    if (std::isfinite(v)) least = std::min(least, v), most = std::max(most, v);
+  if (least > most) throw Error(path.string() + ": has no value that is a number");
+  if (!(threshold >= least && threshold < most))
+    throw Error(fmt::format("{}: no boundary lies at --threshold {:g}: its values are {:g} to {:g}",
+                            path.string(), threshold, least, most));
+}
+
 cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& path, const std::string& name,
                                const Options& options, bool pictures) {
   if (std::isnan(options.threshold))
     throw Error(path.string() + ": what is inside is a question of grey; give --threshold");
+  check_threshold(volume, path, options.threshold);
   const cortex::Axis axis = axis_of(options.axis);
   const double low = volume.origin[int(axis)],
                high = low + volume.step[int(axis)] * double(volume.size[std::size_t(axis)] - 1);
@@ -134,7 +146,16 @@ nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console
 }
 
 void run(const Options& options, Console& console) {
-  if (!options.force) refuse_existing({options.out});
+  if (options.out.extension() == ".contours") {
+    must_take_files({options.out}, options.force);
+  } else {
+    must_have_folder(options.out);
+    if (!options.force) refuse_existing({options.out});
+  }
+  if (options.names.size() > options.inputs.size())
+    throw Error(fmt::format("{} are named for {}; name each once",
+                            counted(options.names.size(), "boundary", "boundaries"),
+                            counted(options.inputs.size(), "file")));
   std::vector<cortex::ContourStack> stacks;
   std::vector<Mesh> surfaces;
   std::vector<std::string> surface_names;
@@ -146,6 +167,8 @@ void run(const Options& options, Console& console) {
                              : options.inputs.size() > 2 ? path.stem().string()
                              : i == 0                    ? "outer"
                                                          : "inner";
+    if (i < options.names.size() && std::ranges::count(options.names, name) > 1)
+      throw Error(fmt::format("two boundaries are to be called '{}'; give each a name of its own", name));
     if (fs::is_directory(path) && files_in(path, ".svg").empty()) {
       stacks.push_back(of_volume(read_pictures(path, options), path, name, options, true));
       continue;
@@ -178,11 +201,20 @@ void run(const Options& options, Console& console) {
   cortex::FitSummary summary;
   if (!options.straight)
     stack = cortex::fitted(stack, {.tolerance = 1e3 * options.tolerance}, summary, console.progress());
-  write_contour_files(stack, options.out);
   std::size_t loops = 0;
   double along = 0.;
   for (const cortex::Section& section : stack.sections)
     for (const cortex::Contour& contour : section.contours) ++loops, along += length(contour.curve);
+  if (loops == 0)
+    throw Error(fmt::format("no section of {} has a contour; check --axis, --spacing and --offset",
+                            options.inputs.front().string()));
+  write_contour_files(stack, options.out);
+  // About a quarter of its length is how large a contour is.
+  if (const double size = .25 * along / double(loops); summary.pieces && 1e3 * options.tolerance > .05 * size)
+    console.warn(
+        fmt::format("curves may be {:g} mm off, which is much beside contours of about {:.2g} mm; give a "
+                    "smaller --tolerance, such as {:.1g}",
+                    options.tolerance, size / 1e3, size / 1e5));
   console.print({{"file", options.out.string()},
                  {"sections", stack.sections.size()},
                  {"contours", loops},
@@ -196,9 +228,9 @@ void run(const Options& options, Console& console) {
   console.table(
       {"file", "sections", "contours", "length mm", "cubics", "mm a cubic", "rms mm", "greatest mm"},
       {{options.out.string(), std::to_string(stack.sections.size()), std::to_string(loops),
-        fmt::format("{:.1f}", along / 1e3), std::to_string(summary.pieces),
+        fmt::format("{:.4g}", along / 1e3), std::to_string(summary.pieces),
         summary.pieces ? fmt::format("{:.2f}", summary.length / 1e3 / double(summary.pieces)) : "",
-        fmt::format("{:.4f}", summary.rms / 1e3), fmt::format("{:.3f}", summary.greatest / 1e3)}});
+        fmt::format("{:.3g}", summary.rms / 1e3), fmt::format("{:.3g}", summary.greatest / 1e3)}});
 }
 
 }  // namespace
@@ -256,7 +288,10 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
       ->type_name("FOLDER");
   add_force(command, o->force);
   return [o, &console] {
-    if (!o->svg.empty() && !o->force) refuse_existing({o->svg});
+    if (!o->svg.empty()) {
+      must_have_folder(o->svg);
+      if (!o->force) refuse_existing({o->svg});
+    }
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3, console);
     if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
       throw Error(fmt::format("{}: has no object '{}'", o->file.string(), o->object));

@@ -91,6 +91,8 @@ Mesh edges_of(const cortex::Elements& elements, std::span<const std::uint32_t> o
 }
 
 void run(const Options& o, Console& console) {
+  must_take_surfaces({o.out}, true);
+  if (!o.values.empty()) must_take_files({o.out, o.values}, true);
   const io::ElementsFile file = io::read_elements(o.file);
   const cortex::Elements& elements = file.cortex.elements;
   if (!o.edges.empty()) {
@@ -123,8 +125,9 @@ void run(const Options& o, Console& console) {
   std::string text;
   for (const double value : values)
     for (int k = 0; k < 5; ++k) text += fmt::format("{:.6g}\n", value);
-  write_unless_there(o.out, io::write_surface(mesh, o.out.string()), o.force);
-  if (!o.values.empty()) write_unless_there(o.values, text, o.force);
+  std::vector<std::pair<fs::path, std::string>> files{{o.out, io::write_surface(mesh, o.out.string())}};
+  if (!o.values.empty()) files.emplace_back(o.values, std::move(text));
+  write_unless_there(files, o.force);
   const auto [least, most] = std::ranges::minmax(values);
   console.say(fmt::format("{} at depth {} in {}; {} ({}) from {:.4g} to {:.4g}{}",
                           counted(elements.size(), "element"), o.depth, o.out.string(), measure->name,
@@ -148,17 +151,23 @@ std::function<void()> cortex_faces(CLI::App& command, Console& console) {
   command.add_option("-o,--out", o->out, "The surface to write: .gii, or FreeSurfer's by any other name")
       ->required()
       ->type_name("FILE");
-  command.add_option("--values", o->values, "Text, a number a vertex, as render --overlay takes it")
-      ->type_name("FILE");
-  must_be_within(*command.add_option("--depth", o->depth, "By volume: 0 the outer surface, 1 the inner one")
-                      ->capture_default_str(),
-                 0., 1.);
-  command.add_option("--measure", o->measure, help)->check(CLI::IsMember(names))->capture_default_str();
+  CLI::Option* const values =
+      command.add_option("--values", o->values, "Text, a number a vertex, as render --overlay takes it")
+          ->type_name("FILE");
+  CLI::Option* const depth =
+      command.add_option("--depth", o->depth, "By volume: 0 the outer surface, 1 the inner one")
+          ->capture_default_str();
+  must_be_within(*depth, 0., 1.);
+  CLI::Option* const measure =
+      command.add_option("--measure", o->measure, help)->check(CLI::IsMember(names))->capture_default_str();
   CLI::Option* const edges =
       command
           .add_option("--edges", o->edges,
                       "Instead of a level the edges of these elements, as tubes: 7,12,20-29 or all")
-          ->type_name("LIST");
+          ->type_name("LIST")
+          ->excludes(values)
+          ->excludes(depth)
+          ->excludes(measure);
   must_be_within(
       *command.add_option("--radius", o->radius, "Of the tubes, µm")->needs(edges)->capture_default_str(), .1,
       1000.);

@@ -64,14 +64,10 @@ double least_scaled_jacobian(const cortex::Grid& grid) {
 }
 
 void write(const Options& options, std::span<const cortex::GridPanel> panels) {
-  const std::string extension = options.out.extension().string();
-  if (extension == ".svg")
-    write_unless_there(options.out, cortex::to_svg(panels, options.picture), options.force);
-  else if (extension == ".obj" && panels.size() == 1)
-    write_unless_there(options.out, cortex::to_obj(*panels.front().grid), options.force);
-  else
-    throw Error(fmt::format("'{}' has no ending that can be written; give {}", options.out.string(),
-                            panels.size() == 1 ? ".svg or .obj" : ".svg"));
+  write_unless_there(options.out,
+                     options.out.extension() == ".svg" ? cortex::to_svg(panels, options.picture)
+                                                       : cortex::to_obj(*panels.front().grid),
+                     options.force);
 }
 
 // Every domain by every generator.
@@ -136,7 +132,19 @@ Block block(const Options& options) {
           cortex::sample(elements.hexahedron(options.element), {n, n, n})};
 }
 
+// Before the work.
+void check_out(const Options& options) {
+  if (options.out.empty()) return;
+  const bool many = options.domain.empty() && options.elements.empty();
+  const std::string ending = options.out.extension().string();
+  if (ending != ".svg" && (many || ending != ".obj"))
+    throw Error(fmt::format("'{}' has no ending that can be written; give {}", options.out.string(),
+                            many ? ".svg" : ".svg or .obj"));
+  must_have_folder(options.out);
+}
+
 void run(const Options& options, Console& console) {
+  check_out(options);
   if (options.domain.empty() && options.elements.empty()) return compare(options, console);
   const auto [name, boundary] = block(options);
   const Filled filled = fill(options.generator, boundary);
@@ -170,16 +178,20 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> cortex_grid(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
-  std::string domains, generators = "best";
+  std::string domains;
+  std::vector<std::string> generators{"best"};
   for (const cortex::Domain& row : cortex::domains())
     domains += (domains.empty() ? "" : ", ") + std::string(row.name);
-  for (const cortex::Generator& row : cortex::generators()) generators += ", " + std::string(row.name);
+  for (const cortex::Generator& row : cortex::generators()) generators.emplace_back(row.name);
   command.add_option("domain", options->domain,
                      "The block: " + domains + "; by default all, by every generator");
   CLI::Option* const elements = command.add_option(
       "--elements", options->elements, "File of cortex build; then the block is one of its elements");
   command.add_option("--element", options->element, "Its number")->needs(elements)->capture_default_str();
-  command.add_option("--generator", options->generator, "What fills it: " + generators)
+  command
+      .add_option("--generator", options->generator,
+                  fmt::format("What fills it: {}", fmt::join(generators, ", ")))
+      ->check(CLI::IsMember(generators))
       ->capture_default_str();
   command
       .add_option("--steps", options->steps,

@@ -64,7 +64,11 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                  1e3);
   add_force(command, o->force);
   return [o, &console] {
-    if (!o->force) refuse_existing(o->out);
+    must_take_surfaces(o->out, o->force);
+    if (o->outer == o->inner)
+      throw Error(fmt::format(
+          "'{}' is to be both boundaries; name the outer one by --outer, the inner one by --inner",
+          o->outer));
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     const cortex::Surfaces made = cortex::surfaces_from(stack,
                                                         {.voxel = 1e3 * o->voxel,
@@ -74,14 +78,9 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                                                          .outer = o->outer,
                                                          .inner = o->inner},
                                                         console.progress());
-    // Both or none.
-    NewFile outer(o->out[0]), inner(o->out[1]);
-    const auto put = [](NewFile& file, const std::string& bytes) {
-      file.write(std::as_bytes(std::span(bytes.data(), bytes.size())));
-    };
-    put(outer, io::write_surface(made.outer, o->out[0].string()));
-    put(inner, io::write_surface(made.inner, o->out[1].string()));
-    outer.commit(), inner.commit();
+    write_unless_there({{o->out[0], io::write_surface(made.outer, o->out[0].string())},
+                        {o->out[1], io::write_surface(made.inner, o->out[1].string())}},
+                       true);
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto tell = [&](const fs::path& path, const Mesh& mesh, std::size_t cut) {

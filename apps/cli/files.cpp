@@ -3,9 +3,13 @@
 
 #include <algorithm>
 #include <cctype>
+#include <deque>
 #include <fstream>
 #include <functional>
 #include <map>
+#include <set>
+#include <span>
+#include <unistd.h>
 
 #include <fmt/format.h>
 
@@ -132,6 +136,55 @@ void write_unless_there(const fs::path& to, std::string_view bytes, bool force) 
   if (!force) overwrites.look(to, bytes);
   overwrites.refuse();
   write_file(to, bytes);
+}
+
+void write_unless_there(const std::vector<std::pair<fs::path, std::string>>& files, bool force) {
+  Overwrites overwrites;
+  if (!force)
+    for (const auto& [to, bytes] : files) overwrites.look(to, bytes);
+  overwrites.refuse();
+  std::deque<NewFile> made;
+  for (const auto& [to, bytes] : files)
+    made.emplace_back(to).write(std::as_bytes(std::span(bytes.data(), bytes.size())));
+  for (NewFile& file : made) file.commit();
+}
+
+void must_have_folder(const fs::path& place) {
+  std::error_code none;
+  if (const auto there = fs::status(place, none);
+      fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there))
+    return;  // a stream
+  const fs::path folder = place.has_parent_path() ? place.parent_path() : fs::path(".");
+  const std::string name = repository::escaped(place.string());
+  if (!fs::is_directory(folder, none))
+    throw Error(fmt::format("{}: its folder is not there; make it first", name));
+  if (access(folder.c_str(), W_OK) != 0)
+    throw Error(fmt::format("{}: its folder cannot be written; choose another", name));
+}
+
+void must_take_files(const std::vector<fs::path>& files, bool force) {
+  std::error_code none;
+  std::set<fs::path> places;
+  for (const fs::path& file : files) {
+    const std::string name = repository::escaped(file.string());
+    const auto there = fs::status(file, none);
+    if (!places.insert(fs::weakly_canonical(file, none)).second)
+      throw Error(fmt::format("{} is named twice; give each result a name of its own", name));
+    if (fs::is_directory(there)) throw Error(fmt::format("{} is a folder; name a file in it", name));
+    must_have_folder(file);
+  }
+  if (!force) refuse_existing(files);
+}
+
+void must_take_surfaces(const std::vector<fs::path>& files, bool force) {
+  constexpr std::string_view others[] = {".obj",  ".ply", ".stl", ".off", ".vtk", ".vtp", ".glb",
+                                         ".gltf", ".mz3", ".txt", ".csv", ".h5",  ".nii"};
+  for (const fs::path& file : files)
+    if (std::ranges::count(others, extension_of(file)))
+      throw Error(fmt::format(
+          "{}: surfaces are written as GIFTI (.gii) or in FreeSurfer's format (lh.pial), not as {}",
+          repository::escaped(file.string()), extension_of(file)));
+  must_take_files(files, force);
 }
 
 void refuse_existing(const std::vector<fs::path>& files) {

@@ -7,6 +7,7 @@
 #include <set>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
 namespace forest {
@@ -45,6 +46,17 @@ class Overwrites {
 
 /// One file, unless another holds something else there and `force` is not given.
 void write_unless_there(const std::filesystem::path& to, std::string_view bytes, bool force);
+
+/// Several files, all or none.
+void write_unless_there(const std::vector<std::pair<std::filesystem::path, std::string>>& files, bool force);
+
+/// Throws Error when what is made over minutes could not be put there in the end: two of the places are one, a folder is missing
+/// or cannot be written, a folder is there, or a file, unless `force` is given.
+void must_take_files(const std::vector<std::filesystem::path>& files, bool force);
+/// The same for a surface, which io::write_surface writes: names of other formats than its are refused.
+void must_take_surfaces(const std::vector<std::filesystem::path>& files, bool force);
+/// Throws Error when the folder of something new is missing or cannot be written.
+void must_have_folder(const std::filesystem::path& place);
 
 /// Throws Error when one of them is there, whatever it holds: people write into tables.
 void refuse_existing(const std::vector<std::filesystem::path>& files);

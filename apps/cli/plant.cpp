@@ -58,17 +58,18 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
 
 std::string sentence_of(const Bending& b) {
   const auto change = [](double ratio) { return fmt::format("{:+.1f}", 100. * (ratio - 1.)); };
+  const double longer = 100. * (b.length_ratio - 1.);
   return fmt::format(
-      "bent; {} were taller than the tissue above them and made shorter; {:.3g} m of branches became {} % "
-      "longer, "
+      "bent; {} were taller than the tissue above them and made shorter; {:.3g} m of branches became {:.1f} "
+      "% {}, "
       "single neurons {} to {} % (98 of 100: {} to {} %), and the angles between segments changed by {:.2g}° "
       "in the median; "
       "{:.2g} % of the length lies beyond the pia, {:.2g} % would have and lies on it, {:.2g} % lies in the "
       "white matter, "
       "{:.2g} % left the elements at their rim",
-      counted(b.shortened, "neuron"), b.length * 1e-6, change(b.length_ratio), change(b.ratio.least),
-      change(b.ratio.most), change(b.ratio.p1), change(b.ratio.p99), b.turn.median, 100. * b.beyond_pia,
-      100. * b.pressed, 100. * b.beyond_white, 100. * b.beside);
+      counted(b.shortened, "neuron"), b.length * 1e-6, std::abs(longer), longer < 0. ? "shorter" : "longer",
+      change(b.ratio.least), change(b.ratio.most), change(b.ratio.p1), change(b.ratio.p99), b.turn.median,
+      100. * b.beyond_pia, 100. * b.pressed, 100. * b.beyond_white, 100. * b.beside);
 }
 
 void run(const Options& options, Console& console) {

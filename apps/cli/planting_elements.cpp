@@ -229,6 +229,8 @@ std::vector<std::uint32_t> parse_elements(const std::string& text, const std::fi
     const std::uint32_t first = number();
     std::uint32_t last = first;
     if (at != end && *at == '-') ++at, last = number();
+    if (last < first)
+      throw Error(fmt::format("'{}-{}' runs backwards; write {}-{}", first, last, last, first));
     for (std::uint32_t e = first; e <= last; ++e) chosen.push_back(e);
     if (at == end) break;
     if (*at++ != ',')

@@ -39,6 +39,10 @@ scene::Forest empty_forest() { return scene::Forest::from_bytes(scene::pack(circ
 // What is shown when nobody says what: the neurons, or the surfaces from one side.
 scene::View default_view(const scene::Forest& forest, const scene::Surfaces& surfaces,
                          std::optional<scene::Side> side, float aspect) {
+  if (side && surfaces.empty())
+    throw Error(
+        "--from shows surfaces from a side, and there are none; give --surface, or say by --view where one "
+        "is");
   if (!surfaces.empty() && (side || forest.instances().empty())) {
     scene::View view;
     view.camera = surfaces.camera(side.value_or(surfaces.outside()), aspect);
@@ -135,7 +139,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
     play(artist, options->activity, view, console);
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
-    artist.explain(view, options->marks, drawn.image);
+    if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
+      console.warn(missing);
     io::write_png(options->out, width, height, drawn.image.pixels);
     nlohmann::ordered_json activity;
     if (artist.playback())

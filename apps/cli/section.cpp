@@ -104,16 +104,31 @@ void film(const Options& options, const scene::Forest& forest, const Plane& plan
                   film.codec()}});
 }
 
+// All that the plane cuts, on its way too, and a margin.
+scene::Sheet all_of(const scene::Forest& forest, const Plane& plane, double depth) {
+  constexpr double margin = 20.;  // µm
+  scene::Sheet all = scene::sheet_of(forest, plane);
+  for (const double share : {0., .5, 1.}) {
+    if (share > 0. && depth == 0.) break;
+    const scene::Sheet cut = scene::bounds_of(scene::slice(forest, plane.moved(float(share * depth))));
+    all.low = all.low.cwiseMin(cut.low - Place::Constant(margin));
+    all.high = all.high.cwiseMax(cut.high + Place::Constant(margin));
+  }
+  return all;
+}
+
 void run(const Options& options, Console& console) {
   const std::string extension = options.out.extension().string();
   if (extension == ".png") must_take(options.out, png_picture);
   if (extension == ".mp4") must_take(options.out, mp4_film);
+  must_have_folder(options.out);
   const scene::Forest forest = scene::Forest::open(options.forest);
   const Plane plane = plane_of(options.plane, forest);
   scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
                                                                          : scene::Background::light};
   std::tie(picture.width_pixels, picture.height_pixels) = parse_size(options.size);
-  const scene::Sheet all = scene::sheet_of(forest, plane);
+  const scene::Sheet all =
+      options.height > 0. ? scene::sheet_of(forest, plane) : all_of(forest, plane, options.depth);
   const Place extent = all.high - all.low;
   picture.height = options.height > 0.
                        ? options.height

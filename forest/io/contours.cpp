@@ -80,9 +80,10 @@ class JsonReader {
   JsonReader(std::string_view text, const std::string& name) : name_(name) {
     try {
       json_ = json::parse(text);
-    } catch (const json::exception& error) {
+    } catch (const json::parse_error& error) {
       throw InputError(
-          name, 0, fmt::format("is no JSON that can be read ({}); write it again", shown(error.what(), 90)));
+          name, 0,
+          fmt::format("is no JSON from byte {} on; get the whole file, or write it again", error.byte));
     }
   }
 

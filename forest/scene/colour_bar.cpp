@@ -14,6 +14,8 @@ namespace {
 // In heights of a letter.
 constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide = 20.f;
 
+constexpr float share_at_most = .65f;  // of a picture's width and height that a plate takes
+
 std::size_t lines_of(const ColourBar& bar) {
   return (bar.map ? 1 : 0) + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
 }
@@ -25,9 +27,25 @@ float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 std::string note_of(const ActivityView& activity) {
   return fmt::format("a spike, then fading, {:g} µm/ms", activity.speed);
 }
+// As many digits as tell them apart, four or more.
+std::pair<std::string, std::string> ends_of(const ColourBar& bar) {
+  for (int digits = 4;; ++digits) {
+    std::pair ends(fmt::format("{:.{}g}", bar.low, digits), fmt::format("{:.{}g}", bar.high, digits));
+    if (ends.first != ends.second || digits == 9) return ends;
+  }
+}
+// The text, or as much of its beginning as has room.
+std::string shortened(const Lettering& letters, std::string text, float room) {
+  if (letters.width(text) <= room) return text;
+  while (!text.empty() && letters.width(text + "…") > room) {
+    while ((static_cast<unsigned char>(text.back()) & 0xc0) == 0x80) text.pop_back();
+    text.pop_back();
+  }
+  return text + "…";
+}
 // Whether a plate of this size leaves enough of a picture.
 bool fits(const frame::Image& image, float width, float height) {
-  return width <= .65f * float(image.width) && height <= .65f * float(image.height);
+  return width <= share_at_most * float(image.width) && height <= share_at_most * float(image.height);
 }
 
 }  // namespace
@@ -82,8 +100,8 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
     fill(image, {left, place.top, left + 1.f, place.bottom}, bar.at((i + .5f) / steps));
   }
   const float base = place.bottom + 1.7f * letters.height;
-  const std::string high = fmt::format("{:.4g}", bar.high);
-  letters.write(image, fmt::format("{:.4g}", bar.low), place.left, base);
+  const auto [low, high] = ends_of(bar);
+  letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
 }
 
@@ -120,20 +138,34 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
   return true;
 }
 
-bool paint(frame::Image& image, std::span<const LegendEntry> names, Background background, bool right) {
+bool paint(frame::Image& image, std::span<const LegendEntry> all, Background background, bool right) {
   const auto [letters, ground] = writing_in(image, background);
   const float h = letters.height, dot = mark_size(h), indent = dot + .7f * h;
+  // What has no room is shortened, and counted.
+  const float room = share_at_most * float(image.width) - indent - (2.f * padding + margin) * h,
+              rows = (share_at_most * float(image.height) / h - margin - 2.f * padding - 1.f) / line + 1.f;
+  if (all.empty() || room < 8.f * h || rows < std::min(3.f, float(all.size()))) return false;
+  std::vector<LegendEntry> names(all.begin(), all.end());
+  std::size_t shown = names.size();
+  if (float(shown) > rows) {
+    shown = std::size_t(rows) - 1;
+    names.resize(shown);
+    names.push_back({fmt::format("… and {} more", all.size() - shown), Vec3::Zero()});
+  }
   float widest = 0.f;
-  for (const LegendEntry& entry : names) widest = std::max(widest, letters.width(entry.name));
+  for (LegendEntry& entry : names) {
+    entry.name = shortened(letters, std::move(entry.name), room);
+    widest = std::max(widest, letters.width(entry.name));
+  }
   const float width = indent + widest + 2.f * padding * h,
               height = h * (2.f * padding + 1.f + line * (float(names.size()) - 1.f));
-  if (names.empty() || !fits(image, width + margin * h, height + margin * h)) return false;
   const float left = right ? float(image.width) - h * margin - width : h * margin, top = h * margin;
   fill(image, {left, top, left + width, top + height}, ground, .62f);
   float base = top + h * (padding + 1.f);
   for (const LegendEntry& entry : names) {
     const float at = std::round(left + h * padding), foot = std::round(base);
-    fill(image, {at, foot - std::round(dot), at + std::round(dot), foot}, screen_of(entry.colour));
+    if (&entry < names.data() + shown)
+      fill(image, {at, foot - std::round(dot), at + std::round(dot), foot}, screen_of(entry.colour));
     letters.write(image, entry.name, at + indent, base);
     base += h * line;
   }

@@ -47,7 +47,8 @@ ColourBar bar_of(const Playback& playback, const ActivityView& activity, Backgro
 /// @return  whether they are in it
 bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background);
 
-/// The names of colours, one below the other, at the top left, or right, on the same ground. Left out where it does not fit.
+/// The names of colours, one below the other, at the top left, or right, on the same ground. Names that are too long are
+/// shortened, those for which there is no room counted; a picture in which not even three have room stays as it is.
 /// @return  whether they are in it
 bool paint(frame::Image& image, std::span<const LegendEntry> names, Background background, bool right);
 

@@ -233,7 +233,10 @@ class Painter {
 
   // The hue of an appearance with a colour of its own.
   std::uint16_t flat(const Appearance& a) {
-    const std::string name = a.branch ? fmt::format("neuron {}, a branch", a.branch->neuron) : a.name;
+    const std::string name = !a.branch ? a.name
+                             : a.branch->section == soma_section
+                                 ? fmt::format("neuron {}", a.branch->neuron)
+                                 : fmt::format("neuron {}, a branch", a.branch->neuron);
     const auto [known, first] = flat_.try_emplace({*a.colour, name}, std::uint16_t(0));
     if (first) known->second = add_hue(light_of(*a.colour), name);
     return known->second;
@@ -352,17 +355,14 @@ class Painter {
                      .states = {},
                      .parts = {},
                      .legend = {}};
-    std::vector<bool> told(hues_.size());
     for (std::size_t c = 0; c < kept.size(); ++c) {
       const Hue& hue = hues_[kept[c] / rows];
       for (std::size_t kind = 0; kind < 8; ++kind) {
         result.palette[8 * c + kind] = hue.kinds[kind];
         result.opacities[8 * c + kind] = rows_[kept[c] % rows][kind];
       }
-      if (!told[kept[c] / rows])
-        result.legend.insert(result.legend.end(), hue.legend.begin(), hue.legend.end());
-      told[kept[c] / rows] = true;
     }
+    explain(used, kept, class_of, rows, result.legend);
     const auto state_of = [&](const Look& look) {
       return frame::State{class_of[look.hue * rows + look.row], look.kind, look.opacity, look.flags};
     };
@@ -378,6 +378,31 @@ class Painter {
     result.palette[highlight_entry] = light_ ? light_of(0xC00040) : Vec3(1.f, 1.f, 1.f);
     result.palette[outline_entry] = light_ ? light_of(0x8090A0) : light_of(0x5A6B80);
     return result;
+  }
+
+  // Each colour that is seen by the first of those who have it, and how many others do.
+  void explain(const std::vector<std::size_t>& used, const std::vector<std::size_t>& kept,
+               const std::vector<std::uint8_t>& class_of, std::size_t rows,
+               std::vector<LegendEntry>& legend) const {
+    std::vector<std::size_t> others;
+    std::vector<bool> told(hues_.size());
+    for (const std::size_t i : used) {
+      if (told[i / rows]) continue;
+      told[i / rows] = true;
+      const Hue &own = hues_[i / rows], &shown = hues_[kept[class_of[i]] / rows];
+      for (std::size_t k = 0; k < own.legend.size(); ++k) {
+        const LegendEntry& as =
+            shown.legend.empty() ? own.legend[k] : shown.legend[std::min(k, shown.legend.size() - 1)];
+        const auto same =
+            std::ranges::find_if(legend, [&](const LegendEntry& e) { return e.colour == as.colour; });
+        if (same != legend.end())
+          ++others[std::size_t(same - legend.begin())];
+        else
+          legend.push_back({own.legend[k].name, as.colour}), others.push_back(0);
+      }
+    }
+    for (std::size_t k = 0; k < legend.size(); ++k)
+      if (others[k]) legend[k].name += fmt::format(" and {} more", others[k]);
   }
 
   // Of those kept, the one that looks most alike: what one sees through must stay so, the colour may differ.

@@ -122,6 +122,15 @@ std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::ui
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
 const circuit::NodeNames& Forest::nodes() const { return data_->nodes; }
 const Bounds& Forest::soma_bounds() const { return data_->soma_bounds; }
+std::vector<circuit::Layer> Forest::layers_in_place() const {
+  std::vector<circuit::Layer> layers = circuit().layers;
+  std::erase_if(layers, [](const circuit::Layer& l) { return !(l.bottom < l.top); });
+  float low = INFINITY, high = -INFINITY;
+  for (const auto& layer : layers) low = std::min(low, layer.bottom), high = std::max(high, layer.top);
+  const float middle = soma_bounds().empty() ? low : soma_bounds().centre().y();
+  if (!(low <= middle && middle <= high)) layers.clear();
+  return layers;
+}
 std::uint64_t Forest::segment_total() const { return data_->segment_total; }
 std::uint64_t Forest::bytes() const { return data_->bytes; }
 

@@ -99,11 +99,90 @@ constexpr Sign signs[] = {
     {"[", "2a0a0m2m"},
     {"]", "0a2a2m0m"},
     {"%", "0m7a 1b1b 6l6l"},
+    {"!", "0a0i 0m0m"},
+    {"\"", "0a0d 3a3d"},
+    {"#", "2b1l 5b4l 0e6e 0i6i"},
+    {"$", "6d4c2c0d0e1f5h6i6j4k2k0j 3a3m"},
+    {"&", "7g4m2m0k0i4e4c3a2a1b1d7m"},
+    {";", "1f1f 1m0o"},
+    {"?", "0c1a4a5c5d3g3i 3m3m"},
+    {"@", "6i5k3k2i2g3e5e6g6i7k8j8e6b3b0e0j3m6m"},
+    {"\\", "0a5m"},
+    {"`", "0a2c"},
+    {"{", "3a2a1c1f0g1h1k2m3m"},
+    {"|", "0a0o"},
+    {"}", "0a1a2c2f3g2h2k1m0m"},
+    {"~", "0i1h2h4i5i6h"},
+    {"…", "0m0m 3m3m 6m6m"},
+    {"—", "0h8h"},
+    {"’", "1a0c"},
+    {"‘", "0a1c"},
+    {"ß", "0m0c1a3a4b4d2f4g5h5k4m2m"},
+    {"ø", "2e4e6g6k4m2m0k0g2e 0m6e"},
+    {"Ø", "3a5a8d8j5m3m0j0d3a 1m7a"},
+    {"æ", "1e3e4g4m 4i1i0j0l1m3m4k 4i8i8g7e5e4g 4k5m7m8l"},
+    {"Æ", "0m3a8a 5a5m8m 2h5h 5f7f"},
+    {"ı", "0e0m"},
+    {"ł", "1a1m 0i2f"},
+    {"Ł", "1a1m7m 0i3e"},
+    {"α", "6e5k4m2m0k0g2e4e5g6m"},
+    {"β", "0q0c1a3a4c4d3f1f 3f5h5k3m1m0l"},
+    {"γ", "0e1e3j5e 3j3q"},
+    {"δ", "4e1c1b2a4a 3e5f6h6k4m2m0k0h2e3e"},
+    {"ε", "5f4e1e0f0g1h3h 1h0i0l1m4m5l"},
+    {"ζ", "0a4a1d0g0k1m3m4n3p"},
+    {"η", "0e0m 0g2e3e5g5q"},
+    {"θ", "2a4a6d6j4m2m0j0d2a 0g6g"},
+    {"κ", "0e0m 5e0i 2h5m"},
+    {"λ", "0a1a5m 3g0m"},
+    {"ν", "0e3m5e"},
+    {"ξ", "4a1a0c1e3e 1e0g0k1m3m4n3p"},
+    {"π", "0e7e 2e2m 5e5m"},
+    {"ρ", "0q0g2e4e6g6k4m2m0k"},
+    {"σ", "7e2e0g0k2m4m6k6g4e"},
+    {"ς", "5f4e2e0g0k2m4n3p"},
+    {"τ", "0e5e 2e2k3m4m"},
+    {"υ", "0e0k2m3m5k5e"},
+    {"φ", "4c4q 2e0g0k2m6m8k8g6e2e"},
+    {"χ", "0e5q 5e0q"},
+    {"ψ", "0e0i2k6k8i8e 4c4q"},
+    {"ω", "1e0h0k1m3m4k4h 4k5m7m8k8h7e"},
+    {"Γ", "0m0a6a"},
+    {"Δ", "0m4a8m0m"},
+    {"Θ", "3a5a8d8j5m3m0j0d3a 2g6g"},
+    {"Λ", "0m4a8m"},
+    {"Ξ", "0a6a 1g5g 0m6m"},
+    {"Π", "0m0a7a7m"},
+    {"Σ", "7a0a4g0m7m"},
+    {"Φ", "4a4m 2c0e0i2k6k8i8e6c2c"},
+    {"Ψ", "0a0e2h6h8e8a 4a4m"},
+    {"Ω", "0m2m2k0h0d3a5a8d8h6k6m8m"},
     {"'", "0a0c"},
     {"°", "1a2a3b3c2d1d0c0b1a"},
     {"²", "0b1a2a3b3c0f3f"},
     {"³", "0a3a1c3d3e2f0f"},
 };
+// A letter with a mark above or below its middle.
+struct Marked {
+  std::string_view text, letter, mark;
+};
+constexpr Marked marked[] = {
+    {"ä", "a", "¨"}, {"ë", "e", "¨"}, {"ï", "ı", "¨"}, {"ö", "o", "¨"}, {"ü", "u", "¨"}, {"ÿ", "y", "¨"},
+    {"Ä", "A", "¨"}, {"Ë", "E", "¨"}, {"Ï", "I", "¨"}, {"Ö", "O", "¨"}, {"Ü", "U", "¨"}, {"á", "a", "´"},
+    {"é", "e", "´"}, {"í", "ı", "´"}, {"ó", "o", "´"}, {"ú", "u", "´"}, {"ý", "y", "´"}, {"ć", "c", "´"},
+    {"ń", "n", "´"}, {"ś", "s", "´"}, {"ź", "z", "´"}, {"Á", "A", "´"}, {"É", "E", "´"}, {"Í", "I", "´"},
+    {"Ó", "O", "´"}, {"Ú", "U", "´"}, {"Ý", "Y", "´"}, {"Ś", "S", "´"}, {"à", "a", "`"}, {"è", "e", "`"},
+    {"ì", "ı", "`"}, {"ò", "o", "`"}, {"ù", "u", "`"}, {"À", "A", "`"}, {"È", "E", "`"}, {"Ì", "I", "`"},
+    {"Ò", "O", "`"}, {"Ù", "U", "`"}, {"â", "a", "^"}, {"ê", "e", "^"}, {"î", "ı", "^"}, {"ô", "o", "^"},
+    {"û", "u", "^"}, {"Â", "A", "^"}, {"Ê", "E", "^"}, {"Î", "I", "^"}, {"Ô", "O", "^"}, {"Û", "U", "^"},
+    {"ã", "a", "~"}, {"ñ", "n", "~"}, {"õ", "o", "~"}, {"Ã", "A", "~"}, {"Ñ", "N", "~"}, {"Õ", "O", "~"},
+    {"å", "a", "°"}, {"Å", "A", "°"}, {"ů", "u", "°"}, {"č", "c", "ˇ"}, {"ě", "e", "ˇ"}, {"ř", "r", "ˇ"},
+    {"š", "s", "ˇ"}, {"ž", "z", "ˇ"}, {"Č", "C", "ˇ"}, {"Ř", "R", "ˇ"}, {"Š", "S", "ˇ"}, {"Ž", "Z", "ˇ"},
+    {"ç", "c", "¸"}, {"Ç", "C", "¸"}, {"ş", "s", "¸"}, {"Ş", "S", "¸"}, {"ą", "a", "¸"}, {"ę", "e", "¸"},
+};
+// Over a small letter, four parts wide; three parts higher over a capital.
+constexpr Sign marks[] = {{"¨", "1c1c 3c3c"}, {"´", "3b1c"},   {"`", "1b3c"},       {"^", "1c2b3c"},
+                          {"~", "0c1b3c4b"},  {"ˇ", "1b2c3b"}, {"°", "1b2a3b2c1b"}, {"¸", "2m3n2o1o"}};
 constexpr std::string_view unknown = "0a6a6m0m0a";
 constexpr float em = 12.f;                      // parts that a capital is high
 constexpr float gap = 3.2f, space = 4.f;        // between signs; of a space besides
@@ -118,9 +197,22 @@ std::string_view next(std::string_view& text) {
   return sign;
 }
 
-std::string_view strokes_of(std::string_view sign) {
+std::string strokes_of(std::string_view sign) {
+  if (const auto* both = std::ranges::find(marked, sign, &Marked::text); both != std::end(marked)) {
+    std::string strokes = strokes_of(both->letter);
+    char widest = '0';
+    for (const char c : strokes)
+      if (c >= '0' && c <= '9') widest = std::max(widest, c);
+    const bool capital = strokes.find('a') != std::string::npos, below = both->mark == "¸";
+    const int right = (widest - '0' - 4) / 2, up = capital && !below ? 3 : 0;
+    strokes += ' ';
+    const std::string_view mark = std::ranges::find(marks, both->mark, &Sign::text)->strokes;
+    for (std::size_t i = 0; i < mark.size(); ++i)
+      strokes += mark[i] == ' ' ? ' ' : char(mark[i] >= 'a' ? mark[i] - up : mark[i] + right);
+    return strokes;
+  }
   const auto* known = std::ranges::find(signs, sign, &Sign::text);
-  return known == std::end(signs) ? unknown : known->strokes;
+  return std::string(known == std::end(signs) ? unknown : known->strokes);
 }
 
 // Of a sign that begins at 0, in parts of em.
@@ -165,7 +257,7 @@ void Lettering::write(frame::Image& image, std::string_view text, float left, fl
     const std::string_view sign = next(text);
     if (sign != " ") {
       std::vector<std::pair<Vec2, Vec2>> lines;
-      const std::string_view strokes = strokes_of(sign);
+      const std::string strokes = strokes_of(sign);
       for (std::size_t i = 0; i + 3 < strokes.size(); i += 2) {
         if (strokes[i] == ' ') ++i;
         if (strokes[i + 2] == ' ') continue;
@@ -176,7 +268,8 @@ void Lettering::write(frame::Image& image, std::string_view text, float left, fl
       }
       const auto [x0, x1] =
           touched(left - radius - 1.f, left + part * advance(sign) + radius + 1.f, image.width);
-      const auto [y0, y1] = touched(base - height - radius - 1.f, base + part * 5.f + radius, image.height);
+      const auto [y0, y1] =
+          touched(base - 1.4f * height - radius - 1.f, base + part * 5.f + radius, image.height);
       for (std::size_t y = y0; y < y1; ++y)
         for (std::size_t x = x0; x < x1; ++x) {
           float nearest = INFINITY;

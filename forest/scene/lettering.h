@@ -14,7 +14,7 @@ struct Lettering {
   float height = 12.f;
   Vec3 colour = Vec3::Ones();  // sRGB 0–1, as on the screen
 
-  /// Pixels to the right, of UTF-8. Signs that are not known are boxes, and as wide as one.
+  /// Pixels to the right, of UTF-8. Latin, Greek and their marks; other signs are boxes, and as wide as one.
   float width(std::string_view text) const;
   /// @param left, base  where the line begins on which capitals stand. What lies beyond the picture is left out.
   void write(frame::Image& image, std::string_view text, float left, float base) const;

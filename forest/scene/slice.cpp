@@ -102,11 +102,19 @@ std::vector<ProfileArea> areas(const Slice& slice) {
   return all;
 }
 
+Sheet bounds_of(const Slice& slice) {
+  Sheet sheet{Place::Constant(INFINITY), Place::Constant(-INFINITY)};
+  for (const Profile& profile : slice.profiles)
+    for (const Place& place : profile.shape.outline(.1, .1))
+      sheet.low = sheet.low.cwiseMin(place), sheet.high = sheet.high.cwiseMax(place);
+  return sheet;
+}
+
 Sheet sheet_of(const Forest& forest, const Plane& plane) {
   constexpr float beside = 60.f;  // µm
   Bounds bounds = forest.soma_bounds();
   if (bounds.empty()) return {Place::Constant(-beside), Place::Constant(beside)};
-  for (const auto& layer : forest.circuit().layers)
+  for (const auto& layer : forest.layers_in_place())
     bounds.add(Vec3(bounds.centre().x(), layer.bottom, bounds.centre().z())),
         bounds.add(Vec3(bounds.centre().x(), layer.top, bounds.centre().z()));
   Sheet sheet{Place::Constant(INFINITY), Place::Constant(-INFINITY)};

@@ -40,6 +40,9 @@ struct ProfileArea {
 /// By neuron and kind, in this order.
 std::vector<ProfileArea> areas(const Slice& slice);
 
+/// The rectangle that holds all profiles; none, low beyond high, without any.
+Sheet bounds_of(const Slice& slice);
+
 /// The rectangle that holds all that a plane may cut of the forest's somata and a margin, along its right and up.
 Sheet sheet_of(const Forest& forest, const Plane& plane);
 

@@ -16,6 +16,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/scene/placed.h"
 
 namespace forest::scene {
 namespace {
@@ -447,9 +448,20 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
 
 constexpr int outline_corners = 16;
 
-/// Places on branches, spread evenly over their area: the straws of one level of bricks.
+/// Places on branches: of a small forest the ends of all segments, else spread evenly over their area, the straws of one level of
+/// bricks.
 std::vector<Vec3> sampled_branches(const Forest& forest) {
-  constexpr std::size_t enough = 4096;
+  constexpr std::size_t enough = 4096, small = 200'000;
+  if (forest.segment_total() <= small) {
+    std::vector<Vec3> ends;
+    for (const frame::Instance& i : forest.instances()) {
+      const Placed placed(i);
+      const Neuron& neuron = forest.neurons()[i.morphology];
+      for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count))
+        ends.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
+    }
+    return ends;
+  }
   const auto bricks = forest.bricks();
   if (bricks.empty()) return {};
   const auto straws_from = [&](std::size_t brick) {
@@ -548,8 +560,7 @@ std::string to_json(const View& view) { return write_all(view, keys_of_view()).d
 // On dark ground through a colour of its own, for between white and the grey of what has no value lies grey.
 FlashColours flash_colours(Background background) {
   if (background == Background::dark) return {Vec3(1.f, 1.f, .92f), light_of(0x2FD6FF)};
-  const Vec3 bright = light_of(0xC00010);
-  return {bright, .5f * (bright + light_of(0xB4BCC8))};
+  return {light_of(0x000000), light_of(0x0078C8)};
 }
 
 std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
@@ -569,7 +580,7 @@ View overview(const Forest& forest, float aspect) {
   Bounds bounds = somata;
   const float radius = forest.circuit().radius;
   const Vec3 axis = radius > 0.f || somata.empty() ? Vec3(Vec3::Zero()) : somata.centre();
-  for (const auto& layer : forest.circuit().layers)
+  for (const auto& layer : forest.layers_in_place())
     for (const float y : {layer.bottom, layer.top}) {
       bounds.add({axis.x(), y, axis.z()});
       for (int i = 0; i < outline_corners; ++i) {

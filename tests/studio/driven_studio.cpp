@@ -88,8 +88,7 @@ Json Studio::wait_for(const std::string& event) {
 std::pair<std::string, int> Studio::end() {
   std::string said;
   std::array<char, 4096> part;
-  for (ssize_t n; (n = read(error_, part.data(), part.size())) > 0;)
-    said.append(part.data(), std::size_t(n));
+  for (ssize_t n; (n = read(error_, part.data(), part.size())) > 0;) said.append(part.data(), std::size_t(n));
   int status = 0;
   waitpid(std::exchange(pid_, -1), &status, 0);
   return {said, WIFEXITED(status) ? WEXITSTATUS(status) : 128 + WTERMSIG(status)};
