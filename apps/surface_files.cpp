@@ -28,6 +28,8 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
   const std::string name = file.string();
   const io::SurfaceValues read = io::read_surface_values(MappedFile(file).text(), name);
   try {
+    if (std::ranges::none_of(read.values, [](float v) { return std::isfinite(v); }))
+      throw InputError(name, 0, "has no value that is a number; give another overlay");
     if (read.labels.empty()) return surfaces.colour(read.values);
     std::vector<scene::AreaColour> areas;
     for (const io::SurfaceLabel& label : read.labels) {

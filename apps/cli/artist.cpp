@@ -15,6 +15,7 @@
 
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 
 namespace forest::cli {
 
@@ -116,13 +117,31 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
              : fmt::format("the picture has no room for a {}; draw it larger, by --size", missing);
 }
 
+namespace {
+
+// Those of a longer film that was there before.
+void remove_pictures(const std::filesystem::path& folder, std::size_t from) {
+  std::error_code none;
+  for (std::size_t i = from;; ++i) {
+    const std::filesystem::path picture = folder / fmt::format("{:05}.png", i);
+    if (!std::filesystem::is_regular_file(picture, none)) return;
+    must_take(picture, png_picture);
+    std::filesystem::remove(picture);
+  }
+}
+
+}  // namespace
+
 FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& plan,
                  const std::filesystem::path& file, Progress& progress,
                  const std::optional<scene::ActivityView>& activity) {
   const auto start = Clock::now();
   const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
   io::Film film(file, plan.width, plan.height, plan.frames_per_second);
-  if (!plan.pictures.empty()) std::filesystem::create_directories(plan.pictures);
+  if (!plan.pictures.empty()) {
+    std::filesystem::create_directories(plan.pictures);
+    remove_pictures(plan.pictures, std::size_t(count));
+  }
   FilmFigures figures;
   std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;

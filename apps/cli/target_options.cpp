@@ -45,6 +45,7 @@ void add_appearances(const TargetOptions& options, std::vector<scene::Appearance
 
 void warn_of_empty(const scene::Targets& targets, const std::vector<scene::Appearance>& shown,
                    Console& console) {
+  if (targets.forest().instances().empty()) return;  // which is told by itself
   for (const scene::Appearance& a : shown)
     if (!a.branch && targets.find(a.name).empty())
       console.warn(fmt::format("no neuron belongs to the target '{}'", a.name));

@@ -57,6 +57,11 @@ void check(const Circuit& circuit) {
     within(instance.morphology, circuit.morphologies.size(), "morphology");
     if (!instance.position.allFinite())
       throw Error(fmt::format("the position of neuron {} is not finite", i));
+    constexpr float farthest = 1e8f;  // µm, 100 m
+    if (!(instance.position.cwiseAbs().maxCoeff() < farthest))
+      throw Error(fmt::format(
+          "neuron {} stands at ({:.3g}, {:.3g}, {:.3g}) µm, farther than any brain; mend its place", i,
+          instance.position.x(), instance.position.y(), instance.position.z()));
     if (!(std::abs(instance.orientation.norm() - 1.f) < 1e-3f))
       throw Error(fmt::format("the orientation of neuron {} is not a unit quaternion", i));
   }

@@ -90,6 +90,44 @@ TEST(ColourBar, NamesOfColoursStandAtEitherSideAndNotWhereTheyDoNotFit) {
   EXPECT_EQ(std::ranges::count(small.pixels, 0), std::ptrdiff_t(small.pixels.size()));
 }
 
+TEST(ColourBar, NamesThatHaveNoRoomAreShortenedAndCounted) {
+  std::vector<LegendEntry> names;
+  for (int i = 0; i < 60; ++i) names.push_back({"type " + std::to_string(i), {0.f, 1.f, 0.f}});
+  const auto green_rows = [](const frame::Image& image) {
+    std::size_t rows = 0;
+    for (std::uint32_t y = 0; y < image.height; ++y) {
+      bool green = false;
+      for (std::uint32_t x = 0; x < image.width; ++x) {
+        const std::uint8_t* p = &image.pixels[4 * (std::size_t(y) * image.width + x)];
+        green |= p[0] == 0 && p[1] == 255 && p[2] == 0;
+      }
+      rows += green;
+    }
+    return rows;
+  };
+  frame::Image many = black(640, 360), few = black(640, 360);
+  EXPECT_TRUE(paint(many, names, Background::dark, false));
+  EXPECT_TRUE(paint(few, std::span(names).first(5), Background::dark, false));
+  EXPECT_GT(green_rows(many), green_rows(few));
+  EXPECT_LT(green_rows(many), .65 * 360);
+  names.resize(3);
+  names[0].name.assign(500, 'w').append("ö");
+  frame::Image wide = black(640, 360);
+  EXPECT_TRUE(paint(wide, names, Background::dark, false));
+  for (std::uint32_t y = 0; y < 360; ++y)  // the plate ends where two thirds of the picture do
+    EXPECT_EQ(wide.pixels[4 * (std::size_t(y) * 640 + 430)], 0);
+}
+
+TEST(ColourBar, ItsEndsHaveAsManyDigitsAsTellThemApart) {
+  const auto painted = [](float low, float high) {
+    frame::Image image = black(400, 100);
+    paint(image, ColourBar{.low = low, .high = high}, {20.f, 20.f, 380.f, 40.f}, {.height = 12.f});
+    return image.pixels;
+  };
+  EXPECT_NE(painted(2.f, 2.00001f), painted(2.f, 2.00002f));
+  EXPECT_NE(painted(2.f, 2.00001f), painted(2.f, 2.f));
+}
+
 TEST(ColourBar, IsLeftOutOfPicturesInWhichItCannotBeRead) {
   const ColourBar bars[] = {bar_of(ActivityView(), 12.5, "mV", Background::dark),
                             {.map = &colour_maps().front()}};

@@ -244,6 +244,8 @@ class Packer {
   std::vector<Pieces> pieces_;
 };
 
+constexpr float farthest = 1e7f;  // µm from the middle of a neuron: a whale's spinal cord
+
 PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource& source, Progress& progress,
                       const circuit::NodeNames& nodes) {
   circuit::check(c);
@@ -256,6 +258,11 @@ PackFigures pack_into(Output& out, const circuit::Circuit& c, const NeuronSource
       [&](std::size_t i) {
         const Morphology m = source(i);
         Made made{build_clusters(m), facts_of(m), {}};
+        if (!made.tree.clusters.empty() && !(made.tree.clusters.front().radius < farthest))
+          throw Error(
+              fmt::format("the neuron {} reaches {:.3g} µm, farther than any does; mend its points, which "
+                          "'brainforest check' looks at",
+                          c.morphologies[i], made.tree.clusters.front().radius));
         made.pieces = pieces_of(std::span(made.tree.segments).first(made.tree.original_count), pieces);
         if (!made.tree.clusters.empty()) {
           const Cluster& root = made.tree.clusters.front();

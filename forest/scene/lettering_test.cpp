@@ -32,6 +32,24 @@ TEST(Lettering, EverySignIsThereAndAnUnknownOneIsABox) {
   EXPECT_EQ(written(""), 0.);
 }
 
+TEST(Lettering, HasAllOfAsciiMarksAndGreek) {
+  const double box = written("☃");
+  const auto known = [&](std::string_view sign) {
+    frame::Image one = black(100, 60), other = black(100, 60);
+    Lettering{.height = 20.f}.write(one, sign, 20.f, 40.f);
+    Lettering{.height = 20.f}.write(other, "☃", 20.f, 40.f);
+    return one.pixels != other.pixels && light(one) > 2.;
+  };
+  for (char c = '!'; c <= '~'; ++c) EXPECT_TRUE(known(std::string_view(&c, 1))) << c;
+  for (const char* sign :
+       {"ö", "Ö", "é", "ñ", "å", "Å", "ç", "š", "í", "ß", "ø", "α", "β", "γ", "δ", "ω", "Ω", "…", "—"})
+    EXPECT_TRUE(known(sign)) << sign;
+  EXPECT_GT(written("ö"), written("o") + 2.);
+  EXPECT_GT(written("Ö"), written("O") + 2.);
+  EXPECT_FLOAT_EQ(Lettering{}.width("ö"), Lettering{}.width("o"));
+  EXPECT_GT(box, 30.);
+}
+
 TEST(Lettering, InkGrowsWithTheSquareOfTheSizeAndWidthWithTheSize) {
   EXPECT_NEAR(written("mV 123", 24.f) / written("mV 123", 12.f), 4., .5);
   EXPECT_FLOAT_EQ(Lettering{.height = 24.f}.width("mV 123"), 2.f * Lettering{.height = 12.f}.width("mV 123"));

@@ -193,6 +193,28 @@ TEST(Appearance, LaterOnesWinAndWhatIsNotSaidStays) {
   EXPECT_EQ(c.legend.back().name, "upper");
 }
 
+TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
+  circuit::Circuit c = testing::sample_circuit(60);
+  c.types.clear();
+  for (int i = 0; i < 30; ++i) c.types.push_back({"type " + std::to_string(i), "p", true});
+  for (std::size_t i = 0; i < c.instances.size(); ++i) c.instances[i].type = std::uint32_t(i % 30);
+  const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
+  View view;
+  view.colour_by = ColourBy::type;
+  const Colouring by_type = colour(Targets(f), view);
+  std::size_t told = 0;
+  for (std::size_t i = 0; i < by_type.legend.size(); ++i) {
+    const LegendEntry& entry = by_type.legend[i];
+    const auto at = entry.name.find(" and ");
+    told += 1 + (at == std::string::npos ? 0 : std::stoul(entry.name.substr(at + 5)));
+    for (std::size_t k = 0; k < i; ++k) EXPECT_NE(entry.colour, by_type.legend[k].colour);
+  }
+  std::set<std::pair<std::uint32_t, std::uint32_t>> seen;  // type and layer
+  for (std::size_t i = 0; i < f.instances().size(); ++i) seen.insert({f.types()[i], f.layers()[i]});
+  EXPECT_EQ(told, seen.size());
+  EXPECT_LE(by_type.legend.size(), 16u);
+}
+
 TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
   const Forest f = sample();
   const Targets targets(f);

@@ -161,6 +161,28 @@ TEST(View, TheOverviewHoldsBranchesAndFillsThePicture) {
   }
 }
 
+TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInThem) {
+  circuit::Circuit c = testing::sample_circuit(3);
+  for (const float down : {0.f, 20000.f}) {
+    for (circuit::Instance& i : c.instances) i.position.y() -= down;
+    c.layers.push_back({"none " + std::to_string(down), 0.f, 0.f});
+    const Forest forest = Forest::from_bytes(pack(c, testing::sample_neurons()));
+    EXPECT_EQ(forest.layers_in_place().empty(), down > 0.f);
+    const frame::Camera camera = overview(forest, 1.5f).camera;
+    float farthest = 0.f;
+    for (const frame::Instance& i : forest.instances()) {
+      const Neuron& neuron = forest.neurons()[i.morphology];
+      for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count)) {
+        const Vec3 end = Vec3(i.x, i.y, i.z) + Quat(i.qw, i.qx, i.qy, i.qz) * Vec3(s.bx, s.by, s.bz);
+        const Vec3 at = project(camera, {900.f, 600.f}, end);
+        farthest = std::max({farthest, std::abs(at.x() / 450.f - 1.f), std::abs(at.y() / 300.f - 1.f)});
+      }
+    }
+    EXPECT_LT(farthest, 1.f);
+    EXPECT_GT(farthest, down > 0.f ? .5f : .3f);  // the column is larger than they are
+  }
+}
+
 TEST(View, EveryFrameKeepsTheContract) {
   const Forest forest = sample();
   const auto lines = outline(forest);

@@ -137,6 +137,18 @@ told surfaces.json 'all(s["euler"] == 2 for s in d["surfaces"])'
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
 
+# What could not be written in the end is refused before the work; nothing is left behind.
+refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
+refuses 'its folder is not there' $BRAINFOREST cortex contours outer inner -o nowhere/s.contours
+refuses 'its folder is not there' $BRAINFOREST cortex compare s.contours --svg nowhere/drawn
+refuses 'is named twice' $BRAINFOREST cortex surfaces s.contours -o no.gii no.gii
+refuses "'outer' is to be both boundaries" $BRAINFOREST cortex surfaces s.contours --inner outer -o no.gii no2.gii
+refuses 'not as .obj' $BRAINFOREST cortex surfaces s.contours -o no.gii no2.obj
+refuses "two boundaries are to be called 'a'" $BRAINFOREST cortex contours outer inner --name a --name a -o no.contours
+refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
+refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
+[ ! -e nowhere ] && [ ! -e no.gii ] && [ ! -e no2.gii ] && [ ! -e no.contours ]
+
 # Successive sections over one another, as drawings; contours that cross are told with a place.
 $BRAINFOREST cortex compare s.contours --svg overlays --json >overlays.json
 told overlays.json 'len(d["pairs"]) > 20 and all(p["hausdorff"] >= p["p95"] >= p["mean"] >= 0 for p in d["pairs"] if p["mean"] is not None)'

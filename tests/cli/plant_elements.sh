@@ -119,3 +119,12 @@ grep -v '^\[\[layer' "$FOREST_SOURCE_DIR/data/recipes/human-frontal.toml" | sed 
 fails_with 1 'bare.toml' $BRAINFOREST plant --elements e.h5 --element 1 --recipe bare.toml --repo cells.db --out no
 fails_with 2 'elements' $BRAINFOREST plant --element 1 --recipe human-frontal --repo cells.db --out no
 [ ! -e no ]
+
+# Lists that run backwards, results that cannot be written together, options that say nothing of edges.
+fails_with 1 "'7-3' runs backwards; write 3-7" plant --element 7-3 --out no
+fails_with 1 "'2-1' runs backwards" $BRAINFOREST cortex faces e.h5 --edges 2-1 -o no.gii
+fails_with 1 'its folder is not there' $BRAINFOREST cortex faces e.h5 -o no.gii --values nowhere/no.txt
+fails_with 1 'is named twice' $BRAINFOREST cortex faces e.h5 -o no.gii --values no.gii
+fails_with 1 'not as .obj' $BRAINFOREST cortex faces e.h5 -o no.obj
+fails_with 2 'edges' $BRAINFOREST cortex faces e.h5 --edges 1 --values no.txt -o no.gii
+[ ! -e no ] && [ ! -e no.gii ] && [ ! -e no.txt ] && [ ! -e no.obj ]

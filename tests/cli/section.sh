@@ -29,6 +29,10 @@ svg = tree.parse("a.svg").getroot()
 assert svg.tag.endswith("svg") and any(g.get("id", "").startswith("neuron-") for g in svg), "no contours"
 PY
 
+# All that is cut is in the default picture; where it would lie is asked before the work.
+"$program" section a.forest -o all.svg --json >drawn.json
+/usr/bin/python3 -c 'import json; a, b = (json.load(open(f)) for f in ("all.json", "drawn.json")); assert a["profiles"] == b["profiles"], (a, b)'
+fails_with 1 "its folder is not there" "$program" section a.forest -o nowhere/x.csv
 "$program" section a.forest --plane 0,99999,0,0,1,0 -o nothing.png >told 2>&1
 grep -q "cuts no neuron" told || fail "an empty section is silent"
 fails_with 1 "no direction" "$program" section a.forest --plane 0,0,0,0,0,0 -o x.png

@@ -86,3 +86,6 @@ refuses "no range" "$program" render lh.pial --range 3:2 -o x.png
 refuses "no colour map 'jet'" "$program" render lh.pial --colour-map jet -o x.png
 fails_with 2 "surface-opacity" "$program" render lh.pial --surface-opacity 2 -o x.png
 fails_with 2 "from" "$program" render lh.pial --from inside -o x.png
+printf 'nan\n%.0s' $(seq 7320) >none.txt
+refuses "has no value that is a number" "$program" render lh.pial --overlay none.txt -o x.png
+refuses "there are none; give --surface" "$program" render a.forest --from left -o x.png
