@@ -30,7 +30,10 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
   try {
     if (std::ranges::none_of(read.values, [](float v) { return std::isfinite(v); }))
       throw InputError(name, 0, "has no value that is a number; give another overlay");
-    if (read.labels.empty()) return surfaces.colour(read.values);
+    if (read.labels.empty()) {
+      surfaces.title += (surfaces.title.empty() ? "" : ", ") + file.filename().string();
+      return surfaces.colour(read.values);
+    }
     std::vector<scene::AreaColour> areas;
     for (const io::SurfaceLabel& label : read.labels) {
       if (label.alpha == 0.f) continue;

@@ -122,6 +122,12 @@ void run(const Options& options, Console& console) {
   if (extension == ".png") must_take(options.out, png_picture);
   if (extension == ".mp4") must_take(options.out, mp4_film);
   must_have_folder(options.out);
+  if (extension == ".mp4" && options.depth == 0.)
+    throw Error("a film moves the plane; say how far by --through, in µm");
+  if (const auto [width, height] = parse_size(options.size); extension == ".mp4" && (width % 2 || height % 2))
+    throw Error(fmt::format("{} is no size of a film; width and height must be even", options.size));
+  if (extension == ".csv" && (options.height > 0. || !options.centre.empty()))
+    throw Error("--height and --centre are of pictures; a table tells of all that the plane cuts");
   const scene::Forest forest = scene::Forest::open(options.forest);
   const Plane plane = plane_of(options.plane, forest);
   scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
@@ -148,8 +154,6 @@ void run(const Options& options, Console& console) {
   const scene::Targets targets(forest, read_node_sets(forest, options.targets.node_sets, console));
   warn_of_empty(targets, view.targets, console);
   const scene::Colouring colouring = scene::colour(targets, view);
-  if (extension == ".mp4" && options.depth == 0.)
-    throw Error("a film moves the plane; say how far by --through, in µm");
   if (extension == ".mp4") return film(options, forest, plane, colouring, picture, console);
   if (options.depth != 0.) throw Error("--through makes a film; give its name with the ending .mp4");
 

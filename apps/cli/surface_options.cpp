@@ -43,7 +43,9 @@ std::pair<float, float> parse_range(const std::string& text) {
 }  // namespace
 
 void add_surfaces(CLI::App& command, SurfaceOptions& options) {
-  const auto each = [](CLI::Option* option) { return option->allow_extra_args(false); };  // one at a time
+  const auto each = [](CLI::Option* option) {  // one at a time
+    return option->allow_extra_args(false)->option_text(option->get_type_name() + ", again for each");
+  };
   each(command.add_option(
       "--surface", options.files,
       "Surface of a cortex to show, too: GIFTI (.surf.gii), FreeSurfer (lh.pial), PLY, STL or OBJ, in mm"));
@@ -68,6 +70,8 @@ scene::Surfaces read_surfaces(const SurfaceOptions& options, Console& console) {
       throw Error(fmt::format("there is no colour map '{}'; give one of {}", options.map, map_names()));
   }
   if (!options.range.empty()) surfaces.range = parse_range(options.range);
+  if (options.overlays.empty() && !(options.map.empty() && options.range.empty()))
+    console.warn("--colour-map and --range are of the values of --overlay, and none is given");
   forest::add_surfaces(surfaces, {options.files, options.overlays, options.opacities});
   if (options.opacities.size() > options.files.size())
     console.warn(fmt::format("{} of the opacities belong to no surface",

@@ -120,7 +120,8 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
     fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, .62f);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
-      letters.write(image, bar.title, left, base);
+      const float room = right - left - (bar.units.empty() ? 0.f : letters.width(bar.units) + h);
+      letters.write(image, shortened(letters, bar.title, room), left, base);
       letters.write(image, bar.units, right - letters.width(bar.units), base);
       base += h * line;
     }

@@ -6,6 +6,7 @@
 #include <cstdint>
 #include <optional>
 #include <span>
+#include <string>
 #include <utility>
 #include <vector>
 
@@ -65,6 +66,7 @@ class Surfaces {
   /// (zero_means_none).
   std::optional<std::pair<float, float>> range;
   std::pair<float, float> shown_range() const;
+  std::string title;  // of the values, above their colour bar; may be empty
 
   /// Adds them to a frame, in palette entries that the neurons do not use. The frame must not outlive this object, or a
   /// change of it.
