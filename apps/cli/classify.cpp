@@ -227,8 +227,10 @@ std::string report_of(const Types& t, const Sample& sample, const FeatureTable& 
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.csv, options.report}, true);
   const Sample sample = options.repo.empty() ? read_sample(options.files, {}, console)
                                              : read_sample({options.population}, options.repo, console);
+  must_have_sections(sample, options.kind);
   const FeatureTable table = measured(sample, groups_of(options.kind), console);
   const Types t =
       find_types(table,
@@ -236,9 +238,10 @@ void run(const Options& options, Console& console) {
                   .seed = options.seed},
                  console.progress());
   const Given given = given_types(sample);
-  if (!options.csv.empty()) write_unless_there(options.csv, csv_of(t, sample, given), options.force);
-  if (!options.report.empty())
-    write_unless_there(options.report, report_of(t, sample, table, given, options), options.force);
+  write_unless_there(
+      {{options.csv, options.csv.empty() ? "" : csv_of(t, sample, given)},
+       {options.report, options.report.empty() ? "" : report_of(t, sample, table, given, options)}},
+      options.force);
 
   console.print(json_of(t, sample, given, options));
   console.say(sentence(t, given, options));

@@ -234,15 +234,16 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.csv, options.report}, true);
   const bool stored = !options.repo.empty();
   const std::array<Sample, 2> samples{
       read_sample({stored ? options.population : options.samples[0]}, options.repo, console),
       read_sample({stored ? options.with : options.samples[1]}, options.repo, console)};
+  for (const Sample& sample : samples) must_have_sections(sample, options.kind);
   const std::vector<Group> groups = groups_of(options.kind);
   std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
                                      measured(samples[1], groups, console)};
-  if (!options.slices.empty())
-    for (FeatureTable& table : tables) set_slices(table, options.slices);
+  if (!options.slices.empty()) set_slices(std::array{&tables[0], &tables[1]}, options.slices);
   std::array<std::string, 2> names{samples[0].name, samples[1].name};
   if (names[0] == names[1]) names = {options.samples[0], options.samples[1]};
 
@@ -251,9 +252,9 @@ void run(const Options& options, Console& console) {
               {.repeats = options.repeats, .permutations = options.permutations, .seed = options.seed},
               console.progress());
   warn_of_shared(samples[0], samples[1], console);
-  if (!options.csv.empty()) write_unless_there(options.csv, features_csv(tables, names), options.force);
-  if (!options.report.empty())
-    write_unless_there(options.report, report_of(c, tables, names, options), options.force);
+  write_unless_there({{options.csv, options.csv.empty() ? "" : features_csv(tables, names)},
+                      {options.report, options.report.empty() ? "" : report_of(c, tables, names, options)}},
+                     options.force);
 
   console.print(json_of(c, names, options));
   console.say(sentence(c, names[0], names[1]));
@@ -282,7 +283,8 @@ std::function<void()> compare(CLI::App& command, Console& console) {
   add_kind(command, options->kind);
   add_slices(command, options->slices);
   add_whole(command, "--repeats", options->repeats, "Cross-validations that an AUC is the mean of", 1, 10000);
-  add_whole(command, "--permutations", options->permutations, "Dealings by which chance is known", 0, 100000);
+  add_whole(command, "--permutations", options->permutations, "Dealings by which chance is known", 19,
+            100000);
   add_seed(command, options->seed, "The same seed gives the same result");
   command.add_option("--csv", options->csv, "Write the features of all cells to this file")
       ->type_name("FILE");

@@ -224,6 +224,7 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.grammar, options.report}, true);
   const KindSet kinds = kind_set(options.kind);
   const Given by = *given_of(options.by);
   const Sample sample = options.repo.empty() ? read_sample(options.files, "", console)

@@ -1,9 +1,14 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/cli/filed_neurons.h"
 
+#include <algorithm>
+
+#include <fmt/format.h>
+
 #include "forest/core/error.h"
 #include "forest/repository/names.h"
 
+#include "apps/cli/console.h"
 #include "apps/cli/files.h"
 
 namespace forest::cli {
@@ -34,7 +39,26 @@ std::string FiledNeurons::cell(std::size_t i) const {
 
 Morphology FiledNeurons::read(std::size_t i) const {
   const auto [f, c] = neurons_[i];
-  return cells_[f] ? cells_[f]->read(c).read.morphology : io::read(files_[f]).morphology;
+  io::ReadResult read = cells_[f] ? cells_[f]->read(c).read : io::read(files_[f]);
+  remember(i, read.warnings);
+  return std::move(read.morphology);
+}
+
+void FiledNeurons::remember(std::size_t i, const std::vector<io::Warning>& warnings) const {
+  // What has a mending of its own no program can mend.
+  const auto guess =
+      std::ranges::find_if(warnings, [](const io::Warning& w) { return !w.mending.empty() && !w.lost; });
+  if (guess == warnings.end()) return;
+  const std::lock_guard lock(mutex_);
+  guessed_[i] = guess->line ? fmt::format("{}:{}: {}", file(i).string(), guess->line, guess->sentence)
+                            : fmt::format("{}: {}", file(i).string(), guess->sentence);
+}
+
+std::string FiledNeurons::guesses() const {
+  if (guessed_.empty()) return {};
+  return fmt::format(
+      "{} of {} hold something odd that only the tracing can mend, first {}; 'brainforest check' tells all",
+      guessed_.size(), counted(size(), "neuron"), repository::escaped(guessed_.begin()->second));
 }
 
 }  // namespace forest::cli

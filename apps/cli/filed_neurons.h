@@ -4,7 +4,9 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <map>
 #include <memory>
+#include <mutex>
 #include <optional>
 #include <string>
 #include <utility>
@@ -25,12 +27,19 @@ class FiledNeurons {
   /// The cell's own name in a file of cells; empty in others, and where it cannot be read.
   std::string cell(std::size_t i) const;
   Morphology read(std::size_t i) const;  // by any thread; throws InputError
+  /// How many that were read hold something odd that only the tracing can mend (a place that is no number, a lost
+  /// parent), in a sentence; nothing where there were none.
+  std::string guesses() const;
 
  private:
+  void remember(std::size_t i, const std::vector<io::Warning>& warnings) const;
+
   std::vector<std::filesystem::path> files_;
   std::vector<std::unique_ptr<MappedFile>> mapped_;           // of files of cells
   std::vector<std::optional<io::CellReader>> cells_;          // the same
   std::vector<std::pair<std::size_t, std::size_t>> neurons_;  // file and cell
+  mutable std::mutex mutex_;
+  mutable std::map<std::size_t, std::string> guessed_;  // the first of each neuron
 };
 
 }  // namespace forest::cli

@@ -141,11 +141,12 @@ void write_unless_there(const fs::path& to, std::string_view bytes, bool force) 
 void write_unless_there(const std::vector<std::pair<fs::path, std::string>>& files, bool force) {
   Overwrites overwrites;
   if (!force)
-    for (const auto& [to, bytes] : files) overwrites.look(to, bytes);
+    for (const auto& [to, bytes] : files)
+      if (!to.empty()) overwrites.look(to, bytes);
   overwrites.refuse();
   std::deque<NewFile> made;
   for (const auto& [to, bytes] : files)
-    made.emplace_back(to).write(std::as_bytes(std::span(bytes.data(), bytes.size())));
+    if (!to.empty()) made.emplace_back(to).write(std::as_bytes(std::span(bytes.data(), bytes.size())));
   for (NewFile& file : made) file.commit();
 }
 
@@ -166,6 +167,7 @@ void must_take_files(const std::vector<fs::path>& files, bool force) {
   std::error_code none;
   std::set<fs::path> places;
   for (const fs::path& file : files) {
+    if (file.empty()) continue;
     const std::string name = repository::escaped(file.string());
     const auto there = fs::status(file, none);
     if (!places.insert(fs::weakly_canonical(file, none)).second)
@@ -190,7 +192,7 @@ void must_take_surfaces(const std::vector<fs::path>& files, bool force) {
 void refuse_existing(const std::vector<fs::path>& files) {
   std::error_code none;
   for (const fs::path& file : files)
-    if (fs::exists(file, none))
+    if (!file.empty() && fs::exists(file, none))
       throw Error(fmt::format(
           "{} is there already, so nothing was written; choose another name, or replace it with --force",
           repository::escaped(file.string())));

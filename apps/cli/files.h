@@ -47,11 +47,12 @@ class Overwrites {
 /// One file, unless another holds something else there and `force` is not given.
 void write_unless_there(const std::filesystem::path& to, std::string_view bytes, bool force);
 
-/// Several files, all or none.
+/// Several files, all or none; those without a name are not wanted.
 void write_unless_there(const std::vector<std::pair<std::filesystem::path, std::string>>& files, bool force);
 
 /// Throws Error when what is made over minutes could not be put there in the end: two of the places are one, a folder is missing
-/// or cannot be written, a folder is there, or a file, unless `force` is given.
+/// or cannot be written, a folder is there, or a file, unless `force` is given. Empty
+/// paths are not wanted.
 void must_take_files(const std::vector<std::filesystem::path>& files, bool force);
 /// The same for a surface, which io::write_surface writes: names of other formats than its are refused.
 void must_take_surfaces(const std::vector<std::filesystem::path>& files, bool force);

@@ -34,22 +34,36 @@ struct Options {
 std::vector<std::uint32_t> slices_of(const Sample& sample, const std::string& expression) {
   statistics::FeatureTable names;
   names.cells = sample.cells;
-  if (!expression.empty()) set_slices(names, expression);
+  if (!expression.empty()) set_slices(std::array{&names}, expression);
   return statistics::numbered(names.slices);
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.out}, true);
   const bool files = !options.files.empty();
   const Sample sample = read_sample(files ? options.files : std::vector{options.population},
                                     files ? "" : options.repo, console);
   const std::vector<Morphology>& neurons = sample.neurons;
   const std::string& of = sample.name;
+  for (const std::string& word : options.kinds) must_have_sections(sample, word);
   fitting::Resampling resampling = options.resampling;
   resampling.kinds = {};
   for (const std::string& word : options.kinds)
     resampling.kinds = resampling.kinds | statistics::kind_set(word);
   fitting::Calibration calibration = options.calibration;
   if (!options.calibrate) calibration.candidates = 1;
+  const auto without = std::ranges::count_if(neurons, [&](const Morphology& m) {
+    return std::ranges::none_of(m.sections(),
+                                [&](const Section& s) { return resampling.kinds.contains(s.kind); });
+  });
+  if (without)
+    console.warn(fmt::format("{} of {} {} no section of these kinds and {} left out", without,
+                             counted(neurons.size(), "neuron"), without == 1 ? "has" : "have",
+                             without == 1 ? "is" : "are"));
+  constexpr std::size_t enough = 12;  // of which a taste can be learned
+  if (options.calibrate && neurons.size() < enough)
+    console.warn(
+        fmt::format("--calibrate learns nothing of fewer than {} neurons, so there is no taste", enough));
   const fitting::Calibrated fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices),
                                                                  fmt::format("neurons like those of {}", of),
                                                                  resampling, calibration, console.progress());
@@ -114,15 +128,19 @@ std::function<void()> fit(CLI::App& command, Console& console) {
       .add_option("--kind", options->kinds,
                   "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
       ->capture_default_str();
-  command
-      .add_option("--style", options->resampling.style,
-                  "How far the style of the neurons that are drawn from may be from a neuron's own, in "
-                  "standard deviations")
-      ->capture_default_str();
-  command
-      .add_option("--smoothing", options->resampling.smoothing,
-                  "How far a neuron's style may be from that of the traced one whose stems it has")
-      ->capture_default_str();
+  must_be_within(
+      *command
+           .add_option("--style", options->resampling.style,
+                       "How far the style of the neurons that are drawn from may be from a neuron's own, in "
+                       "standard deviations")
+           ->capture_default_str(),
+      .01, 100.);
+  must_be_within(*command
+                      .add_option("--smoothing", options->resampling.smoothing,
+                                  "How far a neuron's style may be from that of the traced one whose stems "
+                                  "it has; 0: not at all")
+                      ->capture_default_str(),
+                 0., 100.);
   CLI::Option* calibrate =
       command.add_flag("--calibrate", options->calibrate,
                        "Learn a taste: of some candidates of each neuron one is drawn, by weights from a "

@@ -87,7 +87,7 @@ Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& 
     return jittered(train.neurons[i], 10.f, options.seed, i);
   }));
   if (!slices.empty()) {
-    for (FeatureTable* traced : {&judged.tables[0], &judged.tables[1]}) set_slices(*traced, slices);
+    set_slices(std::array{&judged.tables[0], &judged.tables[1]}, slices);
     for (std::size_t i = 0; i < grown.cells.size(); ++i)
       judged.tables[2].slices.push_back(fmt::format("grown {}", i));
     for (Control& control : controls)
@@ -284,6 +284,7 @@ void leave_out(const Options& options, Console& console) {
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.features, options.report}, true);
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);

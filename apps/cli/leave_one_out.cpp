@@ -131,7 +131,7 @@ void judge_leaving_out(const LeftOutTrial& trial, Console& console) {
   const std::vector<Group> groups = groups_of(trial.kind);
   const Sample& traced = trial.traced;
   FeatureTable known = measured(traced, groups, console);
-  if (!trial.slices.empty()) set_slices(known, trial.slices);
+  if (!trial.slices.empty()) set_slices(std::array{&known}, trial.slices);
   std::vector<FeatureTable> grown;
   std::optional<std::size_t> longest_run;
   for (std::size_t i = 0; i < traced.neurons.size(); ++i) {

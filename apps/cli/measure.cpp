@@ -78,7 +78,8 @@ struct Neurons {
   std::vector<std::string> names, groups;  // groups: only with --by; of a file its folder
   std::vector<repository::NeuronId> ids;   // of a repository's
   std::function<std::function<Morphology(std::size_t)>()> reader;  // reads the i-th; each thread has its own
-  std::function<bool(const Error&, std::size_t)> may_skip;         // of a file's, as in files.h
+  std::function<std::string()> guesses = [] { return std::string(); };  // what reading guessed, a sentence
+  std::function<bool(const Error&, std::size_t)> may_skip;              // of a file's, as in files.h
 };
 
 Neurons of_files(const Options& options, Console& console) {
@@ -93,6 +94,7 @@ Neurons of_files(const Options& options, Console& console) {
     for (std::size_t i = 0; i < files->size(); ++i)
       neurons.groups.push_back(files->file(i).parent_path().filename().string());
   neurons.reader = [files] { return [files](std::size_t i) { return files->read(i); }; };
+  neurons.guesses = [files] { return files->guesses(); };
   neurons.may_skip = [files, named = options.files](const Error& error, std::size_t i) {
     return may_skip(error, files->file(i), named);
   };
@@ -374,6 +376,7 @@ void list(Console& console) {
 
 void run(const Options& options, Console& console) {
   if (options.list) return list(console);
+  must_take_files({options.csv, options.xlsx}, true);
   if (!options.xlsx.empty() && !options.force) refuse_existing({options.xlsx});
   const Picks picks = pick(options);
   const KindSet kinds = kind_set(options.kind);
@@ -399,6 +402,7 @@ void run(const Options& options, Console& console) {
     }
   });
   console.progress().end();
+  if (const std::string guesses = neurons.guesses(); !guesses.empty()) console.warn(guesses);
 
   Table table{columns(options, picks), {}};
   std::vector<std::string> groups;

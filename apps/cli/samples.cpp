@@ -57,6 +57,7 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
     console.progress().advance();
   });
   console.progress().end();
+  if (const std::string guesses = files.guesses(); !guesses.empty()) console.warn(guesses);
   Sample sample;
   sample.name = words.size() == 1 ? folder_name(words[0]) : counted(files.size(), "file");
   std::size_t failed = 0;
@@ -109,6 +110,17 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
   return sample;
 }
 
+void must_have_sections(const Sample& sample, const std::string& kind) {
+  const statistics::KindSet kinds = statistics::kind_set(kind);
+  const auto has = [&](const Morphology& m) {
+    return std::ranges::any_of(m.sections(), [&](const Section& s) { return kinds.contains(s.kind); });
+  };
+  if (std::ranges::none_of(sample.neurons, has))
+    throw Error(fmt::format("none of the {} of {} has a section of kind {}; say another --kind",
+                            counted(sample.neurons.size(), "neuron"), repository::escaped(sample.name),
+                            kind));
+}
+
 void warn_of_shared(const Sample& one, const Sample& other, Console& console) {
   const auto sum = [](const Morphology& m) { return hash64(std::as_bytes(m.points())); };
   std::set<std::uint64_t> sums;
@@ -151,14 +163,21 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
   return io::csv_of(sheet);
 }
 
-void set_slices(statistics::FeatureTable& table, const std::string& expression) {
+void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression) {
   const std::regex pattern(expression);
-  table.slices.clear();
-  for (const std::string& cell : table.cells) {
-    std::smatch found;
-    const bool any = std::regex_search(cell, found, pattern) && found.length() > 0;
-    table.slices.push_back(any ? found.str() : "only " + cell);
+  bool matched = false;
+  for (statistics::FeatureTable* table : tables) {
+    table->slices.clear();
+    for (const std::string& cell : table->cells) {
+      std::smatch found;
+      const bool any = std::regex_search(cell, found, pattern) && found.length() > 0;
+      table->slices.push_back(any ? found.str() : "only " + cell);
+      matched |= any;
+    }
   }
+  if (!matched && !tables.front()->cells.empty())
+    throw Error(fmt::format("--slices '{}' finds nothing in any name, such as {}; give another expression",
+                            expression, repository::escaped(tables.front()->cells.front())));
 }
 
 void add_slices(CLI::App& command, std::string& expression) {

@@ -30,6 +30,9 @@ struct Sample {
 /// What cannot be read is told and left out. Throws Error when nothing is left.
 Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console);
 
+/// Throws Error when no neuron has a section of the kind, a word of --kind.
+void must_have_sections(const Sample& sample, const std::string& kind);
+
 /// Warns of cells that are in both samples, by their points: how two samples differ is then said of less than it seems.
 void warn_of_shared(const Sample& one, const Sample& other, Console& console);
 
@@ -42,7 +45,8 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
                          std::span<const std::string> groups);
 
 /// Names the slice of each cell: what the regular expression finds in its name, or the cell itself where it finds nothing.
-void set_slices(statistics::FeatureTable& table, const std::string& expression);
+/// Throws Error when it finds nothing in any.
+void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression);
 
 /// --slices, a regular expression.
 void add_slices(CLI::App& command, std::string& expression);

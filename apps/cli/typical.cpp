@@ -63,11 +63,18 @@ std::string words_of(const Oddity& o) {
 
 std::string sentence(const std::string& cell, const Typicality& t, const std::string& population) {
   const auto abnormal = std::ranges::count_if(t.oddities, &Oddity::abnormal);
-  std::string out = fmt::format("{} is {} of {} (p = {:.3g}, {} cells): ", cell,
-                                t.p <= .05  ? "not typical"
-                                : t.p <= .2 ? "at the edge of what is typical"
-                                            : "typical",
-                                population, t.p, t.cells);
+  const bool few = t.least_p() > .05, least = t.p <= 1.001 * t.least_p();
+  std::string out =
+      few && least
+          ? fmt::format(
+                "{} is as strange beside {} as so few cells can show: p = {:.3g} is the least that {} cells "
+                "give, where 59 could tell: ",
+                cell, population, t.p, t.cells)
+          : fmt::format("{} is {} of {} (p = {:.3g}, {} cells): ", cell,
+                        t.p <= .05  ? "not typical"
+                        : t.p <= .2 ? "at the edge of what is typical"
+                                    : "typical",
+                        population, t.p, t.cells);
   if (abnormal == 0)
     return out + (t.oddities.empty()
                       ? "nothing can be said of it."
@@ -93,6 +100,7 @@ Json json_of(const std::string& cell, const Typicality& t, const std::string& po
           {"population", population},
           {"cells", t.cells},
           {"p", t.p},
+          {"p_least", t.least_p()},
           {"p_whole", t.p_whole},
           {"p_metric", t.p_feature},
           {"p_missing", t.p_missing},
@@ -114,8 +122,10 @@ std::vector<const Oddity*> telling(const Typicality& t, const FeatureTable& popu
 }
 
 void run(const Options& options, Console& console) {
+  must_take_files({options.report}, true);
   const Sample cells = cells_of(options, console),
                population = read_sample(options.population, options.repo, console);
+  must_have_sections(population, options.kind);
   const std::vector<Group> groups = groups_of(options.kind);
   const FeatureTable known = measured(population, groups, console), asked = measured(cells, groups, console);
   std::vector<Typicality> answers;

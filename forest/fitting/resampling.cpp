@@ -89,8 +89,8 @@ axiom: Soma(cells.soma(me)) Plan(0)
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : if(its(i), plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
-    tips = max(1, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))), thick = thicker(kind), d = thick * plans.d(p),
+    tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
+    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind), d = thick * plans.d(p),
     sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
     bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
     ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
@@ -104,8 +104,8 @@ stem: Plan(i) : if(its(i), plans.length(plan(i)), 0) > 0
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : its(i)  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
-    tips = max(2, round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))),
-    ahead = plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))),
+    tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
+    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
     away = ahead / max(1, plans.ahead(p)), d = thicker(kind) * plans.d(p), sway = normal(0, sways(kind)) }
   -> [ Kind(kind) At(swayed_x(sway, plans.x(p), plans.y(p)), swayed_y(sway, plans.x(p), plans.y(p)), plans.z(p))
        Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
@@ -166,6 +166,10 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
 )";
 
 /// Writes the grammar, part by part.
+// Neurons stray from one another by no more than this, in logarithms of how often they fork and how far they reach: axons of one
+// tip beside those of hundreds would make it twice as much, and what is grown then nine times as large as what was traced.
+constexpr double most_deviation = 1.2;
+
 class Writer {
  public:
   Writer(const Traced& traced, const std::string& title, const Resampling& options)
@@ -457,9 +461,13 @@ class Writer {
                                       {"slope", slope}}) {
       std::vector<std::string> bins;
       for (const auto& [kind, sd] : traced_.deviations)
-        bins.push_back(fmt::format("{}: {:.4g}", kind, sd[style]));
+        bins.push_back(fmt::format("{}: {:.4g}", kind, std::min(sd[style], most_deviation)));
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
+    put("# No stem has more tips, or reaches farther, than half as much again as the largest that was "
+        "traced.\n");
+    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
+    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
     std::vector<std::string> slopes;
     for (const auto& [kind, mean] : traced_.means)
       slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
@@ -499,6 +507,17 @@ class Writer {
     text_ += rest;
   }
 
+  void most(const char* name, double steps, auto&& of) {
+    constexpr double beyond = 1.5;
+    std::map<int, double> largest;
+    for (const Cell& c : traced_.cells)
+      for (const Stem& stem : c.stems) largest[stem.kind] = std::max(largest[stem.kind], double(of(stem)));
+    std::vector<std::string> bins;
+    for (const auto& [kind, value] : largest)
+      bins.push_back(fmt::format("{}: {}", kind, std::ceil(beyond * value * steps) / steps));
+    put("table {} = {}\n", name, fmt::join(bins, ", "));
+  }
+
   // How much stems of each kind differ in where the middle of their tips lies, in the plane of the slice: the angle from the
   // mean, in degrees, that two of three stay below, and at most 100, where they lie all around.
   std::map<int, double> directions() const {
@@ -524,7 +543,8 @@ class Writer {
     std::vector<std::string> bins;
     for (const auto& [kind, of] : values) {
       const double sd = deviation(of);
-      bins.push_back(fmt::format("{}: {:.4g}", kind, sd > 0. ? share * sd : 1.));
+      constexpr double same = 1e-6;  // but for what rounding makes of it
+      bins.push_back(fmt::format("{}: {:.4g}", kind, sd > same ? share * sd : 1.));
     }
     put("table {} = {}\n", name, fmt::join(bins, ", "));
   }
@@ -565,9 +585,14 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
   const Traced traced = learn(neurons, options.kinds);
   if (traced.cells.size() < 2 || traced.forks.empty())
     throw Error(
-        fmt::format("{} of {} neurons have stems and forks of these kinds; a model needs two such "
-                    "neurons, name more of them or other kinds",
-                    traced.cells.size(), neurons.size()));
+        traced.cells.size() < 2
+            ? fmt::format("{} of {} neurons have stems of these kinds; a model needs two such neurons, name "
+                          "more of them or other kinds",
+                          traced.cells.size(), neurons.size())
+            : fmt::format(
+                  "none of {} neurons has a fork of these kinds, so there is nothing to learn branching "
+                  "from; name others",
+                  neurons.size()));
   return Writer(traced, title, options).text();
 }
 

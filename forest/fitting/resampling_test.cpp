@@ -461,6 +461,59 @@ TEST(Resampling, AnAxonOnADendriteIsAStemOfItsOwn) {
   EXPECT_NEAR(sections / 20., 3., 1.);
 }
 
+// The same neurons, as a tracer leaves them who looks at no diameters.
+std::vector<Morphology> without_diameters(std::span<const Morphology> neurons) {
+  std::vector<Morphology> bare;
+  for (const Morphology& m : neurons) {
+    MorphologyBuilder builder;
+    builder.set_soma(m.soma());
+    for (std::uint32_t i = 0; i < m.sections().size(); ++i) {
+      std::vector<Point> points(m.points(SectionId(i)).begin(), m.points(SectionId(i)).end());
+      for (Point& p : points) p.radius = 0.f;
+      const Section& s = m.section(SectionId(i));
+      builder.add_section(s.parent, s.kind, points, s.tag, s.soma_point);
+    }
+    bare.push_back(builder.build());
+  }
+  return bare;
+}
+
+TEST(Resampling, NeuronsWithoutDiametersGrowAsLongAsTheyWereTraced) {
+  const std::vector<Morphology> models = without_diameters(traced(30));
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "bare"), "bare");
+  const std::vector<Morphology> grown = lsystem::grow_population(grammar, 60, 3);
+  for (const char* metric : {"total_length", "number_of_leaves", "max_path_distance"})
+    EXPECT_NEAR(mean_of(grown, metric), mean_of(models, metric), .2 * mean_of(models, metric)) << metric;
+}
+
+// Axons that were hardly traced beside whole ones.
+TEST(Resampling, NothingGrowsManyTimesAsLargeAsWhatWasTraced) {
+  const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(
+steps: 200
+module Tip(left, n)
+cell large = floor(uniform(0, 1)^3 * 7)
+axiom: Soma(14) Axon [ f(7) !(1) F(8) Tip(large, 0) ]
+fork: Tip(left, n) : n > 2 & left > 0 -> [ +(30) Tip(left - 1, 0) ] -(30) Tip(left - 1, 0)
+grow: Tip(left, n) : n < 6 -> +(uniform(-12, 12)) F(8) Tip(left, n + 1)
+)",
+                                                                                 "axons"),
+                                                                  24, 5);
+  Resampling axons;
+  axons.kinds = {SectionKind::axon};
+  const std::vector<Morphology> grown =
+      lsystem::grow_population(lsystem::parse(resampling_grammar(models, "axons", axons), "fitted"), 200, 3);
+  const auto most = [](std::span<const Morphology> neurons) {
+    double tips = 0.;
+    for (const Morphology& n : neurons)
+      tips = std::max(tips, statistics::find_metric("number_of_leaves")->values(Arbors(n))[0]);
+    return tips;
+  };
+  EXPECT_LE(most(grown), 1.5 * most(models));
+  EXPECT_GT(most(grown), .5 * most(models));
+  EXPECT_NEAR(mean_of(grown, "number_of_leaves"), mean_of(models, "number_of_leaves"),
+              .5 * mean_of(models, "number_of_leaves"));
+}
+
 TEST(Resampling, TooFewNeuronsAreRefused) {
   std::vector<Morphology> one = traced(1);
   EXPECT_THROW((void)resampling_grammar(one, "t"), Error);

@@ -234,7 +234,9 @@ void standardise(Traced& traced) {
     for (std::size_t s = 0; s < styles; ++s) {
       std::vector<double> values;
       for (const Style* style : of) values.push_back((*style)[s]);
-      const double mean = statistics::mean(values), sd = statistics::summarize(values).sd;
+      const double mean = statistics::mean(values), measured = statistics::summarize(values).sd;
+      const double sd =
+          measured > 1e-9 * std::abs(mean) ? measured : 0.;  // what is the same in all may be rounded
       traced.means[kind][s] = mean, traced.deviations[kind][s] = sd;
       for (Style* style : of) (*style)[s] = sd > 0. ? ((*style)[s] - mean) / sd : 0.;
     }

@@ -77,6 +77,9 @@ void Repository::Impl::keep_distributions(int model, const std::string& name,
 std::pair<int, bool> Repository::add_model(const NewModel& model) {
   Impl& impl = *impl_;
   check_name("model", model.name);
+  if (model.name.find('@') != std::string::npos)
+    throw Error(
+        fmt::format("'{}' is no name for a model: what follows '@' is a version; leave it out", model.name));
   if (!model.population.empty()) check_name("population", model.population);
   for (const auto& [name, text] : model.distributions) check_name("distribution", model.name + "." + name);
   return impl.write([&] {

@@ -95,7 +95,7 @@ TEST(Budget, WhereThereIsNoTimeForOneSampleAPixelPixelsGrow) {
     EXPECT_EQ(budget.samples(), 1u);
     before = budget.pixel();
   }
-  EXPECT_EQ(before, 2.f);
+  EXPECT_EQ(before, 2.8f);
   EXPECT_FLOAT_EQ(budget.error(), 6.f);
   EXPECT_EQ(budget.thinnest(), budget.error());
   watch(budget, 45., 200);
@@ -109,7 +109,7 @@ TEST(Budget, AForestOfFewSegmentsKeepsThemWhereTheMachineIsBusy) {
   EXPECT_EQ(budget.error(), 1.f);
   EXPECT_EQ(budget.pixel(), 1.f);
   watch(budget, 1000., 50);  // a large one
-  EXPECT_EQ(budget.pixel(), 2.f);
+  EXPECT_EQ(budget.pixel(), 2.8f);
   EXPECT_GT(budget.error(), 4.f);
   for (int i = 0; i < 100; ++i) budget.took(400., 3000);
   EXPECT_EQ(budget.error(), 1.f);

@@ -107,7 +107,8 @@ struct Step {
 };
 // Most time goes to segments and not to samples, so that four samples at an error of five pixels take little more than one at
 // one, and are as much like the truth (docs/scene/seam.md); so are sixteen at three and four at two.
-constexpr std::array<Step, 5> steps{{{2.f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
+constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
+                                     {2.f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
                                      {1.4f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .16f},
                                      {1.f, 1, 1.f, 6.f, 4.f, 1.f, 1.4, .12f},
                                      {1.f, 4, .5f, 5.f, 4.f, 2.f, 1.3, .06f},

@@ -163,16 +163,16 @@ class Budget {
 
  private:
   static constexpr std::uint64_t all = ~std::uint64_t(0);
-  static constexpr std::size_t plain_step = 2;  // one sample of every pixel
+  static constexpr std::size_t plain_step = 3;  // one sample of every pixel
 
   std::size_t upwards(double milliseconds) const;
 
   double milliseconds_;
   std::size_t step_ = plain_step;
   float error_ = 1.f;
-  std::array<double, 4> doubt_{1., 1., 1., 1.};  // of each step but the last: the next was tried in vain
-  std::uint32_t agreed_ = 0;                     // pictures that have asked for another step
-  std::uint32_t since_ = 0;                      // pictures since the step was gone up to
+  std::array<double, 5> doubt_{1., 1., 1., 1., 1.};  // of each step but the last: the next was tried in vain
+  std::uint32_t agreed_ = 0;                         // pictures that have asked for another step
+  std::uint32_t since_ = 0;                          // pictures since the step was gone up to
 };
 
 }  // namespace forest::scene

@@ -148,6 +148,9 @@ Types find_types(const FeatureTable& table, const TypesOptions& options, Progres
     throw Error(
         fmt::format("{} cells cannot be divided into {} types; ask for 1 to {}", n, *options.types, n / 2));
   const FeatureTable full = completed(table);
+  if (full.features.empty())
+    throw Error(fmt::format(
+        "the {} cells are the same in every metric, so there are no types; are they copies of one?", n));
   // No cell counts for more than three standard deviations in any feature: a single odd value makes no type.
   const Matrix X = standardised(full).cwiseMax(-3.).cwiseMin(3.);
   const Projection projection = principal_components(X.rowwise() - X.colwise().mean(), .8, 10);

@@ -4,6 +4,7 @@
 // cell of the population every p is equally likely, whatever the distribution and however many the features.
 #pragma once
 
+#include <algorithm>
 #include <string>
 #include <vector>
 
@@ -31,6 +32,9 @@ struct Typicality {
       1.;  // how many features are not defined: a cell without dendrites is strange in no dendrite's length
   std::size_t cells = 0;         // of the population, without the cell itself
   std::vector<Oddity> oddities;  // the strangest first
+
+  /// What p is where nothing of the population is as strange: with so few cells it cannot be less.
+  double least_p() const { return std::min(1., 3. / double(cells + 1)); }
 };
 
 /// @param cell  a table of one row; the same cell among the population is left out

@@ -46,7 +46,10 @@ grep -qw 4 count.txt
 mkdir few && cp "$(find traced -name '*.swc' | sort | head -1)" few
 refuses 'needs two such neurons' $BRAINFOREST fit few -o few.lsys
 [ ! -e few.lsys ]
-refuses 'needs two such neurons' $BRAINFOREST fit traced --kind axon -o axon.lsys
+refuses 'none of the 12 neurons of traced has a section of kind axon' $BRAINFOREST fit traced --kind axon -o axon.lsys
+refuses "finds nothing in any name" $BRAINFOREST fit traced --slices nosuch -o axon.lsys
+fails_with 2 'is no number from 0.01 to 100' $BRAINFOREST fit traced --style -1 -o axon.lsys
+refuses 'its folder is not there' $BRAINFOREST fit traced -o nowhere/axon.lsys
 printf 'mine\n' >kept.lsys
 refuses '--force' $BRAINFOREST fit traced -o kept.lsys
 grep -q mine kept.lsys

@@ -97,6 +97,23 @@ cmp first.json second.json
 refuses 'into 20 types' $BRAINFOREST classify one --types 20
 fails_with 2 'files or --repo' $BRAINFOREST classify
 
+# What has no such sections is not compared; so few cells cannot show what is strange; results are written all or none.
+for verb in "compare one two" "classify one" "typical purkinje/*-00000.swc --population one"; do
+  refuses 'has a section of kind glia' $BRAINFOREST $verb --kind glia
+done
+$BRAINFOREST typical purkinje/*-00000.swc --population one >few.txt
+grep -q 'as so few cells can show' few.txt
+refuses 'its folder is not there' $BRAINFOREST compare one two $quick --csv no.csv --report nowhere/no.html
+refuses 'its folder is not there' $BRAINFOREST classify all --csv no.csv --report nowhere/no.html
+refuses 'is named twice' $BRAINFOREST judge --train one --held-out two --grown three --features no.csv --report no.csv
+fails_with 2 'permutations' $BRAINFOREST compare one two --permutations 0
+mkdir copies && for i in 1 2 3 4 5 6 7; do cp "one/$first.swc" copies/$i.swc; done
+refuses 'the same in every metric' $BRAINFOREST classify copies
+sed '/^#/!s/^\(30 [0-9]*\) [^ ]*/\1 nan/' "one/$first.swc" >odd.swc
+$BRAINFOREST measure odd.swc --metric total_length >/dev/null 2>odd.txt
+grep -q '1 of 1 neuron hold something odd that only the tracing can mend, first odd.swc' odd.txt
+[ ! -e no.csv ]
+
 # The judge: cells of another kind are no passable growth; the controls say whether it could have seen.
 $BRAINFOREST judge --train one --held-out two --grown purkinje --repeats 3 --features judged.csv --report judged.html --json >judged.json
 told judged.json 'd["pass"] is False and d["auc"]["structure"]["value"] > .9 and d["ks_rejections"] > 0 and d["energy_p"] < .05'
