@@ -40,8 +40,8 @@ PY
 done
 "$program" render lh.pial -o again.png --size 320x240 --renderer cpu --threads 1 >/dev/null
 cmp plain.cpu.png again.png || fail "the picture depends on the number of threads"
-"$program" render lh.pial --overlay lh.curv --range -50:50 --colour-map viridis -o a.png --size 320x240 --renderer cpu >/dev/null
-"$program" render lh.pial --overlay values.txt --range -50:50 --colour-map viridis -o b.png --size 320x240 --renderer cpu --json >b.json
+"$program" render lh.pial --overlay lh.curv --range -50:50 --colour-map viridis --no-legend -o a.png --size 320x240 --renderer cpu >/dev/null
+"$program" render lh.pial --overlay values.txt --range -50:50 --colour-map viridis --no-legend -o b.png --size 320x240 --renderer cpu --json >b.json
 cmp a.png b.png || fail "values as text look otherwise"
 cmp -s a.png plain.cpu.png && fail "values make no difference"
 "$program" render lh.pial --from above --overlay lh.curv -o above.png --size 320x240 --renderer cpu --json >above.json
