@@ -246,7 +246,17 @@ void run(const Options& options, Console& console) {
   if (!options.grammar.empty()) {
     const auto write = options.form == "burke" ? fitting::burke_grammar : fitting::hillman_grammar;
     const std::string name = options.grammar.stem().string();
-    write_unless_there(options.grammar, write(cells, name, {.kinds = kinds, .seed = options.seed}),
+    const auto tell = [&](const fitting::Corrected& c) {
+      constexpr double alike = 1.25;
+      if (c.grown < alike * c.traced && c.traced < alike * c.grown) return;
+      console.warn(
+          fmt::format("what grows of kind {} by these rules has {:.3g} tips in the mean, where the traced "
+                      "ones have {:.3g}; "
+                      "'brainforest fit' keeps how many a neuron has",
+                      name_of(c.kind), c.grown, c.traced));
+    };
+    write_unless_there(options.grammar,
+                       write(cells, name, {.kinds = kinds, .seed = options.seed, .tell = tell}),
                        options.force);
   }
   if (!options.report.empty())

@@ -211,11 +211,11 @@ std::string text_of(const KindModel& m) {
   t += fmt::format(
       "#define a_{0} {1}  # what a daughter has of its sibling's draw\n"
       "#define extent_{0} {2}  # µm of path at most\n"
-      "#define more_{0} {3}  # corrects the chance to fork, so that cells have {4} tips as the traced ones\n"
+      "#define more_{0} {3}  # corrects the chance to fork: {4}\n"
       "table trend_{0} = {5}  # of ratios, by the parent's diameter\n"
       "table loss_{0} = {6}  # of diameter a µm, by diameter\n",
       k, number_text(m.anticorrelation), number_text(m.extent), number_text(m.correction.more),
-      number_text(m.correction.tips), m.trend, m.loss);
+      m.correction.comment(), m.trend, m.loss);
   t += fmt::format(
       "function girth_{0}(d) = min({1}, max({2}, d))\n"
       "function thin_{0}(d) = girth_{0}(d - dL * loss_{0}(d))\n"
@@ -267,6 +267,8 @@ std::string burke_grammar(std::span<const Morphology> cells, const std::string& 
   std::vector<Correction*> corrections;
   for (KindModel& m : kinds) corrections.push_back(&m.correction);
   correct(corrections, text, options.rounds, options.seed);
+  for (const Correction* c : corrections)
+    if (options.tell && c->grown > 0.) options.tell({c->kind, c->tips, c->grown});
   return text();
 }
 

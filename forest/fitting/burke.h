@@ -4,6 +4,7 @@
 // estimated from cells; the yardstick that finer models are held to, as it forgets order, place and cell.
 #pragma once
 
+#include <functional>
 #include <span>
 #include <string>
 
@@ -12,11 +13,18 @@
 
 namespace forest::fitting {
 
+/// What came of correcting the chance to fork: tips of a kind, in the mean of cells.
+struct Corrected {
+  SectionKind kind;
+  double traced, grown;
+};
+
 struct BurkeOptions {
   statistics::KindSet kinds = statistics::KindSet::all();  // each kind gets numbers of its own
   int rounds =
       10;  // of growing cells and correcting the chance to fork until they have as many tips; 0: as measured
   std::uint64_t seed = 1;
+  std::function<void(const Corrected&)> tell = {};  // of each kind
 };
 
 /// The text of a grammar (docs/lsystem/notation.md): soma, number and diameter and direction of stems, taper, chances to fork

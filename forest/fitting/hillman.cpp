@@ -85,7 +85,7 @@ std::string text_of(const KindModel& m) {
   t += drawn_as("wander_" + k, m.angles.turns, {"weibull", "gamma", "lognormal"});
   t += fmt::format(
       "#define extent_{0} {1}  # µm of path at most\n"
-      "#define more_{0} {2}  # corrects the threshold, so that cells have {3} tips as the traced ones\n"
+      "#define more_{0} {2}  # corrects the threshold: {3}\n"
       "function girth_{0}(d) = min({4}, max({5}, d))\n"
       "module Branch_{0}(d, path), Run_{0}(left, length, d, e, path, forks)\n"
       "total budding_{0} = Branch_{0}(d, path) : 1\n"
@@ -104,8 +104,8 @@ std::string text_of(const KindModel& m) {
       "    b = spread_{0}() }}\n"
       "  -> F(left, e) /(uniform(0, 360)) [ +(b * big / (small + big)) !(small) Branch_{0}(small, path) ]\n"
       "  -(b * small / (small + big)) !(big) Branch_{0}(big, path)\n",
-      k, number_text(m.extent), number_text(m.correction.more), number_text(m.correction.tips),
-      number_text(thickest), number_text(finest), 4 * std::max<std::size_t>(m.most_abreast, 5));
+      k, number_text(m.extent), number_text(m.correction.more), m.correction.comment(), number_text(thickest),
+      number_text(finest), 4 * std::max<std::size_t>(m.most_abreast, 5));
   return t + text_of(m.stems, *m.form, fmt::format("Branch_{}(d, 0)", k));
 }
 
@@ -139,6 +139,8 @@ std::string hillman_grammar(std::span<const Morphology> cells, const std::string
   std::vector<Correction*> corrections;
   for (KindModel& m : kinds) corrections.push_back(&m.correction);
   correct(corrections, text, options.rounds, options.seed);
+  for (const Correction* c : corrections)
+    if (options.tell && c->grown > 0.) options.tell({c->kind, c->tips, c->grown});
   return text();
 }
 

@@ -249,24 +249,31 @@ void correct(std::span<Correction*> kinds, const std::function<std::string()>& t
              std::uint64_t seed) {
   constexpr std::size_t grown = 80;
   struct Best {
-    double more, off;
+    double more, off, tips;
   };
-  std::vector<Best> best(kinds.size(), {1., 1e9});
+  std::vector<Best> best(kinds.size(), {1., 1e9, 0.});
   for (int round = 0; round < rounds; ++round) {
     const auto cells =
         lsystem::grow_population(lsystem::parse(text(), "model"), grown, seed + std::uint64_t(round));
     double worst = 0.;
     for (std::size_t k = 0; k < kinds.size(); ++k) {
       Correction& c = *kinds[k];
-      const double off = std::log(std::max(c.tips, 0.1) / std::max(tips_of(cells, c.kind), 0.1));
-      if (std::abs(off) < best[k].off) best[k] = {c.more, std::abs(off)};
+      const double tips = tips_of(cells, c.kind);
+      const double off = std::log(std::max(c.tips, 0.1) / std::max(tips, 0.1));
+      if (std::abs(off) < best[k].off) best[k] = {c.more, std::abs(off), tips};
       worst = std::max(worst, std::abs(off));
       const double slowly = round < 4 ? 0.5 : 0.25;  // by then what is left is chance
       c.more = std::clamp(c.more * std::exp(std::clamp(slowly * off, -0.4, 0.4)), 0.05, 10.);
     }
     if (worst < 0.03) break;
   }
-  for (std::size_t k = 0; k < kinds.size() && rounds > 0; ++k) kinds[k]->more = best[k].more;
+  for (std::size_t k = 0; k < kinds.size() && rounds > 0; ++k)
+    kinds[k]->more = best[k].more, kinds[k]->grown = best[k].tips;
+}
+
+std::string Correction::comment() const {
+  return fmt::format("{} tips were traced in the mean{}", number_text(tips),
+                     grown > 0. ? fmt::format(", and {} grew with it", number_text(grown)) : "");
 }
 
 }  // namespace forest::fitting

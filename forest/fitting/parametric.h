@@ -77,8 +77,11 @@ std::string assembled(const std::string& comment, const std::string& title, cons
 struct Correction {
   SectionKind kind;
   double tips = 0., more = 1.;
+  double grown = 0.;  // tips of cells that grew with it; 0: none did
+
+  std::string comment() const;
 };
-/// Grows cells of text() and changes each `more` until they have as many tips. A rule measured on traced branches is not
+/// Grows cells of text() and changes each `more` until they have as many tips, or nearly: the best of all is kept. A rule measured on traced branches is not
 /// that of grown ones, whose diameters wander differently, and near the border between dying out and running away a little
 /// is much.
 void correct(std::span<Correction*> kinds, const std::function<std::string()>& text, int rounds,

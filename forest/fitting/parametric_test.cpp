@@ -28,8 +28,13 @@ double mean_of(const std::vector<Morphology>& cells, std::string_view metric) {
 TEST(Burke, GrowsCellsLikeThoseOfBurkesOwnModel) {
   const auto grammar = lsystem::parse_file(std::string(FOREST_SOURCE_DIR) + "/data/grammars/motoneuron.lsys");
   const auto cells = lsystem::grow_population(grammar, 30, 1992);
-  const std::string text = burke_grammar(cells, "like motoneurons");
+  std::vector<Corrected> corrected;
+  const std::string text =
+      burke_grammar(cells, "like motoneurons", {.tell = [&](const Corrected& c) { corrected.push_back(c); }});
   EXPECT_EQ(text, burke_grammar(cells, "like motoneurons"));
+  ASSERT_EQ(corrected.size(), 1u);
+  EXPECT_NEAR(corrected[0].traced, mean_of(cells, "number_of_leaves"), 1e-6);
+  EXPECT_NEAR(corrected[0].grown / corrected[0].traced, 1., .1);
   const auto again = lsystem::grow_population(lsystem::parse(text, "burke"), 60, 7);
   const struct {
     const char* metric;
