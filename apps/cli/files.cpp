@@ -30,6 +30,13 @@ std::string extension_of(const fs::path& path) {
   return extension;
 }
 
+// Whether it takes bytes and no file: a pipe, a terminal, what leads to an open file (/dev/stdout).
+bool is_stream(const fs::path& place) {
+  std::error_code none;
+  const auto there = fs::symlink_status(followed(place), none);
+  return fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there);
+}
+
 bool known(const fs::path& path) {
   return std::ranges::any_of(io::formats(), [&](const io::Format& f) {
     return f.read && std::ranges::find(f.extensions, extension_of(path)) != f.extensions.end();
@@ -151,10 +158,8 @@ void write_unless_there(const std::vector<std::pair<fs::path, std::string>>& fil
 }
 
 void must_have_folder(const fs::path& place) {
+  if (is_stream(place)) return;
   std::error_code none;
-  if (const auto there = fs::status(place, none);
-      fs::exists(there) && !fs::is_regular_file(there) && !fs::is_directory(there))
-    return;  // a stream
   const fs::path folder = place.has_parent_path() ? place.parent_path() : fs::path(".");
   const std::string name = repository::escaped(place.string());
   if (!fs::is_directory(folder, none))
@@ -167,12 +172,11 @@ void must_take_files(const std::vector<fs::path>& files, bool force) {
   std::error_code none;
   std::set<fs::path> places;
   for (const fs::path& file : files) {
-    if (file.empty()) continue;
+    if (file.empty() || is_stream(file)) continue;
     const std::string name = repository::escaped(file.string());
-    const auto there = fs::status(file, none);
     if (!places.insert(fs::weakly_canonical(file, none)).second)
       throw Error(fmt::format("{} is named twice; give each result a name of its own", name));
-    if (fs::is_directory(there)) throw Error(fmt::format("{} is a folder; name a file in it", name));
+    if (fs::is_directory(file, none)) throw Error(fmt::format("{} is a folder; name a file in it", name));
     must_have_folder(file);
   }
   if (!force) refuse_existing(files);
@@ -203,12 +207,11 @@ void must_take(const fs::path& place, const Product& product) {
   const std::string name = repository::escaped(place.string());
   const auto there = fs::symlink_status(followed(place), none);
   if (fs::is_directory(there)) throw Error(fmt::format("{} is a folder; name a file in it", name));
-  if (fs::exists(there) && !fs::is_regular_file(there)) return;
+  if (is_stream(place)) return;
   if (*product.ending && extension_of(place) != product.ending)
     throw Error(
         fmt::format("{}: {}s have names that end in {}; choose one", name, product.what, product.ending));
-  if (const fs::path folder = place.parent_path(); !folder.empty() && !fs::is_directory(folder, none))
-    throw Error(fmt::format("{}: its folder is not there; make it first", name));
+  must_have_folder(place);
   if (!fs::exists(there) || fs::file_size(place, none) == 0) return;
   std::string mark(product.mark.size(), 0);
   std::ifstream file(place, std::ios::binary);

@@ -51,7 +51,7 @@ void write_unless_there(const std::filesystem::path& to, std::string_view bytes,
 void write_unless_there(const std::vector<std::pair<std::filesystem::path, std::string>>& files, bool force);
 
 /// Throws Error when what is made over minutes could not be put there in the end: two of the places are one, a folder is missing
-/// or cannot be written, a folder is there, or a file, unless `force` is given. Empty
+/// or cannot be written, a folder is there, or a file, unless `force` is given. Streams may be named as often as one likes, empty
 /// paths are not wanted.
 void must_take_files(const std::vector<std::filesystem::path>& files, bool force);
 /// The same for a surface, which io::write_surface writes: names of other formats than its are refused.

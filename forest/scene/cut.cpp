@@ -431,11 +431,11 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
   const Sphere wide{sphere.centre, b.neurons};
   if (!look.plain || !look.straws_do(sight, sight.eye.see(wide))) {
     const auto owners = look.forest.owners().subspan(b.first_segment - look.forest.places().size());
-    for (std::uint32_t rest = shown; rest; rest &= rest - 1)
-      if (const int i = std::countr_zero(rest);
-          !look.far(owners[std::size_t(i)].instance, look.forest.spheres()[owners[std::size_t(i)].instance],
-                    1u << s))
-        shown &= ~(1u << i);
+    for (std::uint32_t rest = shown; rest; rest &= rest - 1) {
+      const int i = std::countr_zero(rest);
+      const std::uint32_t owner = owners[std::size_t(i)].instance;
+      if (!look.far(owner, look.forest.spheres()[owner], 1u << s)) shown &= ~(1u << i);
+    }
   }
   const auto put = [&](std::uint32_t drawn, const Sphere& around) {
     if (!drawn) return;
