@@ -557,10 +557,11 @@ View parse_view(std::string_view text, const std::string& name) {
 
 std::string to_json(const View& view) { return write_all(view, keys_of_view()).dump(); }
 
-// On dark ground through a colour of its own, for between white and the grey of what has no value lies grey.
+// On dark ground through a colour of its own, for between white and the grey of what has no value lies grey; on light ground
+// black, then a green that hardly any map has.
 FlashColours flash_colours(Background background) {
   if (background == Background::dark) return {Vec3(1.f, 1.f, .92f), light_of(0x2FD6FF)};
-  return {light_of(0x000000), light_of(0x0078C8)};
+  return {light_of(0x000000), light_of(0x00A040)};
 }
 
 std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
