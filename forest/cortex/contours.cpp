@@ -86,6 +86,8 @@ std::vector<Contour> cut_one(const Mesh& surface, Axis axis, double at,
   return contours;
 }
 
+constexpr double fine = .2;  // µm: so near are polygons to curves where it is asked what crosses
+
 // Where two edges of a section's polygons cross that share no end.
 struct Crossing {
   Place place;
@@ -162,7 +164,7 @@ std::string fault_of(const ContourStack& stack) {
     for (std::uint32_t object = 0; object < stack.objects.size() && faults[i].empty(); ++object) {
       std::vector<std::vector<Place>> polygons;
       for (const Contour& contour : section.contours)
-        if (contour.object == object) polygons.push_back(flattened(contour.curve, 2.));
+        if (contour.object == object) polygons.push_back(flattened(contour.curve, fine));
       if (const auto found = crossing_in(polygons))
         faults[i] = fmt::format(
             "{} of '{}' cross{} in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; draw them apart",
@@ -181,7 +183,7 @@ std::vector<ContourCrossing> crossings(const ContourStack& stack) {
   parallel_for(stack.sections.size(), 1, [&](std::size_t i) {
     const Section& section = stack.sections[i];
     std::vector<std::vector<Place>> polygons;
-    for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, 2.));
+    for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, fine));
     for (const Crossing& crossing : crossings_in(polygons)) {
       const auto [object, other] =
           std::minmax(section.contours[crossing.first].object, section.contours[crossing.second].object);
@@ -264,52 +266,73 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
   for (Section& section : result.sections)
     for (Contour& contour : section.contours) all.push_back(&contour);
   std::vector<FitSummary> each(all.size());
-  std::vector<double> tolerances(all.size(), options.tolerance);
   std::vector<BezierLoop> given;
   for (const Contour* contour : all) given.push_back(contour->curve);
-  for (std::size_t i = 0; i < all.size(); ++i)
-    if (!given[i].polygon()) tolerances[i] = 0.;
-  const auto fit_one = [&](std::size_t i) {
+  const auto keep = [&](std::size_t i) {
+    all[i]->curve = given[i];
+    const std::size_t corners = given[i].polygon() ? given[i].pieces() : 0;
+    each[i] = {1, given[i].pieces(), corners, length(given[i]), 0., 0.};
+  };
+  const auto fit = [&](std::size_t i, std::span<const Emphasis> closer) {
+    FitOptions so = options;
+    so.closer = closer;
+    const Fit found = fit_loop(flattened(given[i], options.tolerance / 4.), so);
+    all[i]->curve = found.curve;
     const double along = length(given[i]);
-    if (tolerances[i] < options.tolerance / 20.) {  // as it is
-      all[i]->curve = given[i];
-      each[i] = {1, given[i].pieces(), given[i].polygon() ? given[i].pieces() : 0, along, 0., 0.};
-      return;
-    }
-    const Fit fit = fit_loop(flattened(given[i], tolerances[i] / 4.),
-                             {.tolerance = tolerances[i], .corner = options.corner});
-    each[i] = {1, fit.curve.pieces(), fit.corners, along, fit.rms * fit.rms * along, fit.greatest};
-    all[i]->curve = fit.curve;
+    each[i] = {1, found.curve.pieces(), found.corners, along, found.rms * found.rms * along, found.greatest};
   };
   progress.begin("fitting curves", all.size());
   parallel_for(all.size(), 1, [&](std::size_t i) {
-    fit_one(i);
+    given[i].polygon() ? fit(i, {}) : keep(i);
     progress.advance();
   });
   progress.end();
-  // Where curves cross whose polygons do not, by a narrow sulcus or a thin tip, they must lie nearer.
+  // Where curves cross whose polygons do not, by a narrow sulcus or a thin tip, they must lie nearer around that place, from
+  // round to round.
   std::vector<std::size_t> first_of{0};
   for (const Section& section : result.sections)
     first_of.push_back(first_of.back() + section.contours.size());
+  const double within = 25. * options.tolerance;
+  progress.begin("parting curves", result.sections.size());
   parallel_for(result.sections.size(), 1, [&](std::size_t k) {
     const Section& section = result.sections[k];
-    for (std::uint32_t object = 0; object < stack.objects.size(); ++object)
+    for (std::uint32_t object = 0; object < stack.objects.size(); ++object) {
+      std::vector<std::size_t> who;
+      for (std::size_t i = 0; i < section.contours.size(); ++i)
+        if (section.contours[i].object == object) who.push_back(first_of[k] + i);
+      std::vector<Emphasis> closer;
+      std::vector<bool> kept(who.size());
+      for (std::size_t i = 0; i < who.size(); ++i) kept[i] = !given[who[i]].polygon();
       for (;;) {
-        std::vector<std::size_t> who;
         std::vector<std::vector<Place>> polygons;
-        for (std::size_t i = 0; i < section.contours.size(); ++i)
-          if (section.contours[i].object == object)
-            who.push_back(first_of[k] + i), polygons.push_back(flattened(section.contours[i].curve, 2.));
-        const auto found = crossing_in(polygons);
-        if (!found) break;
-        const std::size_t one = who[found->first], other = who[found->second];
-        const double least = std::min(tolerances[one], tolerances[other]);
-        if (std::max(tolerances[one], tolerances[other]) < options.tolerance / 20.)
-          break;  // so do the polygons
-        for (const std::size_t i : {one, other})
-          if (tolerances[i] > .5 * least) tolerances[i] = .5 * least, fit_one(i);
+        for (const std::size_t i : who) polygons.push_back(flattened(all[i]->curve, fine));
+        std::vector<double> needed(who.size(), 0.);  // how many times what lies by its crossings shall count
+        std::vector<bool> raised(closer.size());
+        for (const Crossing& crossing : crossings_in(polygons)) {
+          const auto near = std::ranges::find_if(closer, [&](const Emphasis& one) {
+            return (one.at - crossing.place).norm() < .5 * one.within;
+          });
+          const auto which = std::size_t(near - closer.begin());
+          if (near == closer.end())
+            closer.push_back({crossing.place, within, 4.});
+          else if (which < raised.size() && !raised[which])
+            raised[which] = true, near->times *= 4.;
+          for (const std::size_t i : {crossing.first, crossing.second})
+            needed[i] = std::max(needed[i], closer[which].times);
+        }
+        bool changed = false;
+        for (std::size_t i = 0; i < who.size(); ++i) {
+          if (kept[i] || needed[i] == 0.) continue;
+          changed = true;
+          kept[i] = needed[i] > 1e4;
+          kept[i] ? keep(who[i]) : fit(who[i], closer);
+        }
+        if (!changed) break;
       }
+    }
+    progress.advance();
   });
+  progress.end();
   summary = {};
   for (const FitSummary& one : each) {
     summary.contours += one.contours, summary.pieces += one.pieces, summary.corners += one.corners;

@@ -78,9 +78,9 @@ struct FitSummary {
   double length = 0.;              // µm
   double rms = 0., greatest = 0.;  // µm, over all contours
 };
-/// Every polygon by the fewest cubics that lie along it (fit_loop), closer where curves of an object would cross and what was
-/// given does not: then it is fitted to a half of the tolerance, and so on, or kept. What is curves already stays as it is, bit
-/// for bit. On all cores.
+/// Every polygon by the fewest cubics that lie along it (fit_loop), closer around places where curves of an object would cross
+/// and what was given does not; where that does not help the polygon is kept. What is curves already stays as it is, bit for
+/// bit. On all cores.
 ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSummary& summary,
                     Progress& progress);
 

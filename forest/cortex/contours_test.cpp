@@ -161,6 +161,7 @@ TEST(Fitted, BanksOfANarrowSulcusDoNotCross) {
   FitSummary summary;
   EXPECT_EQ(fault_of(fitted(stack, {}, summary, Progress::none())), "");
   EXPECT_LE(summary.rms, 20.);
+  EXPECT_LT(double(summary.pieces), 2. * double(freely.sections[0].contours[0].curve.pieces()));
 }
 
 TEST(Contours, OfTwoSurfacesAreOneStackWhenTheirSectionsAreAlike) {

@@ -44,7 +44,8 @@ void flatten(const Cubic& cubic, double tolerance, std::vector<Place>& into) {
 // Points all along a closed polygon, each for so much of its length.
 struct Samples {
   std::vector<Place> places;
-  std::vector<double> weights;        // µm
+  std::vector<double> lengths;        // µm
+  std::vector<double> weights;        // µm: lengths times what counts there
   std::vector<std::size_t> first_of;  // the first sample behind each breakpoint …
   std::vector<Place>
       breaks;  // … where pieces may begin and end: the polygon's corners, and more in long edges
@@ -53,20 +54,29 @@ struct Samples {
   std::size_t count() const { return breaks.size(); }
 };
 
-Samples sampled(std::span<const Place> polygon, double tolerance) {
+Samples sampled(std::span<const Place> polygon, const FitOptions& options) {
   Samples samples;
+  const auto counts = [&](const Place& at) {
+    double times = 1.;
+    for (const Emphasis& close : options.closer)
+      if ((close.at - at).squaredNorm() < close.within * close.within) times = std::max(times, close.times);
+    return times;
+  };
   for (std::size_t i = 0; i < polygon.size(); ++i) {
     const Place &a = polygon[i], &b = polygon[(i + 1) % polygon.size()];
     const double edge = (b - a).norm();
     if (edge == 0.) continue;
-    const int parts = int(std::clamp(std::ceil(edge / (40. * tolerance)), 1., 8.));
+    const int parts = int(std::clamp(std::ceil(edge / (40. * options.tolerance)), 1., 8.));
     for (int part = 0; part < parts; ++part) {
       samples.breaks.push_back(a + double(part) / parts * (b - a));
       samples.first_of.push_back(samples.places.size());
-      const int points = int(std::clamp(std::ceil(edge / parts / (8. * tolerance)), 2., 8.));
+      const bool closer = counts(a + (part + .5) / parts * (b - a)) > 1.;
+      const int points =
+          closer ? 8 : int(std::clamp(std::ceil(edge / parts / (8. * options.tolerance)), 2., 8.));
       for (int k = 0; k < points; ++k) {
         samples.places.push_back(a + (part + (k + .5) / points) / parts * (b - a));
-        samples.weights.push_back(edge / parts / points);
+        samples.lengths.push_back(edge / parts / points);
+        samples.weights.push_back(samples.lengths.back() * counts(samples.places.back()));
       }
     }
     samples.total += edge;
@@ -77,6 +87,7 @@ Samples sampled(std::span<const Place> polygon, double tolerance) {
 struct PieceFit {
   Cubic cubic;
   double error = 0.;  // the integral of the squared distance
+  double cost = 0.;   // of the squared distance times what counts
 };
 
 // One step of Newton's method towards the place on a cubic that is nearest to a point.
@@ -103,11 +114,11 @@ PieceFit fit_piece(const Samples& samples, std::size_t from, std::size_t breaks,
   const auto sample = [&](std::size_t k) { return (first + k * stride) % all; };
   const std::size_t taken = (count - 1) / stride + 1;
   t.resize(taken);
-  double along = 0., weights = 0.;
+  double along = 0., seen = 0.;
   for (std::size_t s = 0; s < count; ++s) {
-    const double weight = samples.weights[(first + s) % all];
-    if (s % stride == 0) t[s / stride] = along + weight / 2., weights += weight;
-    along += weight;
+    const double length = samples.lengths[(first + s) % all];
+    if (s % stride == 0) t[s / stride] = along + length / 2., seen += length;
+    along += length;
   }
   for (double& one : t) one /= along;
   PieceFit fit{.cubic = {{a, a + (b - a) / 3., b - (b - a) / 3., b}}};
@@ -124,13 +135,14 @@ PieceFit fit_piece(const Samples& samples, std::size_t from, std::size_t breaks,
     const double det = m00 * m11 - m01 * m01;
     fit.cubic.points[1] = (m11 * r0 - m01 * r1) / det;
     fit.cubic.points[2] = (m00 * r1 - m01 * r0) / det;
-    fit.error = 0.;
+    fit.error = fit.cost = 0.;
     for (std::size_t s = 0; s < taken; ++s) {
       const Place& point = samples.places[sample(s)];
       t[s] = nearer(fit.cubic, t[s], point);
-      fit.error += samples.weights[sample(s)] * (fit.cubic.at(t[s]) - point).squaredNorm();
+      const double off = (fit.cubic.at(t[s]) - point).squaredNorm();
+      fit.error += samples.lengths[sample(s)] * off, fit.cost += samples.weights[sample(s)] * off;
     }
-    fit.error *= along / weights;
+    fit.error *= along / seen, fit.cost *= along / seen;
   }
   return fit;
 }
@@ -152,9 +164,9 @@ class Division {
       int over = 0;
       // All short pieces, and of long ones some lengths.
       for (std::size_t k = 1; i + k <= n && k < n && over < 3; k += 1 + k / 12) {
-        const double error = fit_piece(samples, from, k, t, 96).error;
-        costs_[i].push_back({k, error});
-        over = error > most ? over + 1 : 0;
+        const PieceFit fit = fit_piece(samples, from, k, t, 96);
+        costs_[i].push_back({k, fit.error, fit.cost});
+        over = fit.cost > most ? over + 1 : 0;
       }
     }
   }
@@ -166,8 +178,8 @@ class Division {
     std::vector<std::size_t> from(n + 1, 0);
     best[0] = 0.;
     for (std::size_t i = 0; i < n; ++i)
-      for (const auto& [k, off] : costs_[i]) {
-        const double cost = best[i] + off + price;
+      for (const auto& [k, off, badly] : costs_[i]) {
+        const double cost = best[i] + badly + price;
         if (cost < best[i + k]) best[i + k] = cost, from[i + k] = i, error[i + k] = error[i] + off;
       }
     std::vector<std::size_t> breaks;
@@ -206,8 +218,11 @@ class Division {
 
   const Samples& samples_;
   std::size_t start_ = 0;
-  std::vector<std::vector<std::pair<std::size_t, double>>>
-      costs_;  // by first breakpoint: breakpoints along, error
+  struct Way {
+    std::size_t breaks;  // along
+    double error, cost;
+  };
+  std::vector<std::vector<Way>> costs_;  // by first breakpoint
 };
 
 // All pieces at once, between nodes that may move: Gauss-Newton on the distances along the normal (tangent distance
@@ -232,16 +247,21 @@ class Refinement {
         return std::abs(std::atan2(cross(u, v), u.dot(v))) > by;
       };
       const Place here = samples.breaks[breaks[i]];
+      const auto polygon_turns = [&] {
+        return turns(here - samples.breaks[(breaks[i] + n - std::min<std::size_t>(2, n - 1)) % n],
+                     samples.breaks[(breaks[i] + 2) % n] - here, corner / 3.);
+      };
+      const std::size_t sample = samples.first_of[breaks[i]];
+      const bool much_closer = samples.weights[sample] > 50. * samples.lengths[sample];
       smooth_[i] = in.norm() > 0. && out.norm() > 0. &&
-                   !(turns(in, out, corner) &&
-                     turns(here - samples.breaks[(breaks[i] + n - std::min<std::size_t>(2, n - 1)) % n],
-                           samples.breaks[(breaks[i] + 2) % n] - here, corner / 3.));
+                   !(much_closer ? turns(in, out, .1) : turns(in, out, corner) && polygon_turns());
       if (!smooth_[i]) continue;
       // The tangent in between, by the longer handle more.
       const Place direction = (in + out).normalized();
       before.points[2] = before.points[3] - in.norm() * direction;
       behind.points[1] = behind.points[0] + out.norm() * direction;
     }
+    hold();
   }
 
   void refine() {
@@ -265,8 +285,14 @@ class Refinement {
   }
 
   Fit result() {
-    Fit fit{.curve = {}, .rms = std::sqrt(measure() / samples_.total), .samples = spots_.size()};
-    for (const Spot& spot : spots_) fit.greatest = std::max(fit.greatest, off(spot).norm());
+    Fit fit;
+    fit.samples = spots_.size();
+    for (const Spot& spot : spots_) {
+      const double away = off(spot).norm();
+      fit.rms += samples_.lengths[spot.sample] * away * away / samples_.total;
+      fit.greatest = std::max(fit.greatest, away);
+    }
+    fit.rms = std::sqrt(fit.rms);
     for (const Cubic& cubic : pieces_)
       fit.curve.points.insert(fit.curve.points.end(), cubic.points.begin(), cubic.points.begin() + 3);
     fit.corners = std::size_t(std::ranges::count(smooth_, false));
@@ -381,6 +407,20 @@ class Refinement {
       }
       before.points[3] = behind.points[0] = place;
     }
+    hold();
+  }
+
+  // No handle is longer than the polygon along its piece: on a straight way the curve would turn back, at no cost.
+  void hold() {
+    std::vector<double> along(pieces_.size(), 0.);
+    for (const Spot& spot : spots_) along[spot.piece] += samples_.lengths[spot.sample];
+    for (std::size_t i = 0; i < pieces_.size(); ++i) {
+      auto& p = pieces_[i].points;
+      const auto held = [&](const Place& handle) -> Place {
+        return handle * std::min(1., along[i] / std::max(handle.norm(), 1e-9));
+      };
+      p[1] = p[0] + held(p[1] - p[0]), p[2] = p[3] + held(p[2] - p[3]);
+    }
   }
 
   const Samples& samples_;
@@ -468,7 +508,7 @@ std::vector<Place> resampled(const BezierLoop& loop, std::size_t count) {
 }
 
 Fit fit_loop(std::span<const Place> polygon, const FitOptions& options) {
-  const Samples samples = sampled(polygon, options.tolerance);
+  const Samples samples = sampled(polygon, options);
   const Division division(samples, options.tolerance);
   const auto divided = [&](double share) {
     Refinement refinement(samples,

@@ -48,10 +48,18 @@ double area(const BezierLoop& loop);  // µm², exactly; negative when the insid
 /// `count` points at equal distances along the loop (1e-6 of its length), the first where the first piece begins.
 std::vector<Place> resampled(const BezierLoop& loop, std::size_t count);
 
+/// Where a curve must lie closer than elsewhere: squared distances of what lies within a circle count so many times.
+struct Emphasis {
+  Place at;
+  double within;  // µm
+  double times;   // >= 1; where several circles meet, the most
+};
+
 struct FitOptions {
   double tolerance = 20.;  // µm: the root mean square of the distances of the polygon from the curve
   double corner =
       .5;  // radians: where pieces that fit by themselves meet at a greater angle, the corner stays
+  std::span<const Emphasis> closer = {};
 };
 struct Fit {
   BezierLoop curve;

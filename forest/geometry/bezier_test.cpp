@@ -111,6 +111,44 @@ TEST(Fit, NeedsMorePiecesForLessTolerance) {
             fit_loop(polygon, {.tolerance = 100.}).curve.pieces());
 }
 
+TEST(Fit, LiesCloserWhereItIsAskedTo) {
+  const auto polygon = star(5000., .4, 400);
+  const Place there = polygon[50];
+  const auto apart = [&](const Fit& fit) {  // how far it is off, there and elsewhere
+    const auto curve = flattened(fit.curve, .05);
+    std::array<double, 2> sums{}, counts{};
+    for (const Place& p : polygon) {
+      const std::size_t elsewhere = (p - there).norm() < 500. ? 0 : 1;
+      const double off = distance(p, curve);
+      sums[elsewhere] += off * off, ++counts[elsewhere];
+    }
+    return std::array{std::sqrt(sums[0] / counts[0]), std::sqrt(sums[1] / counts[1])};
+  };
+  const Emphasis closer[] = {{there, 500., 400.}};
+  const Fit evenly = fit_loop(polygon, {.tolerance = 40.}),
+            with = fit_loop(polygon, {.tolerance = 40., .closer = closer});
+  EXPECT_LT(apart(with)[0], .25 * apart(evenly)[0]);
+  EXPECT_LT(with.rms, 40.);
+  EXPECT_GT(apart(with)[1], .5 * apart(evenly)[1]);
+  EXPECT_LE(with.curve.pieces(), evenly.curve.pieces() + 4);
+}
+
+TEST(Fit, NeverTurnsBackOnAStraightWay) {
+  // Long edges that turn by chance: a curve that runs to and fro on one lies on it, and is longer.
+  for (unsigned seed = 1; seed <= 10; ++seed) {
+    std::mt19937 random(seed);
+    std::uniform_real_distribution<double> share(0., 1.);
+    std::vector<Place> polygon;
+    for (int i = 0; i < 400; ++i) {
+      const double angle = 2. * std::numbers::pi * (i + .9 * share(random)) / 400.;
+      polygon.push_back((40000. + 300. * share(random)) * Place(std::cos(angle), std::sin(angle)));
+    }
+    const Fit fit = fit_loop(polygon);
+    EXPECT_LE(fit.rms, 20.) << seed;
+    EXPECT_LT(length(fit.curve), 1.03 * length(straight_loop(polygon))) << seed;
+  }
+}
+
 TEST(Fit, KeepsCornersAndMakesNoneOnACircle) {
   const Fit fit = fit_loop(square, {.tolerance = 5.});
   EXPECT_EQ(fit.corners, 4u);
