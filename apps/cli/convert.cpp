@@ -372,6 +372,9 @@ void run(Options options, Console& console) {
   const Target target = !single.empty() ? target_of(single)
                         : container     ? Target{.neuron = container}
                                         : find_target(options.format);
+  if (!options.format.empty() && target.name() != options.format)
+    throw Error(fmt::format("--format {} and {} say different formats; leave --format out", options.format,
+                            (single.empty() ? options.out : single).string()));
   if (target.neuron && !target.neuron->write)
     throw Error(fmt::format("{} can be read but not written; choose another format", target.title()));
   options.model.geometry = *io::geometry(options.geometry);
@@ -424,6 +427,8 @@ std::function<void()> convert(CLI::App& command, Console& console) {
   add_force(command, options->force);
   command.parse_complete_callback([options] {
     std::error_code none;
+    for (const std::string& file : options->files)
+      if (file.empty()) throw CLI::ValidationError("the name of a file is empty; is a variable unset?");
     if (options->out.empty() && (options->files.size() != 2 || fs::is_directory(options->files[0], none)))
       throw CLI::ValidationError(
           "say where the files go: convert A B for two files, or --format NAME --out DIR for many");

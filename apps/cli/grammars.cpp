@@ -38,7 +38,9 @@ lsystem::Grammar find_grammar(const std::string& name_or_path) {
     throw InputError(name_or_path, 0,
                      fmt::format("there is no such grammar; give a file or one of {}",
                                  fmt::join(built_in_grammars(), ", ")));
-  return lsystem::parse_file(name_or_path);
+  lsystem::Grammar grammar = lsystem::parse_file(name_or_path);
+  grammar.name = reference_of(grammar.name).name;  // NAME@version.lsys is what export writes
+  return grammar;
 }
 
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {

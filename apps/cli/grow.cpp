@@ -197,6 +197,11 @@ void report(const Options& options, const lsystem::Grammar& grammar, const io::C
                              {"segments", total.segments}, {"length", total.length}};
   out.update(more);
   console.print(out);
+  if (total.segments == 0)
+    console.warn(fmt::format("no neuron has a segment; {}",
+                             grammar.steps == 0
+                                 ? "the grammar does not say how many steps to derive, as in steps: 10"
+                                 : "look at its axiom and productions"));
   const double count = double(options.count);
   console.table(
       {"grammar", "neurons", "segments each", "length each (µm)"},

@@ -262,7 +262,7 @@ void run(const Options& options, Console& console) {
       } catch (const Error& error) {  // the repository's trouble, not the file's
         throw Error(fmt::format("{} ({} stored)", error.what(), counted(done, "neuron is", "neurons are")));
       }
-      ++stored;
+      stored += !file.added->already_there;
       if (file.added->name != neuron.name)
         console.warn(file.added->already_there
                          ? fmt::format("{}: is the same file as that of neuron '{}', which is already there",

@@ -776,13 +776,26 @@ bool is_workbook(const fs::path& path) {
          (path.extension() == ".xlsx" || io::recognises_workbook(begin_of(path, 4)));
 }
 
+namespace {
+
+void read_sheet(io::ReadWorkbook& book, const std::string& sheet, const fs::path& path) {
+  const MappedFile file(path);
+  const std::string_view text = file.text();
+  if (const std::size_t good = repository::utf8_bytes(text); good < text.size())
+    throw InputError(path.string(), std::size_t(1 + std::ranges::count(text.substr(0, good), '\n')),
+                     "is not UTF-8; save it as \"CSV UTF-8\"");
+  io::read_csv(book, sheet, text, path.string());
+}
+
+}  // namespace
+
 void revise(const ReviseOptions& options, Console& console) {
   std::error_code ignored;
   io::ReadWorkbook book;
   if (fs::is_directory(options.workbook, ignored)) {
     for (const Rule& rule : rules)
       if (const fs::path file = sheet_file(options.workbook, rule.sheet); fs::exists(file, ignored))
-        io::read_csv(book, rule.sheet, MappedFile(file).text(), file.string());
+        read_sheet(book, std::string(rule.sheet), file);
   } else {
     book = io::read_workbook(MappedFile(options.workbook).text(), options.workbook.string());
   }

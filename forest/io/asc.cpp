@@ -16,6 +16,7 @@
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
+#include "forest/io/own_file.h"
 #include "forest/io/placed_words.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/swc_rows.h"
@@ -177,7 +178,7 @@ class Reader {
   }
 
   bool holds_nothing() const { return sections_.size() == 0 && soma_.points.empty(); }
-  bool to_the_letter() const { return to_the_letter_; }
+  bool may_hold_nothing() const { return without_points_; }
   const Annotations& annotations() const { return annotations_; }
 
   ReadResult result() {
@@ -228,8 +229,8 @@ class Reader {
     const std::string_view said = asc_comment({begin, p_});
     if (inside_) {
       if (said.starts_with(asc_own_prefix)) own_comment(said);
-    } else if (line_ == 1 && said == asc_marker) {
-      to_the_letter_ = true;
+    } else if (const OwnFile own = own_file(said, asc_marker); line_ == 1 && own.ours) {
+      to_the_letter_ = true, without_points_ = own.without_points;
     } else if (const bool whole_line = before == text_.data() || is_line_end(before[-1]); !whole_line) {
       lose_comment(said);
     } else if (!said.empty()) {
@@ -871,7 +872,7 @@ class Reader {
   const char* p_ = nullptr;
   const char* end_ = nullptr;
   std::size_t line_ = 1, soma_line_ = 0;
-  bool inside_ = false, to_the_letter_ = false, has_last_ = false;
+  bool inside_ = false, to_the_letter_ = false, without_points_ = false, has_last_ = false;
 
   MorphologyBuilder builder_;
   TracedSections sections_;
@@ -953,7 +954,7 @@ bool recognises_asc(std::string_view bytes) {
 ReadResult read_asc(std::string_view bytes, const std::string& name) {
   Reader reader(bytes, name);
   reader.read();
-  if (reader.holds_nothing() && !reader.to_the_letter()) {
+  if (reader.holds_nothing() && !reader.may_hold_nothing()) {
     const std::string sentence =
         "holds neither a tree nor a cell body; a tree is ((Axon) (x y z diameter) …)";
     if (reader.annotations().empty()) throw InputError(name, 0, sentence);

@@ -10,6 +10,7 @@
 #include "forest/io/asc.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
+#include "forest/io/own_file.h"
 #include "forest/io/placed_words.h"
 #include "forest/io/swc_rows.h"
 
@@ -37,7 +38,7 @@ class Writer {
 
   std::string write() {
     text_.reserve(40 * (m_.points().size() + 32));
-    text_ = fmt::format("; {}\n", asc_marker);
+    text_ = fmt::format("; {}\n", own_line(asc_marker, m_));
     header();
     soma();
     sort_spines();
@@ -101,7 +102,7 @@ class Writer {
       const std::size_t end = std::min(value.find_first_of("\r\n"), value.size());
       const auto [key, rest] = swc_comment(asc_comment(value.substr(0, end)));
       const std::string_view said = asc_comment(rest);
-      if (const bool named = key != "comment"; named || (!said.empty() && said != asc_marker)) {
+      if (const bool named = key != "comment"; named || (!said.empty() && !own_file(said, asc_marker).ours)) {
         text_ += ';';
         if (named) text_ += ' ', text_ += key;
         if (!rest.empty()) text_ += ' ', text_ += named ? rest : said;

@@ -156,6 +156,19 @@ TEST_P(EveryFormat, WritesTheSameBytesForWhatIsLeftOfANeuron) {
   }
 }
 
+TEST_P(EveryFormat, ANeuronWithoutPointsIsNotTakenForAFileThatWasCutOff) {
+  const Format& format = GetParam();
+  if (!format.read || !format.write) GTEST_SKIP() << "is not both read and written";
+  const Morphology nothing, tree = zoo_parts::binary_tree(3);
+  expect_same_neuron(format.read(format.write(nothing), "nothing").morphology, nothing, format.keeps);
+  const std::string bytes = format.write(tree);
+  for (std::size_t length = 0; length < std::min<std::size_t>(bytes.size(), 400); ++length) try {
+      const Morphology cut = format.read(bytes.substr(0, length), "cut").morphology;
+      EXPECT_FALSE(cut.points().empty() && cut.soma().kind == SomaKind::none) << length;
+    } catch (const InputError&) {
+    }
+}
+
 TEST_P(EveryFormat, AFileIsWrittenWholeAndReadBack) {
   const Format& format = GetParam();
   if (!format.write) GTEST_SKIP() << "is only read";

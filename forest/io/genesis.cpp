@@ -16,6 +16,7 @@
 #include "forest/core/error.h"
 #include "forest/io/genesis_names.h"
 #include "forest/io/oddity.h"
+#include "forest/io/own_file.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/words.h"
 #include "forest/morphology/measure.h"
@@ -194,7 +195,7 @@ struct Said {
 };
 
 struct Scan {
-  bool ours = false;
+  bool ours = false, without_points = false;
   std::vector<Group> groups;
   std::vector<Said> said;
 };
@@ -207,8 +208,8 @@ class Scanner {
     scan_.groups.emplace_back();
     each_line(bytes, [&](std::string_view text, std::size_t line) {
       line_ = line;
-      if (line == 1 && text == genesis_marker) {
-        scan_.ours = true;
+      if (const OwnFile own = own_file(text, genesis_marker); line == 1 && own.ours) {
+        scan_.ours = true, scan_.without_points = own.without_points;
       } else if (scan_.ours && text.starts_with(genesis_note)) {
         const std::string_view note = text.substr(genesis_note.size());
         const std::size_t end = std::min(note.find(' '), note.size());
@@ -657,7 +658,7 @@ bool recognises_genesis(std::string_view bytes) {
   bool found = false, in_comment = false;
   if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
   each_line(bytes.substr(0, 65536), [&](std::string_view text, std::size_t line) {
-    if (line == 1 && text == genesis_marker) return !(found = true);
+    if (line == 1 && own_file(text, genesis_marker).ours) return !(found = true);
     text = trimmed(text);
     if (in_comment || text.starts_with("/*")) {
       in_comment = text.find("*/") == text.npos;
@@ -690,7 +691,7 @@ std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
   };
   take(false);
   if (groups.empty()) take(true);
-  if (groups.empty() && !scan.ours)
+  if (groups.empty() && !scan.without_points)
     throw InputError(name, 0, fmt::format("holds no compartment; {}", layout));
   std::vector<Cell> cells;
   if (groups.size() > 1)

@@ -8,6 +8,7 @@
 
 #include "forest/io/genesis.h"
 #include "forest/io/genesis_names.h"
+#include "forest/io/own_file.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/swc_rows.h"
 #include "forest/morphology/measure.h"
@@ -58,7 +59,7 @@ class Writer {
   explicit Writer(const Morphology& m) : m_(m), soma_place_(m) {}
 
   std::string write() {
-    text_ = fmt::format("{}\n", genesis_marker);
+    text_ = own_line(genesis_marker, m_) + '\n';
     for (const auto& [key, value] : m_.annotations())
       text_ += fmt::format("{}{} {}\n", genesis_note, escaped_note(key, true), escaped_note(value, false));
     text_ += "*cartesian\n*absolute\n*asymmetric\n*double_endpoint\n";

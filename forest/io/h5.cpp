@@ -574,7 +574,12 @@ class CellReader {
 
   void annotate() {
     for (const Spine& s : spines_) builder_.add_spine(s);
-    if (auto comment = image_.text(group_, comment_key); comment && !comment->empty())
+    const auto among_own = [&](const std::string& comment) {
+      return std::ranges::any_of(own_annotations_, [&](const auto& annotation) {
+        return annotation.first == comment_key && annotation.second == comment;
+      });
+    };
+    if (auto comment = image_.text(group_, comment_key); comment && !comment->empty() && !among_own(*comment))
       builder_.annotate(std::string(comment_key), std::move(*comment));
     if (family_ != neuron)
       builder_.annotate(std::string(family_key), std::string(family_names[std::size_t(family_)]));

@@ -260,6 +260,30 @@ TEST(H5, CellsOfAContainerMayBeCalledAsThePartsOfOne) {
   }
 }
 
+TEST(H5, AnnotationsKeepTheirOrder) {
+  for (const Annotations& annotations :
+       {Annotations{{"comment", "one"}, {"CREATURE", "rat"}},
+        Annotations{{"CREATURE", "rat"}, {"comment", "one"}},
+        Annotations{{"comment", "one"}, {"comment", "one"}},
+        Annotations{{"a", ""}, {"comment", "one"}, {"b", ""}, {"comment", "two"}, {"comment", "one"}}}) {
+    MorphologyBuilder builder;
+    for (const auto& [key, value] : annotations) builder.annotate(key, value);
+    EXPECT_EQ(read_h5(write_h5(builder.build()), "annotated").morphology.annotations(), annotations);
+  }
+}
+
+TEST(H5, AContainerHoldsNeuronsWithoutPointsToo) {
+  MorphologyBuilder builder;
+  builder.annotate("CREATURE", "rat");
+  const std::vector<NamedMorphology> cells{{"nothing", builder.build()}, {"tree", zoo_parts::binary_tree(3)}};
+  const std::vector<Cell> read = read_all_h5(write_h5(cells), "container");
+  ASSERT_EQ(read.size(), 2u);
+  for (std::size_t i = 0; i < 2; ++i) {
+    EXPECT_EQ(read[i].name, cells[i].name);
+    EXPECT_EQ(read[i].read.morphology, cells[i].morphology);
+  }
+}
+
 TEST(H5, ManyThreadsWriteAtOnce) {
   std::vector<Morphology> cells;
   for (std::uint64_t i = 0; i < 64; ++i) cells.push_back(zoo_parts::random_tree(i, 20));

@@ -47,12 +47,12 @@ class Writer {
 
   void write() {
     if (!prefix_.empty()) file_.group(prefix_);
+    if (m_.sections().empty() && m_.soma().kind == SomaKind::none) file_.group(own(""));
     choose_family();
     write_sections();
     write_metadata();
     write_annotations();
     if (!m_.spines().empty()) write_spines();
-    if (m_.sections().empty() && m_.soma().kind == SomaKind::none) file_.group(own(""));
   }
 
  private:
@@ -140,7 +140,8 @@ class Writer {
       if (key == comment_key && !comment && !value.empty() && value.size() < longest_attribute &&
           value.find('\0') == value.npos) {
         file_.attribute(root(), "comment", value);
-        comment = placed[i] = true;
+        // Read back it is the first of all; where it is not, it keeps its place among the others, too.
+        comment = true, placed[i] = i == 0 && std::ranges::count(all, all[i]) == 1;
       } else if (key == family_key && family_ != neuron && value == family_names[std::size_t(family_)] &&
                  std::ranges::find(all, family_key, &Annotations::value_type::first) - all.begin() ==
                      std::ptrdiff_t(i)) {

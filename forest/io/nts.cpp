@@ -166,7 +166,7 @@ class Reader {
       return true;
     });
     finish_tree();
-    if (records_ == 0 && !to_the_letter_)
+    if (records_ == 0 && !(to_the_letter_ && said_points_ == 0))
       throw InputError(name_, 0, fmt::format("holds no point; {}", layout));
     compare_counts();
     set_soma();

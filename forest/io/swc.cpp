@@ -136,7 +136,7 @@ class Assembler {
       : rows_(std::move(rows)), name_(name), oddities_(oddities) {}
 
   Morphology assemble() {
-    if (rows_.size() == 0 && !rows_.to_the_letter)
+    if (rows_.size() == 0 && !rows_.without_points)
       throw InputError(name_, 0, "holds no point; a row of SWC is: id type x y z radius parent");
     if (rows_.size() > static_cast<std::size_t>(std::numeric_limits<std::int32_t>::max()))
       throw InputError(name_, 0, "has more than 2147483647 points; split it into several files");

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
+#include "forest/io/own_file.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/words.h"
 
@@ -197,8 +198,8 @@ class Scanner {
     if (text == "start synapse") {
       footer_ = true;
       late_comment_ = 0;
-    } else if (text == swc_marker) {
-      if (line_ == 1) rows_.to_the_letter = true;
+    } else if (const OwnFile own = own_file(text, swc_marker); own.ours) {
+      if (line_ == 1) rows_.to_the_letter = true, rows_.without_points = own.without_points;
     } else if (!rows_.to_the_letter || !own_comment(text)) {
       const auto [key, value] = swc_comment(text);
       rows_.annotations.emplace_back(key, value);

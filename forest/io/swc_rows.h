@@ -95,9 +95,9 @@ struct SwcRows {
 
   Annotations
       annotations;  // comment lines; those between "start synapse" and "end synapse" under the key "synapse"
-  bool to_the_letter = false;
-  std::vector<std::int64_t> nodes;  // ids of rows that begin a section
-  std::vector<Point> outline;       // of the soma
+  bool to_the_letter = false, without_points = false;  // as a file of ours says
+  std::vector<std::int64_t> nodes;                     // ids of rows that begin a section
+  std::vector<Point> outline;                          // of the soma
   std::vector<std::uint32_t> outline_starts;
   std::vector<Spine> spines;
 

@@ -5,6 +5,7 @@
 #include <fmt/format.h>
 
 #include "forest/io/numbers.h"
+#include "forest/io/own_file.h"
 #include "forest/io/soma_place.h"
 #include "forest/io/swc.h"
 #include "forest/io/swc_rows.h"
@@ -21,7 +22,7 @@ class Writer {
 
   std::string write() {
     rows();  // first, since the header names ids
-    std::string text = fmt::format("# {}\n", swc_marker);
+    std::string text = fmt::format("# {}\n", own_line(swc_marker, m_));
     text.reserve(header_.size() + rows_.size() + 4096);
     for (const auto& [key, value] : m_.annotations())
       if (key != "synapse") comment(text, key == "comment" ? value : key + ' ' + value);
@@ -106,7 +107,7 @@ class Writer {
     while (true) {
       const std::size_t end = std::min(value.find_first_of("\r\n"), value.size());
       const auto [key, rest] = swc_comment(value.substr(0, end));
-      const bool ours = rest == swc_marker || rest == "start synapse" || swc_own_key(key);
+      const bool ours = own_file(rest, swc_marker).ours || rest == "start synapse" || swc_own_key(key);
       if (!ours) {
         text += '#';
         if (key != "comment") text += ' ', text += key;

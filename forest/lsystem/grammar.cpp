@@ -864,7 +864,10 @@ class Parser {
 Grammar parse(std::string_view text, const std::string& file) { return Parser(text, file).grammar(); }
 
 Grammar parse_file(const std::filesystem::path& path) {
-  return parse(MappedFile(path).text(), path.string());
+  const MappedFile file(path);
+  std::string_view text = file.text();
+  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // the mark that editors of Windows write
+  return parse(text, path.string());
 }
 
 std::string text_of(const Declaration& declaration, const Grammar& grammar) {

@@ -70,6 +70,12 @@ bool is_name(std::string_view text) {
   return true;
 }
 
+std::size_t utf8_bytes(std::string_view text) {
+  std::size_t at = 0;
+  while (const std::size_t length = character(text.substr(at))) at += length;
+  return at;
+}
+
 std::string escaped(std::string_view bytes) {
   std::string doubled;
   for (const char c : bytes) doubled.append(c == '\\' ? 2 : 1, c);

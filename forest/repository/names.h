@@ -15,6 +15,9 @@ inline constexpr std::size_t max_name = 1100;  // bytes; the longest file name, 
 /// semicolons too.
 bool is_name(std::string_view text);
 
+/// How many bytes are well-formed UTF-8 before the first that are not.
+std::size_t utf8_bytes(std::string_view text);
+
 /// Bytes as text that can be stored and read by a person: what is no UTF-8 and control characters become
 /// \xHH, and a backslash becomes \\ so that nothing is lost.
 std::string escaped(std::string_view bytes);

@@ -45,6 +45,10 @@ cmp odd.swc kept.swc || fail "checking changed the file"
 "$program" export --repo r.db --format nts --out nts >/dev/null 2>lost.txt
 grep -q '^nts/.*\.nts: rounded: ' lost.txt || fail "export says nothing of what is lost"
 refuses "is a folder; convert into it with --format" "$program" convert "cells/$first" cells
+refuses "say different formats" "$program" convert "cells/$first" other.swc --format asc
+[ ! -e other.swc ] || fail "a refused conversion wrote a file"
+if "$program" convert "cells/$first" "" 2>empty.txt; then fail "a file without a name is taken"; fi
+grep -q "is empty" empty.txt || fail "an empty name is not said to be empty"
 
 # Two files of one stem are mended side by side, and a log that quotes a file is none.
 mkdir twins

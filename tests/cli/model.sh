@@ -27,6 +27,11 @@ TEXT
   [ "$($model import bush.lsys --repo "$repo" --json | json 'd["models"][0]')" = "{'name': 'bush', 'version': 1, 'already_there': True}" ]
   sed -i 's/uniform(20, 40)/uniform(10, 50)/' bush.lsys
   [ "$($model import bush.lsys --repo "$repo" --json | json 'd["models"][0]["version"]')" = 2 ]
+  # A file as export writes it is a text of that model, whatever program reads it; the mark of Windows' editors is none of it.
+  $model export bush@1 bush@2 --repo "$repo" --out exported >/dev/null
+  { printf '\xef\xbb\xbf'; cat exported/bush@2.lsys; } >bush@2.lsys
+  [ "$($model import exported/bush@2.lsys bush@2.lsys --repo "$repo" --json | json '[(m["name"], m["version"]) for m in d["models"]]')" = "[('bush', 2), ('bush', 2)]" ]
+  rm -r exported bush@2.lsys
   cp bush.lsys second.lsys
   [ "$($model list --repo "$repo" --json | json '[(m["name"], m["version"], m["population"], len(m["distributions"]) > 0, m["origin"]) for m in d]')" = \
     "[('bush', 2, 'L5', True, 'from bush.lsys'), ('pyramidal', 1, 'L5', True, 'the built-in grammar pyramidal')]" ]
