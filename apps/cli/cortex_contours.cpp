@@ -32,11 +32,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
+// Numbers in names by their value, so that s2 comes before s10; the rest by its bytes.
+bool before(const fs::path& one, const fs::path& other) {
+  const std::string a = one.filename().string(), b = other.filename().string();
+  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
+  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+    if (!is_digit(a[i]) || !is_digit(b[j])) {
+      if (a[i] != b[j]) return a[i] < b[j];
+      ++i, ++j;
+      continue;
+    }
+    const auto number = [&](const std::string& text, std::size_t& at) {  // without the zeros before it
+      while (at < text.size() && text[at] == '0') ++at;
+      const std::size_t begin = at;
+      while (at < text.size() && is_digit(text[at])) ++at;
+      return std::string_view(text).substr(begin, at - begin);
+    };
+    const std::string_view m = number(a, i), n = number(b, j);
+    if (m != n) return m.size() != n.size() ? m.size() < n.size() : m < n;
+  }
+  return a.size() != b.size() ? a.size() < b.size() : a < b;
+}
+
 std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
     if (entry.path().extension() == extension) files.push_back(entry.path());
-  std::ranges::sort(files);
+  std::ranges::sort(files, before);
   return files;
 }
 

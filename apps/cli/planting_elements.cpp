@@ -33,15 +33,17 @@ namespace {
 
 using Place = Eigen::Vector3d;
 
-// As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends.
+// As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends or the row would
+// meet itself.
 std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle,
                                        std::uint32_t count) {
   std::vector<std::uint32_t> row{middle};
+  std::set<std::uint32_t> taken{middle};
   const auto walk = [&](std::uint32_t element, cortex::Face out, std::size_t length) {
     std::vector<std::uint32_t> way;
     while (way.size() < length) {
       const cortex::Junction next = sheet.junctions[element][std::size_t(out)];
-      if (next.element == cortex::Junction::nothing || next.element == middle) break;
+      if (next.element == cortex::Junction::nothing || !taken.insert(next.element).second) break;
       way.push_back(element = next.element);
       out = cortex::Face(int(next.face) ^ 1);  // out by the opposite face
     }
@@ -68,6 +70,11 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
       order.emplace_back((middles[e] - near).squaredNorm(), e);
     const auto count = std::min<std::size_t>(options.count, order.size());
     std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(count), order.end());
+    constexpr double farthest = 5e3;
+    if (const double away = std::sqrt(order.front().first); !(away <= farthest))
+      throw Error(
+          fmt::format("the element nearest to ({:g}, {:g}, {:g}) µm is {:.3g} mm away; give --near in µm",
+                      near.x(), near.y(), near.z(), away / 1e3));
     for (std::size_t i = 0; i < count; ++i) chosen.push_back(order[i].second);
     return chosen;
   }

@@ -36,6 +36,7 @@ Picture read_png(const std::filesystem::path& path) {
   };
   if (!png_image_begin_read_from_memory(&image, file.bytes().data(), file.bytes().size())) fail();
   image.format = PNG_FORMAT_RGBA;
+  image.flags |= PNG_IMAGE_FLAG_16BIT_sRGB;  // as those of 8 bits: the same grey is the same number
   Picture picture{image.width, image.height, std::vector<std::uint8_t>(PNG_IMAGE_SIZE(image))};
   if (!png_image_finish_read(&image, nullptr, picture.pixels.data(), 0, nullptr)) fail();
   return picture;

@@ -63,6 +63,11 @@ found = np.einsum("ni,nj,nk,njikx->nx", u, v, w, lattice)
 assert np.abs(found - np.stack([group[k][:] for k in "xyz"], 1)).max() < .01
 PY
 
+# A row ends where it would meet itself.
+plant --near 0 0 8000 --row 10000 --scale .0001 --out round --json >round.json
+python3 -c 'import json; e = [x["element"] for x in json.load(open("round.json"))["tissue"]["elements"]]; assert len(e) == len(set(e)) > 3, e'
+refuses "mm away; give --near in" plant --near 1e9 0 0 --out no
+
 plant --near 0 0 8000 --row 3 --scale .002 --bend grid --out bent --json >bent.json
 python3 - <<'PY'
 import json
