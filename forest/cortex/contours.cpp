@@ -259,6 +259,30 @@ ContourStack together(std::span<const ContourStack> stacks) {
   return all;
 }
 
+namespace {
+
+// What lies by crossings counts four times, or four times as much as it did; once a round for each place.
+// @return  how many times it counts now, the most by the crossings of each contour; 0 for one that crosses none
+std::vector<double> emphasised(std::span<const Crossing> crossings, double within,
+                               std::vector<Emphasis>& closer, std::size_t contours) {
+  std::vector<double> most(contours, 0.);
+  std::vector<bool> raised(closer.size());
+  for (const Crossing& crossing : crossings) {
+    const auto near = std::ranges::find_if(
+        closer, [&](const Emphasis& one) { return (one.at - crossing.place).norm() < .5 * one.within; });
+    const auto which = std::size_t(near - closer.begin());
+    if (near == closer.end())
+      closer.push_back({crossing.place, within, 4.});
+    else if (which < raised.size() && !raised[which])
+      raised[which] = true, near->times *= 4.;
+    for (const std::size_t i : {crossing.first, crossing.second})
+      most[i] = std::max(most[i], closer[which].times);
+  }
+  return most;
+}
+
+}  // namespace
+
 ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSummary& summary,
                     Progress& progress) {
   ContourStack result = stack;
@@ -306,20 +330,7 @@ ContourStack fitted(const ContourStack& stack, const FitOptions& options, FitSum
       for (;;) {
         std::vector<std::vector<Place>> polygons;
         for (const std::size_t i : who) polygons.push_back(flattened(all[i]->curve, fine));
-        std::vector<double> needed(who.size(), 0.);  // how many times what lies by its crossings shall count
-        std::vector<bool> raised(closer.size());
-        for (const Crossing& crossing : crossings_in(polygons)) {
-          const auto near = std::ranges::find_if(closer, [&](const Emphasis& one) {
-            return (one.at - crossing.place).norm() < .5 * one.within;
-          });
-          const auto which = std::size_t(near - closer.begin());
-          if (near == closer.end())
-            closer.push_back({crossing.place, within, 4.});
-          else if (which < raised.size() && !raised[which])
-            raised[which] = true, near->times *= 4.;
-          for (const std::size_t i : {crossing.first, crossing.second})
-            needed[i] = std::max(needed[i], closer[which].times);
-        }
+        const auto needed = emphasised(crossings_in(polygons), within, closer, who.size());
         bool changed = false;
         for (std::size_t i = 0; i < who.size(); ++i) {
           if (kept[i] || needed[i] == 0.) continue;

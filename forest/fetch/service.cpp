@@ -7,6 +7,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
 
@@ -86,7 +87,7 @@ Swc Service::swc(const Record& record, const Cache::Accept& accept) {
 }
 
 bool is_web_page(std::string_view bytes) {
-  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
+  bytes = without_byte_order_mark(bytes);
   const std::size_t first = bytes.find_first_not_of(" \t\r\n");
   return first != std::string_view::npos && bytes[first] == '<';
 }

@@ -12,6 +12,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
@@ -933,7 +934,7 @@ bool asc_reads_as_annotation(std::string_view text, std::string_view key, std::s
 }
 
 bool recognises_asc(std::string_view bytes) {
-  std::size_t at = bytes.starts_with("\xef\xbb\xbf") ? 3 : 0;
+  std::size_t at = bytes.size() - without_byte_order_mark(bytes).size();
   const auto skip = [&] {
     while (at < bytes.size()) {
       if (bytes[at] == ';')

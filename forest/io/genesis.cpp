@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/io/genesis_names.h"
 #include "forest/io/oddity.h"
@@ -656,7 +657,7 @@ std::span<const Oddity> genesis_oddities() { return table; }
 
 bool recognises_genesis(std::string_view bytes) {
   bool found = false, in_comment = false;
-  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);
+  bytes = without_byte_order_mark(bytes);
   each_line(bytes.substr(0, 65536), [&](std::string_view text, std::size_t line) {
     if (line == 1 && own_file(text, genesis_marker).ours) return !(found = true);
     text = trimmed(text);

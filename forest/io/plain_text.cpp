@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 
 namespace forest::io {
@@ -16,11 +17,8 @@ PlainText plain_text(std::string_view bytes, const std::string& name) {
     throw InputError(name, 1, "is written in UTF-32; save it as plain text (UTF-8 or ASCII)");
   if (bytes.starts_with("\xff\xfe") || bytes.starts_with("\xfe\xff") || halves)
     throw InputError(name, 1, "is written in UTF-16; save it as plain text (UTF-8 or ASCII)");
-  PlainText result{.text = bytes};
-  if (bytes.starts_with("\xef\xbb\xbf")) {
-    result.byte_order_mark = true;
-    result.text.remove_prefix(3);
-  }
+  PlainText result{.text = without_byte_order_mark(bytes)};
+  result.byte_order_mark = result.text.size() < bytes.size();
   while (!result.text.empty() && (result.text.back() == '\0' || result.text.back() == '\x1a')) {
     result.padding = true;
     result.text.remove_suffix(1);

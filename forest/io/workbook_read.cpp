@@ -13,6 +13,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/io/words.h"
 #include "forest/io/workbook.h"
@@ -454,7 +455,7 @@ void check_parts(std::string_view bytes, const std::string& name) {
 }
 
 void read_csv(ReadWorkbook& book, std::string sheet, std::string_view bytes, const std::string& name) {
-  if (bytes.starts_with("\xef\xbb\xbf")) bytes.remove_prefix(3);  // Excel writes one
+  bytes = without_byte_order_mark(bytes);  // Excel writes one
   const std::string_view first = bytes.substr(0, bytes.find_first_of("\r\n"));
   const std::size_t mark = first.find_first_of(",;\t");
   const char separator = mark == std::string_view::npos ? ',' : first[mark];

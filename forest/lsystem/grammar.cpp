@@ -11,6 +11,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/lsystem/cursor.h"
@@ -865,9 +866,7 @@ Grammar parse(std::string_view text, const std::string& file) { return Parser(te
 
 Grammar parse_file(const std::filesystem::path& path) {
   const MappedFile file(path);
-  std::string_view text = file.text();
-  if (text.starts_with("\xef\xbb\xbf")) text.remove_prefix(3);  // the mark that editors of Windows write
-  return parse(text, path.string());
+  return parse(without_byte_order_mark(file.text()), path.string());
 }
 
 std::string text_of(const Declaration& declaration, const Grammar& grammar) {
