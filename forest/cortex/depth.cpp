@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numbers>
+#include <ranges>
 
 #include <Eigen/LU>
 
@@ -121,7 +122,7 @@ class Growth {
       const double x = .5 * (low + high);
       double sum = 0.;
       for (std::size_t c = 0; c < columns; ++c)
-        sum += footprint().weight[c] * columns_[c].above(std::clamp(where(c, x), 0., 1.));
+        sum += footprint().weight[c] * columns_[c].above(where(c, x));
       (sum < wanted ? low : high) = x;
     }
     return .5 * (low + high);
@@ -139,41 +140,63 @@ Depth::Table own_table(const Elements& elements, std::size_t element,
   const Growth growth(elements.hexahedron(element));
   const auto at = elements.corners_of(element);
   Depth::Table own;
+  std::array<double, columns> above{};  // where the depth before is: no column turns back
   for (std::size_t k = 0; k < own.size(); ++k) {
     const auto w = [&](std::size_t corner) { return double(corners[at[corner]][k]); };
-    own[k] = float(growth.solve(growth.all() * double(k + 1) / steps, -1., 1., [&](std::size_t c, double x) {
-      return (1. - f.u[c]) * (1. - f.v[c]) * w(0) + f.u[c] * (1. - f.v[c]) * w(1) +
-             (1. - f.u[c]) * f.v[c] * w(2) + f.u[c] * f.v[c] * w(3) + x * bump(f.u[c], f.v[c]);
-    }));
+    const auto where = [&](std::size_t c, double x) {
+      const double level = (1. - f.u[c]) * (1. - f.v[c]) * w(0) + f.u[c] * (1. - f.v[c]) * w(1) +
+                           (1. - f.u[c]) * f.v[c] * w(2) + f.u[c] * f.v[c] * w(3);
+      return std::clamp(level + x * bump(f.u[c], f.v[c]), above[c], 1.);
+    };
+    own[k] = float(growth.solve(growth.all() * double(k + 1) / steps, -1., 1., where));
+    for (std::size_t c = 0; c < columns; ++c) above[c] = where(c, own[k]);
   }
   return own;
 }
 
+// The table halfway between the least that is nowhere below this one and the greatest that is nowhere above, both with layers not thinner
+// than a tenth of even ones.
+void make_grow(Depth::Table& table) {
+  constexpr float least = .1f / float(steps);
+  Depth::Table low = table;
+  float before = 0.f, after = 1.f;
+  for (float& w : table) before = w = std::max(w, before + least);
+  for (float& w : std::views::reverse(low)) after = w = std::min(w, after - least);
+  for (std::size_t k = 0; k < table.size(); ++k)
+    table[k] = std::clamp(.5f * (table[k] + low[k]), least * float(k + 1), 1.f - least * float(steps - 1 - int(k)));
+}
+
 // Where an element narrows otherwise than those around, the mean table of its corners is so far from its own that w would have to leave
-// the element in its middle. Such corners go towards what their elements want, most towards the one that wants most.
+// the element in its middle. The corners of such elements go towards what the elements around them want, most towards the one that
+// wants most, by the same shares at all depths.
 void calm_corners(const Elements& elements, Depth& depth) {
-  constexpr int rounds = 6;
-  constexpr float much = .08f;              // of w
+  constexpr int rounds = 24;
+  constexpr float much = .2f;               // of w
   constexpr double share = .5 * (4. / 9.);  // half of what would do: the bump's mean is 4/9
   const Stars stars(elements);
+  const auto wants = [&](std::size_t element) {
+    float most = 0.f;
+    for (const float own : depth.elements[element]) most = std::max(most, std::abs(own));
+    return most;
+  };
   for (int round = 0; round < rounds; ++round) {
     std::vector<std::uint32_t> corners, around;
     for (std::size_t e = 0; e < elements.size(); ++e)
-      if (std::ranges::any_of(depth.elements[e], [](float own) { return std::abs(own) > much; }))
+      if (wants(e) > much)
         for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
     if (corners.empty()) return;
     corners = distinct(std::move(corners));
     for (const std::uint32_t c : corners) {
       Depth::Table& table = depth.corners[c];
-      for (std::size_t k = 0; k < table.size(); ++k) {
-        double cubes = 0., squares = 0.;
-        for (const std::uint32_t e : stars.of(c)) {
-          const double own = depth.elements[e][k];
-          cubes += own * own * own, squares += own * own;
-        }
-        if (squares > 0.) table[k] += float(share * cubes / squares);
-        table[k] = std::clamp(table[k], k ? table[k - 1] : 0.f, 1.f);
+      std::array<double, steps - 1> sum{};
+      double weights = 0.;
+      for (const std::uint32_t e : stars.of(c)) {
+        const double squared = double(wants(e)) * double(wants(e)), weight = squared * squared;
+        weights += weight;
+        for (std::size_t k = 0; k < sum.size(); ++k) sum[k] += weight * depth.elements[e][k];
       }
+      for (std::size_t k = 0; k < table.size(); ++k) table[k] += float(share * sum[k] / weights);
+      make_grow(table);
       around.insert(around.end(), stars.of(c).begin(), stars.of(c).end());
     }
     around = distinct(std::move(around));
