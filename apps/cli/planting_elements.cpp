@@ -306,7 +306,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   all.layer_volumes.resize(recipe.layers.size());
   for (const std::uint32_t e : all.elements) {
     const cortex::Borders borders = borders_of(e);
-    for (const auto& layer : planter.counts(elements[e], borders))
+    for (const auto& layer : planter.counts(elements[e], e, borders))
       wanted += std::accumulate(layer.begin(), layer.end(), 0.);
     for (std::size_t l = 0; l < recipe.layers.size(); ++l)
       all.layer_volumes[l] += borders.volume(elements[e], l);
@@ -351,7 +351,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   }
   for (std::size_t e = 0; e < all.elements.size(); ++e)
     for (std::size_t i = all.first[e]; i < all.first[e + 1]; ++i)
-      circuit.in_elements.push_back({all.elements[e], rooted[i].uvw.cast<float>()});
+      circuit.in_elements.push_back({all.elements[e], rooted[i].uvw.cast<float>(), rooted[i].depth});
   for (std::size_t l = 0; l < reach.size();
        ++l)  // layers are curved; a circuit says how far their somata reach
     if (reach[l].first <= reach[l].second)

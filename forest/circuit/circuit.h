@@ -44,6 +44,7 @@ struct Instance {
 struct InElement {
   std::uint32_t element = 0;  // its number in the file of elements
   Vec3 uvw = Vec3::Zero();    // 0 to 1
+  float depth = 0.f;          // below the pia, µm along w
 
   bool operator==(const InElement&) const = default;
 };

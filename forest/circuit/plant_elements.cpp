@@ -17,12 +17,15 @@
 namespace forest::circuit {
 namespace {
 
-// Streams of the packings, of which each layer has its own, and of the places in them.
-constexpr std::uint32_t packing_stream = 0x70650000, lot_stream = 0x70651000, cell_stream = 0x70652000;
+// Streams of the packings, of which each layer has its own, of the places in them, and of how many an element has.
+constexpr std::uint32_t packing_stream = 0x70650000, lot_stream = 0x70651000, cell_stream = 0x70652000,
+                        count_stream = 0x70653000;
 
 constexpr double rounding = .02;  // µm that places may be off, as single precision is in a head
 constexpr double at_ease =
     .95;  // so many mean distances wide are the widest somata that are taken where narrower ones are at hand
+constexpr double few =
+    300.;  // an element has at least so many places in a layer, that small ones have some, too
 constexpr double evenness = .8;  // at least this times their mean distance keep the places of a packing apart
 
 /// Neurons/mm³ of each layer. Counts hold in the recipe's column.
@@ -90,7 +93,7 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
       if (grows(l, t)) needed = std::max(needed, radius(*std::ranges::min_element(of_type[t], {}, radius)));
     narrow_[l] = needed;
     const double most = std::pow(cortex::PackedCube::most_spacing / (2. * needed + gap), 3.);
-    supply[l] = std::min((1.2 * usual + 4. * std::sqrt(usual) + 10.) / volume, most);
+    supply[l] = std::min(std::max(1.2 * usual + 4. * std::sqrt(usual) + 10., few) / volume, most);
     if (supply[l] < 1.01 * density)
       throw Error(
           fmt::format("{:.0f} somata/mm³ of a radius of {:.3g} µm or more do not fit into layer {} without "
@@ -124,17 +127,24 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
 }
 
 std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hexahedron& element,
+                                                               std::size_t number,
                                                                const cortex::Borders& borders) const {
-  std::vector<double> wanted(depths_.size());
-  for (std::size_t l = 0; l < depths_.size(); ++l)
-    if (densities_[l] > 0.) wanted[l] = std::max(0., densities_[l] * 1e-9 * borders.volume(element, l));
-  const double sum = std::accumulate(wanted.begin(), wanted.end(), 0.);
+  std::vector<double> expected;  // of all types of the first layer, then of the next
+  for (std::size_t l = 0; l < depths_.size(); ++l) {
+    const double here =
+        densities_[l] > 0. ? std::max(0., densities_[l] * 1e-9 * borders.volume(element, l)) : 0.;
+    for (const double share : recipe_.layers[l].mix) expected.push_back(here * share);
+  }
+  const double sum = std::accumulate(expected.begin(), expected.end(), 0.);
   if (!(sum < 4e9))
     throw Error(fmt::format("an element of {:.3g} neurons is too large; lower the densities", sum));
-  const auto by_layer = apportion(std::uint32_t(std::lround(sum)), wanted);
+  const auto flat = apportion_by_lot(expected, Random(seed_, number, count_stream).uniform());
   std::vector<std::vector<std::uint32_t>> result;
-  for (std::size_t l = 0; l < by_layer.size(); ++l)
-    result.push_back(apportion(by_layer[l], recipe_.layers[l].mix));
+  auto next = flat.begin();
+  for (const Recipe::Layer& layer : recipe_.layers) {
+    result.emplace_back(next, next + std::ptrdiff_t(layer.mix.size()));
+    next += std::ptrdiff_t(layer.mix.size());
+  }
   return result;
 }
 
@@ -178,7 +188,7 @@ std::uint32_t ElementPlanter::choose(std::span<const std::uint32_t> choice, doub
 
 std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number,
                                           const cortex::Borders& borders) const {
-  const auto wanted = counts(element, borders);
+  const auto wanted = counts(element, number, borders);
   std::vector<Rooted> rooted;
   for (std::size_t l = 0; l < wanted.size(); ++l) {
     const std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
@@ -218,6 +228,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.uvw = place.uvw;
       neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
       neuron.position = here.at.cast<float>();
+      neuron.depth = float(cortex::below_outer_face(element, place.uvw));
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
       const double height = place.uvw[2] * here.jacobian.col(2).norm();
       neuron.candidate =

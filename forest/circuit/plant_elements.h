@@ -39,6 +39,7 @@ struct Rooted {
   Eigen::Vector3d uvw = Eigen::Vector3d::Zero();
   double turn = 0.;
   Vec3 position = Vec3::Zero();  // of the soma, µm
+  float depth = 0.f;             // of the soma below the pia, µm along w
   Quat orientation = Quat::Identity();
   std::uint32_t candidate = 0, type = 0, layer = 0;
 };
@@ -61,17 +62,18 @@ class ElementPlanter {
   double widest(std::size_t layer) const { return radii_[layer]; }       // soma, radius in µm
   double density(std::size_t layer) const { return densities_[layer]; }  // neurons/mm³, scaled
 
-  /// How many neurons an element has, [layer][type]: all of them are the nearest whole number, shared out by largest remainders
-  /// among the layers, then among the types of a layer.
-  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element,
+  /// How many neurons an element has, [layer][type]: each number is within one of what the densities say, and which ones are rounded up is
+  /// drawn for every element, so that many elements together have what the densities say of each layer and type, however rare.
+  /// @param number  of the element
+  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element, std::size_t number,
                                                  const cortex::Borders& borders) const;
-  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element,
+  std::vector<std::vector<std::uint32_t>> counts(const cortex::Hexahedron& element, std::size_t number,
                                                  const cortex::Layers& layers = {}) const {
-    return counts(element, by_volume(layers));
+    return counts(element, number, by_volume(layers));
   }
 
   /// In the order of layers, then types. A neuron is one of its type's that end under the pia at its place, or the lowest one.
-  /// @param number  of the element, for what is thrown: Error when its layer has no room for all somata
+  /// @param number  of the element. Throws Error when a layer of it has no room for all somata
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,
                             const cortex::Borders& borders) const;
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,

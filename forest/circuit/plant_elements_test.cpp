@@ -84,7 +84,7 @@ double p_of(std::span<const double> seen, std::span<const double> expected) {
 TEST(PlantElements, CountsAreThoseOfTheDensitiesToTheLastNeuron) {
   const ElementPlanter planter(layered(), candidates, 1);
   for (const Hexahedron& element : cortex::folded_sheet(3, 2)) {
-    const auto wanted = planter.counts(element);
+    const auto wanted = planter.counts(element, 0);
     std::vector<std::vector<std::uint32_t>> planted(3, std::vector<std::uint32_t>(2));
     for (const Rooted& r : planter.plant(element, 0)) ++planted[r.layer][r.type];
     EXPECT_EQ(planted, wanted);
@@ -96,6 +96,31 @@ TEST(PlantElements, CountsAreThoseOfTheDensitiesToTheLastNeuron) {
       before = planter.depths()[l];
     }
   }
+}
+
+// Of a thousandth of the density an element has some 40 neurons, most of them of the second layer; in a thousand elements the rare ones are
+// there as often as they should be.
+TEST(PlantElements, RareNeuronsAreSpreadOverElementsAndNotRoundedAway) {
+  const ElementPlanter planter(layered(), candidates, 1, {.scale = .001});
+  const Hexahedron element = cortex::folded_sheet(3, 2)[2];
+  constexpr std::size_t elements = 1000;
+  std::vector<std::vector<double>> sums(3, std::vector<double>(2));
+  for (std::size_t e = 0; e < elements; ++e) {
+    const auto here = planter.counts(element, e);
+    for (std::size_t l = 0; l < 3; ++l)
+      for (std::size_t t = 0; t < 2; ++t) sums[l][t] += here[l][t];
+  }
+  double before = 0.;
+  for (std::size_t l = 0; l < 3; ++l) {
+    const double wanted = planter.density(l) * 1e-9 * element.volume(before, planter.depths()[l]);
+    for (std::size_t t = 0; t < 2; ++t) {
+      const double share = wanted * layered().layers[l].mix[t];
+      EXPECT_NEAR(sums[l][t] / elements, share, 4. * std::sqrt(.25 / elements)) << l << " " << t;
+    }
+    before = planter.depths()[l];
+  }
+  EXPECT_GT(sums[0][0], 0.);
+  for (std::size_t e = 0; e < 40; ++e) EXPECT_NO_THROW(planter.plant(element, e));  // there is room for all
 }
 
 TEST(PlantElements, AnElementIsTheSameWhateverElseIsPlantedAndOnAnyNumberOfThreads) {
@@ -184,7 +209,7 @@ TEST(PlantElements, LayersShareTheVolumeAlsoWhereWDoesNotAndDoNotTouch) {
   for (std::size_t e = 0; e < edge.size(); ++e) {
     const cortex::Layers layers(edge, e);
     const Hexahedron element = edge.hexahedron(e);
-    const auto wanted = planter.counts(element, layers);
+    const auto wanted = planter.counts(element, e, layers);
     std::array<std::size_t, 3> seen{};
     double before = 0.;
     for (const Rooted& r : planter.plant(element, e, layers)) {
@@ -212,7 +237,7 @@ TEST(PlantElements, LayersEndWhereTheyWereMeasured) {
   const Hexahedron element = cortex::folded_sheet(8, 1)[5];
   const cortex::Borders borders(std::array<std::vector<double>, 4>{
       std::vector{.1, .6, 1.}, std::vector{.5, .6, 1.}, std::vector{.1, .6, 1.}, std::vector{.5, .6, 1.}});
-  const auto wanted = planter.counts(element, borders);
+  const auto wanted = planter.counts(element, 0, borders);
   std::array<std::size_t, 3> seen{};
   const auto rooted = planter.plant(element, 0, borders);
   for (const Rooted& r : rooted) {

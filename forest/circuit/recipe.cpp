@@ -159,6 +159,21 @@ std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double
   return shares;
 }
 
+std::vector<std::uint32_t> apportion_by_lot(std::span<const double> expected, double lot) {
+  // Sums of numbers that should be whole are off by rounding: none is within it of a mark.
+  constexpr double rounding = 1e-6;
+  const double first = std::clamp(lot, rounding, 1. - rounding);
+  std::vector<std::uint32_t> whole;
+  double sum = 0., marks = 0.;
+  for (const double next : expected) {
+    sum += next;
+    const double below = std::floor(sum + first);
+    whole.push_back(std::uint32_t(below - marks));
+    marks = below;
+  }
+  return whole;
+}
+
 std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe) {
   const cortex::Column tissue = column(recipe);
   std::vector<double> expected;  // of the layers whose number follows from a density

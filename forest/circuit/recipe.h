@@ -60,6 +60,12 @@ std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe);
 /// shares of 0.
 std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double> weights);
 
+/// Whole numbers for expected ones (>= 0): each, and their sum, is the next one below or above, and over many lots the mean is what was
+/// expected, so that what is expected to be a tenth is there in one case of ten. Systematic sampling: along a ruler of expected numbers
+/// the marks lot, lot + 1, lot + 2, … are counted (Madow & Madow 1944, "On the theory of systematic sampling").
+/// @param lot  in [0, 1)
+std::vector<std::uint32_t> apportion_by_lot(std::span<const double> expected, double lot);
+
 /// A recipe in which a new type takes `fraction` of every layer whose lower limit is at least `height` µm under the pia,
 /// the others making room in proportion.
 Recipe with_type(Recipe recipe, CellType type, double fraction, float height = 0.f);

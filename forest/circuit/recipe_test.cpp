@@ -100,6 +100,34 @@ RC_GTEST_PROP(Apportion, IsExactAndNoShareIsAWholeUnitOff, ()) {
     RC_ASSERT(std::abs(shares[i] - total * weights[i] / sum) < 1. + 1e-9);
 }
 
+RC_GTEST_PROP(ApportionByLot, IsWithinAUnitAndExactInTheMean, ()) {
+  const auto parts = *rc::gen::nonEmpty(rc::gen::container<std::vector<int>>(rc::gen::inRange(0, 4000)));
+  std::vector<double> expected;
+  for (const int part : parts) expected.push_back(part / 1000.);
+  const double sum = std::accumulate(expected.begin(), expected.end(), 0.);
+  constexpr int lots = 500;  // as many as there are different remainders of these sums, twice
+  std::vector<double> mean(expected.size());
+  for (int i = 0; i < lots; ++i) {
+    const auto whole = apportion_by_lot(expected, (i + .5) / lots);
+    RC_ASSERT(std::abs(std::accumulate(whole.begin(), whole.end(), 0.) - sum) < 1. + 1e-9);
+    for (std::size_t k = 0; k < whole.size(); ++k) {
+      RC_ASSERT(std::abs(whole[k] - expected[k]) < 1. + 1e-9);
+      mean[k] += whole[k] / double(lots);
+    }
+  }
+  for (std::size_t k = 0; k < mean.size(); ++k) RC_ASSERT(std::abs(mean[k] - expected[k]) < 2.1 / lots);
+}
+
+TEST(ApportionByLot, WholeNumbersStayWhatTheyAre) {
+  std::vector<double> thousandths(1000, 1e6 / 1000.);
+  thousandths[0] = .1 + .2 + .7;  // 1 by some roundings
+  for (const double lot : {0., 1e-12, .5, std::nextafter(1., 0.)}) {
+    const auto whole = apportion_by_lot(thousandths, lot);
+    EXPECT_EQ(whole[0], 1u) << lot;
+    EXPECT_EQ(std::accumulate(whole.begin(), whole.end(), 0u), 999'001u) << lot;
+  }
+}
+
 TEST(Recipe, AnAddedTypeTakesItsFractionOfEveryLayer) {
   const Recipe recipe =
       with_type(parse_recipe(good, "x.toml"), {.name = "traced", .population = "traced"}, .2);

@@ -121,8 +121,7 @@ class Growth {
     while (high - low > enough) {
       const double x = .5 * (low + high);
       double sum = 0.;
-      for (std::size_t c = 0; c < columns; ++c)
-        sum += footprint().weight[c] * columns_[c].above(where(c, x));
+      for (std::size_t c = 0; c < columns; ++c) sum += footprint().weight[c] * columns_[c].above(where(c, x));
       (sum < wanted ? low : high) = x;
     }
     return .5 * (low + high);
@@ -163,7 +162,8 @@ void make_grow(Depth::Table& table) {
   for (float& w : table) before = w = std::max(w, before + least);
   for (float& w : std::views::reverse(low)) after = w = std::min(w, after - least);
   for (std::size_t k = 0; k < table.size(); ++k)
-    table[k] = std::clamp(.5f * (table[k] + low[k]), least * float(k + 1), 1.f - least * float(steps - 1 - int(k)));
+    table[k] =
+        std::clamp(.5f * (table[k] + low[k]), least * float(k + 1), 1.f - least * float(steps - 1 - int(k)));
 }
 
 // Where an element narrows otherwise than those around, the mean table of its corners is so far from its own that w would have to leave

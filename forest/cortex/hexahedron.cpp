@@ -225,13 +225,26 @@ Eigen::Matrix3d Hexahedron::jacobian(double u, double v, double w) const {
   return linear(*this, {u, v, w}).jacobian;
 }
 
+namespace {
+
+// Gauss and Legendre's five places in [-1, 1].
+struct FivePlaces {
+  std::array<double, 5> at, weight;
+};
+const FivePlaces& five_places() {
+  static const FivePlaces result = [] {
+    const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
+                 outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
+    const double near = (322. + 13. * std::sqrt(70.)) / 900., far = (322. - 13. * std::sqrt(70.)) / 900.;
+    return FivePlaces{{-outer, -inner, 0., inner, outer}, {far, near, 128. / 225., near, far}};
+  }();
+  return result;
+}
+
+}  // namespace
+
 double Hexahedron::volume(double from_w, double to_w) const {
-  const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
-               outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
-  const std::array<double, 5> at{-outer, -inner, 0., inner, outer};
-  const double near_weight = (322. + 13. * std::sqrt(70.)) / 900.,
-               far_weight = (322. - 13. * std::sqrt(70.)) / 900.;
-  const std::array<double, 5> weight{far_weight, near_weight, 128. / 225., near_weight, far_weight};
+  const auto& [at, weight] = five_places();
   double sum = 0.;
   for (std::size_t k = 0; k < 5; ++k)
     for (std::size_t j = 0; j < 5; ++j)
@@ -241,6 +254,15 @@ double Hexahedron::volume(double from_w, double to_w) const {
             weight[i] * weight[j] * weight[k] * jacobian(.5 + .5 * at[i], .5 + .5 * at[j], w).determinant();
       }
   return sum * (to_w - from_w) / 8.;
+}
+
+double below_outer_face(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw) {
+  const auto& [at, weight] = five_places();
+  const double half = .5 * uvw[2];
+  double sum = 0.;
+  for (std::size_t k = 0; k < 5; ++k)
+    sum += weight[k] * hexahedron.jacobian(uvw[0], uvw[1], half + half * at[k]).col(2).norm();
+  return sum * half;
 }
 
 double scaled_jacobian(const Hexahedron& hexahedron, int steps) {

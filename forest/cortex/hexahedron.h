@@ -63,6 +63,9 @@ struct Linear {
 };
 Linear linear(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw);
 
+/// µm along the line of constant u and v from the outer face (w = 0) to a place, by five places of Gauss and Legendre.
+double below_outer_face(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw);
+
 /// The least of det J / (|∂x/∂u| |∂x/∂v| |∂x/∂w|) at (steps + 1)³ places: 1 where the parameters are at right angles everywhere,
 /// at or below 0 where the element is not valid. A measure, no proof: that is certify.
 double scaled_jacobian(const Hexahedron& hexahedron, int steps = 4);

@@ -159,6 +159,7 @@ void write_nodes(const fs::path& path, const Circuit& circuit) {
     column(group + "/element", [&](const Instance&, std::size_t i) { return seats[i].element; });
     for (const auto& [name, axis] : {std::pair{"/u", 0}, {"/v", 1}, {"/w", 2}})
       column(group + name, [&, axis = axis](const Instance&, std::size_t i) { return seats[i].uvw[axis]; });
+    column(group + "/depth", [&](const Instance&, std::size_t i) { return seats[i].depth; });
   }
 
   std::vector<std::string> layers;

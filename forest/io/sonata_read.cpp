@@ -258,6 +258,9 @@ class Assembler {
       if (!values) return std::nullopt;
       for (std::size_t i = 0; i < seats.size(); ++i) seats[i].uvw[axis] = (*values)[i];
     }
+    if (const auto depths =
+            nodes.reals("depth", 0.f))  // circuits that were planted before it was told lack it
+      for (std::size_t i = 0; i < seats.size(); ++i) seats[i].depth = (*depths)[i];
     return seats;
   }
 

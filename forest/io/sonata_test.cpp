@@ -110,8 +110,8 @@ TEST_F(Sonata, ACircuitComesBackEqual) {
 
 TEST_F(Sonata, SomataKeepTheirPlacesInElements) {
   for (std::size_t i = 0; i < circuit_.instances.size(); ++i)
-    circuit_.in_elements.push_back(
-        {std::uint32_t(i % 3 ? i : 4'000'000'000u + i), Vec3(float(i) / 40.f, 1.f, 1.f / float(i + 3))});
+    circuit_.in_elements.push_back({std::uint32_t(i % 3 ? i : 4'000'000'000u + i),
+                                    Vec3(float(i) / 40.f, 1.f, 1.f / float(i + 3)), float(i) * 2.5f});
   write();
   const circuit::Circuit back = read_sonata(folder()).circuit;
   EXPECT_EQ(back.in_elements, circuit_.in_elements);

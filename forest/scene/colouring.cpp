@@ -209,15 +209,17 @@ class Painter {
     };
   }
 
-  // Of the soma below the pia: the top of the highest layer.
+  // Of the soma below the pia: as its circuit tells it of curved tissue, else below the top of the highest layer.
   HueOf by_depth() {
     const auto first = std::uint16_t(hues_.size());
+    const std::span<const double> told = depths_in_elements();
     float pia = -INFINITY, bottom = INFINITY;
     for (const auto& layer : forest_.circuit().layers)
       pia = std::max(pia, layer.top), bottom = std::min(bottom, layer.bottom);
     const Bounds& somata = forest_.soma_bounds();
     if (!somata.empty()) pia = std::max(pia, somata.high.y()), bottom = std::min(bottom, somata.low.y());
-    const float step = std::max((pia - bottom) / float(depth_steps), 1e-3f);
+    const float deepest = told.empty() ? pia - bottom : float(std::ranges::max(told));
+    const float step = std::max(deepest / float(depth_steps), 1e-3f);
     for (std::size_t i = 0; i < depth_steps; ++i) {
       const float at = float(i) / float(depth_steps - 1) * float(layered.size() - 1);
       const std::size_t k = std::min(std::size_t(at), layered.size() - 2);
@@ -225,10 +227,22 @@ class Painter {
       add_hue(a + (b - a) * (at - float(k)),
               fmt::format("{:.0f}–{:.0f} µm deep", step * float(i), step * float(i + 1)));
     }
-    return [this, first, pia, step](std::uint32_t i) {
-      const float depth = (pia - forest_.instances()[i].y) / step;
-      return std::uint16_t(first + std::size_t(std::clamp(depth, 0.f, float(depth_steps) - .5f)));
+    return [this, first, pia, step, told](std::uint32_t i) {
+      const float depth = told.empty() ? pia - forest_.instances()[i].y : float(told[i]);
+      return std::uint16_t(first + std::size_t(std::clamp(depth / step, 0.f, float(depth_steps) - .5f)));
     };
+  }
+
+  // µm below the pia, of all neurons of a circuit that stands in elements (cortex/elements.h); else none.
+  std::span<const double> depths_in_elements() const {
+    const auto find = [&](std::string_view name) -> std::span<const double> {
+      const auto& attributes = forest_.nodes().attributes;
+      const auto found = std::ranges::find(attributes, name, &circuit::NodeAttribute::name);
+      return found == attributes.end() ? std::span<const double>() : found->of.numbers;
+    };
+    const std::span<const double> depths = find("depth");
+    const bool all = std::ranges::all_of(depths, [](double d) { return std::isfinite(d); });
+    return all && !find("element").empty() ? depths : std::span<const double>();
   }
 
   // The hue of an appearance with a colour of its own.

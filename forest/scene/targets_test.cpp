@@ -230,6 +230,33 @@ TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
   }
 }
 
+// In curved tissue y says nothing about depth: what the circuit tells of it does.
+TEST(Appearance, DepthInElementsIsWhatTheCircuitTells) {
+  circuit::Circuit c = testing::sample_circuit(40);
+  circuit::NodeNames nodes;
+  nodes.attributes = {{"depth", {}}, {"element", {}}};
+  for (std::size_t i = 0; i < c.instances.size(); ++i) {
+    nodes.attributes[0].of.numbers.push_back(i % 2 ? 10. : 1990.);
+    nodes.attributes[1].of.numbers.push_back(0.);
+  }
+  View view;
+  view.colour_by = ColourBy::depth;
+  const auto colours = [&](const circuit::NodeNames& names) {
+    const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons(), Progress::none(), names));
+    const Colouring colouring = colour(Targets(f), view);
+    std::set<std::uint32_t> shallow, deep;
+    for (std::size_t i = 0; i < colouring.states.size(); ++i)
+      (i % 2 ? shallow : deep).insert(colouring.states[i].colour_class);
+    return std::pair(shallow, deep);
+  };
+  const auto [shallow, deep] = colours(nodes);
+  EXPECT_EQ(shallow.size(), 1u);
+  EXPECT_EQ(deep.size(), 1u);
+  EXPECT_NE(shallow, deep);
+  nodes.attributes.pop_back();  // whatever another's `depth` is
+  EXPECT_GT(colours(nodes).first.size(), 1u);
+}
+
 TEST(Appearance, MoreColoursThanClassesBecomeTheMostSimilarOnes) {
   const Forest f = sample();
   const Targets targets(f);
