@@ -10,7 +10,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace forest;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   try {
-    const cortex::Volume volume = io::read_nifti(bytes, "input");
+    const cortex::Volume volume = io::read_nifti(bytes, "input").volume;
     if (!io::may_be_nifti(bytes) || volume.values.size() != volume.size[0] * volume.size[1] * volume.size[2])
       std::abort();
   } catch (const InputError&) {

@@ -8,6 +8,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/io/contours.h"
+#include "forest/io/new_folder.h"
 
 #include "apps/cli/console.h"
 
@@ -40,10 +41,19 @@ void write_contour_files(const cortex::ContourStack& stack, const fs::path& path
   if (path.extension() == ".contours") return write_file(path, io::write_contours(stack));
   if (path.has_extension())
     throw Error(path.string() + ": is neither FILE.contours nor a folder for drawings; give one of them");
-  fs::create_directories(path);
+  // All drawings or none, and none of earlier sections between them.
+  if (fs::is_directory(path))
+    for (const auto& entry : fs::directory_iterator(path))
+      if (const std::string name = entry.path().filename().string();
+          !(name.starts_with("section_") && name.ends_with(".svg")))
+        throw Error(fmt::format(
+            "{}: holds more than drawings of sections ({}), and would be replaced; give another folder",
+            path.string(), name));
+  io::NewFolder drawings(path);
   for (std::size_t i = 0; i < stack.sections.size(); ++i)
-    write_file(path / fmt::format("section_{:04}.svg", i + 1),
-               io::write_svg(stack, stack.sections[i], overlay && i ? &stack.sections[i - 1] : nullptr));
+    drawings.write(fmt::format("section_{:04}.svg", i + 1),
+                   io::write_svg(stack, stack.sections[i], overlay && i ? &stack.sections[i - 1] : nullptr));
+  drawings.commit();
 }
 
 }  // namespace forest::cli

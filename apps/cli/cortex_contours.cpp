@@ -2,10 +2,13 @@
 // brainforest cortex contours and cortex compare: sections of surfaces, volumes and pictures as curves, and how successive
 // ones differ.
 #include <algorithm>
+#include <cctype>
 #include <cmath>
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <optional>
+#include <set>
 #include <utility>
 
 #include <CLI/App.hpp>
@@ -56,13 +59,56 @@ bool before(const fs::path& one, const fs::path& other) {
 
 std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (entry.path().extension() == extension) files.push_back(entry.path());
+  for (const auto& entry : fs::directory_iterator(folder)) {
+    std::string own = entry.path().extension().string();
+    std::ranges::transform(own, own.begin(), [](unsigned char c) { return char(std::tolower(c)); });
+    if (own == extension) files.push_back(entry.path());
+  }
   std::ranges::sort(files, before);
   return files;
 }
 
+// The last number in a file's name.
+std::optional<long> number_of(const fs::path& file) {
+  const std::string name = file.stem().string();
+  const auto end = name.find_last_of("0123456789");
+  if (end == std::string::npos) return std::nullopt;
+  const auto before = name.find_last_not_of("0123456789", end);
+  const std::size_t begin = std::max(before == std::string::npos ? 0 : before + 1, end < 17 ? 0 : end - 17);
+  return std::stol(name.substr(begin, end + 1 - begin));
+}
+
+// A section between two others that are twice as far apart as most is not there.
+void tell_gaps(const std::vector<fs::path>& files, Console& console) {
+  std::vector<long> steps;
+  for (std::size_t i = 1; i < files.size(); ++i) {
+    const auto one = number_of(files[i - 1]), next = number_of(files[i]);
+    if (!one || !next || *next <= *one) return;  // no numbers of sections
+    steps.push_back(*next - *one);
+  }
+  if (steps.size() < 2) return;
+  auto sorted = steps;
+  std::ranges::nth_element(sorted, sorted.begin() + std::ptrdiff_t(sorted.size() / 2));
+  const long usual = sorted[sorted.size() / 2];
+  const auto gap = std::ranges::find_if(steps, [usual](long step) { return step > usual; });
+  if (gap == steps.end()) return;
+  const auto at = std::size_t(gap - steps.begin());
+  console.warn(fmt::format(
+      "{}: sections seem to be missing between {} and {}, and all are taken at equal distances; bring "
+      "them in",
+      files.front().parent_path().string(), files[at].filename().string(),
+      files[at + 1].filename().string()));
+}
+
+constexpr double least_tolerance = 1e-4;  // mm
+
+// Which options said something of an input.
+struct Used {
+  bool threshold = false, pixel = false, unit = false;
+};
+
 struct Options {
+  CLI::App* command = nullptr;
   std::vector<fs::path> inputs;
   std::vector<std::string> names;
   fs::path out;
@@ -72,12 +118,13 @@ struct Options {
 };
 
 // Grey values of a folder of pictures, one a section.
-cortex::Volume read_pictures(const fs::path& folder, const Options& options) {
+cortex::Volume read_pictures(const fs::path& folder, const Options& options, Console& console) {
   const auto files = files_in(folder, ".png");
   if (files.empty())
     throw Error(folder.string() + ": has no .png file and no .svg file; give a folder of sections");
   if (!(options.pixel > 0.))
     throw Error(folder.string() + ": pictures do not say how large they are; give --pixel, in mm");
+  tell_gaps(files, console);
   const cortex::Axis axis = axis_of(options.axis);
   const int across = int(axis), right = axis == cortex::Axis::x ? 1 : 0, up = axis == cortex::Axis::z ? 1 : 2;
   cortex::Volume volume;
@@ -167,6 +214,29 @@ nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console
   return list;
 }
 
+// What the i-th boundary is called, unless its file says so.
+std::string name_of(const Options& options, std::size_t i) {
+  return i < options.names.size()    ? options.names[i]
+         : options.inputs.size() > 2 ? options.inputs[i].stem().string()
+         : i == 0                    ? "outer"
+                                     : "inner";
+}
+
+// An option that says nothing of any input was meant for another.
+void refuse_unused(const Options& options, const Used& used) {
+  struct Row {
+    const char *option, *of;
+    bool used;
+  };
+  for (const auto& [option, of, is_used] :
+       {Row{"--threshold", "of volumes and pictures", used.threshold},
+        {"--pixel", "of pictures", used.pixel},
+        {"--unit", "of an .slc file", used.unit},
+        {"--tolerance", "of curves, without --straight", !options.straight}})
+    if (!is_used && options.command->count(option))
+      throw Error(fmt::format("{} is {}, and none is given; leave it out", option, of));
+}
+
 void run(const Options& options, Console& console) {
   if (options.out.extension() == ".contours") {
     must_take_files({options.out}, options.force);
@@ -183,34 +253,49 @@ void run(const Options& options, Console& console) {
   std::vector<std::string> surface_names;
   double low = HUGE_VAL, high = -HUGE_VAL;
   const cortex::Axis axis = axis_of(options.axis);
+  Used used;
+  std::set<std::string> given;
+  const auto must_be_new = [&](const std::string& name) {
+    if (!given.insert(name).second)
+      throw Error(
+          fmt::format("two boundaries are to be called '{}'; give each a name of its own by --name", name));
+    return name;
+  };
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
     const fs::path& path = options.inputs[i];
-    const std::string name = i < options.names.size()    ? options.names[i]
-                             : options.inputs.size() > 2 ? path.stem().string()
-                             : i == 0                    ? "outer"
-                                                         : "inner";
-    if (i < options.names.size() && std::ranges::count(options.names, name) > 1)
-      throw Error(fmt::format("two boundaries are to be called '{}'; give each a name of its own", name));
-    if (fs::is_directory(path) && files_in(path, ".svg").empty()) {
-      stacks.push_back(of_volume(read_pictures(path, options), path, name, options, true));
-      continue;
+    const std::string name = name_of(options, i);
+    if (fs::is_directory(path)) {
+      const bool drawn = !files_in(path, ".svg").empty();
+      if (drawn && !files_in(path, ".png").empty())
+        console.warn(path.string() + ": has drawings (.svg) and pictures (.png); the drawings are taken");
+      if (!drawn) {
+        used.threshold = used.pixel = true;
+        stacks.push_back(
+            of_volume(read_pictures(path, options, console), path, must_be_new(name), options, true));
+        continue;
+      }
     }
     if (fs::is_directory(path) || path.extension() == ".contours" || path.extension() == ".svg" ||
         path.extension() == ".jser" || path.extension() == ".slc") {
+      used.unit |= path.extension() == ".slc";
       stacks.push_back(read_contour_files(path, 1e3 * options.unit, console));
       continue;
     }
     const MappedFile file(path);
     const std::string lower = path.string();
     if (io::may_be_nifti(file.text()) && (lower.ends_with(".nii") || lower.ends_with(".nii.gz"))) {
-      stacks.push_back(of_volume(io::read_nifti(file.text(), path.string()), path, name, options, false));
+      used.threshold = true;
+      const io::NiftiVolume read = io::read_nifti(file.text(), path.string());
+      for (const std::string& oddity : read.oddities) console.warn(path.string() + ": " + oddity);
+      stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false));
       continue;
     }
     surfaces.push_back(io::read_surface(file.text(), path.string()));
-    surface_names.push_back(name);
+    surface_names.push_back(must_be_new(name));
     for (const Vec3& p : surfaces.back().positions)
       low = std::min(low, double(p[int(axis)])), high = std::max(high, double(p[int(axis)]));
   }
+  refuse_unused(options, used);
   // All surfaces by the same planes.
   const auto planes = surfaces.empty()
                           ? std::vector<double>{}
@@ -236,7 +321,7 @@ void run(const Options& options, Console& console) {
     console.warn(
         fmt::format("curves may be {:g} mm off, which is much beside contours of about {:.2g} mm; give a "
                     "smaller --tolerance, such as {:.1g}",
-                    options.tolerance, size / 1e3, size / 1e5));
+                    options.tolerance, size / 1e3, std::max(size / 1e5, least_tolerance)));
   console.print({{"file", options.out.string()},
                  {"sections", stack.sections.size()},
                  {"contours", loops},
@@ -259,6 +344,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> cortex_contours(CLI::App& command, Console& console) {
   const auto o = std::make_shared<Options>();
+  o->command = &command;
   command
       .add_option(
           "input", o->inputs,
@@ -289,7 +375,7 @@ std::function<void()> cortex_contours(CLI::App& command, Console& console) {
   must_be_within(
       *command.add_option("--tolerance", o->tolerance, "Of the curves: root mean square of the distance, mm")
            ->capture_default_str(),
-      1e-4, 10.);
+      least_tolerance, 10.);
   command.add_flag("--straight", o->straight, "Keep polygons as they are, and fit no curves");
   add_force(command, o->force);
   return [o, &console] { run(*o, console); };

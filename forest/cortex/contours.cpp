@@ -137,6 +137,37 @@ std::optional<Crossing> crossing_in(std::span<const std::vector<Place>> polygons
 
 }  // namespace
 
+namespace {
+
+// The middle of a polygon that is there twice, whichever way round and wherever it begins.
+std::optional<Place> twin_in(const std::vector<std::vector<Place>>& polygons) {
+  constexpr double same = 1e-3;  // of their size
+  struct Shape {
+    double area;
+    Place middle;
+  };
+  std::vector<Shape> shapes;
+  for (const auto& polygon : polygons) {
+    double twice = 0.;
+    Place middle = Place::Zero();
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      const Place a = polygon[i] - polygon[0], b = polygon[(i + 1) % polygon.size()] - polygon[0];
+      const double part = a.x() * b.y() - a.y() * b.x();
+      twice += part, middle += part / 3. * (a + b);
+    }
+    if (twice == 0.) continue;
+    const Shape shape{std::abs(twice) / 2., polygon[0] + middle / twice};
+    for (const Shape& other : shapes)
+      if (std::abs(shape.area - other.area) < same * shape.area &&
+          (shape.middle - other.middle).norm() < same * std::sqrt(shape.area))
+        return shape.middle;
+    shapes.push_back(shape);
+  }
+  return std::nullopt;
+}
+
+}  // namespace
+
 std::string fault_of(const ContourStack& stack) {
   for (std::size_t i = 0; i < stack.sections.size(); ++i) {
     const Section& section = stack.sections[i];
@@ -165,7 +196,12 @@ std::string fault_of(const ContourStack& stack) {
       std::vector<std::vector<Place>> polygons;
       for (const Contour& contour : section.contours)
         if (contour.object == object) polygons.push_back(flattened(contour.curve, fine));
-      if (const auto found = crossing_in(polygons))
+      if (const auto twin = twin_in(polygons))
+        faults[i] = fmt::format(
+            "'{}' has one contour twice in section {} ({:.3f} mm), by ({:.3f}, {:.3f}) mm; leave "
+            "one of them out",
+            stack.objects[object], i + 1, section.at / 1e3, twin->x() / 1e3, twin->y() / 1e3);
+      else if (const auto found = crossing_in(polygons))
         faults[i] = fmt::format(
             "{} of '{}' cross{} in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; draw them apart",
             found->first == found->second ? "one contour" : "two contours", stack.objects[object],

@@ -37,6 +37,21 @@ double distance_of_sections(const ContourStack& stack) {
   return spacing;
 }
 
+// Sections have an object from the first one that has it to the last, or a surface would end there and begin anew.
+void must_go_on(const ContourStack& stack, std::uint32_t object) {
+  const auto has = [&](const Section& section) {
+    return std::ranges::any_of(section.contours, [&](const Contour& c) { return c.object == object; });
+  };
+  const auto first = std::ranges::find_if(stack.sections, has);
+  const auto last = std::ranges::find_if(stack.sections.rbegin(), stack.sections.rend(), has).base();
+  const auto without = std::find_if_not(first, last, has);
+  if (first != stack.sections.end() && without != last)
+    throw Error(fmt::format(
+        "section {} ({:.3f} mm) has no contour of '{}', and sections before and behind it have; trace "
+        "it there",
+        without - stack.sections.begin() + 1, without->at / 1e3, stack.objects[object]));
+}
+
 // Where the grid stands: its first two axes are those of the sections, its third one goes across them.
 struct Raster {
   Place origin;
@@ -125,6 +140,31 @@ ScalarGrid interpolated(const ContourStack& stack, std::uint32_t object, const R
   return grid;
 }
 
+// Points within, of every section of a stack.
+std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
+  std::vector<std::size_t> counts(raster.sections - 2);
+  const std::size_t layer = grid.size[0] * grid.size[1];
+  for (std::size_t s = 0; s < counts.size(); ++s) {
+    const auto first = grid.values.begin() + std::ptrdiff_t((s + 1) * std::size_t(raster.between) * layer);
+    counts[s] =
+        std::size_t(std::count_if(first, first + std::ptrdiff_t(layer), [](float v) { return v < 0.f; }));
+  }
+  return counts;
+}
+
+LeftOut left_out(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
+                 const Raster& raster) {
+  std::vector<std::size_t> lost(before.size());
+  std::ranges::transform(before, after, lost.begin(), std::minus<>());
+  const auto most = std::ranges::max_element(lost);
+  const double voxel = raster.step * raster.step;
+  std::erase(before, 0u);
+  if (before.empty()) return {};
+  const auto middle = before.begin() + std::ptrdiff_t(before.size() / 2);
+  std::ranges::nth_element(before, middle);
+  return {std::size_t(most - lost.begin()), double(*most) * voxel, double(*most) / double(*middle)};
+}
+
 // The grid's axes are those of a section and the one across them; the mesh's are x, y, z.
 void stand_up(Mesh& mesh, Axis axis) {
   for (Vec3& p : mesh.positions) p = solid({p.x(), p.y()}, p.z(), axis).cast<float>();
@@ -202,21 +242,24 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
   const std::uint32_t outer_object = object_of(stack, options.outer),
                       inner_object = object_of(stack, options.inner);
   const Raster raster = raster_of(stack, options);
+  for (const std::uint32_t object : {outer_object, inner_object}) must_go_on(stack, object);
   ScalarGrid inner = interpolated(stack, inner_object, raster, progress);
   ScalarGrid outer = interpolated(stack, outer_object, raster, progress);
   Surfaces result;
   const auto margin = float(options.margin), least = float(raster.step / 10.);
   // Swapped objects, or sections of different brains: most of the inner one outside is no matter of accuracy.
-  std::size_t within = 0, without = 0;
+  std::size_t nested = 0, outside = 0;
   for (std::size_t i = 0; i < inner.count(); ++i)
-    if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? within : without);
-  if (without > within / 4)
+    if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? nested : outside);
+  if (outside > nested / 4)
     throw Error(fmt::format(
         "{:.0f} % of what lies within '{}' lies outside '{}'; swap them or give contours of one brain",
-        100. * double(without) / double(within + without), options.inner, options.outer));
+        100. * double(outside) / double(nested + outside), options.inner, options.outer));
   progress.begin("one ball, inner", 0);
   std::vector<std::uint8_t> ball;
+  std::vector<std::size_t> drawn = within(inner, raster);
   result.inner_cut = grow_ball(inner, ball, least).cut;
+  result.inner_left_out = left_out(std::move(drawn), within(inner, raster), raster);
   progress.end();
   for (std::size_t i = 0; i < inner.count(); ++i)
     if (ball[i] && outer.values[i] > inner.values[i] - margin) {
@@ -224,7 +267,9 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
       outer.values[i] = inner.values[i] - margin;
     }
   progress.begin("one ball, outer", 0);
+  drawn = within(outer, raster);
   result.outer_cut = grow_ball(outer, ball, least).cut;
+  result.outer_left_out = left_out(std::move(drawn), within(outer, raster), raster);
   progress.end();
   // Within every tetrahedron both are linear: where one is smaller at all points, its surface lies outside.
   for (std::size_t i = 0; i < inner.count(); ++i) {

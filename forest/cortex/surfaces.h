@@ -20,18 +20,26 @@ struct SurfaceOptions {
   std::string outer = "outer", inner = "inner";  // objects
 };
 
+/// Where the most of a section did not come into a surface: a piece apart, or what hangs together by a handle.
+struct LeftOut {
+  std::size_t section = 0;  // index in the stack
+  double area = 0.;         // µm²
+  double share = 0.;        // of what lies within the object's contours in the median section
+};
+
 struct Surfaces {
   Mesh outer, inner;  // closed, genus 0, one piece each, without self-intersections; inner within outer
   /// Points of the grid that were moved outside, so that it is so: bridges over sulci, pieces apart.
   std::size_t outer_cut = 0, inner_cut = 0;
   /// Points of the grid where the contours had the inner surface outside the outer one: the outer one was moved.
   std::size_t pushed = 0;
+  LeftOut outer_left_out, inner_left_out;
   std::size_t triangles = 0;  // of both, before they were made fewer
 };
 
 /// @param stack  sections at equal distances (to 1 %), none between two missing
 /// Throws Error: sections too few or not at equal distances, an object missing, contours that cross (fault_of), an inner
-/// contour wholly outside the outer ones. On all cores; the same bytes at any number of threads.
+/// contour wholly outside the outer ones, an object that a section lacks between two that have it. On all cores; the same bytes at any number of threads.
 Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress);
 
 /// Signed distances from an object's contours in a section, µm, negative within, at `width` × `height` points `step` apart,

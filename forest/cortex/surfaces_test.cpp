@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/parallel.h"
@@ -75,6 +76,34 @@ TEST(SurfacesFrom, AreSpheresWithinOneAnotherThatCutNothing) {
   Mesh both = result.outer;
   append(both, result.inner);
   EXPECT_FALSE(self_intersection(both).has_value());
+}
+
+TEST(SurfacesFrom, SayWhatHangsTogetherWithNothing) {
+  ContourStack stack = cuts(folded(1.f), folded(.75f));
+  EXPECT_LT(made(stack).outer_left_out.share, .01);
+  const auto with_outer = [](ContourStack s, std::size_t section, auto&& change) {
+    change(s.sections[section].contours);
+    return s;
+  };
+  const std::size_t middle = stack.sections.size() / 2;
+  const auto no_outer = [](auto& contours) {
+    std::erase_if(contours, [](auto& c) { return c.object == 0; });
+  };
+  EXPECT_THAT(refused([&] { made(with_outer(stack, middle, no_outer)); }),
+              ::testing::HasSubstr("has no contour of 'outer', and sections before and behind it have"));
+  const auto twice = [](auto& contours) { contours.push_back(contours[0]); };
+  EXPECT_THAT(refused([&] { made(with_outer(stack, middle, twice)); }),
+              ::testing::HasSubstr("one contour twice"));
+  // An island far aside, in three sections.
+  ContourStack island = stack;
+  for (std::size_t i = middle - 1; i <= middle + 1; ++i) {
+    Contour aside = *std::ranges::find(stack.sections[middle].contours, 0u, &Contour::object);
+    for (Place& point : aside.curve.points) point = .5 * point + Place(30'000., 0.);
+    island.sections[i].contours.push_back(aside);
+  }
+  const Surfaces result = made(island);
+  EXPECT_NEAR(result.outer_left_out.share, .32, .1);
+  EXPECT_LE(std::abs(double(result.outer_left_out.section) - double(middle)), 1.);
 }
 
 TEST(SurfacesFrom, HaveNoHandleWhereTheirContoursDo) {

@@ -133,7 +133,7 @@ bool may_be_nifti(std::string_view bytes) {
   return false;
 }
 
-cortex::Volume read_nifti(std::string_view packed, const std::string& name) {
+NiftiVolume read_nifti(std::string_view packed, const std::string& name) {
   std::string place;
   std::string_view bytes = packed;
   if (packed.starts_with("\x1f\x8b")) bytes = place = inflated(packed, most_bytes, name);
@@ -182,13 +182,18 @@ cortex::Volume read_nifti(std::string_view packed, const std::string& name) {
     if (!(edge > 1e-6 && edge < 1e9))
       header.fail(fmt::format("has voxels of {} µm along axis {}; get the file again", edge, c + 1));
   }
-  if (which[0] == which[1] || which[0] == which[2] || which[1] == which[2] || oblique > .01)
+  if (which[0] == which[1] || which[0] == which[2] || which[1] == which[2] || oblique > .2)
     header.fail(
         "has axes that are oblique to those of space; resample it, such as by 'flirt' or 'mri_convert'");
   double slope = header.real(at.slope), inter = header.real(at.inter);
   if (!(std::isfinite(slope) && std::isfinite(inter)) || slope == 0.) slope = 1., inter = 0.;
 
-  cortex::Volume volume;
+  NiftiVolume result;
+  double more = 1.;  // volumes
+  for (std::size_t k = 3; double(k) < axes; ++k)
+    more *= std::max(1., header.whole(at.dim + each * (k + 1), at.wide));
+  if (more > 1.) result.oddities.push_back(fmt::format("has {} volumes; the first is taken", more));
+  cortex::Volume& volume = result.volume;
   std::array<std::ptrdiff_t, 3> stride{};  // by axis of the file, in the result
   for (std::size_t c = 0; c < 3; ++c) volume.size[std::size_t(which[c])] = size[c];
   const std::array<std::ptrdiff_t, 3> own{1, std::ptrdiff_t(volume.size[0]),
@@ -211,7 +216,9 @@ cortex::Volume read_nifti(std::string_view packed, const std::string& name) {
         volume.values[std::size_t(to)] =
             float(slope * header.number_at(from, type->size, type->read) + inter);
     }
-  return volume;
+  if (const auto odd = std::ranges::count_if(volume.values, [](float v) { return std::isnan(v); }))
+    result.oddities.push_back(fmt::format("has {} voxels that are no number; they count as outside", odd));
+  return result;
 }
 
 }  // namespace forest::io

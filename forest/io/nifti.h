@@ -11,6 +11,7 @@
 
 #include <string>
 #include <string_view>
+#include <vector>
 
 #include "forest/cortex/volume.h"
 
@@ -19,9 +20,14 @@ namespace forest::io {
 /// Whether the bytes, unpacked or not, may be such a file.
 bool may_be_nifti(std::string_view bytes);
 
+struct NiftiVolume {
+  cortex::Volume volume;
+  std::vector<std::string> oddities;  // sentences, without the file's name
+};
+
 /// In µm, axes to the right, to the front and upwards (a volume whose axes run otherwise is turned so). Of several volumes
 /// the first. Throws InputError: another type, sizes that are not there, axes that are oblique to those of space by more than
-/// a hundredth of a voxel over the volume, pairs of files (.hdr and .img).
-cortex::Volume read_nifti(std::string_view bytes, const std::string& name);
+/// a fifth of a voxel over the volume (quaternions of single precision are off by some hundredths), pairs of files (.hdr and .img).
+NiftiVolume read_nifti(std::string_view bytes, const std::string& name);
 
 }  // namespace forest::io

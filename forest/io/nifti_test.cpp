@@ -69,7 +69,7 @@ TEST(Nifti, IsTheSameInBothVersionsAndOrdersOfBytes) {
     for (const bool big : {false, true}) {
       const File file = small(wide, big);
       EXPECT_TRUE(may_be_nifti(file.bytes));
-      const cortex::Volume volume = read_nifti(file.bytes, "v.nii");
+      const cortex::Volume volume = read_nifti(file.bytes, "v.nii").volume;
       EXPECT_EQ(volume.size, (std::array<std::size_t, 3>{4, 3, 2}));
       EXPECT_EQ(volume.origin, Eigen::Vector3d(-10000., 20000., 5000.));
       EXPECT_EQ(volume.step, Eigen::Vector3d(1000., 2000., 3000.));
@@ -85,7 +85,7 @@ TEST(Nifti, IsTurnedSoThatAxesRunAsThoseOfSpace) {
   const float affine[3][4] = {{-1, 0, 0, 7}, {0, 0, 3, 5}, {0, 2, 0, 1}};
   for (std::size_t r = 0; r < 3; ++r)
     for (std::size_t c = 0; c < 4; ++c) file.put(280 + 4 * (4 * r + c), affine[r][c]);
-  const cortex::Volume volume = read_nifti(file.bytes, "v.nii");
+  const cortex::Volume volume = read_nifti(file.bytes, "v.nii").volume;
   EXPECT_EQ(volume.size, (std::array<std::size_t, 3>{4, 2, 3}));
   EXPECT_EQ(volume.origin, Eigen::Vector3d(4000., 5000., 1000.));
   EXPECT_EQ(volume.at(3, 0, 0), 0.f);
@@ -99,7 +99,7 @@ TEST(Nifti, TakesTheQuaternionWhereNoAffineIs) {
   file.put(254, std::int16_t(0)), file.put(252, std::int16_t(1));
   file.put(268, 3.f), file.put(272, 4.f), file.put(276, 5.f);
   file.put(264, 1.f);  // half a turn around z
-  const cortex::Volume volume = read_nifti(file.bytes, "v.nii");
+  const cortex::Volume volume = read_nifti(file.bytes, "v.nii").volume;
   EXPECT_NEAR((volume.origin - Eigen::Vector3d(0., 0., 5000.)).norm(), 0., 1e-3);
   EXPECT_EQ(volume.at(3, 2, 0), 0.f);
 }
@@ -108,7 +108,7 @@ TEST(Nifti, ScalesItsValuesAndItsUnit) {
   File file = small();
   file.put(112, .5f), file.put(116, 7.f);
   file.put(123, std::int8_t(3));  // µm
-  const cortex::Volume volume = read_nifti(file.bytes, "v.nii");
+  const cortex::Volume volume = read_nifti(file.bytes, "v.nii").volume;
   EXPECT_EQ(volume.at(3, 2, 1), 7.f + .5f * 123.f);
   EXPECT_EQ(volume.step.x(), 1.);
 }
@@ -128,7 +128,7 @@ TEST(Nifti, WithAnyByteOfItsHeaderWrongIsRefusedOrRead) {
       File broken = file;
       broken.bytes[at] = byte;
       const auto look = [&] {
-        const cortex::Volume volume = read_nifti(broken.bytes, "v.nii");
+        const cortex::Volume volume = read_nifti(broken.bytes, "v.nii").volume;
         EXPECT_EQ(volume.values.size(), volume.size[0] * volume.size[1] * volume.size[2]);
       };
       (void)refused<InputError>(look);
@@ -172,7 +172,7 @@ TEST(Nifti, SaysWhatToDo) {
 TEST(Nifti, OfAnAverageBrainIsWhereItsSpaceSays) {
   FOREST_REAL_DATA(folder, "cortex/mni152");
   const MappedFile file(folder / "mni_icbm152_gm_tal_nlin_sym_09a_converted.nii.gz");
-  const cortex::Volume volume = read_nifti(file.text(), "gm.nii.gz");
+  const cortex::Volume volume = read_nifti(file.text(), "gm.nii.gz").volume;
   EXPECT_EQ(volume.step, Eigen::Vector3d(1000., 1000., 1000.));
   EXPECT_GT(volume.size[1], 200u);
   EXPECT_LT(volume.origin.x(), -70000.);

@@ -145,6 +145,8 @@ refuses 'is named twice' $BRAINFOREST cortex surfaces s.contours -o no.gii no.gi
 refuses "'outer' is to be both boundaries" $BRAINFOREST cortex surfaces s.contours --inner outer -o no.gii no2.gii
 refuses 'not as .obj' $BRAINFOREST cortex surfaces s.contours -o no.gii no2.obj
 refuses "two boundaries are to be called 'a'" $BRAINFOREST cortex contours outer inner --name a --name a -o no.contours
+refuses "two boundaries are to be called 'outer'" $BRAINFOREST cortex contours outer inner outer -o no.contours
+refuses 'pixel is of pictures, and none is given' $BRAINFOREST cortex contours outer inner --pixel .1 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
 [ ! -e nowhere ] && [ ! -e no.gii ] && [ ! -e no2.gii ] && [ ! -e no.contours ]
@@ -153,6 +155,9 @@ refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
 $BRAINFOREST cortex compare s.contours --svg overlays --json >overlays.json
 told overlays.json 'len(d["pairs"]) > 20 and all(p["hausdorff"] >= p["p95"] >= p["mean"] >= 0 for p in d["pairs"] if p["mean"] is not None)'
 told overlays.json 'd["crossings"] == []'
+mkdir kept && touch kept/notes.txt
+refuses 'holds more than drawings of sections (notes.txt)' $BRAINFOREST cortex compare s.contours --svg kept --force
+[ "$(ls kept)" = notes.txt ]
 [ "$(ls overlays | wc -l)" -ge 15 ] && grep -q 'data-behind="outer"' overlays/section_0005.svg
 python3 - <<'PY2'
 import json
