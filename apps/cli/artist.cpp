@@ -120,15 +120,18 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
 
 namespace {
 
-// Those of a longer film that was there before.
-void remove_pictures(const std::filesystem::path& folder, std::size_t from) {
+// Makes room for so many pictures: none of what they replace is anything else, and those of a longer film that was there before go.
+void take_pictures(const std::filesystem::path& folder, std::size_t count) {
   std::error_code none;
-  for (std::size_t i = from;; ++i) {
+  std::vector<std::filesystem::path> more;
+  for (std::size_t i = 0;; ++i) {
     const std::filesystem::path picture = folder / fmt::format("{:05}.png", i);
-    if (!std::filesystem::is_regular_file(picture, none)) return;
-    must_take(picture, png_picture);
-    std::filesystem::remove(picture);
+    const bool there = std::filesystem::exists(picture, none);
+    if (!there && i >= count) break;
+    if (there) must_take(picture, png_picture);
+    if (i >= count) more.push_back(picture);
   }
+  for (const std::filesystem::path& picture : more) std::filesystem::remove(picture);
 }
 
 }  // namespace
@@ -138,11 +141,11 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
                  const std::optional<scene::ActivityView>& activity) {
   const auto start = Clock::now();
   const int count = std::max(1, int(std::lround(plan.seconds * plan.frames_per_second)));
-  io::Film film(file, plan.width, plan.height, plan.frames_per_second);
   if (!plan.pictures.empty()) {
     std::filesystem::create_directories(plan.pictures);
-    remove_pictures(plan.pictures, std::size_t(count));
+    take_pictures(plan.pictures, std::size_t(count));
   }
+  io::Film film(file, plan.width, plan.height, plan.frames_per_second);
   FilmFigures figures;
   std::uint64_t segments = 0;
   const double picture_ms = plan.rate / plan.frames_per_second;

@@ -245,7 +245,8 @@ void run(const Options& options, Console& console) {
                                      measured(samples[1], groups, console)};
   if (!options.slices.empty()) set_slices(std::array{&tables[0], &tables[1]}, options.slices);
   std::array<std::string, 2> names{samples[0].name, samples[1].name};
-  if (names[0] == names[1]) names = {options.samples[0], options.samples[1]};
+  if (names[0] == names[1] && !stored) names = {options.samples[0], options.samples[1]};
+  if (names[0] == names[1]) names[1] += " (again)";  // tables and plots tell them apart by their names
 
   const Comparison c =
       compare(tables[0], tables[1],

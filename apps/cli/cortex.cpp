@@ -126,10 +126,25 @@ cortex::MeasuredBok measure_layers(const std::vector<fs::path>& files, const Mes
   return found;
 }
 
+// Figures against surfaces that the elements were not made of say nothing of the elements.
+void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& inner, Console& console) {
+  constexpr double same = .01;
+  const double between = volume(outer) - volume(inner);
+  if (std::abs(between - cortex.between) > same * cortex.between)
+    console.warn(fmt::format(
+        "these surfaces enclose {:.1f} mm³ between them and those that the elements were made of {:.1f} "
+        "mm³; give the same ones, the outer one by --outer",
+        between / 1e9, cortex.between / 1e9));
+}
+
 // What is measured, in one list for people and for machines.
 void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& deeper, double volume,
           double seconds, Console& console) {
   const cortex::Symmetry& s = deeper.symmetry;
+  const auto in_mm = [](const std::optional<double>& um) { return um ? Json(*um / 1e3) : Json(); };
+  const auto shown = [](const std::optional<double>& um) {
+    return um ? fmt::format("{:.3f}", *um / 1e3) : std::string("-");
+  };
   using Kind = cortex::Line::Kind;
   Json lengths;
   for (const auto& [name, kind] :
@@ -147,7 +162,7 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
       {"equivolume_p99", r.equivolume_p99},
       {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
       {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
-      {"face_distance_p99", {{"outer", r.outer_distance_p99 / 1e3}, {"inner", r.inner_distance_p99 / 1e3}}},
+      {"face_distance_p99", {{"outer", in_mm(r.outer_distance_p99)}, {"inner", in_mm(r.inner_distance_p99)}}},
       {"lines_mm", lengths},
       {"border_within_2mm", nullptr},
       {"symmetry", {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}}},
@@ -188,8 +203,8 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
           "least / 1st percentile"),
       row("crest angle", fmt::format("{:.2f}", r.crest_angle.median),
           "degrees between v-isolines and the right angle to crests, median"),
-      row("faces", fmt::format("{:.3f} / {:.3f}", r.outer_distance_p99 / 1e3, r.inner_distance_p99 / 1e3),
-          "mm from the outer / inner surface, 99th percentile; 0 where no surfaces are given")};
+      row("faces", fmt::format("{} / {}", shown(r.outer_distance_p99), shown(r.inner_distance_p99)),
+          "mm from the outer / inner surface, 99th percentile; - where it is not given")};
   rows.push_back(
       row("symmetry", fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
           fmt::format("difference of successive v-sections / of the best planar ones, over {} stretches",
@@ -298,6 +313,7 @@ std::function<void()> report(CLI::App& command, Console& console) {
     Deeper deeper;
     if (!o->borders.empty()) measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex, deeper);
     if (!o->layers.empty()) deeper.layers = measure_layers(o->layers, outer_mesh, inner_mesh);
+    if (outer && inner) tell_foreign(file.cortex, outer_mesh, inner_mesh, console);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
     deeper.symmetry = cortex::symmetry(file.cortex.elements, file.cortex.lines);

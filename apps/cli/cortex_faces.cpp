@@ -13,6 +13,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
 #include "forest/io/elements_file.h"
@@ -61,7 +62,14 @@ struct Options {
 // The twelve edges of elements as tubes: a cage, through which one sees what is within.
 Mesh edges_of(const cortex::Elements& elements, std::span<const std::uint32_t> of, double radius) {
   constexpr std::uint32_t steps = 24, sides = 6;
+  constexpr std::size_t an_element = 12 * steps * sides * 2, most = 30'000'000;  // triangles
+  if (of.size() > most / an_element)
+    throw Error(fmt::format("the edges of {} would be {:.0f} million triangles; name no more than {} at once",
+                            counted(of.size(), "element"), double(of.size() * an_element) / 1e6,
+                            most / an_element));
   Mesh mesh;
+  mesh.positions.reserve(of.size() * 12 * (steps + 1) * sides),
+      mesh.triangles.reserve(of.size() * an_element);
   for (const std::uint32_t e : of) {
     const cortex::Hexahedron h = elements.hexahedron(e);
     for (int axis = 0; axis < 3; ++axis)

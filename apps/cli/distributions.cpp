@@ -328,13 +328,15 @@ std::function<void()> distributions(CLI::App& command, Console& console) {
       .add_flag("--keep", options->keep,
                 "Keep the distributions in the repository, as the next versions of their names")
       ->needs(population);
-  command
-      .add_option("--grammar", options->grammar,
-                  "Write a grammar to this file too, whose branches follow their diameters alone")
-      ->type_name("FILE");
+  CLI::Option* const grammar =
+      command
+          .add_option("--grammar", options->grammar,
+                      "Write a grammar to this file too, whose branches follow their diameters alone")
+          ->type_name("FILE");
   command
       .add_option("--form", options->form, "Of that grammar: burke (chances by µm) or hillman (a threshold)")
       ->check(CLI::IsMember({"burke", "hillman"}))
+      ->needs(grammar)
       ->capture_default_str();
   add_report(command, options->report);
   add_force(command, options->force);

@@ -6,6 +6,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/parallel.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
@@ -15,17 +16,26 @@ namespace forest::cli {
 
 FiledNeurons::FiledNeurons(std::vector<std::filesystem::path> files)
     : files_(std::move(files)), mapped_(files_.size()), cells_(files_.size()) {
-  for (std::size_t f = 0; f < files_.size(); ++f) {
-    if (is_cells_file(files_[f])) try {
-        mapped_[f] = std::make_unique<MappedFile>(files_[f]);
-        const std::string_view text = mapped_[f]->text();
-        cells_[f] =
-            io::read_each(io::format_of(files_[f], text), text, repository::escaped(files_[f].string()));
-      } catch (const InputError&) {  // told when it is read
-      }
+  parallel_for(files_.size(), 1, [&](std::size_t f) {
+    try {
+      auto mapped = std::make_unique<MappedFile>(files_[f]);
+      const io::Format& format = io::format_of(files_[f], mapped->text());
+      if (!format.read_all) return;
+      io::CellReader cells = io::read_each(format, mapped->text(), repository::escaped(files_[f].string()));
+      // Where there is one cell it is read when its turn comes, as of a format that holds one.
+      if (cells.count != 1 || format.read_each) mapped_[f] = std::move(mapped), cells_[f] = std::move(cells);
+    } catch (const Error&) {  // told when it is read
+    }
+  });
+  for (std::size_t f = 0; f < files_.size(); ++f)
     for (std::size_t c = 0, count = cells_[f] ? cells_[f]->count : 1; c < count; ++c)
       neurons_.emplace_back(f, c);
-  }
+}
+
+std::vector<std::filesystem::path> FiledNeurons::each() const {
+  std::vector<std::filesystem::path> result;
+  for (const auto& [f, c] : neurons_) result.push_back(files_[f]);
+  return result;
 }
 
 std::string FiledNeurons::cell(std::size_t i) const {

@@ -17,14 +17,16 @@
 
 namespace forest::cli {
 
-/// A file is one neuron, as io::read has it; a file of cells (io/cells.h) as many as it holds, read when they are asked for.
+/// A file is one neuron, or as many as it holds (io/cells.h, HDF5, NeuroML, GENESIS); those of a file of cells are read when they are
+/// asked for.
 class FiledNeurons {
  public:
   explicit FiledNeurons(std::vector<std::filesystem::path> files);
 
   std::size_t size() const { return neurons_.size(); }
   const std::filesystem::path& file(std::size_t i) const { return files_[neurons_[i].first]; }
-  /// The cell's own name in a file of cells; empty in others, and where it cannot be read.
+  std::vector<std::filesystem::path> each() const;  // the file of every neuron
+  /// The cell's own name in a file of several; empty in others, and where it cannot be read.
   std::string cell(std::size_t i) const;
   Morphology read(std::size_t i) const;  // by any thread; throws InputError
   /// How many that were read hold something odd that only the tracing can mend (a place that is no number, a lost
@@ -35,7 +37,7 @@ class FiledNeurons {
   void remember(std::size_t i, const std::vector<io::Warning>& warnings) const;
 
   std::vector<std::filesystem::path> files_;
-  std::vector<std::unique_ptr<MappedFile>> mapped_;           // of files of cells
+  std::vector<std::unique_ptr<MappedFile>> mapped_;           // of files of several cells
   std::vector<std::optional<io::CellReader>> cells_;          // the same
   std::vector<std::pair<std::size_t, std::size_t>> neurons_;  // file and cell
   mutable std::mutex mutex_;

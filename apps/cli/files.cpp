@@ -101,12 +101,47 @@ std::vector<fs::path> neuron_files(const std::vector<std::string>& names, Consol
       throw InputError(name, 0, "holds no file of a known format; name the files themselves");
     std::sort(files.begin() + first, files.end());
   }
+  std::set<fs::path> met;
+  const auto again = [&](const fs::path& file) {
+    return !met.insert(fs::absolute(file, none).lexically_normal()).second;
+  };
+  if (const std::size_t twice = std::erase_if(files, again))
+    console.warn(fmt::format("{} {} named more than once and taken once", counted(twice, "file"),
+                             twice == 1 ? "is" : "are"));
   std::size_t count = 0;
   for (const auto& [extension, number] : skipped) count += number;
   if (count)
     console.warn(fmt::format("{} of other formats {} skipped ({})", counted(count, "file"),
                              count == 1 ? "is" : "are", listed(skipped)));
   return files;
+}
+
+std::vector<std::string> folder_names(const std::vector<fs::path>& files) {
+  std::vector<fs::path> folders;
+  for (const fs::path& file : files) {
+    std::error_code none;
+    folders.push_back(fs::absolute(file, none).lexically_normal().parent_path());
+  }
+  std::map<fs::path, std::string> names;  // of each folder
+  for (const fs::path& folder : folders) names[folder] = folder.filename().string();
+  for (bool longer = true; longer;) {
+    std::map<std::string, std::vector<fs::path>> called;
+    for (const auto& [folder, name] : names) called[name].push_back(folder);
+    longer = false;
+    for (const auto& [name, same] : called)
+      for (const fs::path& folder : same) {
+        // One component more of those that are called alike, as long as there is one.
+        const auto parts = std::ranges::count(name, '/') + 1;
+        fs::path above = folder;
+        for (std::ptrdiff_t i = 0; i < parts; ++i) above = above.parent_path();
+        if (same.size() < 2 || above.filename().empty()) continue;
+        names[folder] = above.filename().string() + '/' + name;
+        longer = true;
+      }
+  }
+  std::vector<std::string> result;
+  for (const fs::path& folder : folders) result.push_back(names[folder]);
+  return result;
 }
 
 bool may_skip(const Error& error, const fs::path& path, const std::vector<std::string>& names) {

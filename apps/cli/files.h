@@ -23,9 +23,12 @@ namespace forest::cli {
 class Console;
 
 /// Files as they were named, whether they are there or not; folders as the files of a known format anywhere below them,
-/// sorted, by extension or by what is in them. How many others lie there is told, and folders that cannot be read. Throws
+/// sorted, by extension or by what is in them; each once. How many others lie there is told, and folders that cannot be read. Throws
 /// InputError for a folder without any.
 std::vector<std::filesystem::path> neuron_files(const std::vector<std::string>& names, Console& console);
+
+/// What each file's folder is called: by its name, and where several folders have that, by as many of those above as tell them apart.
+std::vector<std::string> folder_names(const std::vector<std::filesystem::path>& files);
 
 /// Whether a file that was refused is told as skipped and is no failure: it holds no neuron, and nobody named it.
 /// @param names  what the command line named, as neuron_files takes them

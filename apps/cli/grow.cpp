@@ -123,7 +123,7 @@ class IntoFolder final : public Destination {
  public:
   explicit IntoFolder(std::filesystem::path folder) : folder_(std::move(folder)) {
     std::error_code error;
-    std::filesystem::create_directories(folder_, error);
+    made_ = std::filesystem::create_directories(folder_, error);
     if (error)
       throw Error(fmt::format("{}: the folder cannot be made ({}); choose another", folder_.string(),
                               error.message()));
@@ -131,6 +131,7 @@ class IntoFolder final : public Destination {
   ~IntoFolder() override {
     std::error_code none;
     for (const auto& file : unfinished_) std::filesystem::remove(file, none);
+    if (made_ && std::filesystem::is_empty(folder_, none)) std::filesystem::remove(folder_, none);
   }
   void put(Ready& ready, const std::string& name, std::uint64_t) override {
     write(name, ready.neuron);
@@ -149,6 +150,7 @@ class IntoFolder final : public Destination {
   }
 
   std::filesystem::path folder_;
+  bool made_ = false;  // by us
   std::vector<std::filesystem::path> unfinished_;
 };
 

@@ -276,6 +276,7 @@ void leave_out(const Options& options, Console& console) {
                      .features = options.features,
                      .report = options.report,
                      .force = options.force};
+  must_have_sections(trial.traced, options.kind);
   std::optional<lsystem::Grammar> model;
   std::optional<Sample> grown;
   if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
@@ -288,6 +289,7 @@ void run(const Options& options, Console& console) {
   if (options.held_out.empty()) return leave_out(options, console);
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
+  for (const Sample* sample : {&train, &held_out}) must_have_sections(*sample, options.kind);
   Sample grown, parametric;
   std::optional<std::size_t> longest_run;
   if (options.model.empty()) {

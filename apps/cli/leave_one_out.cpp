@@ -130,6 +130,7 @@ std::string html_of(const LeaveOneOut& r, const FeatureTable& traced, std::span<
 void judge_leaving_out(const LeftOutTrial& trial, Console& console) {
   const std::vector<Group> groups = groups_of(trial.kind);
   const Sample& traced = trial.traced;
+  statistics::must_be_enough(traced.neurons.size());
   FeatureTable known = measured(traced, groups, console);
   if (!trial.slices.empty()) set_slices(std::array{&known}, trial.slices);
   std::vector<FeatureTable> grown;

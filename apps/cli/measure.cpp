@@ -90,9 +90,7 @@ Neurons of_files(const Options& options, Console& console) {
     const std::string cell = files->cell(i);
     neurons.names[i] = (cell.empty() ? files->file(i) : files->file(i) / cell).string();
   });
-  if (!options.by.empty())
-    for (std::size_t i = 0; i < files->size(); ++i)
-      neurons.groups.push_back(files->file(i).parent_path().filename().string());
+  if (!options.by.empty()) neurons.groups = folder_names(files->each());
   neurons.reader = [files] { return [files](std::size_t i) { return files->read(i); }; };
   neurons.guesses = [files] { return files->guesses(); };
   neurons.may_skip = [files, named = options.files](const Error& error, std::size_t i) {

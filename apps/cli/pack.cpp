@@ -79,7 +79,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
                    "Leave out the synapses, which are packed beside the forest: column.synapses");
   return [options, &console] {
     must_take(options->out, forest_file);
-    if (!options->no_synapses) must_take(scene::Synapses::beside(options->out), synapses_file);
+    const std::filesystem::path beside = scene::Synapses::beside(options->out);
+    must_take(beside, synapses_file);
     const auto begin = Clock::now();
     io::SonataOutline outline = io::outline_sonata(options->circuit);
     std::vector<std::vector<io::Warning>> oddities(outline.files.size());  // of their files
@@ -104,6 +105,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
         console.warn(fmt::format("{}; the forest has no synapses, --no-synapses leaves them out without this",
                                  e.what()));
       }
+    if (!synapses && std::filesystem::is_regular_file(beside))
+      std::filesystem::remove(beside);  // of the forest that was here before
     count += outline.warnings.size();
     if (options->verbose) {
       for (const io::Warning& w : outline.warnings) console.warn(w.sentence);

@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest query: a question in SQL to a repository, which nothing can be written by.
+#include <cmath>
 #include <memory>
 
 #include <CLI/App.hpp>
@@ -36,7 +37,10 @@ struct ToText {
 struct ToJson {
   nlohmann::ordered_json operator()(std::monostate) const { return nullptr; }
   nlohmann::ordered_json operator()(std::int64_t value) const { return value; }
-  nlohmann::ordered_json operator()(double value) const { return value; }
+  nlohmann::ordered_json operator()(double value) const {  // JSON has no infinite numbers
+    return std::isinf(value) ? nlohmann::ordered_json(fmt::format("{}", value))
+                             : nlohmann::ordered_json(value);
+  }
   nlohmann::ordered_json operator()(const std::string& value) const { return value; }
 };
 

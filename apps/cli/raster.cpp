@@ -55,7 +55,8 @@ class Axes {
   Axes(std::uint32_t width, std::uint32_t height, std::size_t neurons)
       : image_{width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 4, 255), 0.},
         neurons_(neurons) {
-    const float h = letters_.height = std::max(7.f, std::round(float(height) / 60.f));
+    const float h = letters_.height =
+        std::max(7.f, std::round(std::min(float(height) / 60.f, float(width) / 40.f)));
     left_ = std::uint32_t(std::ceil(letters_.width(std::to_string(neurons)) + 3.f * h));
     top_ = std::uint32_t(3.f * h), right_ = std::uint32_t(2.f * h), bottom_ = std::uint32_t(8.f * h);
     if (width < left_ + right_ + std::uint32_t(24.f * h) || height < top_ + bottom_ + 16)

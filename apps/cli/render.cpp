@@ -246,7 +246,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::optional<scene::View> look;
     if (playing) {
       look = views.empty() ? scene::overview(forest) : views.front();
+      const bool told = options->activity.time || (look->activity && look->activity->time);
       play(artist, options->activity, *look, console);
+      if (!told) look->activity->time = artist.playback()->begin();  // all of it
       plan.from = *look->activity->time;
       plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
     }

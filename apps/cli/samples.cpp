@@ -60,6 +60,7 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
   if (const std::string guesses = files.guesses(); !guesses.empty()) console.warn(guesses);
   Sample sample;
   sample.name = words.size() == 1 ? folder_name(words[0]) : counted(files.size(), "file");
+  const std::vector<std::string> folders = folder_names(files.each());
   std::size_t failed = 0;
   for (std::size_t i = 0; i < files.size(); ++i) {
     if (!read[i].error.empty()) {
@@ -69,7 +70,7 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
     }
     const std::string cell = files.cell(i);
     sample.cells.push_back(cell.empty() ? cell_name(files.file(i)) : cell);
-    sample.types.push_back(folder_name(fs::absolute(files.file(i)).parent_path()));
+    sample.types.push_back(folders[i]);
     sample.neurons.push_back(std::move(read[i].neuron));
   }
   if (failed)  // a comparison of some of the cells would look like one of all
@@ -98,7 +99,11 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
   if (repo.empty()) {
     sample = of_files(words, console);
   } else {
-    for (const std::string& word : words.empty() ? std::vector<std::string>{""} : words) {
+    std::vector<std::string> populations = words.empty() ? std::vector<std::string>{""} : words;
+    std::set<std::string> met;
+    if (std::erase_if(populations, [&](const std::string& word) { return !met.insert(word).second; }))
+      console.warn("a population is named more than once and taken once");
+    for (const std::string& word : populations) {
       Sample part = of_repository(word, repo);
       sample.name += (sample.name.empty() ? "" : " + ") + part.name;
       std::ranges::move(part.cells, std::back_inserter(sample.cells));
@@ -175,6 +180,14 @@ void set_slices(std::span<statistics::FeatureTable* const> tables, const std::st
       matched |= any;
     }
   }
+  for (const statistics::FeatureTable* table : tables)
+    if (matched && table->cells.size() > 1 &&
+        std::ranges::count(table->slices, table->slices.front()) == std::ssize(table->slices))
+      throw Error(fmt::format(
+          "--slices '{}' finds '{}' in the names of all {} cells, such as {}, and what is of one slice "
+          "cannot be dealt; give an expression that finds what differs",
+          expression, repository::escaped(table->slices.front()), table->cells.size(),
+          repository::escaped(table->cells.front())));
   if (!matched && !tables.front()->cells.empty())
     throw Error(fmt::format("--slices '{}' finds nothing in any name, such as {}; give another expression",
                             expression, repository::escaped(tables.front()->cells.front())));

@@ -45,7 +45,7 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
                          std::span<const std::string> groups);
 
 /// Names the slice of each cell: what the regular expression finds in its name, or the cell itself where it finds nothing.
-/// Throws Error when it finds nothing in any.
+/// Throws Error when it finds nothing in any, or the same in all of a table.
 void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression);
 
 /// --slices, a regular expression.

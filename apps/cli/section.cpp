@@ -67,12 +67,19 @@ Plane plane_of(const std::string& text, const scene::Forest& forest) {
   return Plane::through({n[0], n[1], n[2]}, normal);
 }
 
+// A text between quotes; those in it are doubled (RFC 4180).
+std::string in_quotes(std::string_view text) {
+  std::string result = "\"";
+  for (const char c : text) result.append(c == '"' ? 2 : 1, c);
+  return result + '"';
+}
+
 std::string csv_of(const scene::Forest& forest, const std::vector<scene::ProfileArea>& areas) {
   std::string text = "neuron,type,layer,kind,profiles,area\n";
   for (const scene::ProfileArea& a : areas)
-    text += fmt::format("{},\"{}\",\"{}\",{},{},{:.6g}\n", a.instance,
-                        forest.circuit().types[forest.types()[a.instance]].name,
-                        forest.circuit().layers[forest.layers()[a.instance]].name,
+    text += fmt::format("{},{},{},{},{},{:.6g}\n", a.instance,
+                        in_quotes(forest.circuit().types[forest.types()[a.instance]].name),
+                        in_quotes(forest.circuit().layers[forest.layers()[a.instance]].name),
                         a.kind == 1 ? "soma" : name_of(SectionKind(a.kind)), a.profiles, a.area);
   return text;
 }

@@ -7,6 +7,8 @@
 #include <cstdio>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <string_view>
 
 #include <CLI/CLI.hpp>
 
@@ -47,6 +49,18 @@ void on_qt_message(QtMsgType type, const QMessageLogContext&, const QString& tex
         fail("there is no display that a window could open on; use 'brainforest render' for pictures without "
              "one"));
   if (type == QtCriticalMsg) std::fprintf(stderr, "%s\n", qPrintable(text));
+}
+
+// A picture replaces an older one, and nothing else.
+void must_be_picture(const std::filesystem::path& place) {
+  constexpr std::string_view mark = "\x89PNG\r\n";
+  std::error_code none;
+  if (!std::filesystem::is_regular_file(place, none) || std::filesystem::file_size(place, none) == 0) return;
+  std::string first(mark.size(), 0);
+  std::ifstream(place, std::ios::binary).read(first.data(), std::streamsize(first.size()));
+  if (first != mark)
+    throw Error(place.string() +
+                " is there and is no PNG picture, so nothing was written; choose another name");
 }
 
 QSize size_of(const std::string& text) {
@@ -97,6 +111,7 @@ int run(const Options& options, int& argc, char** argv) {
   format.setSwapInterval(1);
   format.setOption(QSurfaceFormat::ResetNotification);  // a card that is reset is told, and ends nothing
   QSurfaceFormat::setDefaultFormat(format);
+  must_be_picture(options.screenshot);
   qInstallMessageHandler(on_qt_message);
   QApplication application(argc, argv);
   application.setOrganizationName("Brain Forest");

@@ -117,7 +117,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
       .enough = .5, .wanted = .62, .volume = volume, .even = 16., .worst_off = 100., .gain = .01};
   Shaping roomy = even;
   roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  constexpr int evenings = 2, last_evenings = 3;
+  constexpr int evenings = 2, last_evenings = 5;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
@@ -126,7 +126,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
   cortex.left_out = leave_out(cortex.elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
   fit_faces(cortex.elements, outer, inner, Fit::places);
-  fit_faces(cortex.elements, outer, inner, Fit::volume);
+  for (int time = 0; time < 2; ++time) fit_faces(cortex.elements, outer, inner, Fit::volume);
   // Faces that take what they lacked make volumes uneven again.
   for (int time = 0; time < last_evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
@@ -308,8 +308,8 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   result.equivolume_p99 = share_of(equivolume, .99);
   result.jacobian_least = *std::min_element(jacobian.begin(), jacobian.end());
   result.jacobian_p1 = share_of(jacobian, .01);
-  result.outer_distance_p99 = share_of(outer_distance, .99),
-  result.inner_distance_p99 = share_of(inner_distance, .99);
+  if (outer) result.outer_distance_p99 = share_of(outer_distance, .99);
+  if (inner) result.inner_distance_p99 = share_of(inner_distance, .99);
 
   // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
   const Mesh crests = pieces(cortex.lines, Line::Kind::crest);

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -57,8 +58,8 @@ struct Report {
   double jacobian_least = 0.,
          jacobian_p1 = 0.;  // scaled Jacobian: the least of each element over a lattice of places
   Spread crest_angle;       // degrees between v-isolines of elements by a crest and the right angle to it
-  double outer_distance_p99 = 0.,
-         inner_distance_p99 = 0.;  // µm from faces to surfaces, where these are given
+  std::optional<double> outer_distance_p99,
+      inner_distance_p99;  // µm from faces to surfaces; none where these are not given
 };
 
 /// @param volume  wanted of an element, µm³

@@ -224,6 +224,48 @@ Place Line::direction(std::size_t piece, double reach) const {
   return along.norm() > 0. ? Place(along.normalized()) : Place(Place::Zero());
 }
 
+namespace {
+
+// A round draws every point half way to the middle of its neighbours; ends stay where they are.
+void fair(std::vector<Place>& points, bool closed, int rounds) {
+  const std::size_t n = points.size() - 1;  // of a closed line the last point is the first one again
+  for (int round = 0; round < rounds; ++round) {
+    std::vector<Place> next = points;
+    for (std::size_t i = closed ? 0 : 1; i < n; ++i)
+      next[i] = .5 * points[i] + .25 * (points[(i + n - 1) % n] + points[i + 1]);
+    if (closed) next[n] = next[0];
+    points = std::move(next);
+  }
+}
+
+// A line that is found triangle by triangle zigzags by as much as they are wide: even steps along it, smooth over `scale`,
+// and back on the ribbon.
+Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator, double scale) {
+  double length = 0.;
+  for (std::size_t i = 1; i < line.points.size(); ++i) length += (line.points[i] - line.points[i - 1]).norm();
+  const auto pieces = std::size_t(std::max(4., std::round(length / 200.)));
+  const double step = length / double(pieces);
+  Line result{line.kind, {line.points.front()}, {}, line.strength, line.closed};
+  double way = 0.;
+  for (std::size_t i = 1; i < line.points.size() && result.points.size() < pieces; ++i) {
+    const Place &a = line.points[i - 1], &b = line.points[i];
+    const double along = (b - a).norm();
+    for (double next;
+         (next = step * double(result.points.size())) <= way + along && result.points.size() < pieces;)
+      result.points.push_back(a + (next - way) / std::max(along, 1e-9) * (b - a));
+    way += along;
+  }
+  result.points.push_back(line.points.back());
+  fair(result.points, line.closed, int(std::lround(2. * scale * scale / (step * step))));
+  for (Place& point : result.points) point = on(ribbon.middle, ribbon, locator.nearest(point));
+  if (line.closed) result.points.back() = result.points.front();
+  for (std::size_t i = 1; i < result.points.size(); ++i)
+    result.triangles.push_back(locator.nearest(.5 * (result.points[i - 1] + result.points[i])).triangle);
+  return result;
+}
+
+}  // namespace
+
 std::vector<Line> borders(const Ribbon& ribbon) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
   std::map<Edge, std::pair<int, std::uint32_t>> edges;  // times met, the triangle
@@ -262,15 +304,7 @@ std::vector<Line> borders(const Ribbon& ribbon) {
     }
     if (line.points.size() < 4) continue;
     line.closed = line.points.front() == line.points.back();
-    for (int round = 0; round < 30; ++round) {
-      std::vector<Place> smooth_points = line.points;
-      const std::size_t n = line.points.size() - 1;
-      for (std::size_t i = line.closed ? 0 : 1; i < n; ++i)
-        smooth_points[i] = .5 * line.points[i] +
-                           .25 * (line.points[(i + n - 1) % n] + line.points[(i + 1) % n == 0 ? 0 : i + 1]);
-      if (line.closed) smooth_points[n] = smooth_points[0];
-      line.points = std::move(smooth_points);
-    }
+    fair(line.points, line.closed, 30);
     lines.push_back(std::move(line));
   }
   return lines;
@@ -283,6 +317,10 @@ std::vector<Line> crests_and_valleys(const Ribbon& ribbon, std::span<const Curva
     lines.push_back(std::move(line));
   std::stable_sort(lines.begin(), lines.end(),
                    [](const Line& one, const Line& two) { return one.strength > two.strength; });
+  constexpr double smooth = 2. / 3.;
+  const RibbonLocator locator(ribbon);
+  parallel_for(lines.size(), 4,
+               [&](std::size_t i) { lines[i] = faired(lines[i], ribbon, locator, smooth * options.scale); });
   return lines;
 }
 

@@ -3,7 +3,8 @@
 // valley along the fundus of a sulcus; they are found as the places where the greater of the two principal curvatures is
 // extreme along its own direction (Ohtake, Belyaev & Seidel 2004; Yoshizawa, Belyaev & Seidel 2005, "Fast and robust
 // detection of crest lines on meshes"), on a surface smoothed to the scale asked for, and told from noise by the integral of
-// the curvature along a line.
+// the curvature along a line. Lines that are found triangle by triangle zigzag by as much as these are wide; they are made smooth
+// over two thirds of that scale (as Hildebrandt, Polthier & Wardetzky 2005, "Smooth feature lines on surface meshes", do).
 #pragma once
 
 #include <cstdint>

@@ -135,6 +135,8 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
   std::vector<Place> up(n), arm(n);
   std::vector<std::uint8_t> border(n, 0);  // sides that only one face has, of every vertex
   constexpr double hold = .6;
+
+  constexpr double evenly = .65;  // stronger, sides turn from crests; weaker, volumes stay uneven
   const double by_a_crest = std::cbrt(options.volume);
   const auto put_back = [&](std::size_t v) {
     if (border[v])
@@ -228,7 +230,7 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
       Place pull = (1. - bent) * (shape * .5 * mean + std::max(shape, held[v]) * aligned) / sides_around +
                    bent * .5 * mean / sides_around;
       pull -= up[v] * up[v].dot(pull);
-      Place step = (last ? 1. - bent : 1. - .7 * bent) * .8 * sum + pull;
+      Place step = (last ? 1. - bent : 1. - .7 * bent) * evenly * sum + pull;
       const double most = .25 * std::sqrt(wanted / under[v]);
       if (step.norm() > most) step *= most / step.norm();
       moved[v] = quads.middle[v] + step;

@@ -24,7 +24,7 @@ std::string text_of(const Value& value) {
   struct {
     std::string operator()(std::monostate) const { return ""; }
     std::string operator()(std::int64_t v) const { return fmt::format("{}", v); }
-    std::string operator()(double v) const { return std::isfinite(v) ? fmt::format("{}", v) : ""; }
+    std::string operator()(double v) const { return std::isnan(v) ? "" : fmt::format("{}", v); }
     std::string operator()(const std::string& v) const { return v; }
   } const text;
   return std::visit(text, value);

@@ -57,6 +57,12 @@ double truncated_normal(Random& random, double mean, double sd, double low, doub
   return random.truncated_normal(mean, sd, low, high);
 }
 
+double normal(Random& random, double mean, double sd) {
+  return sd >= 0. ? random.normal(mean, sd) : nonsense;
+}
+
+double exponential(Random& random, double mean) { return mean >= 0. ? random.exponential(mean) : nonsense; }
+
 double gamma(Random& random, double shape, double scale) {
   return shape > 0. && std::isfinite(shape) ? random.gamma(shape, scale) : nonsense;
 }
@@ -71,6 +77,7 @@ double von_mises(Random& random, double mean, double concentration) {
 
 // Knuth 1969, in pieces of at most 32 so that the product does not vanish.
 double poisson(Random& random, double mean) {
+  if (!(mean >= 0.)) return nonsense;
   double count = 0.;
   for (double left = std::min(mean, 1e6); left > 0.; left -= 32.) {
     const double bound = std::exp(-std::min(left, 32.));
@@ -303,16 +310,16 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         binary([&](double a, double b) { return random.uniform(a, b); });
         break;
       case Op::normal:
-        binary([&](double a, double b) { return random.normal(a, b); });
+        binary([&](double a, double b) { return normal(random, a, b); });
         break;
       case Op::lognormal:
-        binary([&](double a, double b) { return std::exp(random.normal(a, b)); });
+        binary([&](double a, double b) { return std::exp(normal(random, a, b)); });
         break;
       case Op::gamma:
         binary([&](double a, double b) { return gamma(random, a, b); });
         break;
       case Op::exponential:
-        unary([&](double a) { return random.exponential(a); });
+        unary([&](double a) { return exponential(random, a); });
         break;
       case Op::weibull:
         binary([&](double a, double b) { return weibull(random, a, b); });

@@ -531,7 +531,9 @@ class Turtle {
 
   void become(SectionKind kind) { state_.kind = kind, state_.tag = std::int32_t(kind); }
   void become_numbered(double number) {
-    const auto tag = std::int32_t(std::clamp(number, 0., 1e6));
+    if (!(number >= 0. && number <= 1e6 && number == std::floor(number)))
+      fail(fmt::format("Kind({:g}) is no SWC type, which is a whole number from 0 on", number));
+    const auto tag = std::int32_t(number);
     constexpr SectionKind known[] = {SectionKind::axon,     SectionKind::basal, SectionKind::apical,
                                      SectionKind::custom,   SectionKind::glia,  SectionKind::unspecified,
                                      SectionKind::undefined};

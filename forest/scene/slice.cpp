@@ -57,6 +57,21 @@ void cut_neuron(const Forest& forest, std::uint32_t index, const Knife& knife, s
 
 }  // namespace
 
+namespace {
+
+Sheet bounds_of(const Profile& profile) {
+  Sheet sheet{Place::Constant(INFINITY), Place::Constant(-INFINITY)};
+  for (const Place& place : profile.shape.outline(.1, .1))
+    sheet.low = sheet.low.cwiseMin(place), sheet.high = sheet.high.cwiseMax(place);
+  return sheet;
+}
+
+bool beside(const Sheet& one, const Sheet& other) {
+  return (one.low.array() > other.high.array()).any() || (one.high.array() < other.low.array()).any();
+}
+
+}  // namespace
+
 Slice slice(const Forest& forest, const Plane& plane, const Sheet& sheet) {
   const Knife knife{plane, sheet};
   const std::size_t count = forest.instances().size();
@@ -64,6 +79,8 @@ Slice slice(const Forest& forest, const Plane& plane, const Sheet& sheet) {
   parallel_for(parts.size(), 1, [&](std::size_t p) {
     for (std::size_t i = p * chunk; i < std::min(count, (p + 1) * chunk); ++i)
       cut_neuron(forest, std::uint32_t(i), knife, parts[p]);
+    if (sheet.low.allFinite() || sheet.high.allFinite())
+      std::erase_if(parts[p], [&](const Profile& profile) { return beside(bounds_of(profile), sheet); });
   });
   Slice result{plane, {}};
   for (auto& part : parts)
@@ -104,9 +121,10 @@ std::vector<ProfileArea> areas(const Slice& slice) {
 
 Sheet bounds_of(const Slice& slice) {
   Sheet sheet{Place::Constant(INFINITY), Place::Constant(-INFINITY)};
-  for (const Profile& profile : slice.profiles)
-    for (const Place& place : profile.shape.outline(.1, .1))
-      sheet.low = sheet.low.cwiseMin(place), sheet.high = sheet.high.cwiseMax(place);
+  for (const Profile& profile : slice.profiles) {
+    const Sheet own = bounds_of(profile);
+    sheet.low = sheet.low.cwiseMin(own.low), sheet.high = sheet.high.cwiseMax(own.high);
+  }
   return sheet;
 }
 

@@ -29,7 +29,7 @@ struct Sheet {
 };
 
 /// Found through the clusters' bounds, on all cores; the same at any number of threads.
-/// @param sheet  profiles wholly beside it may be missing
+/// @param sheet  profiles wholly beside it are left out
 Slice slice(const Forest& forest, const Plane& plane, const Sheet& sheet = {});
 
 struct ProfileArea {

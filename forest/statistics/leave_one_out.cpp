@@ -154,11 +154,15 @@ bool LeaveOneOut::told_apart() const {
   return 3. * strange_p <= level || ranked || rejections > 0;
 }
 
+void must_be_enough(std::size_t traced) {
+  if (traced < least_traced)
+    throw Error(
+        fmt::format("{} traced cells cannot be left out one by one; give at least {}", traced, least_traced));
+}
+
 LeaveOneOut leave_one_out(const FeatureTable& traced, std::span<const FeatureTable> grown,
                           const LeaveOneOutOptions& options, Progress& progress) {
-  if (traced.size() < least_traced)
-    throw Error(fmt::format("{} traced cells cannot be left out one by one; give at least {}", traced.size(),
-                            least_traced));
+  must_be_enough(traced.size());
   if (grown.size() != traced.size()) throw Error("there are not grown cells for each traced one");
   LeaveOneOut out;
   out.traced = traced.size();

@@ -54,6 +54,9 @@ struct LeaveOneOut {
   bool told_apart() const;
 };
 
+/// Throws Error for fewer traced cells than can be left out one by one: to be asked before any is grown.
+void must_be_enough(std::size_t traced);
+
 /// @param traced  three or more cells; cells of one slice (dealing.h) are left out together
 /// @param grown   of each traced cell those of a model that saw neither it nor its sisters, at least 19
 /// Throws Error when there are fewer, or the tables differ in their features.

@@ -242,6 +242,12 @@ draw gazed "" --time 10 --gaze .5 .5
 cmp dim.png still.png
 "$program" render few.forest --view "$view}}" --size 240x200 -o plain.png --json >plain.json
 "$program" render few.forest --view "$view}}" --activity odd.activity --time 3.5 --size 240x200 -o odd.png --json >nan.json
+mkdir notes && echo mine >notes/00001.png
+if "$program" movie few.forest --seconds 1 --fps 4 --samples 1 --size 160x120 --pictures notes -o notes.mp4 2>told; then fail "a film replaced notes"; fi
+grep -q 'is no PNG picture' told && [[ $(cat notes/00001.png) == mine && ! -e notes.mp4 ]] || fail "a film replaced notes"
+cp few.forest kept.forest
+if "$program" targets kept.forest -o kept.forest --force 2>told; then fail "targets replaced a forest"; fi
+cmp few.forest kept.forest || fail "targets replaced a forest"
 "$program" movie few.forest --view "$view}}" --activity run.activity --rate 20 --from 10 --seconds 1 --fps 4 --samples 1 --size 160x120 --pictures film -o film.mp4 >/dev/null
 $python - <<'PY'
 import json

@@ -55,7 +55,7 @@ told insects.json "d['cells']['traced'] == 4"
 
 refuses 'give at least 3' "$program" judge --train insects/fly0.swc insects/fly1.swc --kind axon --model insects.lsys --count 19
 refuses 'at least 19' "$program" judge --train insects --kind axon --count 5
-refuses 'needs two such neurons' "$program" judge --train insects --kind dendrite --count 19
+refuses 'has a section of kind dendrite' "$program" judge --train insects --kind dendrite --count 19
 fails_with 2 '--model or --grown' "$program" judge --train insects --held-out few
 fails_with 2 '--count' "$program" judge --train insects --grown grown --count 20
 fails_with 2 '--held-out' "$program" judge --train insects --held-out few --leave-one-out

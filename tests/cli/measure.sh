@@ -36,6 +36,16 @@ PY
   python3 -c 'import json,sys; print(json.load(sys.stdin)["rows"])')" = \
   "[{'neuron': 'fork.swc', 'number_of_leaves': 2.0, 'total_length': 30.0, 'max_path_distance': 20.0}, {'neuron': 'apical, one.swc', 'number_of_leaves': 0.0, 'total_length': 0.0, 'max_path_distance': None}]" ]
 
+# All cells of a container, a file named twice once, and folders by as much of their paths as tells them apart.
+mkdir -p a/cells b/cells
+cp fork.swc a/cells && cp fork.swc b/cells/other.swc
+$BRAINFOREST convert a/cells b/cells --out both.h5 >/dev/null
+[ "$($BRAINFOREST measure both.h5 --metric total_length --json | python3 -c 'import json,sys; print(len(json.load(sys.stdin)["rows"]))')" = 2 ]
+$BRAINFOREST measure a/cells b/cells --by folder --metric total_length >by.txt
+grep -Eq 'a/cells +b/cells' by.txt
+$BRAINFOREST measure fork.swc ./fork.swc --metric total_length --json >once.json 2>told.txt
+[ "$(python3 -c 'import json; print(len(json.load(open("once.json"))["rows"]))')" = 1 ] && grep -q 'named more than once' told.txt
+
 # One row a section, a bifurcation, a shell.
 for level in arbor section bifurcation point shell bar; do
   $BRAINFOREST measure fork.swc --level $level --csv $level.csv >/dev/null

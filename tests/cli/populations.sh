@@ -68,6 +68,11 @@ fails_with 2 'two folders' $BRAINFOREST compare
 # Sisters are kept together; an expression that is none is bad usage.
 $BRAINFOREST compare one two $quick --slices '^[a-z]+-1-0000.' --json >sisters.json
 told sisters.json 'd["random_forest"]["value"] < .9 and d["a"]["cells"] == 12'
+refuses 'what is of one slice cannot be dealt' $BRAINFOREST compare one two --slices '^[a-z]+'
+$BRAINFOREST grow --grammar pyramidal --count 4 --seed 1 --repo self.db >/dev/null
+$BRAINFOREST compare --repo self.db --population pyramidal --with pyramidal $quick --json >self.json 2>/dev/null
+told self.json 'not d["told_apart"] and d["a"]["name"] != d["b"]["name"]'
+refuses 'has a section of kind glia' $BRAINFOREST judge --model pyramidal --train one --held-out two --kind glia
 fails_with 2 'no regular expression' $BRAINFOREST compare one two --slices '(['
 
 refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc

@@ -14,6 +14,9 @@ cmp areas.csv again.csv || fail "areas depend on the number of threads"
 cmp a.png b.png || fail "the picture depends on the number of threads"
 "$program" section a.forest --plane 0,1200,0,1,2,3 --height 80 --size 320x240 -o a.svg >/dev/null
 "$program" section a.forest --plane 0,1200,0,0,1,0 --through 5 --seconds .2 --height 80 --size 160x120 -o a.mp4 >/dev/null
+"$program" section a.forest --plane 0,1200,0,1,2,3 --height 80 --centre 90000,0 --size 320x240 -o aside.svg --json >aside.json 2>aside.txt
+told aside.json "d['profiles'] == 0 and d['area'] == 0"
+grep -q 'cuts no neuron where one looks' aside.txt || fail "an empty picture is not told"
 [[ $(head -c 8 a.mp4 | tail -c 4) == ftyp ]] || fail "a.mp4 is no MP4 file"
 /usr/bin/python3 - <<'PY'
 import csv, json, xml.etree.ElementTree as tree

@@ -33,6 +33,9 @@ told packed.json "d['synapses'] == 30000"
 cmp a.synapses b.synapses || fail "the file depends on the number of threads"
 "$program" pack circuit -o without.forest --no-synapses >/dev/null
 [ ! -e without.synapses ] || fail "left-out synapses were packed"
+cp a.synapses without.synapses
+"$program" pack circuit -o without.forest --no-synapses >/dev/null
+[ ! -e without.synapses ] || fail "synapses of the forest that was there before are left"
 
 view='{"eye":[0,900,260],"target":[0,900,0],"field_of_view":40,"fog":0}'
 for who in cpu opengl; do
