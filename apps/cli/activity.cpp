@@ -2,6 +2,7 @@
 // brainforest activity: a simulation's report becomes an activity file.
 #include "forest/reports/activity.h"
 
+#include <algorithm>
 #include <filesystem>
 #include <memory>
 
@@ -67,6 +68,15 @@ void run(const Options& options, Console& console) {
                     facts.clamped, values * facts.steps, facts.range.low, facts.range.high, facts.units));
   if (facts.spikes_left_out)
     console.warn(fmt::format("{} spikes of neurons without a shape were left out", facts.spikes_left_out));
+  std::size_t beside = 0;
+  const double end = facts.start + facts.step * double(facts.steps);
+  for (const reports::Spikes& of : spikes)
+    beside += std::size_t(
+        std::ranges::count_if(of.times, [&](double time) { return time < facts.start || time > end; }));
+  if (beside)
+    console.warn(fmt::format("{} of the spikes lie before or behind the values, which run from {:g} to {:g} ms, and never "
+                             "flash",
+                             beside, facts.start, end));
   console.print({{"file", options.out.string()},
                  {"neurons", packed.rows().size()},
                  {"neurons_of_circuit", facts.instances},
@@ -81,6 +91,7 @@ void run(const Options& options, Console& console) {
                  {"not_numbers", facts.not_numbers},
                  {"spikes", packed.spikes().size()},
                  {"spikes_left_out", facts.spikes_left_out},
+                 {"spikes_beside", beside},
                  {"bytes", packed.bytes()},
                  {"seconds", seconds_since(begin)}});
   console.table({"file", "neurons", "compartments", "steps", "of ms", "spikes", "bytes"},

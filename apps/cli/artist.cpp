@@ -108,11 +108,15 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
         {.map = dressing_.surfaces.map, .low = low, .high = high, .title = dressing_.surfaces.title});
   }
   const bool barred = scene::paint(image, bars, view.background);
-  if (marks.names && colouring_ && !playback_) {  // else the simulation's colours are shown, not theirs
-    if (colouring_->legend.empty()) return "the colours of neurons mean nothing here, so there is no legend";
-    if (!scene::paint(image, colouring_->legend, view.background, barred))
-      missing += missing.empty() ? "legend" : " nor a legend";
-  }
+  std::vector<scene::LegendEntry> names;
+  if (marks.names && colouring_ && !playback_) names = colouring_->legend;  // else the simulation's colours are shown
+  const bool with_synapses = !dressing_.chosen.balls.empty() && view.synapses != scene::SynapseColour::none;
+  if ((marks.names || playback_) && marks.legend && with_synapses && (playback_ || view.synapses == scene::SynapseColour::sign))
+    std::ranges::move(scene::synapse_legend(view.background), std::back_inserter(names));
+  if (marks.names && !playback_ && names.empty())
+    return "the colours of neurons mean nothing here, so there is no legend";
+  if (!names.empty() && !scene::paint(image, names, view.background, barred) && marks.names)
+    missing += missing.empty() ? "legend" : " nor a legend";
   return missing.empty()
              ? missing
              : fmt::format("the picture has no room for a {}; draw it larger, by --size", missing);

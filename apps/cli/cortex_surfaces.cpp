@@ -84,14 +84,14 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto tell = [&](const fs::path& path, const Mesh& mesh, std::size_t cut,
-                          const cortex::LeftOut& left_out, const std::string& object) {
+                          const cortex::Unjoined& unjoined, const std::string& object) {
       constexpr double much = .05;
-      if (left_out.share > much)
+      if (unjoined.share > much)
         console.warn(
             fmt::format("section {} ({:.3f} mm): {:.3g} mm² within '{}' hang together with nothing and are "
                         "not in {}; look at "
                         "the contours there, or for one that is missing before or behind",
-                        left_out.section + 1, stack.sections[left_out.section].at / 1e3, left_out.area / 1e6,
+                        unjoined.section + 1, stack.sections[unjoined.section].at / 1e3, unjoined.area / 1e6,
                         object, path.string()));
       rows.push_back({{"file", path.string()},
                       {"vertices", mesh.positions.size()},
@@ -100,17 +100,17 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
                       {"volume", volume(mesh) / 1e9},
                       {"area", area(mesh) / 1e6},
                       {"cut_voxels", cut},
-                      {"left_out",
-                       {{"section", left_out.section + 1},
-                        {"at", stack.sections[left_out.section].at / 1e3},
-                        {"area", left_out.area / 1e6}}}});
+                      {"unjoined",
+                       {{"section", unjoined.section + 1},
+                        {"at", stack.sections[unjoined.section].at / 1e3},
+                        {"area", unjoined.area / 1e6}}}});
       table.push_back({path.string(), std::to_string(mesh.positions.size()),
                        std::to_string(mesh.triangles.size()), std::to_string(1 - euler_number(mesh) / 2),
                        fmt::format("{:.1f}", volume(mesh) / 1e9), fmt::format("{:.1f}", area(mesh) / 1e6),
                        std::to_string(cut)});
     };
-    tell(o->out[0], made.outer, made.outer_cut, made.outer_left_out, o->outer);
-    tell(o->out[1], made.inner, made.inner_cut, made.inner_left_out, o->inner);
+    tell(o->out[0], made.outer, made.outer_cut, made.outer_unjoined, o->outer);
+    tell(o->out[1], made.inner, made.inner_cut, made.inner_unjoined, o->inner);
     console.print({{"surfaces", rows}, {"pushed_voxels", made.pushed}, {"triangles_before", made.triangles}});
     console.table({"file", "vertices", "triangles", "genus", "volume mm³", "area mm²", "voxels cut"}, table);
   };

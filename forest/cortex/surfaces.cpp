@@ -152,7 +152,7 @@ std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
   return counts;
 }
 
-LeftOut left_out(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
+Unjoined unjoined(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
                  const Raster& raster) {
   std::vector<std::size_t> lost(before.size());
   std::ranges::transform(before, after, lost.begin(), std::minus<>());
@@ -259,7 +259,7 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
   std::vector<std::uint8_t> ball;
   std::vector<std::size_t> drawn = within(inner, raster);
   result.inner_cut = grow_ball(inner, ball, least).cut;
-  result.inner_left_out = left_out(std::move(drawn), within(inner, raster), raster);
+  result.inner_unjoined = unjoined(std::move(drawn), within(inner, raster), raster);
   progress.end();
   for (std::size_t i = 0; i < inner.count(); ++i)
     if (ball[i] && outer.values[i] > inner.values[i] - margin) {
@@ -269,7 +269,7 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
   progress.begin("one ball, outer", 0);
   drawn = within(outer, raster);
   result.outer_cut = grow_ball(outer, ball, least).cut;
-  result.outer_left_out = left_out(std::move(drawn), within(outer, raster), raster);
+  result.outer_unjoined = unjoined(std::move(drawn), within(outer, raster), raster);
   progress.end();
   // Within every tetrahedron both are linear: where one is smaller at all points, its surface lies outside.
   for (std::size_t i = 0; i < inner.count(); ++i) {

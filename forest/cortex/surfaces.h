@@ -21,7 +21,7 @@ struct SurfaceOptions {
 };
 
 /// Where the most of a section did not come into a surface: a piece apart, or what hangs together by a handle.
-struct LeftOut {
+struct Unjoined {
   std::size_t section = 0;  // index in the stack
   double area = 0.;         // µm²
   double share = 0.;        // of what lies within the object's contours in the median section
@@ -33,7 +33,7 @@ struct Surfaces {
   std::size_t outer_cut = 0, inner_cut = 0;
   /// Points of the grid where the contours had the inner surface outside the outer one: the outer one was moved.
   std::size_t pushed = 0;
-  LeftOut outer_left_out, inner_left_out;
+  Unjoined outer_unjoined, inner_unjoined;
   std::size_t triangles = 0;  // of both, before they were made fewer
 };
 

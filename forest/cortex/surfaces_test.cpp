@@ -80,7 +80,7 @@ TEST(SurfacesFrom, AreSpheresWithinOneAnotherThatCutNothing) {
 
 TEST(SurfacesFrom, SayWhatHangsTogetherWithNothing) {
   ContourStack stack = cuts(folded(1.f), folded(.75f));
-  EXPECT_LT(made(stack).outer_left_out.share, .01);
+  EXPECT_LT(made(stack).outer_unjoined.share, .01);
   const auto with_outer = [](ContourStack s, std::size_t section, auto&& change) {
     change(s.sections[section].contours);
     return s;
@@ -102,8 +102,8 @@ TEST(SurfacesFrom, SayWhatHangsTogetherWithNothing) {
     island.sections[i].contours.push_back(aside);
   }
   const Surfaces result = made(island);
-  EXPECT_NEAR(result.outer_left_out.share, .32, .1);
-  EXPECT_LE(std::abs(double(result.outer_left_out.section) - double(middle)), 1.);
+  EXPECT_NEAR(result.outer_unjoined.share, .32, .1);
+  EXPECT_LE(std::abs(double(result.outer_unjoined.section) - double(middle)), 1.);
 }
 
 TEST(SurfacesFrom, HaveNoHandleWhereTheirContoursDo) {

@@ -46,7 +46,7 @@ void check(const Report& report) {
 }
 
 Report without_values(std::span<const Spikes> spikes, const Nodes& nodes) {
-  constexpr double before = 5., after = 100., finest = .1;  // ms
+  constexpr double before = 5., after = 20., finest = .1;  // ms: until the last one has run along its axon
   constexpr double most_steps = 1000.;
   double first = INFINITY, last = -INFINITY;
   for (const Spikes& of : spikes)
@@ -59,7 +59,7 @@ Report without_values(std::span<const Spikes> spikes, const Nodes& nodes) {
                      "holds no spikes, so there is nothing to play; let the simulation run longer");
   Report report;
   report.source = spikes.front().source;
-  report.start = std::max(0., first - before);
+  report.start = std::min(first, std::max(0., first - before));
   const double length = last + after - report.start;
   report.step = std::max(finest, length / most_steps);
   report.steps = std::size_t(std::ceil(length / report.step));
