@@ -251,6 +251,22 @@ TEST(Fit, FindsTheStepsOfATracerAndWhatComesBackBesideThem) {
   EXPECT_EQ(fit_distribution(x, {.families = {"gamma"}, .atoms = false}).distribution.step, 0.);
 }
 
+// Grown branches go straight on, or in steps of 25 µm, to the last bit of their coordinates only.
+TEST(Fit, TakesWhatRoundingMadeOfEqualValuesForEqual) {
+  Random random(3);
+  std::vector<double> turns, lengths;
+  for (int i = 0; i < 2000; ++i) {
+    const double noise = 1e-4 * random.normal();
+    turns.push_back(i % 2 ? 20. + 10. * random.normal() : noise);
+    lengths.push_back(25. * (1. + random.below(40)) * (1. + 1e-7 * random.normal()));
+  }
+  const DistributionFit turn = fit_distribution(turns, {.families = {"normal"}});
+  ASSERT_EQ(turn.distribution.atoms.size(), 1u);
+  EXPECT_EQ(turn.distribution.atoms[0].value, 0.);
+  EXPECT_NEAR(turn.distribution.atoms[0].weight, .5, .01);
+  EXPECT_NEAR(fit_distribution(lengths, {.families = {"uniform"}}).distribution.step, 25., 1e-3);
+}
+
 // Half a pixel of 0.22917 µm, written with two decimals, as in real files.
 TEST(Fit, FindsStepsThatFilesHaveRounded) {
   const Distribution truth{{part("lognormal", {0.6, 0.5})}, {}, 0.22917};

@@ -36,16 +36,24 @@ struct Sample {
   std::size_t count = 0, left_out = 0;
 };
 
-struct Run {  // of equal values
+struct Run {  // of values that are equal but for the rounding of coordinates in single precision
   double value;
   std::size_t count;
+  std::size_t first;  // of the sorted values
 };
 
 std::vector<Run> runs_of(const Values& sorted) {
+  constexpr double rounding = 3e-7, of_spread = 1e-5;  // of a value, and of how far all are from their median
+  double spread = 0.;
+  for (const double v : sorted) spread += std::abs(v - sorted[sorted.size() / 2]) / double(sorted.size());
+  const auto tolerance = [&](double v) { return std::min(rounding * std::abs(v), 1e-3 * spread) + of_spread * spread; };
   std::vector<Run> runs;
-  for (const double v : sorted) {
-    if (runs.empty() || v != runs.back().value) runs.push_back({v, 0});
-    ++runs.back().count;
+  for (std::size_t i = 0, end = 0; i < sorted.size(); i = end) {
+    const double near = tolerance(sorted[i]), far = 20. * near;
+    for (end = i + 1; end < sorted.size() && sorted[end] - sorted[end - 1] <= near && sorted[end] - sorted[i] <= far;)
+      ++end;
+    const double middle = sorted[i + (end - i) / 2];
+    runs.push_back({std::abs(middle) <= tolerance(0.) ? 0. : middle, end - i, i});
   }
   return runs;
 }
@@ -117,13 +125,18 @@ Sample sample_of(std::span<const double> values, const FitOptions& options) {
   std::ranges::sort(x);
   sample.count = x.size(), sample.left_out = values.size() - x.size();
   if (x.empty()) return sample;
-  std::vector<Run> runs = runs_of(x);
+  const Values sorted = x;
+  std::vector<Run> runs = runs_of(sorted);
   if (options.atoms) sample.step = step_of(runs, x.size());
   std::vector<Run> atoms;
   if (options.atoms || runs.size() == 1) atoms = take_atoms(runs, x.size(), sample.step > 0.);
   x.clear();
   for (const Run& r : runs)
     for (std::size_t i = 0; i < r.count; ++i) {
+      if (sample.step == 0.) {
+        x.push_back(sorted[r.first + i]);
+        continue;
+      }
       const double at = (double(i) + 0.5) / double(r.count) - 0.5;
       x.push_back(r.value +
                   sample.step * (r.value == 0. && runs.front().value >= 0. ? 0.5 * std::abs(at) + 1e-6 : at));
