@@ -74,9 +74,10 @@ void run(const Options& options, Console& console) {
     beside += std::size_t(
         std::ranges::count_if(of.times, [&](double time) { return time < facts.start || time > end; }));
   if (beside)
-    console.warn(fmt::format("{} of the spikes lie before or behind the values, which run from {:g} to {:g} ms, and never "
-                             "flash",
-                             beside, facts.start, end));
+    console.warn(fmt::format(
+        "{} of the spikes lie before or behind the values, which run from {:g} to {:g} ms, and never "
+        "flash",
+        beside, facts.start, end));
   console.print({{"file", options.out.string()},
                  {"neurons", packed.rows().size()},
                  {"neurons_of_circuit", facts.instances},

@@ -109,9 +109,11 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
   }
   const bool barred = scene::paint(image, bars, view.background);
   std::vector<scene::LegendEntry> names;
-  if (marks.names && colouring_ && !playback_) names = colouring_->legend;  // else the simulation's colours are shown
+  if (marks.names && colouring_ && !playback_)
+    names = colouring_->legend;  // else the simulation's colours are shown
   const bool with_synapses = !dressing_.chosen.balls.empty() && view.synapses != scene::SynapseColour::none;
-  if ((marks.names || playback_) && marks.legend && with_synapses && (playback_ || view.synapses == scene::SynapseColour::sign))
+  if ((marks.names || playback_) && marks.legend && with_synapses &&
+      (playback_ || view.synapses == scene::SynapseColour::sign))
     std::ranges::move(scene::synapse_legend(view.background), std::back_inserter(names));
   if (marks.names && !playback_ && names.empty())
     return "the colours of neurons mean nothing here, so there is no legend";

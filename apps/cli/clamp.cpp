@@ -148,13 +148,15 @@ void run(const Options& options, Console& console) {
   const auto at_end = [&](const reports::Trace& trace) {
     const Told t = told(trace);
     const float step = 2.f * float(facts.range.error());
-    return t.numbers > 0 && (t.low <= float(facts.range.low) + step || t.high >= float(facts.range.high) - step);
+    return t.numbers > 0 &&
+           (t.low <= float(facts.range.low) + step || t.high >= float(facts.range.high) - step);
   };
   if (facts.clamped && std::ranges::any_of(traces, at_end))
-    console.warn(fmt::format("{} reach the ends of the range that is kept, {} to {} {}, and may lie beyond; pack the report "
-                             "with a wider --range",
-                             traces.size() == 1 ? "these values" : "some of these values", facts.range.low,
-                             facts.range.high, facts.units));
+    console.warn(fmt::format(
+        "{} reach the ends of the range that is kept, {} to {} {}, and may lie beyond; pack the report "
+        "with a wider --range",
+        traces.size() == 1 ? "these values" : "some of these values", facts.range.low, facts.range.high,
+        facts.units));
   console.print({{"file", options.file.string()},
                  {"csv", options.csv.string()},
                  {"units", facts.units},

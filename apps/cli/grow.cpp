@@ -77,7 +77,8 @@ class Destination {
   virtual ~Destination() = default;
   virtual void put(Ready& neuron, const std::string& name, std::uint64_t index) = 0;
   virtual void finish() = 0;
-  virtual std::string told() const = 0;  // where they are, for a person
+  virtual std::string told() const = 0;              // where they are, for a person
+  virtual nlohmann::ordered_json facts() const = 0;  // and for a machine
 };
 
 class IntoRepository final : public Destination {
@@ -108,6 +109,10 @@ class IntoRepository final : public Destination {
         "stored in {} as population {}{}", repository::escaped(options_.repo),
         repository::escaped(population_),
         there_ ? fmt::format("; {} of them {} there already", there_, there_ == 1 ? "was" : "were") : "");
+  }
+
+  nlohmann::ordered_json facts() const override {
+    return {{"repository", options_.repo}, {"population", population_}, {"there_before", there_}};
   }
 
  private:
@@ -141,6 +146,7 @@ class IntoFolder final : public Destination {
   std::string told() const override {
     return fmt::format("written as SWC files into {}", repository::escaped(folder_.string()));
   }
+  nlohmann::ordered_json facts() const override { return {{"folder", folder_.string()}}; }
 
  private:
   void write(const std::string& name, const Morphology& neuron) {
@@ -263,7 +269,10 @@ void run(const Options& options, Console& console) {
   console.progress().end();
   for (const auto& destination : destinations) destination->finish();
 
-  report(options, grammar, total, {{"steps", steps}}, console);
+  nlohmann::ordered_json facts = nlohmann::ordered_json::object();
+  if (!steps.empty()) facts["steps"] = steps;
+  for (const auto& destination : destinations) facts.update(destination->facts());
+  report(options, grammar, total, facts, console);
   for (const auto& destination : destinations) console.say(destination->told());
 }
 
@@ -278,9 +287,8 @@ std::function<void()> grow(CLI::App& command, Console& console) {
   CLI::Option* model =
       from->add_option("--model", options->model, "A model of the repository: NAME, or NAME@version");
   from->require_option(1);
-  command.add_option("--count", options->count, "Neurons to grow")
-      ->check(CLI::Range(1, 100'000'000))
-      ->capture_default_str();
+  must_be_whole(*command.add_option("--count", options->count, "Neurons to grow")->capture_default_str(), 1,
+                100'000'000);
   add_seed(command, options->seed, "The same seed grows the same neurons");
   CLI::Option_group* into = command.add_option_group("into", "where the neurons go");
   CLI::Option* repo = into->add_option("--repo", options->repo, "Store them in this repository");

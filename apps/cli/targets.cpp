@@ -49,7 +49,7 @@ std::vector<circuit::NodeSet> sets_of(const std::string& name, const std::string
                                       const scene::Targets& targets) {
   using circuit::Clause;
   if (expression.starts_with('{') || expression.starts_with('[')) {
-    circuit::NodeSet set = io::parse_node_set(expression, "--define");
+    circuit::NodeSet set = io::parse_node_set(expression, name);
     set.name = name;
     return {set};
   }

@@ -153,7 +153,7 @@ std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
 }
 
 Unjoined unjoined(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
-                 const Raster& raster) {
+                  const Raster& raster) {
   std::vector<std::size_t> lost(before.size());
   std::ranges::transform(before, after, lost.begin(), std::minus<>());
   const auto most = std::ranges::max_element(lost);

@@ -484,6 +484,14 @@ TEST(Resampling, NeuronsWithoutDiametersGrowAsLongAsTheyWereTraced) {
   const std::vector<Morphology> grown = lsystem::grow_population(grammar, 60, 3);
   for (const char* metric : {"total_length", "number_of_leaves", "max_path_distance"})
     EXPECT_NEAR(mean_of(grown, metric), mean_of(models, metric), .2 * mean_of(models, metric)) << metric;
+  std::size_t points = 0, wide = 0;  // a neuron has none, but where it begins
+  for (const Morphology& m : grown)
+    for (std::uint32_t i = 0; i < m.sections().size(); ++i) {
+      points += m.points(SectionId(i)).size();
+      wide += std::size_t(
+          std::ranges::count_if(m.points(SectionId(i)), [](const Point& p) { return p.radius > 0.f; }));
+    }
+  EXPECT_LT(wide * 100, points);
 }
 
 // Axons that were hardly traced beside whole ones.

@@ -183,7 +183,7 @@ struct Learner {
   std::map<int, Manner> manners() const {
     struct Sums {
       std::array<std::vector<double>, styles> values;
-      double farthest = 0., sections = 0., thinnest = INFINITY;
+      double farthest = 0., sections = 0., thinnest = INFINITY, widest = 0.;
     };
     std::map<int, Sums> by_kind;
     for (std::uint32_t i = 0; i < all.size(); ++i) {
@@ -191,7 +191,9 @@ struct Learner {
       Sums& of = by_kind[kind_of(all[i])];
       of.sections += 1.;
       of.farthest = std::max(of.farthest, double((points(i).back().position() - soma).norm()));
-      for (const Point& p : points(i)) of.thinnest = std::min(of.thinnest, diameter_of(p));
+      for (const Point& p : points(i))
+        of.thinnest = std::min(of.thinnest, diameter_of(p)),
+        of.widest = std::max(of.widest, double(p.radius));
       if (drawn(i)) measure(i, of.values);
     }
     std::map<int, Manner> manners;
@@ -200,7 +202,8 @@ struct Learner {
       Manner& manner = manners[kind];
       for (std::size_t s = 0; s < styles; ++s)
         manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
-      manner.thinnest = of.thinnest, manner.winding = std::max(.01, manner.style[wander]);
+      manner.thinnest = of.widest > 0. ? of.thinnest : 0.;  // without diameters: none
+      manner.winding = std::max(.01, manner.style[wander]);
     }
     return manners;
   }

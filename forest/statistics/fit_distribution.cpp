@@ -46,11 +46,14 @@ std::vector<Run> runs_of(const Values& sorted) {
   constexpr double rounding = 3e-7, of_spread = 1e-5;  // of a value, and of how far all are from their median
   double spread = 0.;
   for (const double v : sorted) spread += std::abs(v - sorted[sorted.size() / 2]) / double(sorted.size());
-  const auto tolerance = [&](double v) { return std::min(rounding * std::abs(v), 1e-3 * spread) + of_spread * spread; };
+  const auto tolerance = [&](double v) {
+    return std::min(rounding * std::abs(v), 1e-3 * spread) + of_spread * spread;
+  };
   std::vector<Run> runs;
   for (std::size_t i = 0, end = 0; i < sorted.size(); i = end) {
     const double near = tolerance(sorted[i]), far = 20. * near;
-    for (end = i + 1; end < sorted.size() && sorted[end] - sorted[end - 1] <= near && sorted[end] - sorted[i] <= far;)
+    for (end = i + 1;
+         end < sorted.size() && sorted[end] - sorted[end - 1] <= near && sorted[end] - sorted[i] <= far;)
       ++end;
     const double middle = sorted[i + (end - i) / 2];
     runs.push_back({std::abs(middle) <= tolerance(0.) ? 0. : middle, end - i, i});
