@@ -67,8 +67,9 @@ void FiledNeurons::remember(std::size_t i, const std::vector<io::Warning>& warni
 std::string FiledNeurons::guesses() const {
   if (guessed_.empty()) return {};
   return fmt::format(
-      "{} of {} hold something odd that only the tracing can mend, first {}; 'brainforest check' tells all",
-      guessed_.size(), counted(size(), "neuron"), repository::escaped(guessed_.begin()->second));
+      "{} of {} {} something odd that only the tracing can mend, first {}; 'brainforest check' tells all",
+      guessed_.size(), counted(size(), "neuron"), guessed_.size() == 1 ? "holds" : "hold",
+      repository::escaped(guessed_.begin()->second));
 }
 
 }  // namespace forest::cli

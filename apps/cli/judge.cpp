@@ -43,7 +43,7 @@ std::string shown(const Estimate& e) {
 std::string verdict(const Judgement& j) {
   const auto failed = std::ranges::count(j.criteria, false, &Criterion::pass);
   const std::string cells =
-      fmt::format("{} grown, {} held-out and {} training cells", j.compared, j.held_out, j.train);
+      fmt::format("{} grown, {} held-out and {}", j.compared, j.held_out, counted(j.train, "training cell"));
   if (j.pass)
     return fmt::format(
         "PASS: by {} the grown cells cannot be told from traced ones; a random forest tells them with AUC "

@@ -439,7 +439,7 @@ void run(const Options& options, Console& console) {
   }
   for (const auto& path : {options.csv, options.xlsx})
     if (!path.empty())
-      console.say(fmt::format("{} rows of {} columns were written to {}", table.rows.size(),
+      console.say(fmt::format("{} of {} columns written to {}", counted(table.rows.size(), "row"),
                               table.columns.size(), path.string()));
   if (options.store)
     console.say(fmt::format("{} of {} are kept in {}; list --where and query find them",

@@ -113,8 +113,8 @@ std::function<void()> pack(CLI::App& command, Console& console) {
       for (const auto& list : oddities)
         for (const io::Warning& w : list) console.warn(w.sentence);
     } else if (count) {
-      console.warn(
-          fmt::format("{} oddities in {}; see them with --verbose", count.load(), options->circuit.string()));
+      console.warn(fmt::format("{} in {}; see them with --verbose",
+                               counted(count.load(), "oddity", "oddities"), options->circuit.string()));
     }
     console.print({{"file", options->out.string()},
                    {"neurons", outline.circuit.instances.size()},

@@ -56,7 +56,7 @@ void run(const Options& options, Console& console) {
   if (!options.csv.empty()) {
     const std::string csv = csv_of(answer);
     write_unless_there(options.csv, csv, options.force);
-    console.say(fmt::format("{} rows are written to {}", answer.rows.size(), options.csv.string()));
+    console.say(fmt::format("{} written to {}", counted(answer.rows.size(), "row"), options.csv.string()));
   } else {
     std::vector<std::vector<std::string>> lines;
     for (const auto& row : answer.rows) {
@@ -64,7 +64,7 @@ void run(const Options& options, Console& console) {
       for (const Answer::Value& value : row) line.push_back(std::visit(ToText{}, value));
     }
     console.table(answer.columns, lines);
-    console.say(fmt::format("{} rows", answer.rows.size()));
+    console.say(counted(answer.rows.size(), "row"));
   }
   if (!console.json) return;
   nlohmann::ordered_json rows = nlohmann::ordered_json::array();

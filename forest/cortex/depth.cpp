@@ -208,44 +208,9 @@ void calm_corners(const Elements& elements, Depth& depth) {
 
 }  // namespace
 
-Depth even_depth(const Elements& elements, Progress& progress) {
-  Depth result;
-  const std::size_t n = elements.size();
-  // First of every element by itself, level in w; corners have the mean of those around; then what is still wanting.
-  std::vector<Depth::Table> level(n);
-  progress.begin("evening depths", 2 * n);
-  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e) {
-      const Growth growth(elements.hexahedron(e));
-      for (int k = 1; k < steps; ++k)
-        level[e][std::size_t(k) - 1] =
-            float(growth.solve(growth.all() * k / steps, 0., 1., [](std::size_t, double x) { return x; }));
-    }
-    progress.advance(end - begin);
-  });
-  result.corners.assign(elements.corners, Depth::Table{});
-  std::vector<std::uint32_t> around(elements.corners, 0);
-  for (std::size_t e = 0; e < n; ++e)
-    for (const std::uint32_t c : elements.corners_of(e)) {
-      ++around[c];
-      for (std::size_t k = 0; k < level[e].size(); ++k) result.corners[c][k] += level[e][k];
-    }
-  for (std::size_t c = 0; c < result.corners.size(); ++c)
-    for (std::size_t k = 0; k < result.corners[c].size(); ++k)
-      result.corners[c][k] =
-          around[c] ? result.corners[c][k] / float(around[c]) : float(k + 1) / float(steps);
-  result.elements.assign(n, Depth::Table{});
-  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
-    for (std::size_t e = begin; e < end; ++e) result.elements[e] = own_table(elements, e, result.corners);
-    progress.advance(end - begin);
-  });
-  calm_corners(elements, result);
-  progress.end();
-  return result;
-}
+Layers::Layers(const Elements& elements, std::size_t element) : Layers(elements, elements.depth, element) {}
 
-Layers::Layers(const Elements& elements, std::size_t element) {
-  const Depth& depth = elements.depth;
+Layers::Layers(const Elements& elements, const Depth& depth, std::size_t element) {
   plain_ = depth.corners.empty();
   if (plain_) return;
   const auto fill = [](Knots& knots, const Depth::Table& table, double last) {
@@ -301,29 +266,107 @@ double Layers::volume(const Hexahedron& element, double from_depth, double to_de
   return plain_ ? element.volume(from_depth, to_depth) : (to_depth - from_depth) * element.volume();
 }
 
-double depth_error(const Elements& elements, std::size_t element) {
-  // Other places than the tables were made from: Gauss and Legendre in each half of the footprint.
-  constexpr int levels = 24;
-  const double off = std::sqrt(.15);
-  const std::array<double, 6> at{.25 - .5 * off, .25, .25 + .5 * off, .75 - .5 * off, .75, .75 + .5 * off};
-  constexpr std::array<double, 6> weight{5. / 36., 8. / 36., 5. / 36., 5. / 36., 8. / 36., 5. / 36.};
-  const Hexahedron h = elements.hexahedron(element);
-  const Layers layers(elements, element);
-  std::array<double, levels + 1> above{};
-  for (std::size_t j = 0; j < at.size(); ++j)
-    for (std::size_t i = 0; i < at.size(); ++i) {
-      const Column column(h, at[i], at[j]);
-      const Layers::Knots knots = layers.plain_ ? Layers::Knots{} : layers.knots(at[i], at[j]);
-      for (int k = 1; k <= levels; ++k) {
-        const double depth = double(k) / levels;
-        above[std::size_t(k)] +=
-            weight[i] * weight[j] * column.above(layers.plain_ ? depth : between(knots, depth));
+// Largest |V(0 → depth) / V − depth| at so many depths. Other places than the tables were made from: Gauss and Legendre in each half of the
+// footprint.
+class DepthError {
+ public:
+  DepthError(const Hexahedron& h, int levels) : levels_(levels) {
+    for (std::size_t j = 0; j < side; ++j)
+      for (std::size_t i = 0; i < side; ++i) columns_[side * j + i] = Column(h, at(i), at(j));
+  }
+  double operator()(const Layers& layers) const {
+    std::vector<double> above(std::size_t(levels_) + 1, 0.);
+    for (std::size_t j = 0; j < side; ++j)
+      for (std::size_t i = 0; i < side; ++i) {
+        const Layers::Knots knots = layers.plain_ ? Layers::Knots{} : layers.knots(at(i), at(j));
+        for (int k = 1; k <= levels_; ++k) {
+          const double depth = double(k) / levels_;
+          above[std::size_t(k)] +=
+              weight(i) * weight(j) *
+              columns_[side * j + i].above(layers.plain_ ? depth : between(knots, depth));
+        }
       }
+    double worst = 0.;
+    for (int k = 1; k < levels_; ++k)
+      worst = std::max(worst, std::abs(above[std::size_t(k)] / above.back() - double(k) / levels_));
+    return worst;
+  }
+
+ private:
+  static constexpr std::size_t side = 6;
+  static double at(std::size_t i) {
+    const double off = .5 * std::sqrt(.15);
+    return (i < 3 ? .25 : .75) + off * (double(i % 3) - 1.);
+  }
+  static double weight(std::size_t i) { return i % 3 == 1 ? 8. / 36. : 5. / 36.; }
+
+  int levels_;
+  std::array<Column, side * side> columns_;
+};
+
+double depth_error(const Elements& elements, std::size_t element) {
+  return DepthError(elements.hexahedron(element), 24)(Layers(elements, element));
+}
+
+namespace {
+
+// Tables are exact at their depths; where w leaps from one to the next it is not between them. Such an element's own table is changed
+// here and there, by ever less, as long as the largest error becomes less.
+void settle(const Elements& elements, Depth& depth, std::size_t element) {
+  constexpr double enough = .0045;
+  constexpr int levels = 48;
+  const DepthError error(elements.hexahedron(element), levels);
+  Depth::Table& own = depth.elements[element];
+  double best = error(Layers(elements, depth, element));
+  for (float change = .02f; best > enough && change > 1e-3f; change /= 2.f)
+    for (float& w : own)
+      for (const float sign : {1.f, -1.f}) {
+        const float before = w;
+        w += sign * change;
+        if (const double now = error(Layers(elements, depth, element)); now < best)
+          best = now;
+        else
+          w = before;
+      }
+}
+
+}  // namespace
+
+Depth even_depth(const Elements& elements, Progress& progress) {
+  Depth result;
+  const std::size_t n = elements.size();
+  // First of every element by itself, level in w; corners have the mean of those around; then what is still wanting.
+  std::vector<Depth::Table> level(n);
+  progress.begin("evening depths", 2 * n);
+  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) {
+      const Growth growth(elements.hexahedron(e));
+      for (int k = 1; k < steps; ++k)
+        level[e][std::size_t(k) - 1] =
+            float(growth.solve(growth.all() * k / steps, 0., 1., [](std::size_t, double x) { return x; }));
     }
-  double worst = 0.;
-  for (int k = 1; k < levels; ++k)
-    worst = std::max(worst, std::abs(above[std::size_t(k)] / above[levels] - double(k) / levels));
-  return worst;
+    progress.advance(end - begin);
+  });
+  result.corners.assign(elements.corners, Depth::Table{});
+  std::vector<std::uint32_t> around(elements.corners, 0);
+  for (std::size_t e = 0; e < n; ++e)
+    for (const std::uint32_t c : elements.corners_of(e)) {
+      ++around[c];
+      for (std::size_t k = 0; k < level[e].size(); ++k) result.corners[c][k] += level[e][k];
+    }
+  for (std::size_t c = 0; c < result.corners.size(); ++c)
+    for (std::size_t k = 0; k < result.corners[c].size(); ++k)
+      result.corners[c][k] =
+          around[c] ? result.corners[c][k] / float(around[c]) : float(k + 1) / float(steps);
+  result.elements.assign(n, Depth::Table{});
+  parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
+    for (std::size_t e = begin; e < end; ++e) result.elements[e] = own_table(elements, e, result.corners);
+    progress.advance(end - begin);
+  });
+  calm_corners(elements, result);
+  parallel_for(n, 64, [&](std::size_t e) { settle(elements, result, e); });
+  progress.end();
+  return result;
 }
 
 }  // namespace forest::cortex

@@ -37,6 +37,7 @@ class Layers {
  public:
   Layers() = default;  // without tables: depth is w
   Layers(const Elements& elements, std::size_t element);
+  Layers(const Elements& elements, const Depth& depth, std::size_t element);  // by tables of their own
 
   double w(double u, double v, double depth) const;
   double depth(double u, double v, double w) const;
@@ -47,7 +48,7 @@ class Layers {
 
  private:
   using Knots = std::array<double, Depth::steps + 1>;
-  friend double depth_error(const Elements& elements, std::size_t element);
+  friend class DepthError;
   Knots knots(double u, double v) const;
 
   bool plain_ = true;  // there are no tables

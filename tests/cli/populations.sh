@@ -116,7 +116,7 @@ mkdir copies && for i in 1 2 3 4 5 6 7; do cp "one/$first.swc" copies/$i.swc; do
 refuses 'the same in every metric' $BRAINFOREST classify copies
 sed '/^#/!s/^\(30 [0-9]*\) [^ ]*/\1 nan/' "one/$first.swc" >odd.swc
 $BRAINFOREST measure odd.swc --metric total_length >/dev/null 2>odd.txt
-grep -q '1 of 1 neuron hold something odd that only the tracing can mend, first odd.swc' odd.txt
+grep -q '1 of 1 neuron holds something odd that only the tracing can mend, first odd.swc' odd.txt
 [ ! -e no.csv ]
 
 # The judge: cells of another kind are no passable growth; the controls say whether it could have seen.
