@@ -268,16 +268,18 @@ TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
     curve[0] *= 1. + .006 * std::sin(curve[0].x() / 300.);
     curve[3] *= 1. + .006 * std::sin(curve[3].y() / 300.);
   }
+  // By 199 of 200 places: a face by a fault of the lattice stays where it would cost its element its shape.
   const auto farthest = [&](const Elements& elements) {
-    double outside_by = 0., inside_by = 0.;
+    std::vector<double> outside_by, inside_by;
     for (std::size_t e = 0; e < elements.size(); ++e) {
       const Hexahedron h = elements.hexahedron(e);
       for (const double u : {0., .2, .5, .9}) {
-        outside_by = std::max(outside_by, outer_tree.nearest(h.at(u, .3, 0.))->distance);
-        inside_by = std::max(inside_by, tree.nearest(h.at(u, .3, 1.))->distance);
+        outside_by.push_back(outer_tree.nearest(h.at(u, .3, 0.))->distance);
+        inside_by.push_back(tree.nearest(h.at(u, .3, 1.))->distance);
       }
     }
-    return std::pair{outside_by, inside_by};
+    std::ranges::sort(outside_by), std::ranges::sort(inside_by);
+    return std::pair{outside_by[outside_by.size() * 199 / 200], inside_by[inside_by.size() * 199 / 200]};
   };
   ASSERT_GT(farthest(wavy).first, 50.);
   ASSERT_GT(farthest(wavy).second, 40.);
