@@ -10,21 +10,19 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/elements.h"
+#include "forest/cortex/gauss.h"
 #include "forest/cortex/ribbon.h"
 
 namespace forest::cortex {
 namespace {
 
-// Five places and weights of Gauss and Legendre on [0, 1].
-struct Rule {
-  std::array<double, 5> at, weight;
-};
-const Rule& rule() {
-  static const Rule result = [] {
-    const double a = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
-                 b = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
-    const double p = (322. + 13. * std::sqrt(70.)) / 1800., q = (322. - 13. * std::sqrt(70.)) / 1800.;
-    return Rule{{.5 - .5 * b, .5 - .5 * a, .5, .5 + .5 * a, .5 + .5 * b}, {q, p, 64. / 225., p, q}};
+// Gauss and Legendre on [0, 1].
+const GaussRule& rule() {
+  static const GaussRule result = [] {
+    GaussRule rule = gauss_rule();
+    for (double& at : rule.at) at = .5 + .5 * at;
+    for (double& weight : rule.weight) weight /= 2.;
+    return rule;
   }();
   return result;
 }

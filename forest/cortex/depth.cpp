@@ -10,6 +10,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/cortex/elements.h"
+#include "forest/cortex/gauss.h"
 #include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
@@ -41,23 +42,19 @@ double between(const std::array<double, steps + 1>& y, double depth) {
 
 double bump(double u, double v) { return 16. * u * (1. - u) * v * (1. - v); }
 
-// Integrals over a footprint by Gauss and Legendre: det J is of degree 8 in u and in v.
-constexpr int side = 5, columns = side * side;
+// Integrals over a footprint by Gauss and Legendre.
+constexpr std::size_t side = GaussRule::size, columns = side * side;
 struct Footprint {
   std::array<double, columns> u, v, weight;
 };
 const Footprint& footprint() {
   static const Footprint result = [] {
-    const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
-                 outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
-    const double near = (322. + 13. * std::sqrt(70.)) / 1800., far = (322. - 13. * std::sqrt(70.)) / 1800.;
-    const std::array<double, side> at{-outer, -inner, 0., inner, outer},
-        weight{far, near, 64. / 225., near, far};
+    const auto& [at, weight] = gauss_rule();
     Footprint f;
     for (std::size_t j = 0; j < side; ++j)
       for (std::size_t i = 0; i < side; ++i)
         f.u[side * j + i] = .5 + .5 * at[i], f.v[side * j + i] = .5 + .5 * at[j],
-                       f.weight[side * j + i] = weight[i] * weight[j];
+                       f.weight[side * j + i] = weight[i] / 2. * (weight[j] / 2.);
     return f;
   }();
   return result;

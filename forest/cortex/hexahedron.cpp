@@ -14,6 +14,7 @@
 #include <Eigen/LU>
 
 #include "forest/core/clones.h"
+#include "forest/cortex/gauss.h"
 
 namespace forest::cortex {
 namespace {
@@ -225,26 +226,8 @@ Eigen::Matrix3d Hexahedron::jacobian(double u, double v, double w) const {
   return linear(*this, {u, v, w}).jacobian;
 }
 
-namespace {
-
-// Gauss and Legendre's five places in [-1, 1].
-struct FivePlaces {
-  std::array<double, 5> at, weight;
-};
-const FivePlaces& five_places() {
-  static const FivePlaces result = [] {
-    const double inner = std::sqrt(5. - 2. * std::sqrt(10. / 7.)) / 3.,
-                 outer = std::sqrt(5. + 2. * std::sqrt(10. / 7.)) / 3.;
-    const double near = (322. + 13. * std::sqrt(70.)) / 900., far = (322. - 13. * std::sqrt(70.)) / 900.;
-    return FivePlaces{{-outer, -inner, 0., inner, outer}, {far, near, 128. / 225., near, far}};
-  }();
-  return result;
-}
-
-}  // namespace
-
 double Hexahedron::volume(double from_w, double to_w) const {
-  const auto& [at, weight] = five_places();
+  const auto& [at, weight] = gauss_rule();
   double sum = 0.;
   for (std::size_t k = 0; k < 5; ++k)
     for (std::size_t j = 0; j < 5; ++j)
@@ -257,7 +240,7 @@ double Hexahedron::volume(double from_w, double to_w) const {
 }
 
 double below_outer_face(const Hexahedron& hexahedron, const Eigen::Vector3d& uvw) {
-  const auto& [at, weight] = five_places();
+  const auto& [at, weight] = gauss_rule();
   const double half = .5 * uvw[2];
   double sum = 0.;
   for (std::size_t k = 0; k < 5; ++k)
