@@ -606,9 +606,12 @@ View portrait(const Forest& forest) {
   if (bounds.empty()) return view;
   const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
   const Vec3 centre = bounds.centre();
-  view.camera.target = centre + Vec3(.42f * radius, .2f * height, 0.f);
-  view.camera.eye = centre + Vec3(3.f * radius, .74f * height, 5.8f * radius);
   view.camera.field_of_view = 46.f;
+  // The whole column, a little from above; what roots out of it below may be cut off.
+  const float half = .56f * height + radius;
+  const float away = half / std::tan(.5f * radians(view.camera.field_of_view)) + radius;
+  view.camera.target = centre + Vec3(0.f, .03f * height, 0.f);
+  view.camera.eye = view.camera.target + away * Vec3(.45f, .16f, 1.f).normalized();
   view.camera.near = .5f;
   view.fog = 1.4f, view.halo = 1.5f;
   view.samples = 24;

@@ -61,7 +61,7 @@ std::vector<ViewKey> activity_keys();  // of its `activity`
 /// @param aspect  width over height of the picture
 View overview(const Forest& forest, float aspect = 16.f / 9.f);
 
-/// A picture to hang on a wall: near enough to follow single dendrites, far enough to see the layers.
+/// A picture to hang on a wall: the column from its crown down, near enough to follow single dendrites.
 View portrait(const Forest& forest);
 
 /// Entries where activity colours branches: the map from low to high, what is below the threshold, what has no value, and
