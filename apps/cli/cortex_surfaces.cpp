@@ -111,7 +111,10 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
     };
     tell(o->out[0], made.outer, made.outer_cut, made.outer_unjoined, o->outer);
     tell(o->out[1], made.inner, made.inner_cut, made.inner_unjoined, o->inner);
-    console.print({{"surfaces", rows}, {"pushed_voxels", made.pushed}, {"triangles_before", made.triangles}});
+    console.print({{"surfaces", rows},
+                   {"pushed_voxels", made.pushed},
+                   {"opened_voxels", made.opened},
+                   {"triangles_before", made.triangles}});
     console.table({"file", "vertices", "triangles", "genus", "volume mm³", "area mm²", "voxels cut"}, table);
   };
 }

@@ -14,6 +14,7 @@
 #include "forest/core/parallel.h"
 #include "forest/io/format.h"
 #include "forest/lsystem/derive.h"
+#include "forest/lsystem/turtle.h"
 #include "forest/morphology/measure.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
@@ -87,16 +88,18 @@ class IntoRepository final : public Destination {
       : options_(options),
         name_(grammar.name),
         population_(options.population.empty() ? name_ : options.population),
-        repository_(repository::Repository::open(options.repo, repository::Access::write)),
-        hash_(repository_.add_grammar(grammar.name, grammar.text, distributions_of(grammar))) {}
+        grammar_(grammar) {
+    if (std::filesystem::exists(options.repo)) open();
+  }
 
   void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
-    if (!transaction_) transaction_.emplace(repository_.begin());
-    const auto added = repository_.add(std::move(*neuron.prepared),
-                                       {.name = name,
-                                        .population = population_,
-                                        .provenance = repository::Grown{name_, hash_, options_.seed, index},
-                                        .number_if_taken = true});
+    if (!repository_) open();
+    if (!transaction_) transaction_.emplace(repository_->begin());
+    const auto added = repository_->add(std::move(*neuron.prepared),
+                                        {.name = name,
+                                         .population = population_,
+                                         .provenance = repository::Grown{name_, hash_, options_.seed, index},
+                                         .number_if_taken = true});
     there_ += added.already_there;
     if (++count_ % stored == 0) finish();
   }
@@ -116,9 +119,15 @@ class IntoRepository final : public Destination {
   }
 
  private:
+  void open() {
+    repository_.emplace(repository::Repository::open(options_.repo, repository::Access::write));
+    hash_ = repository_->add_grammar(grammar_.name, grammar_.text, distributions_of(grammar_));
+  }
+
   const Options& options_;
   std::string name_, population_;
-  repository::Repository repository_;
+  const lsystem::Grammar& grammar_;
+  std::optional<repository::Repository> repository_;  // made when there is something to store
   std::optional<repository::Repository::Transaction> transaction_;
   std::string hash_;
   std::size_t count_ = 0, there_ = 0;
@@ -241,6 +250,11 @@ void run(const Options& options, Console& console) {
   const lsystem::Grammar grammar = grammar_of(options);
   const Surroundings surroundings(options.environment, console);
   const cortex::Site& site = surroundings.site();
+  if (site.environment && !lsystem::heeds_surroundings(grammar))
+    console.warn(
+        fmt::format("{} never asks what is around it, so the environment changes nothing but where its "
+                    "neurons stand; docs/lsystem/environment.md says how to ask",
+                    grammar.name));
   refuse_to_replace(options, grammar, site, console);
   std::vector<std::unique_ptr<Destination>> destinations;
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));

@@ -175,7 +175,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   add("real training cells, structure", j.auc.real_control, 0);
   add("real training cells, with diameters", j.auc.real_control_diameters, 0);
   for (const ControlResult& c : j.controls)
-    add(("control: " + c.name).c_str(), c.auc, 3, c.rejected ? "rejected ✓" : "missed");
+    add(("control: " + c.name).c_str(), c.auc, 3,
+        c.rejected ? "rejected by " + counted(c.reasons.size(), "criterion", "criteria") : "missed");
   report.plot(interval_plot(rows, {.low = .3,
                                    .high = 1.,
                                    .marks = {.5, .6},

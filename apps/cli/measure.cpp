@@ -3,8 +3,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <limits>
 #include <map>
 #include <memory>
+#include <set>
 #include <variant>
 
 #include <CLI/App.hpp>
@@ -119,7 +121,8 @@ Neurons of_repository(const Options& options) {
 
 Picks pick(const Options& options) {
   Picks picks;
-  for (const std::string& name : options.metrics) picks.push_back(find_metric(name));
+  for (const std::string& name : options.metrics)
+    if (const Metric* m = find_metric(name); !std::ranges::count(picks, m)) picks.push_back(m);
   for (const Metric& m : metrics())
     if (options.metrics.empty() && (options.level == "neuron" || name_of(m.level) == options.level))
       picks.push_back(&m);
@@ -197,6 +200,9 @@ struct Table {
   std::vector<Row> rows;
 };
 
+/// Over neurons: of one neuron nothing can be said.
+double spread(const Summary& s) { return s.count > 1 ? s.sd : std::numeric_limits<double>::quiet_NaN(); }
+
 /// A row a group: how many neurons, and over them mean and standard deviation of each metric, of which a neuron's own mean
 /// counts where it has many values.
 Table grouped(const Options& options, const Table& neurons, const std::vector<std::string>& groups) {
@@ -223,7 +229,7 @@ Table grouped(const Options& options, const Table& neurons, const std::vector<st
       std::vector<double> values;
       for (const Row* of : rows) values.push_back(std::get<double>((*of)[c]));
       const Summary summary = summarize(values);
-      row->emplace_back(summary.mean), row->emplace_back(summary.sd);
+      row->emplace_back(summary.mean), row->emplace_back(spread(summary));
       ++row;
     }
   }
@@ -275,9 +281,18 @@ std::string shown(const Cell& cell) {
   return number ? shown(*number) : std::get<std::string>(cell);
 }
 
-/// Of a file, without its folder.
-std::string short_name(const Cell& neuron) {
-  return std::filesystem::path(std::get<std::string>(neuron)).filename();
+/// Of files, without their folders where that leaves no two the same.
+std::vector<std::string> short_names(const std::vector<Row>& rows) {
+  std::map<std::string, std::string> whole;  // by the short one
+  std::vector<std::string> names;
+  bool unlike = true;
+  for (const Row& row : rows) {
+    const auto& name = std::get<std::string>(row[0]);
+    names.push_back(std::filesystem::path(name).filename());
+    unlike = unlike && whole.emplace(names.back(), name).first->second == name;
+  }
+  for (std::size_t r = 0; !unlike && r < rows.size(); ++r) names[r] = std::get<std::string>(rows[r][0]);
+  return names;
 }
 
 /// One neuron: a row a metric.
@@ -312,6 +327,7 @@ void print_groups(Console& console, const Options& options, const Table& table) 
 void print_rows(Console& console, const Options& options, const Table& table) {
   const auto& [columns, rows] = table;
   const bool summaries = options.level == "neuron", files = options.repo.empty();
+  const std::vector<std::string> names = files ? short_names(rows) : std::vector<std::string>();
   std::vector<std::string> header;
   std::vector<std::vector<std::string>> lines(rows.size() + (summaries ? 2 : 0));
   for (std::size_t c = 0; c < columns.size(); ++c) {
@@ -319,13 +335,13 @@ void print_rows(Console& console, const Options& options, const Table& table) {
     header.push_back(columns[c].title());
     std::vector<double> values;
     for (std::size_t r = 0; r < rows.size(); ++r) {
-      lines[r].push_back(c == 0 && files ? short_name(rows[r][c]) : shown(rows[r][c]));
+      lines[r].push_back(c == 0 && files ? names[r] : shown(rows[r][c]));
       if (const double* value = std::get_if<double>(&rows[r][c])) values.push_back(*value);
     }
     if (!summaries) continue;
     const Summary summary = summarize(values);
     lines[rows.size()].push_back(c == 0 ? "mean" : shown(summary.mean));
-    lines[rows.size() + 1].push_back(c == 0 ? "sd" : shown(summary.sd));
+    lines[rows.size() + 1].push_back(c == 0 ? "sd" : shown(spread(summary)));
   }
   console.table(header, lines);
 }
@@ -405,11 +421,13 @@ void run(const Options& options, Console& console) {
   Table table{columns(options, picks), {}};
   std::vector<std::string> groups;
   std::vector<repository::NeuronId> ids;
+  std::set<std::string> told;
   std::size_t failed = 0, unread = 0;
   for (std::size_t i = 0; i < measured.size(); ++i) {
     Measured& m = measured[i];
     if (!m.error.empty()) {
-      console.warn(m.skipped ? m.error + "; skipped" : m.error);
+      // A file of many cells says the same of each.
+      if (told.insert(m.error).second) console.warn(m.skipped ? m.error + "; skipped" : m.error);
       ++unread, failed += !m.skipped;
     } else {
       if (!options.by.empty()) groups.push_back(neurons.groups[i]);

@@ -115,6 +115,10 @@ std::function<void()> render(CLI::App& command, Console& console) {
     const auto [width, height] = parse_size(options->size);
     SurfaceOptions named = options->surfaces;
     const bool alone = is_surface(options->forest);
+    if (alone && (options->skin || options->outline))
+      throw Error(
+          fmt::format("{} is of neurons, and {} is a surface; name a forest file, and that by --surface",
+                      options->skin ? "--skin" : "--outline", options->forest.string()));
     if (alone) named.files.insert(named.files.begin(), options->forest);
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);

@@ -13,6 +13,7 @@
 #include "forest/core/file.h"
 #include "forest/io/film.h"
 #include "forest/io/png.h"
+#include "forest/io/workbook.h"
 #include "forest/morphology/morphology.h"
 #include "forest/scene/slice_picture.h"
 
@@ -67,21 +68,17 @@ Plane plane_of(const std::string& text, const scene::Forest& forest) {
   return Plane::through({n[0], n[1], n[2]}, normal);
 }
 
-// A text between quotes; those in it are doubled (RFC 4180).
-std::string in_quotes(std::string_view text) {
-  std::string result = "\"";
-  for (const char c : text) result.append(c == '"' ? 2 : 1, c);
-  return result + '"';
-}
-
 std::string csv_of(const scene::Forest& forest, const std::vector<scene::ProfileArea>& areas) {
-  std::string text = "neuron,type,layer,kind,profiles,area\n";
+  io::TableSheet sheet{
+      .name = "section",
+      .columns = {{"neuron", ""}, {"type", ""}, {"layer", ""}, {"kind", ""}, {"profiles", ""}, {"area", ""}},
+      .rows = {}};
   for (const scene::ProfileArea& a : areas)
-    text += fmt::format("{},{},{},{},{},{:.6g}\n", a.instance,
-                        in_quotes(forest.circuit().types[forest.types()[a.instance]].name),
-                        in_quotes(forest.circuit().layers[forest.layers()[a.instance]].name),
-                        a.kind == 1 ? "soma" : name_of(SectionKind(a.kind)), a.profiles, a.area);
-  return text;
+    sheet.rows.push_back({std::int64_t(a.instance), forest.circuit().types[forest.types()[a.instance]].name,
+                          forest.circuit().layers[forest.layers()[a.instance]].name,
+                          std::string(a.kind == 1 ? "soma" : name_of(SectionKind(a.kind))),
+                          std::int64_t(a.profiles), a.area});
+  return io::csv_of(sheet);
 }
 
 // Without the profiles of neurons that are hidden.

@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/progress.h"
+#include "forest/cortex/hidden_sulci.h"
 #include "forest/geometry/decimate.h"
 #include "forest/geometry/isosurface.h"
 
@@ -266,6 +267,9 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
       result.pushed += outer.values[i] >= 0.f;
       outer.values[i] = inner.values[i] - margin;
     }
+  progress.begin("sulci between sections", 0);
+  result.opened = open_hidden_sulci(outer, inner, std::size_t(options.between), float(raster.step / 4.));
+  progress.end();
   progress.begin("one ball, outer", 0);
   drawn = within(outer, raster);
   result.outer_cut = grow_ball(outer, ball, least).cut;

@@ -33,6 +33,8 @@ struct Surfaces {
   std::size_t outer_cut = 0, inner_cut = 0;
   /// Points of the grid where the contours had the inner surface outside the outer one: the outer one was moved.
   std::size_t pushed = 0;
+  /// Points of the grid that came outside since two banks meet there, which no section shows (hidden_sulci.h).
+  std::size_t opened = 0;
   Unjoined outer_unjoined, inner_unjoined;
   std::size_t triangles = 0;  // of both, before they were made fewer
 };

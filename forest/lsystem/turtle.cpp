@@ -598,6 +598,15 @@ Morphology interpret(const Word& word, const Grammar& grammar, const Annotations
   return Turtle(word, grammar, site).draw(annotations);
 }
 
+bool heeds_surroundings(const Grammar& grammar) {
+  const auto heeds = [](const Shape& s) {
+    return s.symbol < turtle_symbols().size() && turtle_symbols()[s.symbol].action >= Action::avoid;
+  };
+  return grammar.queries || std::ranges::any_of(grammar.axiom, heeds) ||
+         std::ranges::any_of(grammar.productions,
+                             [&](const Production& p) { return std::ranges::any_of(p.successor, heeds); });
+}
+
 void answer(Word& word, const Grammar& grammar, const cortex::Site& site) {
   Turtle(word, grammar, site).answer(word.parameters);
 }

@@ -43,4 +43,7 @@ Morphology interpret(const Word& word, const Grammar& grammar, const Annotations
 void answer(Word& word, const Grammar& grammar, const cortex::Site& site = {});
 constexpr bool is_question(Action action) { return action >= Action::ask_place; }
 
+/// Whether what lies around can change what grows: the grammar avoids, seeks or shuns, or asks.
+bool heeds_surroundings(const Grammar& grammar);
+
 }  // namespace forest::lsystem

@@ -14,6 +14,7 @@ namespace {
 // In heights of a letter.
 constexpr float margin = 1.6f, padding = 1.3f, line = 1.9f, thick = 1.2f, wide = 20.f;
 
+constexpr float plate = .8f;           // opacity; more shows lines through the words
 constexpr float share_at_most = .65f;  // of a picture's width and height that a plate takes
 
 std::size_t lines_of(const ColourBar& bar) {
@@ -117,7 +118,7 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
     const float left = h * (margin + padding), right = left + h * wide;
     const float bottom = top + h * (2.f * padding + thick_of(bar) + line * float(lines_of(bar)));
     const float note = bar.note.empty() ? 0.f : marks_width(bar, h) + letters.width(bar.note);
-    fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, .62f);
+    fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, plate);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
       const float room = right - left - (bar.units.empty() ? 0.f : letters.width(bar.units) + h);
@@ -161,7 +162,7 @@ bool paint(frame::Image& image, std::span<const LegendEntry> all, Background bac
   const float width = indent + widest + 2.f * padding * h,
               height = h * (2.f * padding + 1.f + line * (float(names.size()) - 1.f));
   const float left = right ? float(image.width) - h * margin - width : h * margin, top = h * margin;
-  fill(image, {left, top, left + width, top + height}, ground, .62f);
+  fill(image, {left, top, left + width, top + height}, ground, plate);
   float base = top + h * (padding + 1.f);
   for (const LegendEntry& entry : names) {
     const float at = std::round(left + h * padding), foot = std::round(base);
