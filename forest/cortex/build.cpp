@@ -117,7 +117,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
       .enough = .5, .wanted = .62, .volume = volume, .even = 16., .worst_off = 100., .gain = .01};
   Shaping roomy = even;
   roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  constexpr int evenings = 2, last_evenings = 5;
+  constexpr int evenings = 2, last_evenings = 9;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
     improve_shapes(cortex.elements, outer, inner, roomy, progress);

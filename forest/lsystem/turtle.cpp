@@ -349,12 +349,22 @@ class Turtle {
     }
   }
 
+  // Points are kept in 32 bits.
+  static constexpr double world = 1e30;  // µm
+  void must_be_in_world(const Eigen::Vector3d& place) const {
+    if (!place.allFinite() || place.cwiseAbs().maxCoeff() >= world) fail("the turtle has left the world");
+  }
+
+  void must_be_size(double diameter) const {
+    if (!(diameter < world)) fail("a diameter is larger than the world");
+  }
+
   Eigen::Vector3d here() const { return at_ + state_.position; }  // in the tissue
 
   // What it draws in place of this step, so that a neurite of this radius keeps out of what it avoids.
   Eigen::Vector3d clear(const Eigen::Vector3d& step, double radius) {
     if (state_.avoid < 0.) return step;
-    if (!step.allFinite()) fail("the turtle has left the world");
+    must_be_in_world(step);
     const double apart = state_.avoid + radius;
     obstacles_.balls.clear();
     if (soma_) obstacles_.balls.push_back({soma_place_, double(soma_->radius) + apart});
@@ -369,7 +379,8 @@ class Turtle {
   // A segment of the turtle's diameter at its end.
   void line_to(const Eigen::Vector3d& place, float start_radius) {
     const Eigen::Vector3d from = std::exchange(state_.position, place);
-    if (!place.allFinite()) fail("the turtle has left the world");
+    must_be_in_world(place);
+    must_be_size(state_.diameter);
     if (answers_) return;
     if (state_.node == none) {
       drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind});
@@ -524,6 +535,7 @@ class Turtle {
   void soma(double diameter) {
     if (soma_) fail("there are two somata; a neuron has one");
     if (!(diameter >= 0.)) fail("the soma has a negative diameter");
+    must_be_size(diameter);
     soma_ = Point{float(state_.position.x()), float(state_.position.y()), float(state_.position.z()),
                   float(0.5 * diameter)};
     soma_place_ = state_.position;
