@@ -8,6 +8,7 @@
 #include <map>
 #include <memory>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include <CLI/App.hpp>
@@ -165,6 +166,7 @@ std::vector<std::vector<std::string>> lines_of(const std::vector<Arrival>& files
 void report(const std::vector<Arrival>& files, const Options& options, Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t stored = 0, there = 0, failed = 0, skipped = 0, warnings = 0;
+  const bool of_many = std::ranges::adjacent_find(files, {}, &Arrival::path) != files.end();
   for (const Arrival& file : files) {
     const std::string path = escaped(file.path.string());
     nlohmann::ordered_json entry{{"file", path}, {"outcome", outcome(file)}};
@@ -200,7 +202,7 @@ void report(const std::vector<Arrival>& files, const Options& options, Console& 
                  {"files", list}});
   if (failed)
     throw Error(fmt::format("{} of {} could not be read; the sentences above say why", failed,
-                            counted(files.size(), "file")));
+                            counted(files.size(), of_many ? "neuron" : "file")));
 }
 
 /// What a workbook cannot be imported with. Its neurons have their populations and say the rest themselves.
@@ -234,6 +236,7 @@ void run(const Options& options, Console& console) {
   if (fs::exists(options.repo)) repository = Repository::open(options.repo, Access::write);
   const std::size_t window = 64;  // sources in memory at a time, and stored in one transaction
   std::size_t done = 0;
+  std::set<std::string> told;
   console.progress().begin("importing", sources.size());
   for (std::size_t first = 0; first < sources.size(); first += window) {
     const std::size_t count = std::min(window, sources.size() - first), begin = files.size();
@@ -247,7 +250,8 @@ void run(const Options& options, Console& console) {
     std::size_t stored = 0;
     for (Arrival& file : std::span(files).subspan(begin)) {
       if (!file.error.empty()) {
-        console.warn(file.skipped ? file.error + "; skipped" : file.error);
+        // A file of many cells says the same of each.
+        if (told.insert(file.error).second) console.warn(file.skipped ? file.error + "; skipped" : file.error);
         continue;
       }
       if (options.verbose) tell_oddities({escaped(file.path.string()), &file.oddities}, console);

@@ -1,8 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest-studio: a window on a forest file.
 #include <QApplication>
+#include <QOffscreenSurface>
+#include <QOpenGLContext>
 #include <QSurfaceFormat>
-#include <QTimer>
 #include <array>
 #include <cstdio>
 #include <cstdlib>
@@ -49,6 +50,15 @@ void on_qt_message(QtMsgType type, const QMessageLogContext&, const QString& tex
         fail("there is no display that a window could open on; use 'brainforest render' for pictures without "
              "one"));
   if (type == QtCriticalMsg) std::fprintf(stderr, "%s\n", qPrintable(text));
+}
+
+// Of any version: what a window is put together with. Qt ends in a crash where there is none.
+bool offers_opengl() {
+  if (QGuiApplication::platformName() == "offscreen") return false;  // it offers some, and then fails to show it
+  QOffscreenSurface surface;
+  surface.create();
+  QOpenGLContext context;
+  return context.create() && context.makeCurrent(&surface);
 }
 
 // A picture replaces an older one, and nothing else.
@@ -116,6 +126,10 @@ int run(const Options& options, int& argc, char** argv) {
   QApplication application(argc, argv);
   application.setOrganizationName("Brain Forest");
   application.setApplicationName("Studio");
+  if (!offers_opengl())
+    return fail(
+        "this display offers no OpenGL, by which the window shows even what the processor draws; install libgl1-mesa-dri or "
+        "a driver of the graphics card, or use 'brainforest render' for pictures without one");
   apply_theme(application);
 
   Window window(forest, view, QString::fromStdString(options.forest.filename().string()), std::move(sets),
@@ -144,12 +158,6 @@ int run(const Options& options, int& argc, char** argv) {
         Qt::QueuedConnection);
   window.show();
   window.activateWindow();
-  QTimer::singleShot(0, &application, [&] {
-    if (!window.viewport().isValid())
-      end(
-          fail("this display offers no OpenGL 4.5; install a newer graphics driver, or set "
-               "LIBGL_ALWAYS_SOFTWARE=1 to draw on the processor"));
-  });
   const int code = application.exec();
   return status ? status : code;
 }

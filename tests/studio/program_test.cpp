@@ -126,6 +126,18 @@ TEST(Studio, WhatGoesWrongIsOneSentence) {
   }
 }
 
+TEST(Studio, WithoutOpenGlItSaysWhatToInstall) {
+  if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
+  for (const auto& [name, value] : {std::pair{"QT_XCB_GL_INTEGRATION", "none"}, {"QT_QPA_PLATFORM", "offscreen"}}) {
+    setenv(name, value, 1);
+    const auto [said, ended] = Studio({sample_file(), "--renderer", "cpu"}).end();
+    unsetenv(name);
+    EXPECT_EQ(ended, 1);
+    EXPECT_NE(said.find("install libgl1-mesa-dri"), std::string::npos) << said;
+    EXPECT_EQ(std::ranges::count(said, '\n'), 1) << said;
+  }
+}
+
 TEST(Studio, WithoutADisplayItSaysSo) {
   const char* display = std::getenv("DISPLAY");
   const std::string kept = display ? display : "";
