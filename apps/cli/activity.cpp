@@ -100,7 +100,7 @@ void run(const Options& options, Console& console) {
                   std::to_string(facts.steps), fmt::format("{:g}", facts.step),
                   std::to_string(packed.spikes().size()), std::to_string(packed.bytes())}});
   if (!spikes_alone)
-    console.say(fmt::format("\nValues of {:g} to {:g} {} are kept to {:.3f} {}", facts.range.low,
+    console.say(fmt::format("\nValues of {:g} to {:g} {} are kept to {:.3g} {}", facts.range.low,
                             facts.range.high, facts.units, facts.range.error(), facts.units));
 }
 

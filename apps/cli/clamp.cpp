@@ -128,8 +128,8 @@ void run(const Options& options, Console& console) {
     const Told t = told(trace);
     const bool any = t.numbers > 0;
     const double when = any ? facts.time(t.highest) : NAN;
-    const auto figure = [any](const char* form, double value) {
-      return any ? fmt::format(fmt::runtime(form), value) : std::string("none");
+    const auto figure = [&](double value) {  // its last digit says nothing
+      return any ? fmt::format("{:.{}f}", value, std::max(1, facts.range.decimals() - 2)) : std::string("none");
     };
     list.push_back({{"neuron", trace.node},
                     {"section", trace.section == reports::soma_run ? nlohmann::ordered_json(soma)
@@ -141,8 +141,8 @@ void run(const Options& options, Console& console) {
                     {"mean", t.mean},
                     {"not_numbers", facts.steps - t.numbers}});
     lines.push_back({std::to_string(trace.node), trace.section_name(), fmt::format("{:.3g}", trace.position),
-                     figure("{:.1f}", double(t.low)), figure("{:.1f}", double(t.high)),
-                     figure("{:.4g}", when), figure("{:.1f}", t.mean)});
+                     figure(double(t.low)), figure(double(t.high)),
+                     any ? fmt::format("{:.4g}", when) : std::string("none"), figure(t.mean)});
   }
   // Values beyond the range that the report was packed with are kept as its ends.
   const auto at_end = [&](const reports::Trace& trace) {

@@ -30,7 +30,7 @@ struct Options {
   std::filesystem::path file, out;
   std::string size = "1200x800";
   double from = -INFINITY, to = INFINITY;  // ms
-  std::vector<float> range{-80.f, 20.f};
+  std::vector<float> range;  // empty: as a picture of the forest would show
   std::string map = scene::colour_maps().front().name;
   bool plain = false;
 };
@@ -110,7 +110,7 @@ class Axes {
 void run(const Options& options, Console& console) {
   must_take(options.out, png_picture);
   auto [width, height] = parse_size(options.size);
-  if (!(options.range[0] < options.range[1]))
+  if (!options.range.empty() && !(options.range[0] < options.range[1]))
     throw Error(fmt::format("colours from {} to {} show nothing; give the lower end first", options.range[0],
                             options.range[1]));
   const auto activity = reports::Activity::open(options.file);
@@ -124,6 +124,8 @@ void run(const Options& options, Console& console) {
     return std::uint64_t(
         std::clamp(std::ceil((ms - facts.start) / facts.step - 1e-6), 0., double(facts.steps)));
   };
+  const reports::Range shown =
+      options.range.empty() ? facts.shown() : reports::Range{options.range[0], options.range[1]};
   const std::uint64_t begin = step_at(options.from), end = step_at(options.to);
   if (begin >= end)
     throw Error(fmt::format("{:g} to {:g} ms holds no step; the simulation runs from {:g} to {:g} ms",
@@ -138,7 +140,7 @@ void run(const Options& options, Console& console) {
   std::array<Colour, 256> colours;
   for (std::size_t code = 0; code < colours.size(); ++code)
     colours[code] =
-        colour_of(map, facts.range.value(reports::Code(code)), options.range[0], options.range[1]);
+        colour_of(map, facts.range.value(reports::Code(code)), shown.low, shown.high);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(4 * codes.size());
   for (const reports::Code code : codes) {
@@ -149,7 +151,7 @@ void run(const Options& options, Console& console) {
   if (axes) {
     const frame::Image& image =
         axes->around(pixels, first, last,
-                     {.map = &map, .low = options.range[0], .high = options.range[1], .units = facts.units});
+                     {.map = &map, .low = shown.low, .high = shown.high, .units = facts.units});
     io::write_png(options.out, image.width, image.height, image.pixels);
   } else {
     io::write_png(options.out, width, height, pixels);
@@ -159,14 +161,14 @@ void run(const Options& options, Console& console) {
                  {"from", first},
                  {"to", last},
                  {"steps", end - begin},
-                 {"range", options.range},
+                 {"range", {shown.low, shown.high}},
                  {"map", map.name},
                  {"units", facts.units}});
   console.table(
       {"picture", "neurons (down)", "ms (to the right)", "colours"},
       {{options.out.string(), std::to_string(activity.rows().size()),
         fmt::format("{:g} to {:g}", first, last),
-        fmt::format("{:g} to {:g} {}, {}", options.range[0], options.range[1], facts.units, map.name)}});
+        fmt::format("{:g} to {:g} {}, {}", shown.low, shown.high, facts.units, map.name)}});
 }
 
 }  // namespace
@@ -177,9 +179,8 @@ std::function<void()> raster(CLI::App& command, Console& console) {
   add_size(command, options->size);
   command.add_option("--from", options->from, "The first time that is shown, ms; by default all");
   command.add_option("--to", options->to, "The time before which it ends, ms");
-  command.add_option("--range", options->range, "Values at the ends of the colours")
+  command.add_option("--range", options->range, "Values at the ends of the colours; by default -80 to 20 mV, of other units all that is kept")
       ->expected(2)
-      ->capture_default_str()
       ->type_name("LOW HIGH");
   std::vector<std::string> maps;
   for (const scene::ColourMap& map : scene::colour_maps()) maps.push_back(map.name);

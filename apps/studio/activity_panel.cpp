@@ -225,7 +225,7 @@ void TraceView::draw() {
     for (const float v : t.values)
       if (!std::isnan(v)) low = std::min(low, v), high = std::max(high, v);
   if (!(low <= high)) low = 0.f, high = 1.f;
-  const float room = std::max(.05f * (high - low), .5f);
+  const float room = std::max(.05f * (high - low), facts.range.step());
   low -= room, high += room;
   const auto y_of = [&](float v) { return area.bottom() - qreal((v - low) / (high - low)) * area.height(); };
   for (const double v : ticks(double(low), double(high), 6)) {
@@ -237,7 +237,7 @@ void TraceView::draw() {
                      QString::number(v));
   }
   painter.setPen(faint);
-  painter.drawText(QRectF(0, 0, area.left() + 50, area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
+  painter.drawText(QRectF(0, 0, area.right(), area.top() - 1), Qt::AlignLeft | Qt::AlignBottom,
                    QString::fromStdString(facts.units));
   paint_times(painter, area, playback);
   // Of the steps under one column of pixels the least and the greatest: no spike is lost.
@@ -421,6 +421,12 @@ void ActivityPanel::follow() {
 void ActivityPanel::show_activity() {
   traces_.clear();
   const scene::Playback& playback = *viewport_.playback();
+  const int decimals = std::max(1, playback.activity().facts().range.decimals() - 2);
+  for (QDoubleSpinBox* box : {low_, high_, threshold_}) {
+    const QSignalBlocker quiet(box);
+    box->setDecimals(decimals);
+    box->setFixedWidth(decimals > 3 ? 130 : 90);
+  }
   {
     const QSignalBlocker quiet[] = {QSignalBlocker(slider_), QSignalBlocker(threshold_)};
     const std::uint64_t last = playback.activity().facts().steps - 1;

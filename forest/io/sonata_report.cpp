@@ -22,7 +22,7 @@ namespace fs = std::filesystem;
 using reports::Report;
 using reports::Spikes;
 
-/// The populations below a group, or the one that is asked for.
+/// The populations below a group, or the one that is asked for. Some programs leave empty groups, which are none.
 std::vector<std::string> populations_of(const hdf5::File& file, const std::string& group,
                                         const std::string& wanted, const char* what) {
   if (file.kind(group) != hdf5::Kind::group)
@@ -30,7 +30,8 @@ std::vector<std::string> populations_of(const hdf5::File& file, const std::strin
         fmt::format("there is no group {}, so it holds no {} of SONATA; name another file", group, what));
   std::vector<std::string> names;
   for (const std::string& name : file.members(group))
-    if (file.kind(group + "/" + name) == hdf5::Kind::group) names.push_back(name);
+    if (file.kind(group + "/" + name) == hdf5::Kind::group && !file.members(group + "/" + name).empty())
+      names.push_back(name);
   if (names.empty())
     file.refuse(fmt::format(
         "group {} has no population; write the file in SONATA's layout, {}/<population>/…", group, group));

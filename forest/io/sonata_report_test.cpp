@@ -42,6 +42,7 @@ struct Written {
   }();
   std::size_t columns = 5;
   std::string units = "mV", time_units = "ms";
+  bool nothing = false;  // a group, and that is all
 };
 
 class Reports : public testing::Test {
@@ -58,7 +59,8 @@ class Reports : public testing::Test {
     hdf5::NewFile file(path);
     for (const Written& w : populations) {
       const std::string base = "/report/" + w.name, map = base + "/mapping/";
-      file.group(base + "/mapping");
+      file.group(w.nothing ? base : base + "/mapping");
+      if (w.nothing) continue;
       file.write(base + "/data", std::span(w.data), w.columns);
       if (!w.units.empty()) file.attribute(base + "/data", "units", w.units);
       const auto put = [&](const std::string& name, const auto& values) {
@@ -166,6 +168,11 @@ TEST_F(Reports, AreReadInTheDialectsThatProgramsWrite) {
               w.time = {{10, 11.5f, .5f}};
             }),
             "accepted");  // the last step is the end
+  EXPECT_EQ(complaint([&] {
+              const reports::Report report = read_sonata_report(write({Written{}, Written{.name = "empty", .nothing = true}}));
+              EXPECT_EQ(report.step, .5);
+            }),
+            "accepted");
   Written w;
   w.time_units = "s", w.time = {{0, .002f, .0005f}};
   EXPECT_NEAR(read_sonata_report(write({w})).step, .5, 1e-6);

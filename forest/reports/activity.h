@@ -51,6 +51,8 @@ struct Facts {
   std::uint64_t clamped = 0, not_numbers = 0;  // values beyond the range; values that are none
   std::uint64_t spikes_left_out = 0;           // of neurons without a shape
 
+  /// What colours show when nobody says what: −80…+20 mV, of other units all that is kept.
+  Range shown() const { return units == "mV" ? Range{-80.f, 20.f} : range; }
   double time(std::uint64_t i) const { return start + double(i) * step; }  // ms
 };
 

@@ -58,6 +58,8 @@ constexpr unsigned bits_for(unsigned spread) {
 
 }  // namespace
 
+int Range::decimals() const { return std::max(0, int(std::ceil(-std::log10(step()))) + 2); }
+
 float Range::value(Code code) const {
   return code == no_value ? std::numeric_limits<float>::quiet_NaN() : low + float(code) * step();
 }

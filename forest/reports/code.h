@@ -25,6 +25,8 @@ struct Range {
   float step() const { return (high - low) / 254.f; }
   /// The most by which a value inside the range is changed: 0.2953 mV for −100…+50 mV.
   float error() const { return .5f * step(); }
+  /// After the point, with which neighbouring codes differ in their last two: 3 for −100…+50 mV.
+  int decimals() const;
   /// NaN for no_value.
   float value(Code code) const;
   /// Values beyond the range become its nearest end; what is no number, no_value.

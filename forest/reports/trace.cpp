@@ -35,12 +35,13 @@ Trace trace(const Activity& activity, std::uint32_t row, std::uint32_t compartme
 }
 
 std::string csv_of(const Facts& facts, std::span<const Trace> traces) {
+  const int decimals = facts.range.decimals();
   std::string text = "time (ms)";
   for (const Trace& t : traces) text += fmt::format(",{} ({})", t.name(), facts.units);
   for (std::uint64_t i = 0; i < facts.steps; ++i) {
     text += fmt::format("\n{:.10g}", facts.time(i));
     for (const Trace& t : traces)
-      text += std::isnan(t.values[i]) ? std::string(",") : fmt::format(",{:.3f}", t.values[i]);
+      text += std::isnan(t.values[i]) ? std::string(",") : fmt::format(",{:.{}f}", t.values[i], decimals);
   }
   return text + "\n";
 }

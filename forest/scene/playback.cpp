@@ -179,8 +179,8 @@ Playback Playback::open(const Forest& forest, const std::filesystem::path& path)
 
 ActivityView Playback::view() const {
   ActivityView view;
-  const reports::Facts& facts = activity_.facts();
-  if (facts.units != "mV") view.low = facts.range.low, view.high = facts.range.high;
+  const reports::Range shown = activity_.facts().shown();
+  view.low = shown.low, view.high = shown.high;
   return view;
 }
 

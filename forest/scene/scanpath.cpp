@@ -59,6 +59,7 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
   std::optional<Vec2> size;  // of the recorded picture, pixels
   bool pixels = false, begun = false;
   std::size_t line_number = 0;
+  if (constexpr std::string_view mark = "\xef\xbb\xbf"; text.starts_with(mark)) text.remove_prefix(mark.size());
   const auto refuse = [&](const std::string& sentence) { throw InputError(name, line_number, sentence); };
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -104,9 +105,10 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
           fmt::format("'{}, {}' is no place of the gaze; leave both empty in a blink", cells[1], cells[2]));
     Vec2 place{float(*x), float(*y)};
     if (pixels) place.array() /= size->array();
-    if (!(place.array().abs() <= 100.f).all())
+    constexpr float far = 3.f;  // what looks beside the screen is recorded, too
+    if (!(place.array().abs() <= far).all())
       refuse(
-          fmt::format("{}, {} lies a hundred pictures beside the picture; are these pixels? name the columns "
+          fmt::format("{}, {} lies three pictures or more beside the picture; are these pixels? name the columns "
                       "x_px and y_px then",
                       cells[1], cells[2]));
     samples.push_back({*time, place});

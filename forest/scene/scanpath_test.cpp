@@ -30,6 +30,7 @@ TEST(Scanpath, ReadsPixelsBlinksCommentsAndForeignLineEnds) {
   EXPECT_EQ(path.samples()[2].place, Vec2(.5f, .5f));
   EXPECT_EQ(path.samples()[3].place, Vec2(-.1f, 1.5f));
   EXPECT_EQ(parse_scanpath("0,.1,.2").samples().size(), 1u);
+  EXPECT_EQ(parse_scanpath("\xef\xbb\xbftime,x,y\n0,.1,.2").samples().size(), 1u);  // as Excel begins a file
 }
 
 TEST(Scanpath, NamesTheBadLine) {
@@ -45,7 +46,7 @@ TEST(Scanpath, NamesTheBadLine) {
            {"time,x_px,y_px\n0,5,5\n", "gaze.csv:1: pixels of a picture of what size?"},
            {"# size 0x5\n", "gaze.csv:1:"},
            {"time,left,top\n", "gaze.csv:1: the columns must be"},
-           {"0,960,540\n", "gaze.csv:1: 960, 540 lies a hundred pictures"},
+           {"0,960,540\n", "gaze.csv:1: 960, 540 lies three pictures or more"},
            {"", "holds no sample"},
            {"time,x,y\n1,,\n", "holds no sample"}})
     EXPECT_THAT(said(text), testing::HasSubstr(words)) << text;
