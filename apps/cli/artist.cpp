@@ -12,6 +12,7 @@
 #include "forest/io/png.h"
 #include "forest/scene/colour_bar.h"
 #include "forest/scene/scale_bar.h"
+#include "forest/scene/slice_picture.h"
 
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
@@ -40,6 +41,12 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   if (playback_) playback_->begin_picture();
   std::vector<frame::Overlay> marks;
   if (with_outline) marks = outline_;
+  std::optional<frame::Glass> glass;
+  if (view.plane) {
+    glass = scene::plane_glass(forest_, *view.plane, view.background);
+    const auto edge = scene::plane_marks(forest_, *view.plane);
+    marks.insert(marks.end(), edge.begin(), edge.end());
+  }
   const bool spikes_alone = playback_ && !playback_->has_values(), coloured = playback_ && !spikes_alone;
   std::optional<scene::Colouring> quiet;
   if (spikes_alone) {
@@ -66,7 +73,8 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
       };
     else
       dressing_.rest();
-    drawn.image = foveated_.draw(view, width, height, colouring, lines, {}, 0, view.samples, painter, dress);
+    drawn.image =
+        foveated_.draw(view, width, height, colouring, lines, glass, 0, view.samples, painter, dress);
     for (std::size_t i = 3; i < drawn.image.pixels.size(); i += 4) drawn.image.pixels[i] = 255;
     const Foveated::Figures& f = foveated_.figures();
     drawn.cull = f.cull, drawn.draw = f.draw, drawn.read = f.unite;
@@ -79,6 +87,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   const scene::Cut& cut = chooser_.choose(eye, viewport, colouring.shown(), painter);
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, colouring, cut, width, height, lines);
+  frame.glass = glass;
   chooser_.complete(frame);
   start = Clock::now();
   dressing_.put_on(frame, view, cut, eye, colouring, coloured, painter);

@@ -129,7 +129,8 @@ void run(const Options& options, Console& console) {
     const bool any = t.numbers > 0;
     const double when = any ? facts.time(t.highest) : NAN;
     const auto figure = [&](double value) {  // its last digit says nothing
-      return any ? fmt::format("{:.{}f}", value, std::max(1, facts.range.decimals() - 2)) : std::string("none");
+      return any ? fmt::format("{:.{}f}", value, std::max(1, facts.range.decimals() - 2))
+                 : std::string("none");
     };
     list.push_back({{"neuron", trace.node},
                     {"section", trace.section == reports::soma_run ? nlohmann::ordered_json(soma)

@@ -251,7 +251,8 @@ void run(const Options& options, Console& console) {
     for (Arrival& file : std::span(files).subspan(begin)) {
       if (!file.error.empty()) {
         // A file of many cells says the same of each.
-        if (told.insert(file.error).second) console.warn(file.skipped ? file.error + "; skipped" : file.error);
+        if (told.insert(file.error).second)
+          console.warn(file.skipped ? file.error + "; skipped" : file.error);
         continue;
       }
       if (options.verbose) tell_oddities({escaped(file.path.string()), &file.oddities}, console);

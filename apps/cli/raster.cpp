@@ -30,7 +30,7 @@ struct Options {
   std::filesystem::path file, out;
   std::string size = "1200x800";
   double from = -INFINITY, to = INFINITY;  // ms
-  std::vector<float> range;  // empty: as a picture of the forest would show
+  std::vector<float> range;                // empty: as a picture of the forest would show
   std::string map = scene::colour_maps().front().name;
   bool plain = false;
 };
@@ -139,8 +139,7 @@ void run(const Options& options, Console& console) {
   const scene::ColourMap& map = *scene::find_colour_map(options.map);
   std::array<Colour, 256> colours;
   for (std::size_t code = 0; code < colours.size(); ++code)
-    colours[code] =
-        colour_of(map, facts.range.value(reports::Code(code)), shown.low, shown.high);
+    colours[code] = colour_of(map, facts.range.value(reports::Code(code)), shown.low, shown.high);
   std::vector<std::uint8_t> pixels;
   pixels.reserve(4 * codes.size());
   for (const reports::Code code : codes) {
@@ -149,9 +148,8 @@ void run(const Options& options, Console& console) {
   }
   const double first = facts.time(begin), last = facts.time(end);
   if (axes) {
-    const frame::Image& image =
-        axes->around(pixels, first, last,
-                     {.map = &map, .low = shown.low, .high = shown.high, .units = facts.units});
+    const frame::Image& image = axes->around(
+        pixels, first, last, {.map = &map, .low = shown.low, .high = shown.high, .units = facts.units});
     io::write_png(options.out, image.width, image.height, image.pixels);
   } else {
     io::write_png(options.out, width, height, pixels);
@@ -164,11 +162,10 @@ void run(const Options& options, Console& console) {
                  {"range", {shown.low, shown.high}},
                  {"map", map.name},
                  {"units", facts.units}});
-  console.table(
-      {"picture", "neurons (down)", "ms (to the right)", "colours"},
-      {{options.out.string(), std::to_string(activity.rows().size()),
-        fmt::format("{:g} to {:g}", first, last),
-        fmt::format("{:g} to {:g} {}, {}", shown.low, shown.high, facts.units, map.name)}});
+  console.table({"picture", "neurons (down)", "ms (to the right)", "colours"},
+                {{options.out.string(), std::to_string(activity.rows().size()),
+                  fmt::format("{:g} to {:g}", first, last),
+                  fmt::format("{:g} to {:g} {}, {}", shown.low, shown.high, facts.units, map.name)}});
 }
 
 }  // namespace
@@ -179,7 +176,10 @@ std::function<void()> raster(CLI::App& command, Console& console) {
   add_size(command, options->size);
   command.add_option("--from", options->from, "The first time that is shown, ms; by default all");
   command.add_option("--to", options->to, "The time before which it ends, ms");
-  command.add_option("--range", options->range, "Values at the ends of the colours; by default -80 to 20 mV, of other units all that is kept")
+  command
+      .add_option(
+          "--range", options->range,
+          "Values at the ends of the colours; by default -80 to 20 mV, of other units all that is kept")
       ->expected(2)
       ->type_name("LOW HIGH");
   std::vector<std::string> maps;

@@ -54,7 +54,8 @@ void on_qt_message(QtMsgType type, const QMessageLogContext&, const QString& tex
 
 // Of any version: what a window is put together with. Qt ends in a crash where there is none.
 bool offers_opengl() {
-  if (QGuiApplication::platformName() == "offscreen") return false;  // it offers some, and then fails to show it
+  if (QGuiApplication::platformName() == "offscreen")
+    return false;  // it offers some, and then fails to show it
   QOffscreenSurface surface;
   surface.create();
   QOpenGLContext context;
@@ -128,7 +129,8 @@ int run(const Options& options, int& argc, char** argv) {
   application.setApplicationName("Studio");
   if (!offers_opengl())
     return fail(
-        "this display offers no OpenGL, by which the window shows even what the processor draws; install libgl1-mesa-dri or "
+        "this display offers no OpenGL, by which the window shows even what the processor draws; install "
+        "libgl1-mesa-dri or "
         "a driver of the graphics card, or use 'brainforest render' for pictures without one");
   apply_theme(application);
 

@@ -182,6 +182,30 @@ Plane plane_of(const Settings& s, const Vec3& middle) {
   return Plane::through(middle, normals[int(s.across)]).moved(s.plane_at);
 }
 
+scene::View whole_view(const Settings& settings, const Vec3& middle) {
+  scene::View view = settings.view;
+  if (settings.plane) {
+    const Plane plane = plane_of(settings, middle);
+    view.plane = {.at = plane.origin, .normal = plane.normal, .opacity = settings.plane_opacity};
+  }
+  return view;
+}
+
+void set_view(Settings& s, const scene::View& view, const Vec3& middle) {
+  s.view = view;
+  s.view.plane.reset();
+  s.plane = view.plane.has_value();
+  if (!view.plane) return;
+  const Vec3 normal = view.plane->normal.normalized();
+  s.across = Across::any;
+  for (const Across axis : {Across::x, Across::y, Across::z})
+    if (normal[int(axis)] > 1.f - 1e-6f) s.across = axis;
+  s.normal_azimuth = degrees(std::atan2(normal.x(), -normal.z()));
+  s.normal_elevation = degrees(std::asin(std::clamp(normal.y(), -1.f, 1.f)));
+  s.plane_at = normal.dot(view.plane->at - middle);
+  s.plane_opacity = view.plane->opacity;
+}
+
 std::span<const char* const> groups() { return group_names; }
 std::span<const Number> numbers() { return number_table; }
 std::span<const Choice> choices() { return choice_table; }

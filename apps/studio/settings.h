@@ -34,6 +34,11 @@ struct Settings {
 /// The plane of intersection, `middle` being that of the forest.
 Plane plane_of(const Settings& settings, const Vec3& middle);
 
+/// The view as text has it: with the plane in it, where it is shown.
+scene::View whole_view(const Settings& settings, const Vec3& middle);
+/// From now on the settings show this view, and its plane or none.
+void set_view(Settings& settings, const scene::View& view, const Vec3& middle);
+
 /// A number with its unit. Rows that follow one another with the same `row` share a line.
 struct Number {
   const char *group, *row, *name, *unit, *hint;

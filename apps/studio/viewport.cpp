@@ -69,6 +69,7 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       outline_(scene::outline(forest_)),
       dressing_(forest_),
       drawer_(drawer) {
+  set_view(settings_, view, forest_.soma_bounds().centre());
   setFocusPolicy(Qt::StrongFocus);
   setMouseTracking(true);
   setMinimumSize(240, 160);
@@ -87,6 +88,8 @@ Viewport::~Viewport() {
   if (context()) disconnect(context(), nullptr, this, nullptr);
   release();
 }
+
+scene::View Viewport::view() const { return whole_view(settings_, forest_.soma_bounds().centre()); }
 
 void Viewport::change(const Settings& settings) {
   const scene::View& old = settings_.view;
@@ -329,7 +332,8 @@ void Viewport::advance(float seconds) {
     const bool there = t >= 1.f;
     Settings next = settings_;
     if (glide_->whole)
-      next.view = glide_->path.at(std::min(t, 1.f)), next.view.activity = settings_.view.activity;
+      set_view(next, glide_->path.at(std::min(t, 1.f)), forest_.soma_bounds().centre()),
+          next.view.activity = settings_.view.activity;
     else
       next.view.camera = glide_->path.at(std::min(t, 1.f)).camera;
     if (there) next.view.camera = glide_->end, glide_.reset();
@@ -374,16 +378,9 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
   }
   mark_selection(colouring.palette, view.background, selection_ && settings_.dim);
   std::optional<frame::Glass> glass;
-  if (settings_.plane) {
-    const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
-    const scene::Sheet sheet = scene::sheet_of(forest_, plane);
-    glass = frame::Glass{.plane = plane,
-                         .low = sheet.low.cast<float>(),
-                         .high = sheet.high.cast<float>(),
-                         .colour = view.background == scene::Background::dark ? Vec3(.30f, .42f, .60f)
-                                                                              : Vec3(.25f, .40f, .65f),
-                         .opacity = settings_.plane_opacity};
-    const auto marks = scene::plane_marks(forest_, plane);
+  if (const auto plane = this->view().plane) {
+    glass = scene::plane_glass(forest_, *plane, view.background);
+    const auto marks = scene::plane_marks(forest_, *plane);
     overlays.insert(overlays.end(), marks.begin(), marks.end());
   }
   dressing_.skinned = settings_.skin;

@@ -38,6 +38,7 @@ class Viewport final : public QOpenGLWidget {
   const scene::Targets& targets() const { return targets_; }
   const scene::Colouring& colouring() const { return colouring_; }
   const Settings& settings() const { return settings_; }
+  scene::View view() const;  // as text has it
   /// Throws Error, and changes nothing, for a target that is not there.
   void change(const Settings& settings);
   /// Glides there, slow in and slow out.

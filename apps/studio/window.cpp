@@ -355,7 +355,7 @@ QString Window::add_target(const QString& expression) {
 }
 
 void Window::copy_view() {
-  QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->settings().view)));
+  QApplication::clipboard()->setText(QString::fromStdString(scene::to_json(viewport_->view())));
   statusBar()->showMessage(tr("The view is on the clipboard as one line of JSON."), 4000);
 }
 
@@ -365,7 +365,7 @@ void Window::record_view() {
                                          nullptr, QFileDialog::DontConfirmOverwrite);
   if (path_.isEmpty()) return;
   QFile file(path_);
-  const std::string line = scene::to_json(viewport_->settings().view) + "\n";
+  const std::string line = scene::to_json(viewport_->view()) + "\n";
   if (!file.open(QIODevice::Append) || file.write(line.data(), qint64(line.size())) != qint64(line.size())) {
     QMessageBox::warning(this, tr("Path of views"),
                          tr("%1 cannot be written: %2").arg(path_, file.errorString()));
@@ -390,7 +390,8 @@ void Window::play_path() {
 void Window::paste_view() {
   try {
     Settings settings = viewport_->settings();
-    settings.view = view_of(QApplication::clipboard()->text().toStdString(), "clipboard");
+    set_view(settings, view_of(QApplication::clipboard()->text().toStdString(), "clipboard"),
+             viewport_->forest().soma_bounds().centre());
     viewport_->change(settings);
   } catch (const std::exception& error) {
     statusBar()->showMessage(QString::fromUtf8(error.what()), 8000);

@@ -23,8 +23,7 @@ class Ways {
 
   Eigen::Vector3d place(std::size_t i) const {
     const auto [nx, ny, nz] = grid_.size;
-    return grid_.step.cwiseProduct(
-        Eigen::Vector3d(double(i % nx), double(i / nx % ny), double(i / nx / ny)));
+    return grid_.step.cwiseProduct(Eigen::Vector3d(double(i % nx), double(i / nx % ny), double(i / nx / ny)));
   }
   Eigen::Vector3d operator()(std::size_t i) const { return place(nearest_[i]) - place(i); }
   // Up to the surface, which lies a little before the nearest point.

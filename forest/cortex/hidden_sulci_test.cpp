@@ -44,8 +44,7 @@ Sections seen(double (*white)(const Vector3d&)) {
       for (std::size_t x = 0; x < s.inner.size[0]; ++x) {
         const Vector3d p(250. * double(x), 250. * double(y), 500. * double(z)), step(0., 0., 500.);
         s.inner.values.push_back(float(white(p)));
-        s.outer.values.push_back(
-            float(z % 2 ? .5 * (outside(p - step) + outside(p + step)) : outside(p)));
+        s.outer.values.push_back(float(z % 2 ? .5 * (outside(p - step) + outside(p + step)) : outside(p)));
       }
   return s;
 }

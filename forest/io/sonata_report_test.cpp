@@ -169,7 +169,8 @@ TEST_F(Reports, AreReadInTheDialectsThatProgramsWrite) {
             }),
             "accepted");  // the last step is the end
   EXPECT_EQ(complaint([&] {
-              const reports::Report report = read_sonata_report(write({Written{}, Written{.name = "empty", .nothing = true}}));
+              const reports::Report report =
+                  read_sonata_report(write({Written{}, Written{.name = "empty", .nothing = true}}));
               EXPECT_EQ(report.step, .5);
             }),
             "accepted");

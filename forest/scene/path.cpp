@@ -73,6 +73,13 @@ View CameraPath::at(float t) const {
   view.camera.target = view.camera.eye - reach * axes.col(2);
   view.camera.up = axes.col(1);
   view.camera.field_of_view = mix(a.camera.field_of_view, b.camera.field_of_view);
+  if (a.plane && b.plane) {
+    view.plane->at = a.plane->at + s * (b.plane->at - a.plane->at);
+    const Vec3 normal =
+        a.plane->normal.normalized() + s * (b.plane->normal.normalized() - a.plane->normal.normalized());
+    if (normal.norm() > .1f) view.plane->normal = normal;  // not where it turns over
+    view.plane->opacity = mix(a.plane->opacity, b.plane->opacity);
+  }
   view.camera.near = std::exp(mix(std::log(a.camera.near), std::log(b.camera.near)));
   return view;
 }

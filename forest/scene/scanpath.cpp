@@ -59,7 +59,8 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
   std::optional<Vec2> size;  // of the recorded picture, pixels
   bool pixels = false, begun = false;
   std::size_t line_number = 0;
-  if (constexpr std::string_view mark = "\xef\xbb\xbf"; text.starts_with(mark)) text.remove_prefix(mark.size());
+  if (constexpr std::string_view mark = "\xef\xbb\xbf"; text.starts_with(mark))
+    text.remove_prefix(mark.size());
   const auto refuse = [&](const std::string& sentence) { throw InputError(name, line_number, sentence); };
   while (!text.empty()) {
     const std::size_t end = std::min(text.find('\n'), text.size());
@@ -107,10 +108,10 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
     if (pixels) place.array() /= size->array();
     constexpr float far = 3.f;  // what looks beside the screen is recorded, too
     if (!(place.array().abs() <= far).all())
-      refuse(
-          fmt::format("{}, {} lies three pictures or more beside the picture; are these pixels? name the columns "
-                      "x_px and y_px then",
-                      cells[1], cells[2]));
+      refuse(fmt::format(
+          "{}, {} lies three pictures or more beside the picture; are these pixels? name the columns "
+          "x_px and y_px then",
+          cells[1], cells[2]));
     samples.push_back({*time, place});
   }
   if (samples.empty())

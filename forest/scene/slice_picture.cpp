@@ -254,7 +254,18 @@ std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePi
   return svg + "</svg>\n";
 }
 
-std::vector<frame::Overlay> plane_marks(const Forest& forest, const Plane& plane) {
+frame::Glass plane_glass(const Forest& forest, const CutPlane& cut, Background background) {
+  const Plane plane = Plane::through(cut.at, cut.normal);
+  const Sheet sheet = sheet_of(forest, plane);
+  return {.plane = plane,
+          .low = sheet.low.cast<float>(),
+          .high = sheet.high.cast<float>(),
+          .colour = background == Background::dark ? Vec3(.30f, .42f, .60f) : Vec3(.25f, .40f, .65f),
+          .opacity = cut.opacity};
+}
+
+std::vector<frame::Overlay> plane_marks(const Forest& forest, const CutPlane& cut) {
+  const Plane plane = Plane::through(cut.at, cut.normal);
   const Sheet sheet = sheet_of(forest, plane);
   std::vector<frame::Overlay> marks;
   const auto line = [&](double ax, double ay, double bx, double by) {

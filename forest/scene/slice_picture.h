@@ -26,7 +26,8 @@ frame::Image paint(const Slice& slice, const Colouring& colouring, const SlicePi
 /// The same as SVG with one path a neuron, its profiles united; ids are the neurons' numbers.
 std::string to_svg(const Slice& slice, const Colouring& colouring, const SlicePicture& picture);
 
-/// The plane in the main view: its edge around the forest and light hatching, as overlays.
-std::vector<frame::Overlay> plane_marks(const Forest& forest, const Plane& plane);
+/// The plane in the main view: glass as wide as the forest, and its edge as overlays.
+frame::Glass plane_glass(const Forest& forest, const CutPlane& plane, Background background);
+std::vector<frame::Overlay> plane_marks(const Forest& forest, const CutPlane& plane);
 
 }  // namespace forest::scene

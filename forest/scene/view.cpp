@@ -351,6 +351,27 @@ void read_activity(View& v, const Json& json, const std::string& file) {
   read_all(v.activity.emplace(), json, keys_of_activity(), file, "'s activity");
 }
 
+Keys<CutPlane> keys_of_plane() {
+  using P = CutPlane;
+  static const std::vector<Key<P>> keys{
+      point<P>(
+          "at", [](auto& p) -> auto& { return p.at; }),
+      point<P>(
+          "normal", [](auto& p) -> auto& { return p.normal; }),
+      number<P>(
+          "opacity", 0.f, 1.f, [](auto& p) -> auto& { return p.opacity; }),
+  };
+  return keys;
+}
+
+void read_plane(View& v, const Json& json, const std::string& file) {
+  if (!json.is_object() || !json.contains("at"))
+    throw InputError(file, 0, "'plane' must be an object such as {\"at\":[0,1000,0],\"normal\":[0,0,1]}");
+  read_all(v.plane.emplace(), json, keys_of_plane(), file, "'s plane");
+  if (v.plane->normal.isZero())
+    throw InputError(file, 0, "'normal' has no direction; give one such as [0, 0, 1]");
+}
+
 bool has_gaze(const View& v) { return v.detail.gaze.has_value(); }
 
 // In the order in which they are written.
@@ -415,6 +436,10 @@ Keys<View> keys_of_view() {
        [](const V& v) {
          return v.activity ? write_all<ActivityView>(*v.activity, keys_of_activity()) : Json();
        }},
+      {"plane",
+       {},
+       read_plane,
+       [](const V& v) { return v.plane ? write_all<CutPlane>(*v.plane, keys_of_plane()) : Json(); }},
   };
   return keys;
 }
@@ -566,6 +591,7 @@ FlashColours flash_colours(Background background) {
 
 std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
 std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }
+std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 
 View overview(const Forest& forest, float aspect) {
   View view;

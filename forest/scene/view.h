@@ -26,6 +26,13 @@ struct ActivityView {
   std::optional<std::uint32_t> neuron;  // that stands out: the colours of all others step back
 };
 
+/// A plane of intersection, clear as glass (slice_picture.h).
+struct CutPlane {
+  Vec3 at = Vec3::Zero();       // a point of it, µm
+  Vec3 normal = Vec3::UnitZ();  // of any length but zero
+  float opacity = .18f;         // how much of what lies behind it hides
+};
+
 struct View {
   frame::Camera camera;
   Detail detail;  // gaze in shares of the width and height here, so that a view fits every picture size
@@ -38,12 +45,13 @@ struct View {
   SynapseColour synapses = SynapseColour::sign;  // where there are some
   std::vector<Appearance> targets;               // how they are shown; later ones win
   std::optional<ActivityView> activity;          // used where there is a simulation to show
+  std::optional<CutPlane> plane;
 };
 
 /// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
 ///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"skin":true,"synapses":"sign","targets":[{"name":"L5","opacity":.4}],
-///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5}}; only eye and target
-///  are needed.
+///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5},
+///  "plane":{"at":[0,1000,0],"normal":[0,0,1],"opacity":.18}}; only eye and target are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
 View parse_view(std::string_view json, const std::string& name = "view");
 std::string to_json(const View& view);
@@ -56,6 +64,7 @@ struct ViewKey {
 };
 std::vector<ViewKey> view_keys();
 std::vector<ViewKey> activity_keys();  // of its `activity`
+std::vector<ViewKey> plane_keys();     // of its `plane`
 
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture

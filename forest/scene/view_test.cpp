@@ -44,12 +44,13 @@ View full_view() {
   view.targets[0].name = "L5", view.targets[0].opacity = .4f;
   view.activity.emplace();
   view.activity->threshold = -60.f, view.activity->time = 12.5, view.activity->neuron = 3;
+  view.plane = {.at = {1, 2, 3}, .normal = {1, 1, 0}, .opacity = .5f};
   return view;
 }
 
 TEST(View, EveryKeyIsWrittenAndReadBack) {
   const std::string text = to_json(full_view());
-  for (const auto& keys : {view_keys(), activity_keys()})
+  for (const auto& keys : {view_keys(), activity_keys(), plane_keys()})
     for (const ViewKey& key : keys)
       EXPECT_NE(text.find('"' + key.name + "\":"), std::string::npos) << key.name;
   EXPECT_EQ(to_json(parse_view(text)), text);
@@ -62,7 +63,7 @@ TEST(View, ItsPageHasEveryKeyWithWhatItMayHoldAndNoOther) {
   for (std::string line; std::getline(lines, line);)
     if (line.starts_with("| `")) rows.emplace(line.substr(3, line.find('`', 3) - 3), line);
   std::size_t keys = 0;
-  for (const auto& all : {view_keys(), activity_keys()})
+  for (const auto& all : {view_keys(), activity_keys(), plane_keys()})
     for (const ViewKey& key : all) {
       ASSERT_TRUE(rows.contains(key.name)) << key.name;
       for (const std::string& value : key.values)

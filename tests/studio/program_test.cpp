@@ -128,7 +128,8 @@ TEST(Studio, WhatGoesWrongIsOneSentence) {
 
 TEST(Studio, WithoutOpenGlItSaysWhatToInstall) {
   if (!std::getenv("DISPLAY")) GTEST_SKIP() << "there is no display; ctest runs this under xvfb-run";
-  for (const auto& [name, value] : {std::pair{"QT_XCB_GL_INTEGRATION", "none"}, {"QT_QPA_PLATFORM", "offscreen"}}) {
+  for (const auto& [name, value] :
+       {std::pair{"QT_XCB_GL_INTEGRATION", "none"}, {"QT_QPA_PLATFORM", "offscreen"}}) {
     setenv(name, value, 1);
     const auto [said, ended] = Studio({sample_file(), "--renderer", "cpu"}).end();
     unsetenv(name);

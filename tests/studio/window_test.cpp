@@ -176,6 +176,21 @@ TEST_F(Window, ViewIsCopiedAndPasted) {
   EXPECT_EQ(scene::to_json(view_), scene::to_json(old));
 }
 
+TEST_F(Window, ThePlaneOfIntersectionIsPartOfTheView) {
+  EXPECT_FALSE(view_.plane);
+  key("k");
+  settle();
+  ASSERT_TRUE(view_.plane);
+  const scene::View with = view_;
+  key("ctrl+c");
+  key("k");
+  settle();
+  EXPECT_FALSE(view_.plane);
+  key("ctrl+v");
+  settle();
+  EXPECT_EQ(scene::to_json(view_), scene::to_json(with));
+}
+
 TEST_F(Window, APathOfViewsIsFlownToItsEnd) {
   scene::View end = view_;
   end.camera.eye += Vec3(120, 40, -60);
