@@ -2,6 +2,7 @@
 // The choice of what is drawn: for every neuron in sight the coarsest clusters that are good enough for the eye.
 #pragma once
 
+#include <algorithm>
 #include <cmath>
 #include <optional>
 #include <span>
@@ -64,7 +65,7 @@ class NeuronsInSight {
  public:
   void clear(std::size_t neurons) { marked_.assign(neurons, false), count_ = 0; }
   void add(const Cut& cut);
-  std::uint32_t count() const { return count_; }
+  std::uint32_t count() const { return std::min(count_, std::uint32_t(marked_.size())); }  // far ones overlap near ones
 
  private:
   std::vector<bool> marked_;
