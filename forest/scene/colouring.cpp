@@ -33,9 +33,8 @@ constexpr std::array<std::array<std::uint32_t, 3>, 5> ramps{{{0xFFE08A, 0xF28E2B
                                                              {0xF4F1FF, 0xDCCBFA, 0xB9A2EE},
                                                              {0xE8E8E8, 0xBBBBBB, 0x909090}}};
 // Of glia, which no neuron has: olive, rose, tan.
-constexpr std::array<std::array<std::uint32_t, 3>, 3> glial{{{0xE3EDA4, 0xB4CC5C, 0x84A03C},
-                                                             {0xF6CFE0, 0xD98CB3, 0xA8557F},
-                                                             {0xE6D3B8, 0xC2A27A, 0x8C6B46}}};
+constexpr std::array<std::array<std::uint32_t, 3>, 3> glial{
+    {{0xE3EDA4, 0xB4CC5C, 0x84A03C}, {0xF6CFE0, 0xD98CB3, 0xA8557F}, {0xE6D3B8, 0xC2A27A, 0x8C6B46}}};
 // Layers from the pia down: seven steps of viridis (Smith & van der Walt 2015), perceptually even.
 constexpr std::array<std::uint32_t, 7> layered{0xFDE725, 0x90D743, 0x35B779, 0x21918C,
                                                0x31688E, 0x5A5AA8, 0x8E4A9E};

@@ -65,7 +65,9 @@ class NeuronsInSight {
  public:
   void clear(std::size_t neurons) { marked_.assign(neurons, false), count_ = 0; }
   void add(const Cut& cut);
-  std::uint32_t count() const { return std::min(count_, std::uint32_t(marked_.size())); }  // far ones overlap near ones
+  std::uint32_t count() const {
+    return std::min(count_, std::uint32_t(marked_.size()));
+  }  // far ones overlap near ones
 
  private:
   std::vector<bool> marked_;

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <optional>
 #include <unordered_map>
+#include <unordered_set>
 
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
@@ -417,8 +418,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     const std::uint32_t which = instances[list[n].instance].morphology;
     const Shape& of = shape(which);
     const Placed place(instances[list[n].instance]);
+    // Spines reach into cells that no segment does.
+    const auto spine_ball = [&](std::uint32_t k) {
+      const Spine& spine = of.spines[k];
+      const float half = .5f * (spine.tip - spine.base).norm();
+      return Sphere{.5f * (spine.base + spine.tip), half + spine.head + skin_gap * spine_voxel};
+    };
     const auto look = [&](auto&& self, int level, const PieceLattice::Cell& cell,
-                          std::span<const std::uint32_t> segments) -> void {
+                          std::span<const std::uint32_t> segments,
+                          std::span<const std::uint32_t> spines) -> void {
       const PieceLattice grid{of.origin, voxel_of(level)};
       const Sphere ball = grid.around(cell), seen = place(ball);
       if (!eye.frustum().may_see(seen) || !(farthest_depth(eye, seen) > skin_nearest)) return;
@@ -427,28 +435,45 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
         if (meet(ball, around(of.cones[segment])) &&
             signed_distance(ball.centre, of.cones[segment].shape) < ball.radius)
           here.push_back(segment);
-      if (here.empty()) return;
       const float magnification = magnification_of(eye, seen);
+      std::vector<std::uint32_t> on;
+      for (const std::uint32_t k : spines)
+        if (meet(ball, spine_ball(k))) on.push_back(k);
+      if (here.empty() && (on.empty() || magnification < spines_begin * coarser)) return;
       if (level < level_at(magnification, coarser * list[n].share)) {
         for (std::int64_t child = 0; child < 8; ++child)
           self(self, level + 1,
                PieceLattice::Cell{2 * cell[0] + (child & 1), 2 * cell[1] + (child >> 1 & 1),
                                   2 * cell[2] + (child >> 2)},
-               here);
+               here, on);
         return;
       }
+      if (here.empty() && voxel_of(level) > spine_voxel) return;
       wanted.push_back({{which, level, cell}, n, magnification});
     };
     Bounds box;
+    float nearest = 0.f;  // magnification
     for (const std::uint32_t segment : list[n].segments) {
       const Sphere ball = around(of.cones[segment]);
       box.add(ball.centre, ball.radius);
+      nearest = std::max(nearest, magnification_of(eye, place(ball)));
+    }
+    std::vector<std::uint32_t> on;
+    if (nearest >= spines_begin * coarser) {
+      const std::unordered_set<std::uint32_t> wide(list[n].segments.begin(), list[n].segments.end());
+      const std::vector<Spine>& spines = this->spines(which);
+      for (std::uint32_t k = 0; k < spines.size(); ++k)
+        if (wide.contains(spines[k].segment)) {
+          on.push_back(k);
+          box.add(spine_ball(k).centre, spine_ball(k).radius);
+        }
     }
     if (box.empty()) continue;
     const auto [first, last] = PieceLattice{of.origin, voxel_of(coarsest)}.cells(box);
     for (std::int64_t z = first[2]; z <= last[2]; ++z)
       for (std::int64_t y = first[1]; y <= last[1]; ++y)
-        for (std::int64_t x = first[0]; x <= last[0]; ++x) look(look, coarsest, {x, y, z}, list[n].segments);
+        for (std::int64_t x = first[0]; x <= last[0]; ++x)
+          look(look, coarsest, {x, y, z}, list[n].segments, on);
   }
   std::sort(wanted.begin(), wanted.end());
 
