@@ -141,6 +141,10 @@ std::function<void()> render(CLI::App& command, Console& console) {
       artist.show(std::move(*synapses));
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view, console);
+    if (options->outline && scene::outline(forest).empty())
+      console.warn(
+          "the forest is no column, so it has no outline; of elements 'brainforest cortex faces --edges all' makes one for "
+          "--surface");
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
