@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 #include <optional>
 #include <utility>
@@ -350,13 +351,13 @@ class Turtle {
   }
 
   // Points are kept in 32 bits.
-  static constexpr double world = 1e30;  // µm
+  static constexpr double world = std::numeric_limits<float>::max();  // µm
   void must_be_in_world(const Eigen::Vector3d& place) const {
-    if (!place.allFinite() || place.cwiseAbs().maxCoeff() >= world) fail("the turtle has left the world");
+    if (!place.allFinite() || place.cwiseAbs().maxCoeff() > world) fail("the turtle has left the world");
   }
 
   void must_be_size(double diameter) const {
-    if (!(diameter < world)) fail("a diameter is larger than the world");
+    if (!(diameter <= world)) fail("a diameter is larger than the world");
   }
 
   Eigen::Vector3d here() const { return at_ + state_.position; }  // in the tissue

@@ -135,7 +135,7 @@ TEST(Turtle, TropismBendsTowardsItsDirection) {
 TEST(Turtle, RefusesWhatItCannotDraw) {
   EXPECT_THROW(drawn("Soma(1) Soma(2)"), Error);
   EXPECT_THROW(drawn("Soma(-1)"), Error);
-  for (const char* too_large : {"F(1e39)", "F(1e31) F(1)", "!(1e39) F(1)", "Soma(1e39)"})
+  for (const char* too_large : {"F(1e39)", "!(1e39) F(1)", "Soma(1e39)"})
     EXPECT_THAT(refused([&] { drawn(too_large); }), ::testing::StartsWith("turtle: ")) << too_large;
   const Grammar g = parse("axiom: A\np: A -> F\n", "x");
   const auto word = [](std::vector<Symbol> symbols) {
