@@ -143,7 +143,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
     play(artist, options->activity, view, console);
     if (options->outline && scene::outline(forest).empty())
       console.warn(
-          "the forest is no column, so it has no outline; of elements 'brainforest cortex faces --edges all' makes one for "
+          "the forest is no column, so it has no outline; of elements 'brainforest cortex faces --edges all' "
+          "makes one for "
           "--surface");
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));

@@ -121,9 +121,13 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
     fill(image, {left - h * padding, top, std::max(right, left + note) + h * padding, bottom}, ground, plate);
     float base = top + h * (padding + 1.f);
     if (!bar.title.empty() || !bar.units.empty()) {
-      const float room = right - left - (bar.units.empty() ? 0.f : letters.width(bar.units) + h);
-      letters.write(image, shortened(letters, bar.title, room), left, base);
-      letters.write(image, bar.units, right - letters.width(bar.units), base);
+      // Units may be long, and leave the title two thirds of the room.
+      const float room = right - left - (bar.units.empty() ? 0.f : h);
+      const std::string title =
+          shortened(letters, bar.title, std::max(room - letters.width(bar.units), room / 1.5f));
+      const std::string units = shortened(letters, bar.units, room - letters.width(title));
+      letters.write(image, title, left, base);
+      letters.write(image, units, right - letters.width(units), base);
       base += h * line;
     }
     if (bar.map) {
