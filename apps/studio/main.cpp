@@ -105,7 +105,11 @@ int run(const Options& options, int& argc, char** argv) {
                                      : scene::Forest::open(options.forest);
   scene::Surfaces surfaces;
   add_surfaces(surfaces, {surface_files, options.overlays});
-  scene::View view = scene::overview(forest);
+  const QSize size = options.size.empty() ? QSize() : size_of(options.size);
+  // About what panels and bars leave of the window, narrow rather than wide.
+  const QSize about = size.isValid() ? size : QSize(1280, 800);
+  scene::View view =
+      scene::overview(forest, float(std::max(200, about.width() - 340)) / float(about.height() - 40));
   view.camera.near = .5f;
   if (alone) view.camera = surfaces.camera(surfaces.outside(), 1.6f), view.fog = 0.f;
   if (!options.view.empty()) view = read_view(options.view);
@@ -114,7 +118,6 @@ int run(const Options& options, int& argc, char** argv) {
   std::optional<scene::Synapses> synapses = synapses_of(options, forest);
   circuit::NodeSets sets =
       read_node_sets(forest, options.node_sets, [](const std::string& sentence) { say(sentence); });
-  const QSize size = options.size.empty() ? QSize() : size_of(options.size);
 
   QSurfaceFormat format;
   format.setVersion(4, 5);

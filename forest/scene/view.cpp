@@ -626,6 +626,13 @@ View overview(const Forest& forest, float aspect) {
   return view;
 }
 
+bool is_upright(const Forest& forest) {
+  float along = 0.f;
+  for (const frame::Instance& i : forest.instances())
+    along += (Quat(i.qw, i.qx, i.qy, i.qz) * Vec3::UnitY()).y() / float(forest.instances().size());
+  return along > .5f;
+}
+
 View portrait(const Forest& forest) {
   View view = overview(forest);
   const Bounds& bounds = forest.soma_bounds();

@@ -102,6 +102,9 @@ Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 
+/// Whether neurons stand along y, which then grows towards the pia, as it does not where they were planted in folds.
+bool is_upright(const Forest& forest);
+
 /// The outline of the column: circles at the limits of the layers and a few verticals. Empty when it is no column.
 std::vector<frame::Overlay> outline(const Forest& forest);
 

@@ -184,6 +184,16 @@ TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInTh
   }
 }
 
+TEST(View, NeuronsOfAColumnStandUprightAndThoseInAFoldDoNot) {
+  circuit::Circuit circuit = testing::sample_circuit(20);
+  const auto forest = [&] { return Forest::from_bytes(pack(circuit, testing::sample_neurons())); };
+  EXPECT_TRUE(is_upright(forest()));
+  for (std::size_t i = 0; i < circuit.instances.size(); ++i)
+    circuit.instances[i].orientation =
+        Quat(Eigen::AngleAxisf(float(i), Vec3::UnitX())) * circuit.instances[i].orientation;
+  EXPECT_FALSE(is_upright(forest()));
+}
+
 TEST(View, EveryFrameKeepsTheContract) {
   const Forest forest = sample();
   const auto lines = outline(forest);
