@@ -130,6 +130,7 @@ cortex::MeasuredBok measure_layers(const std::vector<fs::path>& files, const Mes
 void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& inner, Console& console) {
   constexpr double same = .01;
   const double between = volume(outer) - volume(inner);
+  if (between <= 0.) throw Error("the surface that --outer names lies within that of --inner; exchange them");
   if (std::abs(between - cortex.between) > same * cortex.between)
     console.warn(fmt::format(
         "these surfaces enclose {:.1f} mm³ between them and those that the elements were made of {:.1f} "

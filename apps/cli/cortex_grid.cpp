@@ -187,7 +187,10 @@ std::function<void()> cortex_grid(CLI::App& command, Console& console) {
                      "The block: " + domains + "; by default all, by every generator");
   CLI::Option* const elements = command.add_option(
       "--elements", options->elements, "File of cortex build; then the block is one of its elements");
-  command.add_option("--element", options->element, "Its number")->needs(elements)->capture_default_str();
+  must_be_whole(*command.add_option("--element", options->element, "Its number")
+                     ->needs(elements)
+                     ->capture_default_str(),
+                0, 1'000'000'000);
   command
       .add_option("--generator", options->generator,
                   fmt::format("What fills it: {}", fmt::join(generators, ", ")))

@@ -85,7 +85,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
     std::vector<std::vector<std::string>> table;
     const auto tell = [&](const fs::path& path, const Mesh& mesh, std::size_t cut,
                           const cortex::Unjoined& unjoined, const std::string& object) {
-      constexpr double much = .05;
+      constexpr double much = .01;
       if (unjoined.share > much)
         console.warn(
             fmt::format("section {} ({:.3f} mm): {:.3g} mm² within '{}' hang together with nothing and are "

@@ -26,6 +26,20 @@ std::uint32_t object_of(const ContourStack& stack, const std::string& name) {
 
 double distance_of_sections(const ContourStack& stack) {
   if (stack.sections.size() < 2) throw Error("a surface needs two sections or more; give more of them");
+  std::vector<double> steps;
+  for (std::size_t i = 0; i + 1 < stack.sections.size(); ++i)
+    steps.push_back(stack.sections[i + 1].at - stack.sections[i].at);
+  std::ranges::nth_element(steps, steps.begin() + std::ptrdiff_t(steps.size() / 2));
+  const double usual = steps[steps.size() / 2];
+  for (std::size_t i = 0; usual > 0. && i + 1 < stack.sections.size(); ++i) {
+    const double times = (stack.sections[i + 1].at - stack.sections[i].at) / usual, whole = std::round(times);
+    if (whole >= 2. && std::abs(times - whole) < .02)
+      throw Error(fmt::format(
+          "between section {} ({:.3f} mm) and the next ({:.3f} mm) {:.0f} {} missing: others are {:.3f} "
+          "mm apart; bring in what is missing",
+          i + 1, stack.sections[i].at / 1e3, stack.sections[i + 1].at / 1e3, whole - 1.,
+          whole > 2. ? "are" : "is", usual / 1e3));
+  }
   const double spacing =
       (stack.sections.back().at - stack.sections.front().at) / double(stack.sections.size() - 1);
   for (std::size_t i = 0; i < stack.sections.size(); ++i)
@@ -71,6 +85,9 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
     for (const Contour& contour : section.contours)
       for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
   if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
+  constexpr double largest = 1e6;  // a whale's brain is .3 m long
+  if (const double extent = (high - low).maxCoeff(); extent > largest)
+    throw Error(fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
   const double border = 2.5 * raster.step;
   raster.origin = low - Place::Constant(border);
   const auto points = [&](double extent) {
@@ -151,6 +168,24 @@ std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
         std::size_t(std::count_if(first, first + std::ptrdiff_t(layer), [](float v) { return v < 0.f; }));
   }
   return counts;
+}
+
+// In no section, either.
+void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const ContourStack& stack,
+                    const Raster& raster, const SurfaceOptions& options) {
+  const std::size_t layer = inner.size[0] * inner.size[1];
+  constexpr double much = 1.;  // mm²
+  for (std::size_t s = 0; s < stack.sections.size(); ++s) {
+    const std::size_t first = (s + 1) * std::size_t(raster.between) * layer;
+    std::size_t nested = 0, outside = 0;
+    for (std::size_t i = first; i < first + layer; ++i)
+      if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? nested : outside);
+    if (outside > nested / 2 && double(outside) * raster.step * raster.step > much * 1e6)
+      throw Error(fmt::format(
+          "section {} ({:.3f} mm): {:.0f} % of what lies within '{}' lies outside '{}'; exchange them there",
+          s + 1, stack.sections[s].at / 1e3, 100. * double(outside) / double(nested + outside), options.inner,
+          options.outer));
+  }
 }
 
 Unjoined unjoined(std::vector<std::size_t> before, const std::vector<std::size_t>& after,
@@ -238,11 +273,11 @@ std::vector<float> signed_distances(const Section& section, std::uint32_t object
 }
 
 Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options, Progress& progress) {
-  const std::string fault = fault_of(stack);
-  if (!fault.empty()) throw Error(fault);
   const std::uint32_t outer_object = object_of(stack, options.outer),
                       inner_object = object_of(stack, options.inner);
-  const Raster raster = raster_of(stack, options);
+  const Raster raster = raster_of(stack, options);  // first of all, since it knows of wrong units
+  const std::string fault = fault_of(stack);
+  if (!fault.empty()) throw Error(fault);
   for (const std::uint32_t object : {outer_object, inner_object}) must_go_on(stack, object);
   ScalarGrid inner = interpolated(stack, inner_object, raster, progress);
   ScalarGrid outer = interpolated(stack, outer_object, raster, progress);
@@ -256,6 +291,7 @@ Surfaces surfaces_from(const ContourStack& stack, const SurfaceOptions& options,
     throw Error(fmt::format(
         "{:.0f} % of what lies within '{}' lies outside '{}'; swap them or give contours of one brain",
         100. * double(outside) / double(nested + outside), options.inner, options.outer));
+  must_be_nested(inner, outer, stack, raster, options);
   progress.begin("one ball, inner", 0);
   std::vector<std::uint8_t> ball;
   std::vector<std::size_t> drawn = within(inner, raster);

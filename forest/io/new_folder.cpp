@@ -26,6 +26,7 @@ NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
   std::string name = (wanted_.parent_path() / ("." + wanted_.filename().string() + ".XXXXXX")).string();
   if (!::mkdtemp(name.data())) fail("created");
   part_ = name;
+  unfinished_.emplace(part_);
   ::chmod(name.c_str(), permissions(0777));
 }
 
@@ -43,7 +44,7 @@ void NewFolder::write(const fs::path& name, std::string_view bytes) const {
 
 void NewFolder::commit() {
   if (::rename(part_.c_str(), wanted_.c_str()) == 0) {  // there was none, or an empty one
-    part_.clear();
+    part_.clear(), unfinished_.reset();
     return;
   }
   // Swapped in one step, so that a whole folder is there at every moment; the destructor removes the old one.

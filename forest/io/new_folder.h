@@ -3,13 +3,16 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string_view>
+
+#include "forest/core/unfinished.h"
 
 namespace forest::io {
 
 /// Collects files in a hidden folder beside the one that is wanted. commit() puts it in its place at once; without it
-/// (an exception) the hidden folder goes away and what was there before stays. A killed program leaves it behind: `.NAME.`
-/// and six letters, which may be removed.
+/// (an exception, an interruption) the hidden folder goes away and what was there before stays. A program that is killed (SIGKILL) leaves
+/// it behind: `.NAME.` and six letters, which may be removed.
 class NewFolder {
  public:
   /// Throws Error when the folder above is missing or cannot be written.
@@ -30,6 +33,7 @@ class NewFolder {
   [[noreturn]] void fail(const char* what) const;
 
   std::filesystem::path wanted_, part_;
+  std::optional<Unfinished> unfinished_;
 };
 
 }  // namespace forest::io
