@@ -87,7 +87,8 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
   if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
   constexpr double largest = 1e6;  // a whale's brain is .3 m long
   if (const double extent = (high - low).maxCoeff(); extent > largest)
-    throw Error(fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
+    throw Error(
+        fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
   const double border = 2.5 * raster.step;
   raster.origin = low - Place::Constant(border);
   const auto points = [&](double extent) {
