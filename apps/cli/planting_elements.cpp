@@ -275,7 +275,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
     all.elements = row_through(sheet, all.elements.front(), options.row);
   }
   const std::size_t asked = std::max(options.row, options.near.empty() ? 1u : options.count);
-  if (all.elements.size() < asked && (options.row > 1 || !options.near.empty()))
+  if (all.elements.size() < asked)
     all.left_out.push_back(
         fmt::format("there are {} and no {} elements in {}", all.elements.size(), asked,
                     options.row > 1 ? "that row, which ends or comes back there" : options.file.string()));
