@@ -380,6 +380,7 @@ std::vector<Touching> surround(Drawing& drawing, std::uint32_t nodes) {
 void merge(Drawing& drawing, std::uint32_t nodes) {
   auto& drafts = drawing.drafts;
   const std::vector<Touching> touching = surround(drawing, nodes);
+  const Places originals(drawing.vertices);
   std::vector<std::uint8_t> numbers_in_sketch(nodes, Sketch::unnumbered);
   const auto merged = [&](std::uint32_t left, std::uint32_t right) {
     const Draft &a = drafts[left], &b = drafts[right];
@@ -389,7 +390,9 @@ void merge(Drawing& drawing, std::uint32_t nodes) {
     Sketch sketch(drawing, a, b, outside, numbers_in_sketch);
     float error = std::max(a.error, b.error);
     if (sketch.segment_count() > limit) sketch.coarsen(std::max(first_tolerance, .5f * error));
-    error = sketch.measured_error(drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]), error);
+    const auto below = drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]);
+    const auto first = std::size_t(below.data() - drawing.vertices.data());
+    error = sketch.measured_error(originals, first, first + below.size(), error);
     Draft parent{.sphere = around(a.sphere, b.sphere),
                  .error = error,
                  .leaf_first = a.leaf_first,

@@ -5,6 +5,8 @@
 #include <bit>
 #include <cmath>
 
+#include "forest/core/clones.h"
+
 namespace forest::scene {
 namespace {
 
@@ -13,6 +15,64 @@ constexpr float hopeless = 1e4f;  // µm; no neuron needs a larger tolerance
 constexpr float widest = 3.f;     // a coarse segment is at most this many times as thick as the original
 
 using Four = Eigen::Array4f;  // computed side by side
+
+// What is drawn, as distances to it are computed.
+struct Pieces {
+  struct Piece {
+    float x, y, z, dx, dy, dz, inverse;
+  };
+  std::array<Piece, Sketch::limit> list;
+  std::uint32_t count = 0;
+
+  void add(float ax, float ay, float az, float bx, float by, float bz) {
+    const float dx = bx - ax, dy = by - ay, dz = bz - az;
+    const float squared = dx * dx + dy * dy + dz * dz;
+    list[count++] = {ax, ay, az, dx, dy, dz, squared > 0.f ? 1.f / squared : 0.f};
+  }
+};
+
+// The greatest squared distance of the points [begin, end) to the nearest piece, or `worst`. Many points are asked together, of
+// one piece after another, from where those before were near to: until all are nearer than the worst so far.
+FOREST_CLONES float farthest(const float* __restrict x, const float* __restrict y, const float* __restrict z,
+                             std::size_t begin, std::size_t end, const Pieces& pieces, float worst) {
+  constexpr std::size_t lanes = 16;
+  constexpr std::uint32_t at_once = 4;
+  std::uint32_t next = 0;
+  for (std::size_t i = begin; i < end; i += lanes) {
+    const std::size_t at = std::min(i, end - lanes);  // the last ones: some of those before once more
+    float least[lanes], most = INFINITY;
+    for (float& l : least) l = INFINITY;
+    for (std::uint32_t asked = 0; asked < pieces.count && most > worst; asked += at_once) {
+      for (std::uint32_t k = 0; k < at_once; ++k) {
+        const Pieces::Piece& p = pieces.list[next];
+        next = next + 1 < pieces.count ? next + 1 : 0;
+        FOREST_LANES for (std::size_t l = 0; l < lanes; ++l) {
+          const float px = x[at + l] - p.x, py = y[at + l] - p.y, pz = z[at + l] - p.z;
+          const float along = (px * p.dx + py * p.dy + pz * p.dz) * p.inverse;
+          const float way = along > 0.f ? along < 1.f ? along : 1.f : 0.f;
+          const float ox = px - way * p.dx, oy = py - way * p.dy, oz = pz - way * p.dz;
+          const float squared = ox * ox + oy * oy + oz * oz;
+          least[l] = squared < least[l] ? squared : least[l];
+        }
+      }
+      std::int32_t bits = 0;  // none is negative: they are in the order of their bits
+      FOREST_LANES for (std::size_t l = 0; l < lanes; ++l) {
+        const auto own = std::bit_cast<std::int32_t>(least[l]);
+        bits = own > bits ? own : bits;
+      }
+      most = std::bit_cast<float>(bits);
+    }
+    if (most > worst) worst = most;
+    next = next >= at_once ? next - at_once : 0;
+  }
+  return worst;
+}
+
+FOREST_CLONES std::int32_t count_above(const float* values, std::size_t count, float limit) {
+  std::int32_t above = 0;
+  for (std::size_t i = 0; i < count; ++i) above += values[i] > limit;
+  return above;
+}
 
 }  // namespace
 
@@ -78,72 +138,18 @@ void Sketch::write(Drawing& drawing, Draft& draft) const {
   drawing.places.insert(drawing.places.end(), places_.begin(), places_.begin() + vertex_count_);
 }
 
-float Sketch::measured_error(std::span<const Vec4> points, float worst) const {
-  struct Group {  // four segments
-    Four x, y, z, dx, dy, dz, inverse;
+Places::Places(std::span<const Vec4> vertices) : x(vertices.size()), y(vertices.size()), z(vertices.size()) {
+  for (std::size_t i = 0; i < vertices.size(); ++i)
+    x[i] = vertices[i].x(), y[i] = vertices[i].y(), z[i] = vertices[i].z();
+}
 
-    [[gnu::always_inline]] Four squared_distance(const Vec4& point) const {
-      const Four px = point.x() - x, py = point.y() - y, pz = point.z() - z;
-      const Four at = ((px * dx + py * dy + pz * dz) * inverse).max(0.f).min(1.f);
-      return (px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square();
-    }
-  };
-  std::array<Group, limit / 4> groups;
-  std::uint32_t count = 0;
-  const auto set = [&](std::uint32_t a, std::uint32_t b) {
-    Group& g = groups[count / 4];
-    const std::uint32_t i = count++ % 4;
-    g.x[i] = x_[a], g.y[i] = y_[a], g.z[i] = z_[a];
-    g.dx[i] = x_[b] - x_[a], g.dy[i] = y_[b] - y_[a], g.dz[i] = z_[b] - z_[a];
-  };
+float Sketch::measured_error(const Places& originals, std::size_t begin, std::size_t end, float worst) const {
+  Pieces pieces;
   for (std::uint32_t i = 0; i < line_count_; ++i)
-    for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v) set(v - 1, v);
-  while (count % 4) set(vertex_count_ - 1, vertex_count_ - 1);
-  const std::uint32_t group_count = count / 4;
-  for (Group& g : std::span(groups).first(group_count)) {
-    const Four squared = g.dx.square() + g.dy.square() + g.dz.square();
-    g.inverse = (squared > 0.f).select(squared.inverse(), 0.f);
-  }
-  float worst_squared = worst * worst;
-  std::uint32_t near = 0;  // the segment that is asked first
-  for (std::size_t i = 0; i < points.size();) {
-    const std::size_t end = std::min(i + 4, points.size());
-    if (end == i + 4) {  // four points to one segment, and to the next few, as the branch goes on
-      Mat4 four = Eigen::Map<const Mat4>(points[i].data());
-      four.transposeInPlace();
-      Four squared = Four::Constant(INFINITY);
-      bool all = false;
-      for (const std::uint32_t beyond = std::min(near + 4, count); near < beyond && !all; ++near) {
-        const Group& g = groups[near / 4];
-        const std::uint32_t n = near % 4;
-        const float dx = g.dx[n], dy = g.dy[n], dz = g.dz[n];
-        const Four px = four.col(0).array() - g.x[n], py = four.col(1).array() - g.y[n],
-                   pz = four.col(2).array() - g.z[n];
-        const Four at = ((px * dx + py * dy + pz * dz) * g.inverse[n]).max(0.f).min(1.f);
-        squared = squared.min((px - at * dx).square() + (py - at * dy).square() + (pz - at * dz).square());
-        all = (squared <= worst_squared).all();
-      }
-      --near;
-      if (all) {
-        i = end;
-        continue;
-      }
-    }
-    for (; i < end; ++i) {  // one point to four segments; they follow one another as the points do
-      std::uint32_t at = near / 4;
-      Four squared = groups[at].squared_distance(points[i]);
-      float nearest = squared.minCoeff();
-      for (std::uint32_t asked = 1, g = at; asked < group_count && nearest > worst_squared; ++asked) {
-        g = g + 1 < group_count ? g + 1 : 0;
-        const Four other = groups[g].squared_distance(points[i]);
-        if (const float least = other.minCoeff(); least < nearest) nearest = least, squared = other, at = g;
-      }
-      near = 4 * at;
-      while (near % 4 < 3 && squared[near % 4] != nearest) ++near;
-      worst_squared = std::max(worst_squared, nearest);
-    }
-  }
-  return std::sqrt(worst_squared);
+    for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v)
+      pieces.add(x_[v - 1], y_[v - 1], z_[v - 1], x_[v], y_[v], z_[v]);
+  return std::sqrt(farthest(originals.x.data(), originals.y.data(), originals.z.data(), begin, end, pieces,
+                            worst * worst));
 }
 
 float Sketch::distance(std::uint32_t a, std::uint32_t b) const {
@@ -258,17 +264,36 @@ void Sketch::measure(Line& line, float least) {
     if (b - a < 2) continue;
     const float dx = x_[b] - x_[a], dy = y_[b] - y_[a], dz = z_[b] - z_[a], dr = radius_[b] - radius_[a];
     const float squared = dx * dx + dy * dy + dz * dz, inverse = squared > 0.f ? 1.f / squared : 0.f;
-    for (std::uint32_t v = a + 1; v < b; v += 4) {
-      const auto four = [v](const OfVertices<float>& list) { return Four(Eigen::Map<const Four>(&list[v])); };
-      const Four x = four(x_) - x_[a], y = four(y_) - y_[a], z = four(z_) - z_[a],
-                 r = four(radius_) - radius_[a];
-      const Four at = ((x * dx + y * dy + z * dz) * inverse).max(0.f).min(1.f);
-      Eigen::Map<Four> out(&deviation[v]);
-      out = ((x - at * dx).square() + (y - at * dy).square() + (z - at * dz).square())
-                .max((r - at * dr).square());
+    // Of one vertex as of four side by side.
+    const auto deviate = [&](auto x, auto y, auto z, auto r) {
+      const auto clamped = [](auto along) {
+        if constexpr (std::is_same_v<decltype(along), float>)
+          return std::clamp(along, 0.f, 1.f);
+        else
+          return Four(along.max(0.f).min(1.f));
+      };
+      using T = decltype(x);
+      const T at = clamped(T((x * dx + y * dy + z * dz) * inverse));
+      const T ox = x - at * dx, oy = y - at * dy, oz = z - at * dz, other = r - at * dr;
+      return std::pair(T(ox * ox + oy * oy + oz * oz), T(other * other));
+    };
+    std::uint32_t split = a + 1;
+    if (b - a == 2) {  // of most lines
+      const auto [away, thicker] =
+          deviate(x_[split] - x_[a], y_[split] - y_[a], z_[split] - z_[a], radius_[split] - radius_[a]);
+      deviation[split] = std::max(away, thicker);
+    } else {
+      for (std::uint32_t v = a + 1; v < b; v += 4) {
+        const auto four = [v](const OfVertices<float>& list, float from) {
+          return Four(Eigen::Map<const Four>(&list[v]) - from);
+        };
+        const auto [away, thicker] =
+            deviate(four(x_, x_[a]), four(y_, y_[a]), four(z_, z_[a]), four(radius_, radius_[a]));
+        Eigen::Map<Four> out(&deviation[v]);
+        out = away.max(thicker);
+      }
+      split = std::uint32_t(std::max_element(&deviation[a + 1], &deviation[b]) - deviation.data());
     }
-    const std::uint32_t split =
-        std::uint32_t(std::max_element(&deviation[a + 1], &deviation[b]) - deviation.data());
     // The lighter end of the range is the one at which was split to come to it.
     const float weight = std::min({deviation[split], weight_[a], weight_[b]});
     if (!(weight > least)) {
@@ -282,9 +307,7 @@ void Sketch::measure(Line& line, float least) {
 }
 
 std::uint32_t Sketch::heavier(float weight) const {
-  std::int32_t count = 0;
-  for (std::uint32_t v = 0; v < vertex_count_; ++v) count += weight_[v] > weight;
-  return std::uint32_t(count);
+  return std::uint32_t(count_above(weight_.data(), vertex_count_, weight));
 }
 
 float Sketch::drop_tips(float tolerance) {

@@ -56,6 +56,13 @@ struct Drawing {
   }
 };
 
+/// Where many points are, on the CPU's terms: x, y and z apart.
+struct Places {
+  std::vector<float> x, y, z;
+
+  explicit Places(std::span<const Vec4> vertices);
+};
+
 /// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays and sets of
 /// bits; a node of the neuron has a number of its own here.
 class Sketch {
@@ -76,10 +83,10 @@ class Sketch {
   /// Adds the strips to the drawing, and tells the draft which they are.
   void write(Drawing& drawing, Draft& draft) const;
 
-  /// The greatest distance of a point to what is drawn, if it is greater than `worst`. The original points below are asked,
-  /// since the sum of the tolerances of all levels would be several times too large; they follow one another along the
-  /// branches, so that most find what is near enough where the one before did.
-  float measured_error(std::span<const Vec4> points, float worst) const;
+  /// The greatest distance of an original point, of [begin, end), to what is drawn, if it is greater than `worst`. The points
+  /// are asked, since the sum of the tolerances of all levels would be several times too large; they follow one another along
+  /// the branches, so that most find what is near enough where those before did.
+  float measured_error(const Places& originals, std::size_t begin, std::size_t end, float worst) const;
 
  private:
   static constexpr std::uint32_t most_lines = 2 * limit, most_vertices = 2 * most_lines,
