@@ -380,7 +380,7 @@ std::vector<Touching> surround(Drawing& drawing, std::uint32_t nodes) {
 void merge(Drawing& drawing, std::uint32_t nodes) {
   auto& drafts = drawing.drafts;
   const std::vector<Touching> touching = surround(drawing, nodes);
-  const Places originals(drawing.vertices);
+  const Coordinates originals(drawing.vertices);
   std::vector<std::uint8_t> numbers_in_sketch(nodes, Sketch::unnumbered);
   const auto merged = [&](std::uint32_t left, std::uint32_t right) {
     const Draft &a = drafts[left], &b = drafts[right];

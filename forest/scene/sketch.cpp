@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <type_traits>
+#include <utility>
 
 #include "forest/core/clones.h"
 
@@ -138,12 +140,14 @@ void Sketch::write(Drawing& drawing, Draft& draft) const {
   drawing.places.insert(drawing.places.end(), places_.begin(), places_.begin() + vertex_count_);
 }
 
-Places::Places(std::span<const Vec4> vertices) : x(vertices.size()), y(vertices.size()), z(vertices.size()) {
+Coordinates::Coordinates(std::span<const Vec4> vertices)
+    : x(vertices.size()), y(vertices.size()), z(vertices.size()) {
   for (std::size_t i = 0; i < vertices.size(); ++i)
     x[i] = vertices[i].x(), y[i] = vertices[i].y(), z[i] = vertices[i].z();
 }
 
-float Sketch::measured_error(const Places& originals, std::size_t begin, std::size_t end, float worst) const {
+float Sketch::measured_error(const Coordinates& originals, std::size_t begin, std::size_t end,
+                             float worst) const {
   Pieces pieces;
   for (std::uint32_t i = 0; i < line_count_; ++i)
     for (std::uint32_t v = lines_[i].first + 1; v < lines_[i].first + lines_[i].count; ++v)

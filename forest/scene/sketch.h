@@ -56,11 +56,11 @@ struct Drawing {
   }
 };
 
-/// Where many points are, on the CPU's terms: x, y and z apart.
-struct Places {
+/// Where many points are: x, y and z apart, so that many can be computed with side by side.
+struct Coordinates {
   std::vector<float> x, y, z;
 
-  explicit Places(std::span<const Vec4> vertices);
+  explicit Coordinates(std::span<const Vec4> vertices);
 };
 
 /// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays and sets of
@@ -86,7 +86,7 @@ class Sketch {
   /// The greatest distance of an original point, of [begin, end), to what is drawn, if it is greater than `worst`. The points
   /// are asked, since the sum of the tolerances of all levels would be several times too large; they follow one another along
   /// the branches, so that most find what is near enough where those before did.
-  float measured_error(const Places& originals, std::size_t begin, std::size_t end, float worst) const;
+  float measured_error(const Coordinates& originals, std::size_t begin, std::size_t end, float worst) const;
 
  private:
   static constexpr std::uint32_t most_lines = 2 * limit, most_vertices = 2 * most_lines,
