@@ -17,6 +17,7 @@
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/borders.h"
+#include "forest/cortex/locate.h"
 #include "forest/cortex/warp.h"
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
@@ -267,7 +268,9 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   const bool bent = options.bend == "grid";
   std::vector<cortex::Junctions> junctions;
   if (bent || options.row > 1) junctions = cortex::junctions(elements);
-  const cortex::Sheet sheet{elements, junctions};
+  std::optional<cortex::Locator> locator;
+  if (bent) locator.emplace(elements);
+  const cortex::Sheet sheet{elements, junctions, locator ? &*locator : nullptr};
   if (options.row > 1) {
     if (all.elements.size() != 1)
       throw Error(

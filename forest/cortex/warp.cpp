@@ -11,6 +11,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/cortex/locate.h"
 
 namespace forest::cortex {
 namespace {
@@ -29,73 +30,102 @@ bool before(const Place& a, const Place& b) {
   return std::lexicographical_compare(a.data(), a.data() + 3, b.data(), b.data() + 3);
 }
 
-// Where a branch is: in which element, at which parameters, and which change of parameters a µm along each of the neuron's axes is.
+enum class Left : std::uint8_t { no, by_pia, by_white, by_rim };
+
+// Where a branch is.
 struct Chart {
+  Linear here;           // its place, and the element there
+  Eigen::Matrix3d turn;  // how the neuron's axes stand
+  Left left = Left::no;
   std::uint32_t element = 0;
-  Place uvw = Place::Zero();
-  Eigen::Matrix3d slope = Eigen::Matrix3d::Zero();
-  bool outside = false;  // it left the sheet at its rim
+  Place uvw;
+  Eigen::RowVector3d inwards;  // by how much w grows by a µm along each of the neuron's axes
 };
 
-double speed(const Hexahedron& h, const Place& uvw, int axis) {
-  return linear(h, uvw).jacobian.col(axis).norm();
+// Where the tissue is as it is in its element at (u, v, w).
+Chart settled(const Linear& here, const Eigen::Matrix3d& turn, std::uint32_t element, const Place& uvw) {
+  return {here, turn, Left::no, element, uvw, (here.jacobian.inverse() * turn).row(2)};
+}
+
+Linear at(const Sheet& sheet, std::uint32_t element, const Place& uvw) {
+  return linear(sheet.elements[element], uvw.cwiseMax(0.).cwiseMin(1.));
+}
+
+Place up(const Linear& here) { return -here.jacobian.col(2).normalized(); }
+
+// The neuron's axes, carried from one place to the next with the least turn that holds the tissue's axis.
+Eigen::Matrix3d carried(const Eigen::Matrix3d& turn, const Linear& from, const Linear& to) {
+  return Eigen::Quaterniond::FromTwoVectors(up(from), up(to)).toRotationMatrix() * turn;
+}
+
+// The change of parameters of a short way along the neuron's axes: to the sides as far as the tissue is wide there, in w as at the soma.
+Place change(const Linear& here, const Eigen::Matrix3d& turn, const Eigen::RowVector3d& inwards,
+             const Place& way) {
+  Place result = here.jacobian.partialPivLu().solve(turn * way);
+  result[2] = inwards.dot(way);
+  return result;
 }
 
 // Through a side face into the neighbour.
 void cross(const Sheet& sheet, Chart& chart, Face face, const Junction& junction) {
   const int from = axis(face), to = axis(junction.face);
-  Place at = chart.uvw;
-  at[from] = is_far(face) ? 1. : 0.;
-  const auto inside = [](const Place& t) { return Place(t.cwiseMax(0.).cwiseMin(1.)); };
-  Place there;
-  const double along = at[1 - from];
-  there[to] = is_far(junction.face) ? 1. : 0.;
-  there[1 - to] = junction.reversed ? 1. - along : along;
-  there[2] = at[2];
-  const double here_speed = speed(sheet.elements[chart.element], inside(at), from);
-  const double there_speed = speed(sheet.elements[junction.element], inside(there), to);
-  // Outwards here is inwards there.
-  const double ratio = (is_far(face) != is_far(junction.face) ? 1. : -1.) * here_speed / there_speed;
-  Eigen::Matrix3d slope;
-  slope.row(to) = ratio * chart.slope.row(from);
-  slope.row(1 - to) = (junction.reversed ? -1. : 1.) * chart.slope.row(1 - from);
-  slope.row(2) = chart.slope.row(2);
-  chart = {junction.element, there, slope, false};
+  const double along = chart.uvw[1 - from];
+  chart.element = junction.element;
+  chart.uvw[to] = is_far(junction.face) ? 1. : 0.;
+  chart.uvw[1 - to] = junction.reversed ? 1. - along : along;
+  chart.here = at(sheet, chart.element, chart.uvw);
+}
+
+void come_back(const Sheet& sheet, Chart& chart) {
+  const Location found = sheet.locator ? sheet.locator->find(chart.here.at) : Location{};
+  if (!found.found()) return;
+  const Linear here = linear(sheet.elements[found.element], found.uvw);
+  const Chart back = settled(here, chart.turn, found.element, found.uvw);
+  if (back.inwards.allFinite()) chart = back;
 }
 
 // Goes on by a step in µm along the neuron's axes.
-void walk(const Sheet& sheet, Chart& chart, Place step) {
+void walk(const Sheet& sheet, Chart& chart, const Place& step, bool below_pia) {
+  constexpr double longest = 20.;  // µm at once
+  constexpr double slant = 200.;   // µm after which a branch follows the layers
   constexpr int most_crossings = 64;
-  for (int crossing = 0;; ++crossing) {
-    const Place move = chart.slope * step;
-    double first = 1.;  // the share of the step until it leaves
+  double rest = step.norm();
+  if (!(rest > 0.)) return;
+  const Place heading = step / rest;
+  for (int crossing = 0; rest > 0. && chart.left == Left::no;) {
+    const double way = std::min(rest, longest);
+    const Place half = change(chart.here, chart.turn, chart.inwards, .5 * way * heading);
+    const Linear middle = at(sheet, chart.element, chart.uvw + half);
+    const Place move = change(middle, carried(chart.turn, chart.here, middle), chart.inwards, way * heading);
+    double first = 1.;  // the share of it until it leaves
     int out = -1;
-    if (!chart.outside && crossing < most_crossings)
-      for (const Face face : side_faces) {
-        const int a = axis(face);
-        const double way = is_far(face) ? 1. - chart.uvw[a] : chart.uvw[a],
-                     pace = is_far(face) ? move[a] : -move[a];
-        if (pace > 0. && way < first * pace) first = std::max(0., way / pace), out = int(face);
-      }
+    for (int face = 0; face < 6; ++face) {
+      if (below_pia && Face(face) == Face::w0) continue;
+      const int a = axis(Face(face));
+      const double room = is_far(Face(face)) ? 1. - chart.uvw[a] : chart.uvw[a],
+                   pace = is_far(Face(face)) ? move[a] : -move[a];
+      if (pace > 0. && room < first * pace) first = std::max(0., room / pace), out = face;
+    }
     chart.uvw += first * move;
-    if (out < 0) return;
-    step *= 1. - first;
-    const Junction junction =
-        sheet.junctions.empty() ? Junction{} : sheet.junctions[chart.element][std::size_t(out)];
-    if (junction.element == Junction::nothing)
-      chart.outside = true;
-    else
+    rest -= first * way;
+    const Linear there = at(sheet, chart.element, chart.uvw);
+    chart.turn = carried(chart.turn, chart.here, there), chart.here = there;
+    const Eigen::RowVector3d axis_there = up(there).transpose() * chart.turn,
+                             upright = chart.inwards.dot(axis_there) * axis_there;
+    chart.inwards = upright + std::exp(-first * way / slant) * (chart.inwards - upright);
+    if (out < 0) continue;
+    const bool side = axis(Face(out)) < 2;
+    const Junction junction = side && ++crossing < most_crossings && !sheet.junctions.empty()
+                                  ? sheet.junctions[chart.element][std::size_t(out)]
+                                  : Junction{};
+    if (junction.element != Junction::nothing)
       cross(sheet, chart, Face(out), junction);
+    else
+      chart.left = side ? Left::by_rim : is_far(Face(out)) ? Left::by_white : Left::by_pia;
   }
-}
-
-Place place_of(const Sheet& sheet, const Chart& chart, bool below_pia) {
-  const Hexahedron& h = sheet.elements[chart.element];
-  Place inside = chart.uvw.cwiseMax(0.).cwiseMin(1.), beyond = chart.uvw - inside;
-  if (below_pia) beyond[2] = std::max(beyond[2], 0.);
-  if (beyond.isZero(0.)) return h.at(inside);
-  const Linear here = linear(h, inside);
-  return here.at + here.jacobian * beyond;
+  if (chart.left == Left::no) return;
+  chart.here.at += rest * (chart.turn * heading);
+  come_back(sheet, chart);
 }
 
 }  // namespace
@@ -178,14 +208,14 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
   }
   const Linear soma = linear(sheet.elements[seat.element], seat.uvw);
   const Eigen::Matrix3d r = axes(sheet, seat);
-  const Chart root{seat.element, seat.uvw, soma.jacobian.inverse() * r, false};
-  if (!root.slope.allFinite())
+  const Chart root = settled(soma, r, seat.element, seat.uvw);
+  if (!root.inwards.allFinite())
     throw Error(
         fmt::format("element {} is flat where a soma is to sit; certify the elements first", seat.element));
 
   Warped result;
   result.points.resize(points.size());
-  std::vector<Chart> charts(points.size());
+  std::vector<Chart> charts(points.size(), root);
   Distortion& d = result.distortion;
   double turns = 0.;
   std::size_t turned = 0;
@@ -197,9 +227,8 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
     const auto parent = std::size_t(std::max(parents[n], 0));
     charts[n] = stem ? root : charts[parent];
     const Place step = points[n] - (stem ? Place(Place::Zero()) : points[parent]);
-    walk(sheet, charts[n], step);
-    result.points[n] =
-        options.rigid ? Place(soma.at + r * points[n]) : place_of(sheet, charts[n], options.below_pia);
+    walk(sheet, charts[n], step, options.below_pia);
+    result.points[n] = options.rigid ? Place(soma.at + r * points[n]) : charts[n].here.at;
     if (stem) continue;  // from the soma's middle to its surface there is no branch
     const Place bent = result.points[n] - result.points[parent];
     const double before = step.norm(), after = bent.norm();
@@ -209,9 +238,9 @@ Warped warp(const Sheet& sheet, const Seat& seat, std::span<const Place> points,
       d.shortest = std::min(d.shortest, after / before);
       d.longest = std::max(d.longest, after / before);
     }
-    if (charts[n].uvw[2] < 0. && !options.below_pia) d.beyond_pia += after;
-    if (charts[n].uvw[2] > 1.) d.beyond_white += after;
-    if (charts[n].outside) d.beside += after;
+    const Left left = charts[n].left;
+    if (left != Left::no)
+      (left == Left::by_pia ? d.beyond_pia : left == Left::by_white ? d.beyond_white : d.beside) += after;
     if (parents[parent] < 0) continue;
     const auto grandparent = std::size_t(parents[parent]);
     const Place step_before = points[parent] - points[grandparent],
