@@ -15,13 +15,7 @@ scene::View view_of(std::string_view text, const std::string& name) {
   try {
     [[maybe_unused]] const auto json = nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {
-    const std::string_view before = text.substr(0, std::min(text.size(), error.byte ? error.byte - 1 : 0));
-    const std::size_t line = std::size_t(std::ranges::count(before, '\n')) + 1;
-    const std::size_t column = before.size() - (before.rfind('\n') + 1) + 1;  // npos + 1 == 0
-    throw InputError(name, line,
-                     fmt::format("is no JSON from column {} on; correct what stands there or before, as "
-                                 "docs/scene/view.md shows",
-                                 column));
+    throw no_json(text, error.byte, name, "correct what stands there or before, as docs/scene/view.md shows");
   } catch (const nlohmann::json::exception&) {
     throw InputError(name, 1, "holds a number too large for any view; write it smaller");
   }

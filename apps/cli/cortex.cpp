@@ -260,6 +260,8 @@ std::function<void()> build(CLI::App& command, Console& console) {
                  .1, 20.);
   add_force(command, o->force);
   return [o, &console] {
+    if (o->out.extension() != ".h5")
+      throw Error(o->out.string() + ": elements are kept as HDF5; give a name that ends in .h5");
     must_take_files({o->out}, o->force);
     const auto begin = Clock::now();
     const Mesh outer = read_mesh(o->outer), inner = read_mesh(o->inner);

@@ -78,6 +78,24 @@ std::optional<long> number_of(const fs::path& file) {
   return std::stol(name.substr(begin, end + 1 - begin));
 }
 
+// Numbers that differ only by zeros before them are one number of two pictures.
+void check_numbers(const std::vector<fs::path>& files) {
+  const auto plain = [](const fs::path& file) {
+    std::string kept;
+    for (const char c : file.filename().string()) {
+      const bool digit = c >= '0' && c <= '9', after = kept.size() > 1 && std::isdigit(kept[kept.size() - 2]);
+      if (digit && !kept.empty() && kept.back() == '0' && !after) kept.pop_back();
+      kept += c;
+    }
+    return kept;
+  };
+  for (std::size_t i = 1; i < files.size(); ++i)
+    if (plain(files[i - 1]) == plain(files[i]))
+      throw Error(fmt::format("{}: {} and {} have the same number; take one of them out",
+                              files[i].parent_path().string(), files[i - 1].filename().string(),
+                              files[i].filename().string()));
+}
+
 // A section between two others that are twice as far apart as most is not there.
 void tell_gaps(const std::vector<fs::path>& files, Console& console) {
   std::vector<long> steps;
@@ -124,6 +142,7 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options, Con
     throw Error(folder.string() + ": has no .png file and no .svg file; give a folder of sections");
   if (!(options.pixel > 0.))
     throw Error(folder.string() + ": pictures do not say how large they are; give --pixel, in mm");
+  check_numbers(files);
   tell_gaps(files, console);
   const cortex::Axis axis = axis_of(options.axis);
   const int across = int(axis), right = axis == cortex::Axis::x ? 1 : 0, up = axis == cortex::Axis::z ? 1 : 2;
@@ -157,6 +176,19 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options, Con
   return volume;
 }
 
+// Distances are mm: so many sections are those of a file in µm.
+std::vector<double> planes_of(double low, double high, const Options& options, const fs::path& path) {
+  const double spacing = 1e3 * options.spacing;
+  constexpr double most = 20'000.;
+  if ((high - low) / spacing > most)
+    throw Error(
+        fmt::format("{}: reaches over {:.4g} mm, which would be {:.0f} sections at --spacing {:g} mm; give "
+                    "it in mm, or a "
+                    "larger --spacing",
+                    path.string(), (high - low) / 1e3, (high - low) / spacing, options.spacing));
+  return cortex::planes_between(low, high, spacing, 1e3 * options.offset);
+}
+
 // What contours would cross, before they are found.
 void check_threshold(const cortex::Volume& volume, const fs::path& path, double threshold) {
   float least = INFINITY, most = -INFINITY;
@@ -176,7 +208,7 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
   const cortex::Axis axis = axis_of(options.axis);
   const double low = volume.origin[int(axis)],
                high = low + volume.step[int(axis)] * double(volume.size[std::size_t(axis)] - 1);
-  std::vector<double> planes = cortex::planes_between(low, high, 1e3 * options.spacing, 1e3 * options.offset);
+  std::vector<double> planes = planes_of(low, high, options, path);
   if (pictures)  // each as it is
     for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = low + volume.step[int(axis)] * double(i);
   return cortex::contours_of(volume, name, axis, planes, options.threshold);
@@ -290,6 +322,7 @@ void run(const Options& options, Console& console) {
       stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false));
       continue;
     }
+    if (lower.ends_with(".png")) throw Error(lower + ": is one section; give the folder of all");
     surfaces.push_back(io::read_surface(file.text(), path.string()));
     surface_names.push_back(must_be_new(name));
     for (const Vec3& p : surfaces.back().positions)
@@ -297,9 +330,8 @@ void run(const Options& options, Console& console) {
   }
   refuse_unused(options, used);
   // All surfaces by the same planes.
-  const auto planes = surfaces.empty()
-                          ? std::vector<double>{}
-                          : cortex::planes_between(low, high, 1e3 * options.spacing, 1e3 * options.offset);
+  const auto planes =
+      surfaces.empty() ? std::vector<double>{} : planes_of(low, high, options, options.inputs.front());
   for (std::size_t i = 0; i < surfaces.size(); ++i)
     stacks.push_back(cortex::cut(surfaces[i], surface_names[i], axis, planes));
   cortex::ContourStack stack = cortex::together(stacks);
@@ -315,6 +347,11 @@ void run(const Options& options, Console& console) {
   if (loops == 0)
     throw Error(fmt::format("no section of {} has a contour; check --axis, --spacing and --offset",
                             options.inputs.front().string()));
+  if (stack.sections.size() < 3 && !surfaces.empty())
+    console.warn(
+        fmt::format("{} reaches over {:.3g} mm, so there {}; a smaller --spacing gives more, if it is in mm",
+                    options.inputs.front().string(), (high - low) / 1e3,
+                    stack.sections.size() == 1 ? "is one section" : "are two sections"));
   write_contour_files(stack, options.out);
   // About a quarter of its length is how large a contour is.
   if (const double size = .25 * along / double(loops); summary.pieces && 1e3 * options.tolerance > .05 * size)
@@ -368,7 +405,7 @@ std::function<void()> cortex_contours(CLI::App& command, Console& console) {
       *command.add_option("--offset", o->offset, "Where one of them is, mm")->capture_default_str(), -1e4,
       1e4);
   command.add_option("--threshold", o->threshold,
-                     "Of a volume or pictures (0–1): what is brighter is inside");
+                     "Of a volume or pictures (0–1), which need it: what is brighter is inside");
   must_be_within(*command.add_option("--pixel", o->pixel, "Of pictures, mm"), 1e-6, 1e3);
   must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
                  1e3);

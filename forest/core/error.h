@@ -5,6 +5,7 @@
 #include <cstddef>
 #include <stdexcept>
 #include <string>
+#include <string_view>
 
 namespace forest {
 
@@ -29,6 +30,11 @@ class InputError : public Error {
   std::size_t line_;
   std::string sentence_;
 };
+
+/// What a parser of JSON found no way on from: "view.json:2: is no JSON from column 11 on; correct what stands there or before".
+/// @param byte  1-based, where it stopped
+InputError no_json(std::string_view text, std::size_t byte, const std::string& source,
+                   std::string_view remedy);
 
 /// A stated limit was reached (runaway growth, a file too large for its format).
 class LimitError : public Error {

@@ -146,6 +146,10 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
         throw Error(
             fmt::format("vertex {} of the {} surface has a coordinate that is no number; mend it", v, name));
     const auto at = [&](std::uint32_t v) { return place_text(mesh->positions[v].cast<double>()); };
+    for (std::size_t t = 0; t < mesh->triangles.size(); ++t)
+      if (const Triangle& v = mesh->triangles[t]; v[0] == v[1] || v[1] == v[2] || v[2] == v[0])
+        throw Error(fmt::format("triangle {} of the {} surface has one vertex twice, {}, {}; take it out", t,
+                                name, v[0] == v[1] ? v[0] : v[2], at(v[2])));
     if (const auto edge = open_edge(*mesh))
       throw Error(fmt::format(
           "the {} surface is open or not of one orientation at the edge of vertices {} and {}, {}; give a "

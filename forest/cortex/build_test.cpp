@@ -385,6 +385,9 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   open.triangles.pop_back();
   EXPECT_THAT(refusal(open, inner), HasSubstr("outer surface is open"));
   EXPECT_THAT(refusal(open, inner), HasSubstr("at the edge of vertices"));
+  Mesh flat = outer;
+  flat.triangles[7][1] = flat.triangles[7][0];
+  EXPECT_THAT(refusal(flat, inner), HasSubstr("triangle 7 of the outer surface has one vertex twice"));
   Mesh nowhere = inner;
   nowhere.positions[17].y() = NAN;
   EXPECT_THAT(refusal(outer, nowhere), HasSubstr("vertex 17 of the inner surface"));

@@ -81,9 +81,7 @@ class JsonReader {
     try {
       json_ = json::parse(text);
     } catch (const json::parse_error& error) {
-      throw InputError(
-          name, 0,
-          fmt::format("is no JSON from byte {} on; get the whole file, or write it again", error.byte));
+      throw no_json(text, error.byte, name, "get the whole file, or write it again");
     }
   }
 
@@ -521,9 +519,15 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
   pugi::xml_document document;
   const auto parsed = document.load_buffer(text.data(), text.size());
   const pugi::xml_node root = document.document_element();
-  if (!parsed || std::string_view(root.name()) != "svg")
+  if (!parsed)
     throw InputError(name, 0,
                      fmt::format("is no SVG drawing ({}); save it as plain SVG", parsed.description()));
+  if (const std::string_view kind = root.name(); kind == "GIFTI")
+    throw InputError(name, 0,
+                     "is a surface, not contours of sections; cut it by brainforest cortex contours");
+  else if (kind != "svg")
+    throw InputError(name, 0,
+                     fmt::format("is no SVG drawing, its root is {}; save it as plain SVG", shown(kind, 20)));
   ReadContours result;
   ContourStack& stack = result.stack;
   const std::string_view axis_name = root.attribute("data-axis").as_string("y");

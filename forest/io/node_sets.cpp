@@ -133,9 +133,7 @@ Json parsed(std::string_view text, const std::string& source) {
       throw InputError(source, 0, fmt::format("has two node sets of the name '{}'; rename one", twice));
     return json;
   } catch (const nlohmann::json::parse_error& error) {
-    const std::string_view before = text.substr(0, std::min(text.size(), error.byte ? error.byte - 1 : 0));
-    throw InputError(source, std::size_t(std::ranges::count(before, '\n')) + 1,
-                     "is no JSON from here on; correct what stands here or before");
+    throw no_json(text, error.byte, source, "correct what stands there or before");
   } catch (const nlohmann::json::exception&) {
     throw InputError(source, 0, "is no JSON; correct it as docs/scene/targets.md shows");
   }

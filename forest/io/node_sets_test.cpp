@@ -54,7 +54,7 @@ TEST(NodeSetsFile, AForestBringsItsOwn) {
 
 TEST(NodeSetsFile, WhatIsNoneIsRefusedInOneSentence) {
   EXPECT_THAT(refused("{\n\"a\": {\"layer\": 5},\n oops}"),
-              HasSubstr("sets.json:3: is no JSON from here on"));
+              HasSubstr("sets.json:3: is no JSON from column 2 on"));
   const std::pair<const char*, const char*> wrong[] = {
       {"", "is no JSON"},
       {"[]", "one JSON object"},

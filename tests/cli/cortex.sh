@@ -147,6 +147,14 @@ refuses 'not as .obj' $BRAINFOREST cortex surfaces s.contours -o no.gii no2.obj
 refuses "two boundaries are to be called 'a'" $BRAINFOREST cortex contours outer inner --name a --name a -o no.contours
 refuses "two boundaries are to be called 'outer'" $BRAINFOREST cortex contours outer inner outer -o no.contours
 refuses 'pixel is of pictures, and none is given' $BRAINFOREST cortex contours outer inner --pixel .1 -o no.contours
+refuses 'as HDF5; give a name that ends in .h5' $BRAINFOREST cortex build outer inner -o elements.txt
+refuses 'is a surface, not contours of sections' $BRAINFOREST cortex compare outer.gii
+refuses 'in mm, or a larger --spacing' $BRAINFOREST cortex contours outer --spacing .0005 -o no.contours
+sed '3s/"at": [-0-9.]*,/"at": NaN,/' s.contours >nan.contours
+refuses 'nan.contours:3: is no JSON from column' $BRAINFOREST cortex compare nan.contours
+mkdir -p same_number && touch same_number/s1.png same_number/s01.png
+refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
+refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
 [ ! -e nowhere ] && [ ! -e no.gii ] && [ ! -e no2.gii ] && [ ! -e no.contours ]
