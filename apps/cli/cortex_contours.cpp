@@ -200,8 +200,34 @@ void check_threshold(const cortex::Volume& volume, const fs::path& path, double 
                             path.string(), threshold, least, most));
 }
 
+// What is inside at the edge of a picture is closed along it, wherever the tissue goes on.
+void tell_edges(const cortex::ContourStack& stack, const cortex::Volume& volume, const fs::path& path,
+                Console& console) {
+  const int right = stack.axis == cortex::Axis::x ? 1 : 0, up = stack.axis == cortex::Axis::z ? 1 : 2;
+  const auto beyond = [&](const Eigen::Vector2d& p) {
+    const auto outside = [&](double at, int axis) {
+      const double voxels = (at - volume.origin[axis]) / volume.step[axis];
+      return voxels < 0. || voxels > double(volume.size[std::size_t(axis)] - 1);
+    };
+    return outside(p.x(), right) || outside(p.y(), up);
+  };
+  const auto cut = [&](const cortex::Section& section) {
+    return std::ranges::any_of(section.contours, [&](const cortex::Contour& contour) {
+      return std::ranges::any_of(contour.curve.points, beyond);
+    });
+  };
+  const auto first = std::ranges::find_if(stack.sections, cut);
+  if (first == stack.sections.end()) return;
+  console.warn(fmt::format(
+      "{}: {} reach the edge of the picture and are closed along it, first that at {:.3f} mm; if tissue goes "
+      "on "
+      "there, give larger pictures",
+      path.string(), counted(std::size_t(std::count_if(first, stack.sections.end(), cut)), "section"),
+      first->at / 1e3));
+}
+
 cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& path, const std::string& name,
-                               const Options& options, bool pictures) {
+                               const Options& options, bool pictures, Console& console) {
   if (std::isnan(options.threshold))
     throw Error(path.string() + ": what is inside is a question of grey; give --threshold");
   check_threshold(volume, path, options.threshold);
@@ -211,7 +237,9 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
   std::vector<double> planes = planes_of(low, high, options, path);
   if (pictures)  // each as it is
     for (std::size_t i = 0; i < planes.size(); ++i) planes[i] = low + volume.step[int(axis)] * double(i);
-  return cortex::contours_of(volume, name, axis, planes, options.threshold);
+  cortex::ContourStack stack = cortex::contours_of(volume, name, axis, planes, options.threshold);
+  tell_edges(stack, volume, path, console);
+  return stack;
 }
 
 // Where contours cross: one sentence for each two boundaries, and how often as a list.
@@ -302,8 +330,8 @@ void run(const Options& options, Console& console) {
         console.warn(path.string() + ": has drawings (.svg) and pictures (.png); the drawings are taken");
       if (!drawn) {
         used.threshold = used.pixel = true;
-        stacks.push_back(
-            of_volume(read_pictures(path, options, console), path, must_be_new(name), options, true));
+        stacks.push_back(of_volume(read_pictures(path, options, console), path, must_be_new(name), options,
+                                   true, console));
         continue;
       }
     }
@@ -319,7 +347,7 @@ void run(const Options& options, Console& console) {
       used.threshold = true;
       const io::NiftiVolume read = io::read_nifti(file.text(), path.string());
       for (const std::string& oddity : read.oddities) console.warn(path.string() + ": " + oddity);
-      stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false));
+      stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false, console));
       continue;
     }
     if (lower.ends_with(".png")) throw Error(lower + ": is one section; give the folder of all");
@@ -442,6 +470,11 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
       throw Error(fmt::format("{}: has no object '{}'", o->file.string(), o->object));
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
+    const auto mm = [](double um) {
+      return std::isnan(um) ? ""
+             : um < 10.     ? fmt::format("{:.3g}", um / 1e3)
+                            : fmt::format("{:.3f}", um / 1e3);
+    };
     for (const cortex::SectionChange& change : cortex::changes(stack, console.progress())) {
       const std::string& name = stack.objects[change.object];
       if (!o->object.empty() && name != o->object) continue;
@@ -454,9 +487,10 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
                       {"p95", change.p95 / 1e3},
                       {"hausdorff", change.greatest / 1e3},
                       {"overlap", change.overlap}});
-      table.push_back({fmt::format("{:.3f}", from), fmt::format("{:.3f}", to), name,
-                       fmt::format("{:.3f}", change.mean / 1e3), fmt::format("{:.3f}", change.p95 / 1e3),
-                       fmt::format("{:.3f}", change.greatest / 1e3), fmt::format("{:.3f}", change.overlap)});
+      table.push_back(
+          {fmt::format("{:.3f}", from), fmt::format("{:.3f}", to), name, mm(change.mean), mm(change.p95),
+           mm(change.greatest),
+           std::isnan(change.mean) ? "in one section only" : fmt::format("{:.3f}", change.overlap)});
     }
     if (!o->svg.empty()) write_contour_files(stack, o->svg, true);
     console.print({{"pairs", rows}, {"crossings", tell_crossings(stack, console)}});

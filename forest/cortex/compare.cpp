@@ -12,12 +12,23 @@
 namespace forest::cortex {
 namespace {
 
-constexpr double apart = 50.;  // µm
+// How far contours reach, µm.
+struct Extent {
+  Place low = Place::Constant(HUGE_VAL), high = Place::Constant(-HUGE_VAL);
 
-std::vector<std::vector<Place>> polygons_of(const Section& section, std::uint32_t object) {
+  Extent(const Section& one, const Section& other, std::uint32_t object) {
+    for (const Section* section : {&one, &other})
+      for (const Contour& contour : section->contours)
+        if (contour.object == object)
+          for (const Place& p : contour.curve.points) low = low.cwiseMin(p), high = high.cwiseMax(p);
+  }
+  double size() const { return (high - low).maxCoeff(); }
+};
+
+std::vector<std::vector<Place>> polygons_of(const Section& section, std::uint32_t object, double size) {
   std::vector<std::vector<Place>> polygons;
   for (const Contour& contour : section.contours)
-    if (contour.object == object) polygons.push_back(flattened(contour.curve, 1.));
+    if (contour.object == object) polygons.push_back(flattened(contour.curve, std::min(1., size / 5000.)));
   return polygons;
 }
 
@@ -35,8 +46,9 @@ TriangleTree tree_of(const std::vector<std::vector<Place>>& polygons) {
   return TriangleTree(mesh);
 }
 
-void measure(const std::vector<std::vector<Place>>& from, const TriangleTree& to,
+void measure(const std::vector<std::vector<Place>>& from, const TriangleTree& to, double size,
              std::vector<double>& distances) {
+  const double apart = std::min(50., size / 200.);
   for (const auto& polygon : from)
     for (std::size_t i = 0; i < polygon.size(); ++i) {
       const Place a = polygon[i], along = polygon[(i + 1) % polygon.size()] - a;
@@ -48,17 +60,13 @@ void measure(const std::vector<std::vector<Place>>& from, const TriangleTree& to
     }
 }
 
-double overlap_of(const Section& one, const Section& other, std::uint32_t object) {
-  Place low = Place::Constant(HUGE_VAL), high = -low;
-  for (const Section* section : {&one, &other})
-    for (const Contour& contour : section->contours)
-      for (const Place& p : contour.curve.points)
-        if (contour.object == object) low = low.cwiseMin(p), high = high.cwiseMax(p);
-  const double step = std::max(100., (high - low).maxCoeff() / 2000.);
-  const auto count = [&](double extent) { return std::size_t(extent / step) + 2; };
-  const std::size_t width = count(high.x() - low.x()), height = count(high.y() - low.y());
-  const auto a = signed_distances(one, object, low, step, width, height, step),
-             b = signed_distances(other, object, low, step, width, height, step);
+double overlap_of(const Section& one, const Section& other, std::uint32_t object, const Extent& extent) {
+  const double step = std::max(std::min(100., extent.size() / 200.), extent.size() / 2000.);
+  const auto count = [&](double length) { return std::size_t(length / step) + 2; };
+  const Place reach = extent.high - extent.low;
+  const std::size_t width = count(reach.x()), height = count(reach.y());
+  const auto a = signed_distances(one, object, extent.low, step, width, height, step),
+             b = signed_distances(other, object, extent.low, step, width, height, step);
   std::size_t both = 0, either = 0;
   for (std::size_t i = 0; i < a.size(); ++i)
     both += a[i] < 0.f && b[i] < 0.f, either += a[i] < 0.f || b[i] < 0.f;
@@ -73,16 +81,19 @@ std::vector<SectionChange> changes(const ContourStack& stack, Progress& progress
   progress.begin("comparing", pairs);
   parallel_for(pairs, 1, [&](std::size_t i) {
     for (std::uint32_t object = 0; object < stack.objects.size(); ++object) {
-      const auto a = polygons_of(stack.sections[i], object), b = polygons_of(stack.sections[i + 1], object);
+      const Section &one = stack.sections[i], &other = stack.sections[i + 1];
+      const Extent extent(one, other, object);
+      const double size = extent.size();
+      const auto a = polygons_of(one, object, size), b = polygons_of(other, object, size);
       if (a.empty() && b.empty()) continue;
       SectionChange change{.section = i, .object = object, .mean = NAN, .p95 = NAN, .greatest = NAN};
       if (!a.empty() && !b.empty()) {
         std::vector<double> distances, back;
-        measure(a, tree_of(b), distances);
-        measure(b, tree_of(a), back);
+        measure(a, tree_of(b), size, distances);
+        measure(b, tree_of(a), size, back);
         const auto mean = [](const std::vector<double>& some) {
           double sum = 0.;
-          for (const double one : some) sum += one;
+          for (const double distance : some) sum += distance;
           return sum / double(some.size());
         };
         change.mean = (mean(distances) + mean(back)) / 2.;
@@ -90,7 +101,7 @@ std::vector<SectionChange> changes(const ContourStack& stack, Progress& progress
         std::ranges::sort(distances);
         change.p95 = distances[std::size_t(.95 * double(distances.size() - 1))];
         change.greatest = distances.back();
-        change.overlap = overlap_of(stack.sections[i], stack.sections[i + 1], object);
+        change.overlap = overlap_of(one, other, object, extent);
       }
       each[i].push_back(change);
     }

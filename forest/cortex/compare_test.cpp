@@ -38,6 +38,14 @@ TEST(Changes, OfAShiftedSquareAreKnown) {
   EXPECT_NEAR(all[0].overlap, 4600. / 5400., .01);
 }
 
+TEST(Changes, AreTheSameOfWhatIsAThousandTimesSmaller) {
+  const auto large = changes(pair(square(5000., 0.), square(5000., 400.)), Progress::none()),
+             small = changes(pair(square(5., 0.), square(5., .4)), Progress::none());
+  EXPECT_NEAR(small[0].mean, large[0].mean / 1e3, .005);
+  EXPECT_NEAR(small[0].greatest, large[0].greatest / 1e3, .001);
+  EXPECT_NEAR(small[0].overlap, large[0].overlap, .01);
+}
+
 TEST(Changes, SeeWhatOnlyOneSectionHas) {
   ContourStack stack = pair(square(5000., 0.), square(5000., 0.));
   stack.sections[1].contours.push_back({1, straight_loop(square(100., 20000.))});

@@ -215,7 +215,8 @@ for bits, most in (8, 255), (16, 65535):
                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 PY
 for bits in 8 16; do
-  $BRAINFOREST cortex contours pictures$bits -o pictures$bits.contours --axis z --pixel 1 --threshold .5 --straight >out.txt
+  $BRAINFOREST cortex contours pictures$bits -o pictures$bits.contours --axis z --pixel 1 --threshold .5 --straight >out.txt 2>edge.txt
+  grep -q "11 sections reach the edge of the picture" edge.txt
 done
 python3 - <<'PY'
 import json
