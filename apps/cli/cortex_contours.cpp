@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cctype>
 #include <cmath>
+#include <compare>
 #include <filesystem>
 #include <map>
 #include <memory>
@@ -35,26 +36,32 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Numbers in names by their value, so that s2 comes before s10; the rest by its bytes.
-bool before(const fs::path& one, const fs::path& other) {
-  const std::string a = one.filename().string(), b = other.filename().string();
+// Names by the value of the numbers in them, so that s2 comes before s10 and s01 is s1; the rest by its bytes.
+std::strong_ordering by_numbers(std::string_view a, std::string_view b) {
   const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  for (std::size_t i = 0, j = 0; i < a.size() && j < b.size();) {
+  std::size_t i = 0, j = 0;
+  while (i < a.size() && j < b.size()) {
     if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] < b[j];
+      if (a[i] != b[j]) return a[i] <=> b[j];
       ++i, ++j;
       continue;
     }
-    const auto number = [&](const std::string& text, std::size_t& at) {  // without the zeros before it
+    const auto number = [&](std::string_view text, std::size_t& at) {  // without the zeros before it
       while (at < text.size() && text[at] == '0') ++at;
       const std::size_t begin = at;
       while (at < text.size() && is_digit(text[at])) ++at;
-      return std::string_view(text).substr(begin, at - begin);
+      return text.substr(begin, at - begin);
     };
     const std::string_view m = number(a, i), n = number(b, j);
-    if (m != n) return m.size() != n.size() ? m.size() < n.size() : m < n;
+    if (m != n) return m.size() != n.size() ? m.size() <=> n.size() : m <=> n;
   }
-  return a.size() != b.size() ? a.size() < b.size() : a < b;
+  return a.size() - i <=> b.size() - j;
+}
+
+bool before(const fs::path& one, const fs::path& other) {
+  const std::string a = one.filename().string(), b = other.filename().string();
+  const auto order = by_numbers(a, b);
+  return order != 0 ? order < 0 : a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
 std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
@@ -80,17 +87,8 @@ std::optional<long> number_of(const fs::path& file) {
 
 // Numbers that differ only by zeros before them are one number of two pictures.
 void check_numbers(const std::vector<fs::path>& files) {
-  const auto plain = [](const fs::path& file) {
-    std::string kept;
-    for (const char c : file.filename().string()) {
-      const bool digit = c >= '0' && c <= '9', after = kept.size() > 1 && std::isdigit(kept[kept.size() - 2]);
-      if (digit && !kept.empty() && kept.back() == '0' && !after) kept.pop_back();
-      kept += c;
-    }
-    return kept;
-  };
   for (std::size_t i = 1; i < files.size(); ++i)
-    if (plain(files[i - 1]) == plain(files[i]))
+    if (by_numbers(files[i - 1].filename().string(), files[i].filename().string()) == 0)
       throw Error(fmt::format("{}: {} and {} have the same number; take one of them out",
                               files[i].parent_path().string(), files[i - 1].filename().string(),
                               files[i].filename().string()));
@@ -145,7 +143,8 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options, Con
   check_numbers(files);
   tell_gaps(files, console);
   const cortex::Axis axis = axis_of(options.axis);
-  const int across = int(axis), right = axis == cortex::Axis::x ? 1 : 0, up = axis == cortex::Axis::z ? 1 : 2;
+  const int across = int(axis);
+  const auto [right, up] = flat_axes(axis);
   cortex::Volume volume;
   std::array<std::size_t, 3> stride{};
   for (std::size_t i = 0; i < files.size(); ++i) {
@@ -183,8 +182,7 @@ std::vector<double> planes_of(double low, double high, const Options& options, c
   if ((high - low) / spacing > most)
     throw Error(
         fmt::format("{}: reaches over {:.4g} mm, which would be {:.0f} sections at --spacing {:g} mm; give "
-                    "it in mm, or a "
-                    "larger --spacing",
+                    "it in mm, or a larger --spacing",
                     path.string(), (high - low) / 1e3, (high - low) / spacing, options.spacing));
   return cortex::planes_between(low, high, spacing, 1e3 * options.offset);
 }
@@ -203,13 +201,12 @@ void check_threshold(const cortex::Volume& volume, const fs::path& path, double 
 // What is inside at the edge of a picture is closed along it, wherever the tissue goes on.
 void tell_edges(const cortex::ContourStack& stack, const cortex::Volume& volume, const fs::path& path,
                 Console& console) {
-  const int right = stack.axis == cortex::Axis::x ? 1 : 0, up = stack.axis == cortex::Axis::z ? 1 : 2;
-  const auto beyond = [&](const Eigen::Vector2d& p) {
+  const auto beyond = [&, axes = flat_axes(stack.axis)](const Eigen::Vector2d& p) {
     const auto outside = [&](double at, int axis) {
       const double voxels = (at - volume.origin[axis]) / volume.step[axis];
       return voxels < 0. || voxels > double(volume.size[std::size_t(axis)] - 1);
     };
-    return outside(p.x(), right) || outside(p.y(), up);
+    return outside(p.x(), axes[0]) || outside(p.y(), axes[1]);
   };
   const auto cut = [&](const cortex::Section& section) {
     return std::ranges::any_of(section.contours, [&](const cortex::Contour& contour) {
@@ -220,8 +217,7 @@ void tell_edges(const cortex::ContourStack& stack, const cortex::Volume& volume,
   if (first == stack.sections.end()) return;
   console.warn(fmt::format(
       "{}: {} reach the edge of the picture and are closed along it, first that at {:.3f} mm; if tissue goes "
-      "on "
-      "there, give larger pictures",
+      "on there, give larger pictures",
       path.string(), counted(std::size_t(std::count_if(first, stack.sections.end(), cut)), "section"),
       first->at / 1e3));
 }

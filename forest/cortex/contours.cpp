@@ -16,8 +16,6 @@
 namespace forest::cortex {
 namespace {
 
-constexpr std::array<std::array<int, 2>, 3> flat_axes{{{1, 2}, {0, 2}, {0, 1}}};
-
 std::string said(const Eigen::Vector3d& point) {
   return fmt::format("({:.3f}, {:.3f}, {:.3f}) mm", point.x() / 1e3, point.y() / 1e3, point.z() / 1e3);
 }
@@ -233,13 +231,13 @@ std::vector<ContourCrossing> crossings(const ContourStack& stack) {
 }
 
 Place flat(const Eigen::Vector3d& point, Axis axis) {
-  const auto& axes = flat_axes[std::size_t(axis)];
+  const auto& axes = flat_axes(axis);
   return {point[axes[0]], point[axes[1]]};
 }
 
 Eigen::Vector3d solid(const Place& place, double at, Axis axis) {
   Eigen::Vector3d point;
-  const auto& axes = flat_axes[std::size_t(axis)];
+  const auto& axes = flat_axes(axis);
   point[int(axis)] = at, point[axes[0]] = place.x(), point[axes[1]] = place.y();
   return point;
 }

@@ -3,6 +3,7 @@
 // come from cutting surfaces, from volumes, or from people who traced them; they go to reconstruction (surfaces.h).
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -21,6 +22,9 @@ namespace forest::cortex {
 enum class Axis : std::uint8_t { x, y, z };
 
 /// In a plane the two other axes in their order: (y, z), (x, z) or (x, y).
+constexpr std::array<int, 2> flat_axes(Axis axis) {
+  return {axis == Axis::x ? 1 : 0, axis == Axis::z ? 1 : 2};
+}
 Place flat(const Eigen::Vector3d& point, Axis axis);
 Eigen::Vector3d solid(const Place& place, double at, Axis axis);
 

@@ -84,7 +84,8 @@ std::vector<std::vector<Place>> marching_squares(std::span<const float> values, 
 
 ContourStack contours_of(const Volume& volume, const std::string& object, Axis axis,
                          std::span<const double> planes, double threshold) {
-  const int across = int(axis), right = axis == Axis::x ? 1 : 0, up = axis == Axis::z ? 1 : 2;
+  const int across = int(axis);
+  const auto [right, up] = flat_axes(axis);
   const std::size_t width = volume.size[std::size_t(right)], height = volume.size[std::size_t(up)],
                     depth = volume.size[std::size_t(across)];
   ContourStack stack{.axis = axis, .objects = {object}, .sections = std::vector<Section>(planes.size())};
