@@ -18,6 +18,7 @@
 #include "forest/core/parallel.h"
 #include "forest/cortex/borders.h"
 #include "forest/cortex/locate.h"
+#include "forest/cortex/outline.h"
 #include "forest/cortex/warp.h"
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
@@ -214,6 +215,16 @@ std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& op
   return cortex::MeasuredBorders(elements, surface, cortex::shares_of(surface, maps));
 }
 
+// Towards the pia, in the mean over some elements; y where they cancel out.
+Vec3 up_of(std::span<const cortex::Hexahedron> elements, std::span<const std::uint32_t> chosen) {
+  Place sum = Place::Zero();
+  for (const std::uint32_t e : chosen)
+    sum -= elements[e].jacobian(Place::Constant(.5)).col(2).stableNormalized();
+  constexpr double least = .1;  // of a whole hemisphere little is left
+  if (!(sum.norm() > least * double(chosen.size()))) return Vec3::UnitY();
+  return sum.normalized().cast<float>();
+}
+
 }  // namespace
 
 std::vector<std::uint32_t> parse_elements(const std::string& text, const std::filesystem::path& file,
@@ -266,8 +277,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   PlantedElements all;
   all.elements = choose(options, elements);
   const bool bent = options.bend == "grid";
-  std::vector<cortex::Junctions> junctions;
-  if (bent || options.row > 1) junctions = cortex::junctions(elements);
+  const std::vector<cortex::Junctions> junctions = cortex::junctions(elements);
   std::optional<cortex::Locator> locator;
   if (bent) locator.emplace(elements);
   const cortex::Sheet sheet{elements, junctions, locator ? &*locator : nullptr};
@@ -364,6 +374,8 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
        ++l)  // layers are curved; a circuit says how far their somata reach
     if (reach[l].first <= reach[l].second)
       circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
+  circuit.outline = cortex::outline(sheet, all.elements, borders_of);
+  circuit.up = up_of(elements, all.elements);
   if (bent) all.bending = bend(all, rooted, sheet, progress);
   mark_glia(all.planted);
   return all;

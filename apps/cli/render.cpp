@@ -107,7 +107,8 @@ std::function<void()> render(CLI::App& command, Console& console) {
                    ->expected(2)
                    ->type_name("X Y");
   must_be_within(*gaze, 0., 1.);
-  command.add_flag("--outline", options->outline, "Draw the outline of the column and its layers");
+  command.add_flag("--outline", options->outline,
+                   "Draw the outline of the column or the elements, and their layers");
   add_marks(command, options->marks);
   add_renderer(command, options->drawer);
   return [options, &console] {
@@ -142,10 +143,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view, console);
     if (options->outline && scene::outline(forest).empty())
-      console.warn(
-          "the forest is no column, so it has no outline; of elements 'brainforest cortex faces --edges all' "
-          "makes one for "
-          "--surface");
+      console.warn("the forest is neither a column nor planted in elements, so it has no outline");
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())

@@ -49,7 +49,7 @@ void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& came
 }
 
 void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
-                      bool tissue) {
+                      const std::optional<Vec3>& pia) {
   constexpr qreal length = 30;
   const QPointF centre(area.right() - margin - 40, area.bottom() - margin - 40);
   plate(painter, QRectF(centre - QPointF(48, 48), QSizeF(96, 96)), ink);
@@ -59,9 +59,11 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
     QColor colour;
   };
   // Okabe & Ito's vermilion, green and blue.
-  Axis axes[] = {{"x", Vec3::UnitX(), {213, 94, 0}},
-                 {tissue ? "y pia" : "y", Vec3::UnitY(), {0, 178, 130}},
-                 {"z", Vec3::UnitZ(), {70, 150, 220}}};
+  const bool along_y = pia == Vec3(Vec3::UnitY());
+  std::vector<Axis> axes{{"x", Vec3::UnitX(), {213, 94, 0}},
+                         {along_y ? "y pia" : "y", Vec3::UnitY(), {0, 178, 130}},
+                         {"z", Vec3::UnitZ(), {70, 150, 220}}};
+  if (pia && !along_y) axes.push_back({"pia", *pia, ink.text});
   const Mat3 seen = camera.axes().transpose();
   std::ranges::sort(axes, {}, [&](const Axis& a) { return (seen * a.way).z(); });  // far ones first
   for (const Axis& a : axes) {

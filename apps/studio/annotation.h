@@ -5,6 +5,7 @@
 #include <QColor>
 #include <QPointF>
 #include <QRect>
+#include <optional>
 
 #include "forest/scene/colour_bar.h"
 #include "forest/scene/view.h"
@@ -23,9 +24,9 @@ QColor to_screen(const Vec3& linear);
 /// A bar of a round number of µm or mm, true at the target's depth; at the bottom left.
 void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink);
 /// The axes; at the bottom right.
-/// @param tissue  they are those of a forest, in which y grows towards the pia; a surface alone has its scanner's
+/// @param pia  which way it lies, if any: along y as in a column, or along an arrow of its own
 void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
-                      bool tissue);
+                      const std::optional<Vec3>& pia);
 /// At the top left.
 void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
                   const Ink& ink);

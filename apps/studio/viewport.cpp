@@ -67,7 +67,7 @@ Viewport::Viewport(scene::Forest forest, const scene::View& view, circuit::NodeS
       settings_{.view = view},
       colouring_(scene::colour(targets_, view)),
       outline_(scene::outline(forest_)),
-      upright_(scene::is_upright(forest_)),
+      pia_(scene::towards_pia(forest_)),
       dressing_(forest_),
       drawer_(drawer) {
   set_view(settings_, view, forest_.soma_bounds().centre());
@@ -514,7 +514,7 @@ void Viewport::annotate() {
   const Ink ink = ink_on(settings_.view.background);
   if (settings_.scale) {
     paint_scale(painter, rect(), settings_.view.camera, ink);
-    paint_directions(painter, rect(), settings_.view.camera, ink, upright_);
+    paint_directions(painter, rect(), settings_.view.camera, ink, pia_);
   }
   if (settings_.legend && playback_)
     paint_bar(painter, rect(), scene::bar_of(*playback_, activity(), settings_.view.background), ink);

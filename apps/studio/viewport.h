@@ -172,7 +172,7 @@ class Viewport final : public QOpenGLWidget {
   double window_ = 0.;  // ms of activity that the picture stands for
   scene::Colouring colouring_;
   std::vector<frame::Overlay> outline_, highlight_;
-  bool upright_;  // y grows towards the pia
+  std::optional<Vec3> pia_;  // which way it lies
   Dressing dressing_;
   std::optional<Selection> selection_;
   std::optional<std::uint32_t> selected_synapse_;

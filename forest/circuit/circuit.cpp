@@ -35,6 +35,13 @@ void check(const Circuit& circuit) {
         "the radius of the circuit is {} µm; it must be positive, or 0 for a tissue that is no column",
         circuit.radius));
 
+  if (!circuit.up.allFinite() || !(circuit.up.norm() > 1e-3f))
+    throw Error(fmt::format("the way up of the circuit is ({}, {}, {}); give a direction", circuit.up.x(),
+                            circuit.up.y(), circuit.up.z()));
+  for (const auto& line : circuit.outline)
+    for (const Vec3& p : line)
+      if (!p.allFinite()) throw Error("a line of the circuit's outline is not finite; plant it again");
+
   const auto& seats = circuit.in_elements;
   if (!seats.empty() && seats.size() != circuit.instances.size())
     throw Error(fmt::format(

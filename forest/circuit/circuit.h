@@ -57,13 +57,16 @@ struct Circuit {
   std::vector<Instance> instances;
   float radius = 0.f;  // of the column about the y axis, µm; 0 when the tissue is no column
   std::vector<InElement> in_elements = {};  // of each instance; empty: the tissue has no elements
+  std::vector<std::vector<Vec3>> outline =
+      {};                   // lines that bound elements, µm; of a column radius and layers say it
+  Vec3 up = Vec3::UnitY();  // towards the pia, in the mean
 
   bool operator==(const Circuit&) const = default;
 };
 
 /// Throws Error that names the first layer, type, morphology or instance that is wrong: a layer without
 /// thickness, a name that is empty or used twice, an index beyond its list, a position that is not finite, an
-/// orientation that is no rotation.
+/// orientation that is no rotation, a line of the outline or a way up that is not finite.
 void check(const Circuit& circuit);
 
 /// How many neurons of one type stand in one layer.

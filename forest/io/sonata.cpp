@@ -39,8 +39,9 @@ void refuse_foreign_folder(const fs::path& folder) {
   if (!SonataConfig::find(Json::parse(config, nullptr, false), sonata_our_key))
     refuse("holds something other than a circuit of Brain Forest");
 
-  constexpr std::array parts{sonata_config_name, sonata_nodes_name,      sonata_types_name,
-                             sonata_edges_name,  sonata_edge_types_name, sonata_morphologies_name};
+  constexpr std::array parts{sonata_config_name,      sonata_nodes_name,      sonata_types_name,
+                             sonata_edges_name,       sonata_edge_types_name, sonata_outline_name,
+                             sonata_morphologies_name};
   for (const auto& entry : fs::recursive_directory_iterator(folder)) {
     const fs::path name = entry.path().lexically_relative(folder);
     const bool morphology = name.parent_path() == sonata_morphologies_name && name.extension() == ".swc";
@@ -88,7 +89,21 @@ std::string config_of(const Circuit& circuit, std::span<const circuit::Projectio
   ours["layers"] = Json::array();
   for (const auto& layer : circuit.layers)
     ours["layers"].push_back(Json{{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
+  if (circuit.up != Circuit().up) ours["up"] = {circuit.up.x(), circuit.up.y(), circuit.up.z()};
+  if (!circuit.outline.empty()) ours["outline"] = base + sonata_outline_name;
   return config.dump(2, ' ', false, Json::error_handler_t::replace) + "\n";
+}
+
+// A line of text for each line.
+std::string outline_of(const Circuit& circuit) {
+  std::string text;
+  for (const auto& line : circuit.outline) {
+    std::string points;
+    for (const Vec3& p : line)
+      points += fmt::format("{}[{},{},{}]", points.empty() ? "" : ",", p.x(), p.y(), p.z());
+    text += fmt::format("{}[{}]", text.empty() ? "[" : ",\n ", points);
+  }
+  return text + "]\n";
 }
 
 std::string types_of(const Circuit& circuit) {
@@ -204,6 +219,7 @@ void write_sonata(const fs::path& folder, const Circuit& circuit, std::span<cons
     write_edges(files.path() / sonata_edges_name, projections);
     files.write(sonata_edge_types_name, edge_types_of(projections));
   }
+  if (!circuit.outline.empty()) files.write(sonata_outline_name, outline_of(circuit));
   files.write(sonata_config_name, config_of(circuit, projections));
   files.commit();
 }

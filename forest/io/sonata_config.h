@@ -21,6 +21,7 @@ inline constexpr const char* sonata_nodes_name = "nodes.h5";
 inline constexpr const char* sonata_types_name = "node_types.csv";
 inline constexpr const char* sonata_edges_name = "edges.h5";
 inline constexpr const char* sonata_edge_types_name = "edge_types.csv";
+inline constexpr const char* sonata_outline_name = "outline.json";
 inline constexpr const char* sonata_morphologies_name = "morphologies";
 inline constexpr const char* sonata_our_key = "brainforest";
 inline constexpr std::uint32_t sonata_magic = 0x0A7A;

@@ -40,6 +40,8 @@ class Assembler {
     for (const Json& layer : *layers)
       circuit_.layers.push_back({config.text(layer, "name"), float(config.number(layer, "bottom")),
                                  float(config.number(layer, "top"))});
+    if (const Json* up = SonataConfig::find(*ours_, "up")) circuit_.up = vector_of(*up, "\"up\"");
+    if (const auto outline = config.path(*ours_, "outline")) read_outline(*outline);
   }
 
   /// One entry of networks.nodes: a nodes file with one or more populations.
@@ -95,6 +97,26 @@ class Assembler {
 
  private:
   static constexpr std::uint32_t unknown = Categories::none;
+
+  Vec3 vector_of(const Json& json, const std::string& what) const {
+    Vec3 v;
+    for (std::size_t i = 0; i < 3; ++i) {
+      if (!json.is_array() || json.size() != 3 || !json[i].is_number())
+        config_.refuse(what + " must be three numbers; plant the circuit again");
+      v[Eigen::Index(i)] = json[i].get<float>();
+    }
+    return v;
+  }
+
+  void read_outline(const fs::path& file) {
+    const MappedFile mapped(file);
+    const Json lines = Json::parse(mapped.text(), nullptr, false);
+    if (!lines.is_array()) throw InputError(file.string(), 0, "is no list of lines; plant the circuit again");
+    for (const Json& line : lines) {
+      auto& points = circuit_.outline.emplace_back();
+      for (const Json& p : line) points.push_back(vector_of(p, "a point of the \"outline\""));
+    }
+  }
 
   void warn(std::string_view code, std::string sentence) {
     warnings_.push_back({0, code, std::move(sentence)});

@@ -130,6 +130,28 @@ TEST_F(Sonata, SomataKeepTheirPlacesInElements) {
   EXPECT_EQ(hdf5::File(folder() / "nodes.h5").kind("/nodes/two_layers/0/u"), hdf5::Kind::none);
 }
 
+TEST_F(Sonata, TheOutlineOfElementsAndTheWayUpComeBack) {
+  circuit_.radius = 0.f;
+  circuit_.up = Vec3(.125f, -.25f, .9375f);
+  circuit_.outline = {{{1.1f, 2.f, -3e5f}, {1.25f, 1e-9f, 0.f}}, {{0, 0, 0}, {1, 1, 1}, {2, 3, 4}}};
+  write();
+  EXPECT_EQ(read_sonata(folder()).circuit, circuit_);
+  for (const auto& [file, from, to, what] :
+       {std::tuple{"outline.json", "[0,0,0]", "[0,0]", "a point of the \"outline\" must be three numbers"},
+        {"outline.json", "[0,0,0]", "\"word\"", "a point of the \"outline\" must be three numbers"},
+        {"outline.json", "[[[", "{", "is no list of lines"},
+        {"circuit_config.json", "0.9375", "\"x\"", "\"up\" must be three numbers"},
+        {"circuit_config.json", "outline.json", "other.json", "other.json"}}) {
+    write();
+    replace(file, from, to);
+    EXPECT_THAT(complaint([&] { read_sonata(folder()); }), HasSubstr(what)) << file << ' ' << from;
+  }
+  circuit_.up = Vec3::Zero();
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("way up"));
+  circuit_.up = Vec3::UnitX(), circuit_.outline[1][2].x() = INFINITY;
+  EXPECT_THAT(complaint([&] { write(); }), HasSubstr("not finite"));
+}
+
 TEST_F(Sonata, WhatNoNeuronUsesAndTiltedNeuronsComeBackToo) {
   circuit_.morphologies.insert(circuit_.morphologies.begin(), "unused");
   morphologies_.insert(morphologies_.begin(), neuron(1.f));

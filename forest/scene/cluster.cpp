@@ -347,11 +347,6 @@ class Leaves {
   std::size_t filled_ = limit;  // segments of the last leaf
 };
 
-// From the first to the last leaf that touches a node.
-struct Touching {
-  std::uint32_t first = 0xffffffffu, last = 0;
-};
-
 // Finds the spheres of the leaves, which of them touch each node, and how far what grows out of each goes.
 std::vector<Touching> surround(Drawing& drawing, std::uint32_t nodes) {
   auto& leaves = drawing.drafts;
@@ -381,13 +376,10 @@ void merge(Drawing& drawing, std::uint32_t nodes) {
   auto& drafts = drawing.drafts;
   const std::vector<Touching> touching = surround(drawing, nodes);
   const Coordinates originals(drawing.vertices);
-  std::vector<std::uint8_t> numbers_in_sketch(nodes, Sketch::unnumbered);
+  Sketch sketch(drawing, touching);
   const auto merged = [&](std::uint32_t left, std::uint32_t right) {
     const Draft &a = drafts[left], &b = drafts[right];
-    const auto outside = [&](std::uint32_t node) {  // nothing is joined through the soma
-      return node == 0 || touching[node].first < a.first_leaf || touching[node].last >= b.last_leaf;
-    };
-    Sketch sketch(drawing, a, b, outside, numbers_in_sketch);
+    sketch.take(a, b);
     float error = std::max(a.error, b.error);
     if (sketch.segment_count() > limit) sketch.coarsen(std::max(first_tolerance, .5f * error));
     const auto below = drawing.vertices_of(drafts[a.first_leaf], drafts[b.last_leaf - 1]);

@@ -23,6 +23,10 @@ namespace {
 using namespace layout;
 using Json = nlohmann::ordered_json;
 
+Vec3 vector_of(const Json& json) {
+  return {json.at(0).get<float>(), json.at(1).get<float>(), json.at(2).get<float>()};
+}
+
 circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
   const Json json = Json::parse(text);
   circuit::Circuit c;
@@ -34,6 +38,12 @@ circuit::Circuit understand(std::string_view text, circuit::NodeNames& nodes) {
   if (json.contains("types"))
     for (const auto& t : json["types"])
       c.types.push_back({t.at("name"), t.at("population"), t.at("excitatory"), t.value("glia", false)});
+  if (json.contains("up")) c.up = vector_of(json["up"]);
+  if (json.contains("outline"))
+    for (const auto& line : json["outline"]) {
+      auto& points = c.outline.emplace_back();
+      for (const auto& p : line) points.push_back(vector_of(p));
+    }
   if (json.contains("node_sets")) nodes.sets = json.at("node_sets");
   if (json.contains("attributes"))
     for (const auto& a : json["attributes"]) {
@@ -124,6 +134,7 @@ const circuit::NodeNames& Forest::nodes() const { return data_->nodes; }
 const Bounds& Forest::soma_bounds() const { return data_->soma_bounds; }
 std::vector<circuit::Layer> Forest::layers_in_place() const {
   std::vector<circuit::Layer> layers = circuit().layers;
+  if (circuit().up != circuit::Circuit().up) layers.clear();  // they are curved
   std::erase_if(layers, [](const circuit::Layer& l) { return !(l.bottom < l.top); });
   float low = INFINITY, high = -INFINITY;
   for (const auto& layer : layers) low = std::min(low, layer.bottom), high = std::max(high, layer.top);
@@ -206,6 +217,13 @@ void Forest::Data::read_description(const Refuse& refuse) {
   try {
     circuit = understand({reinterpret_cast<const char*>(text.data()), text.size()}, nodes);
   } catch (const nlohmann::json::exception&) {
+    refuse.unless(false, "has a damaged description");
+  }
+  try {
+    circuit::Circuit alone = circuit;
+    alone.instances.clear(), alone.in_elements.clear();
+    circuit::check(alone);
+  } catch (const Error& error) {
     refuse.unless(false, "has a damaged description");
   }
   const std::size_t instances = as<frame::Instance>(Part::instances).size();

@@ -22,10 +22,17 @@ using namespace layout;
 using Json = nlohmann::ordered_json;
 using Bytes = std::span<const std::byte>;
 
+Json list_of(const Vec3& p) { return Json{p.x(), p.y(), p.z()}; }
+
 std::string describe(const circuit::Circuit& c, const circuit::NodeNames& nodes) {
   Json json{{"name", c.name}, {"radius", c.radius}, {"morphologies", c.morphologies}};
   for (const auto& layer : c.layers)
     json["layers"].push_back({{"name", layer.name}, {"bottom", layer.bottom}, {"top", layer.top}});
+  if (c.up != circuit::Circuit().up) json["up"] = list_of(c.up);
+  for (const auto& line : c.outline) {
+    Json& points = json["outline"].emplace_back(Json::array());
+    for (const Vec3& p : line) points.push_back(list_of(p));
+  }
   for (const auto& type : c.types) {
     Json& row = json["types"].emplace_back(
         Json{{"name", type.name}, {"population", type.population}, {"excitatory", type.excitatory}});

@@ -5,7 +5,6 @@
 
 #include <array>
 #include <cstdint>
-#include <functional>
 #include <span>
 #include <vector>
 
@@ -63,24 +62,30 @@ struct Coordinates {
   explicit Coordinates(std::span<const Vec4> vertices);
 };
 
+/// Which leaf drafts touch a node: none before the first, none after the last.
+struct Touching {
+  std::uint32_t first = ~std::uint32_t(0), last = 0;
+};
+
 /// What two clusters draw, on its way to at most `limit` segments. It is small, so all of it lies in arrays and sets of
 /// bits; a node of the neuron has a number of its own here.
 class Sketch {
  public:
   static constexpr std::size_t limit = frame::cluster_size;
-  static constexpr std::uint8_t unnumbered = 255;
+  /// One for all merges of a neuron; both must outlive it.
+  /// @param touching  of every node of the neuron
+  Sketch(const Drawing& drawing, std::span<const Touching> touching)
+      : drawing_(drawing), touching_(touching), numbers_(touching.size(), unnumbered) {}
 
-  /// @param outside  whether anything else of the neuron touches a node
-  /// @param numbers  of the neuron's nodes, all `unnumbered`; scratch
-  Sketch(const Drawing& drawing, const Draft& a, const Draft& b,
-         const std::function<bool(std::uint32_t node)>& outside, std::vector<std::uint8_t>& numbers);
+  /// What neighbours draw, anew.
+  void take(const Draft& a, const Draft& b);
 
-  std::uint32_t segment_count() const { return vertex_count_ - line_count_; }
+  std::uint32_t segment_count() const { return now_->vertex_count - now_->line_count; }
 
   /// Fewer and fewer segments until they are `limit` at most.
   void coarsen(float tolerance);
 
-  /// Adds the strips to the drawing, and tells the draft which they are.
+  /// Adds the strips to the drawing, which is that of all of it, and tells the draft which they are.
   void write(Drawing& drawing, Draft& draft) const;
 
   /// The greatest distance of an original point, of [begin, end), to what is drawn, if it is greater than `worst`. The points
@@ -89,6 +94,7 @@ class Sketch {
   float measured_error(const Coordinates& originals, std::size_t begin, std::size_t end, float worst) const;
 
  private:
+  static constexpr std::uint8_t none = 255, unnumbered = 255;
   static constexpr std::uint32_t most_lines = 2 * limit, most_vertices = 2 * most_lines,
                                  most_nodes = 2 * most_lines;
   static_assert(most_lines <= 64 && most_nodes < unnumbered);
@@ -97,6 +103,18 @@ class Sketch {
   };
   template <class T>
   using OfVertices = std::array<T, most_vertices + 4>;  // read in fours
+
+  struct Lines {
+    std::uint32_t line_count = 0, vertex_count = 0;
+    std::array<Line, most_lines> lines;
+    OfVertices<float> x, y, z, radius, weight;
+    OfVertices<reports::Place> places;
+
+    void copy(std::uint32_t to, const Lines& other, std::uint32_t from) {
+      x[to] = other.x[from], y[to] = other.y[from], z[to] = other.z[from], radius[to] = other.radius[from];
+      weight[to] = other.weight[from], places[to] = other.places[from];
+    }
+  };
 
   struct Nodes {  // a set of them
     std::array<std::uint64_t, most_nodes / 64> bits{};
@@ -108,7 +126,6 @@ class Sketch {
     std::uint64_t swallowed = 0;                // lines that follow another
     std::array<std::uint8_t, most_lines> next;  // the line that follows, or none
   };
-  static constexpr std::uint8_t none = 255;
 
   float distance(std::uint32_t a, std::uint32_t b) const;
 
@@ -118,7 +135,7 @@ class Sketch {
   // Which lines follow one another through a node at which nothing else begins or ends, here or outside.
   void link(Links& links) const;
 
-  // Sets the lines anew, joined; add(v) puts in what was vertex v.
+  // Makes `now_` of the lines that it was, joined; add(lines, v) puts in what was vertex v.
   template <class Add>
   void gather(const Links& links, Add&& add);
 
@@ -142,10 +159,12 @@ class Sketch {
   template <class Stays>
   void keep(Stays&& stays);
 
-  std::uint32_t line_count_ = 0, vertex_count_ = 0, node_count_ = 0;
-  std::array<Line, most_lines> lines_;
-  OfVertices<float> x_, y_, z_, radius_, weight_;
-  OfVertices<reports::Place> places_;
+  const Drawing& drawing_;
+  std::span<const Touching> touching_;
+  std::vector<std::uint8_t> numbers_;  // of the neuron's nodes, all `unnumbered` between two merges
+  std::array<Lines, 2> lines_;
+  Lines *now_ = &lines_[0], *old_ = &lines_[1];  // what is gathered comes from the one into the other
+  std::uint32_t node_count_ = 0;
   std::array<std::uint32_t, most_nodes> nodes_;  // the neuron's numbers of them
   Nodes outside_;
   std::array<float, most_nodes>

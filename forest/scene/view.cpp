@@ -551,6 +551,18 @@ class Enclosing {
   std::array<float, 4> reach_{};
 };
 
+/// A direction seen from which y is up, turned to where the forest's way up is; of unit length.
+Vec3 standing(const Forest& forest, const Vec3& direction) {
+  const Vec3& up = forest.circuit().up;
+  return (up == Vec3::UnitY() ? Quat::Identity() : Quat::FromTwoVectors(Vec3::UnitY(), up)) *
+         direction.normalized();
+}
+
+/// How far what lies in that box reaches at most along the forest's way up, µm.
+float height_of(const Forest& forest, const Bounds& box) {
+  return box.extent().dot(forest.circuit().up.cwiseAbs());
+}
+
 }  // namespace
 
 View parse_view(std::string_view text, const std::string& name) {
@@ -596,9 +608,9 @@ std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 View overview(const Forest& forest, float aspect) {
   View view;
   view.camera.near = 2.f;
-  const Vec3 backward = Vec3(.42f, .16f, 1.f).normalized();
+  view.camera.up = forest.circuit().up;
   frame::Camera looking = view.camera;
-  looking.eye = backward, looking.target = Vec3::Zero();
+  looking.eye = standing(forest, {.42f, .16f, 1.f}), looking.target = Vec3::Zero();
   const float slope = std::tan(.5f * radians(view.camera.field_of_view));
   Enclosing enclosing(looking.axes(), slope * aspect, slope);
 
@@ -619,32 +631,34 @@ View overview(const Forest& forest, float aspect) {
   enclosing.add_most(sampled_branches(forest));
   // The near side of a wide forest shall not hide what lies behind it.
   const float wide = std::max(radius, .25f * bounds.extent().norm()),
-              high = std::max(bounds.extent().y(), wide) + 120.f;
+              high = std::max(height_of(forest, bounds), wide) + 120.f;
   const auto [eye, middle] =
       enclosing.camera(bounds.centre(), 1.08f * std::max(.5f * high, wide) / slope + wide);
   view.camera.eye = eye, view.camera.target = middle;
   return view;
 }
 
-bool is_upright(const Forest& forest) {
+std::optional<Vec3> towards_pia(const Forest& forest) {
+  if (const Vec3& up = forest.circuit().up; up != Vec3::UnitY()) return up.normalized();
   float along = 0.f;
   for (const frame::Instance& i : forest.instances())
     along += (Quat(i.qw, i.qx, i.qy, i.qz) * Vec3::UnitY()).y() / float(forest.instances().size());
-  return along > .5f;
+  if (along > .5f) return Vec3::UnitY();
+  return std::nullopt;
 }
 
 View portrait(const Forest& forest) {
   View view = overview(forest);
   const Bounds& bounds = forest.soma_bounds();
   if (bounds.empty()) return view;
-  const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
+  const float radius = std::max(forest.circuit().radius, 50.f), height = height_of(forest, bounds);
   const Vec3 centre = bounds.centre();
   view.camera.field_of_view = 46.f;
   // The whole column, a little from above; what roots out of it below may be cut off.
   const float half = .56f * height + radius;
   const float away = half / std::tan(.5f * radians(view.camera.field_of_view)) + radius;
-  view.camera.target = centre + Vec3(0.f, .03f * height, 0.f);
-  view.camera.eye = view.camera.target + away * Vec3(.45f, .16f, 1.f).normalized();
+  view.camera.target = centre + .03f * height * forest.circuit().up;
+  view.camera.eye = view.camera.target + away * standing(forest, {.45f, .16f, 1.f});
   view.camera.near = .5f;
   view.fog = 1.4f, view.halo = 1.5f;
   view.samples = 24;
@@ -701,7 +715,11 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
 }
 
 std::vector<frame::Overlay> outline(const Forest& forest) {
+  constexpr float width = .5f;  // µm, half
   std::vector<frame::Overlay> lines;
+  for (const auto& line : forest.circuit().outline)
+    for (std::size_t i = 0; i + 1 < line.size(); ++i)
+      lines.push_back({line[i], line[i + 1], width, outline_entry});
   const float radius = forest.circuit().radius;
   const auto& layers = forest.circuit().layers;
   if (!(radius > 0.f) || layers.empty()) return lines;
@@ -720,9 +738,9 @@ std::vector<frame::Overlay> outline(const Forest& forest) {
   heights.erase(std::unique(heights.begin(), heights.end(), [](float a, float b) { return b - a < .01f; }),
                 heights.end());
   for (const float y : heights)
-    for (int i = 0; i < sides; ++i) lines.push_back({corner(i, y), corner(i + 1, y), .5f, outline_entry});
+    for (int i = 0; i < sides; ++i) lines.push_back({corner(i, y), corner(i + 1, y), width, outline_entry});
   for (int i = 0; i < sides; i += sides / 8)
-    lines.push_back({corner(i, low), corner(i, high), .5f, outline_entry});
+    lines.push_back({corner(i, low), corner(i, high), width, outline_entry});
   return lines;
 }
 

@@ -102,10 +102,11 @@ Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 
-/// Whether neurons stand along y, which then grows towards the pia, as it does not where they were planted in folds.
-bool is_upright(const Forest& forest);
+/// Which way the pia lies: as the circuit says, or along y where neurons stand along it. Nothing where they stand in all directions.
+std::optional<Vec3> towards_pia(const Forest& forest);
 
-/// The outline of the column: circles at the limits of the layers and a few verticals. Empty when it is no column.
+/// The outline of a column: circles at the limits of the layers and a few verticals; of what was planted in elements, that of
+/// these (cortex/outline.h). Empty where there is neither.
 std::vector<frame::Overlay> outline(const Forest& forest);
 
 }  // namespace forest::scene

@@ -187,11 +187,53 @@ TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInTh
 TEST(View, NeuronsOfAColumnStandUprightAndThoseInAFoldDoNot) {
   circuit::Circuit circuit = testing::sample_circuit(20);
   const auto forest = [&] { return Forest::from_bytes(pack(circuit, testing::sample_neurons())); };
-  EXPECT_TRUE(is_upright(forest()));
+  EXPECT_EQ(towards_pia(forest()), Vec3(Vec3::UnitY()));
   for (std::size_t i = 0; i < circuit.instances.size(); ++i)
     circuit.instances[i].orientation =
         Quat(Eigen::AngleAxisf(float(i), Vec3::UnitX())) * circuit.instances[i].orientation;
-  EXPECT_FALSE(is_upright(forest()));
+  EXPECT_EQ(towards_pia(forest()), std::nullopt);
+  circuit.up = Vec3(3.f, 0.f, 4.f);
+  EXPECT_LT((*towards_pia(forest()) - Vec3(.6f, 0.f, .8f)).norm(), 1e-6f);
+}
+
+TEST(View, WhatStandsAnotherWayUpIsSeenAsIfItDidNot) {
+  circuit::Circuit circuit = testing::sample_circuit(30);
+  circuit.radius = 0.f, circuit.layers.resize(1);
+  for (circuit::Instance& i : circuit.instances) i.layer = 0;
+  const auto seen = [&](const circuit::Circuit& c) {
+    const Forest forest = Forest::from_bytes(pack(c, testing::sample_neurons()));
+    const frame::Camera camera = overview(forest, 1.5f).camera;
+    std::vector<Vec3> places;
+    for (const frame::Instance& i : forest.instances())
+      places.push_back(project(camera, {900.f, 600.f}, {i.x, i.y, i.z}));
+    return places;
+  };
+  const auto before = seen(circuit);
+  const Vec3 up = Vec3(-1.f, -2.f, .5f).normalized();
+  const Quat turn = Quat::FromTwoVectors(Vec3::UnitY(), up);
+  circuit.up = up;
+  for (circuit::Instance& i : circuit.instances)
+    i.position = turn * i.position, i.orientation = turn * i.orientation;
+  const auto after = seen(circuit);
+  for (std::size_t i = 0; i < before.size(); ++i)
+    EXPECT_LT((before[i] - after[i]).head<2>().norm(), 90.f) << i;  // of 600; their boxes differ a little
+}
+
+TEST(View, ElementsHaveTheirOutlineAndColumnsTheirs) {
+  circuit::Circuit circuit = testing::sample_circuit(3);
+  const auto lines = [&] { return outline(Forest::from_bytes(pack(circuit, testing::sample_neurons()))); };
+  const std::size_t of_column = lines().size();
+  EXPECT_GT(of_column, 100u);
+  circuit.radius = 0.f;
+  EXPECT_TRUE(lines().empty());
+  circuit.outline = {{{0, 0, 0}, {1, 0, .1f}, {2, 5, 0}}, {{7, 7, 7}, {8, 8, 1e5f}}};
+  const auto own = lines();
+  ASSERT_EQ(own.size(), 3u);
+  EXPECT_EQ(own[0].b, own[1].a);
+  EXPECT_EQ(own[0].b, Vec3(1, 0, .1f));
+  EXPECT_EQ(own[2].b, Vec3(8, 8, 1e5f));
+  circuit.outline[0][1].y() = NAN;
+  EXPECT_THROW(lines(), Error);
 }
 
 TEST(View, EveryFrameKeepsTheContract) {
