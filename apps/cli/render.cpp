@@ -36,20 +36,23 @@ const std::map<std::string, scene::Side> sides{{"left", scene::Side::left},   {"
 
 scene::Forest empty_forest() { return scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {})); }
 
-// What is shown when nobody says what: the neurons, or the surfaces from one side.
-scene::View default_view(const scene::Forest& forest, const scene::Surfaces& surfaces,
-                         std::optional<scene::Side> side, float aspect) {
+// What is shown when nobody says what: the neurons that are visible, or the surfaces from one side.
+scene::View default_view(const scene::Targets& targets, const std::vector<scene::Appearance>& shown,
+                         const scene::Surfaces& surfaces, std::optional<scene::Side> side, float aspect) {
   if (side && surfaces.empty())
     throw Error(
         "--from shows surfaces from a side, and there are none; give --surface, or say by --view where one "
         "is");
-  if (!surfaces.empty() && (side || forest.instances().empty())) {
+  if (!surfaces.empty() && (side || targets.forest().instances().empty())) {
     scene::View view;
     view.camera = surfaces.camera(side.value_or(surfaces.outside()), aspect);
     view.fog = 0.f;
     return view;
   }
-  return scene::overview(forest, aspect);
+  scene::View view;
+  view.targets = shown;
+  view.camera = scene::overview(targets.forest(), aspect, scene::colour(targets, view).states).camera;
+  return view;
 }
 
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.
@@ -123,9 +126,13 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (alone) named.files.insert(named.files.begin(), options->forest);
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
-    scene::View view = options->view.empty()
-                           ? default_view(forest, surfaces, options->side, float(width) / float(height))
-                           : read_view(options->view);
+    Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
+    std::vector<scene::Appearance> shown;
+    add_appearances(options->targets, shown);
+    scene::View view = options->view.empty() ? default_view(artist.targets(), shown, surfaces, options->side,
+                                                            float(width) / float(height))
+                                             : read_view(options->view);
+    if (!options->view.empty()) std::ranges::move(shown, std::back_inserter(view.targets));
     nlohmann::ordered_json of_surfaces;  // null where there are none
     if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();
     if (surfaces.has_values()) {
@@ -133,8 +140,6 @@ std::function<void()> render(CLI::App& command, Console& console) {
       of_surfaces["colour_map"] = surfaces.map->name;
     }
     if (!options->gaze.empty()) view.detail.gaze = Vec2(options->gaze[0], options->gaze[1]);
-    add_appearances(options->targets, view.targets);
-    Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     warn_of_empty(artist.targets(), view.targets, console);
     artist.show(std::move(surfaces));
     if (options->skin) artist.give_skin();

@@ -147,7 +147,7 @@ frame::Camera Viewport::whole() const {
   const float aspect = float(width()) / float(std::max(1, height()));
   if (forest_.instances().empty() && !dressing_.surfaces.empty())
     return dressing_.surfaces.camera(dressing_.surfaces.outside(), aspect);
-  frame::Camera camera = scene::overview(forest_, aspect).camera;
+  frame::Camera camera = scene::overview(forest_, aspect, colouring_.states).camera;
   camera.near = settings_.view.camera.near;
   return camera;
 }

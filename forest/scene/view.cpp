@@ -473,33 +473,42 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
 
 constexpr int outline_corners = 16;
 
-/// Places on branches: of a small forest the ends of all segments, else spread evenly over their area, the straws of one level of
-/// bricks.
-std::vector<Vec3> sampled_branches(const Forest& forest) {
+/// Places on branches of neurons that are seen: of few the ends of all segments, else spread evenly over their area, the straws of
+/// one level of bricks.
+/// @param seen  whether an instance is
+template <class Seen>
+std::vector<Vec3> sampled_branches(const Forest& forest, const Seen& seen) {
   constexpr std::size_t enough = 4096, small = 200'000;
-  if (forest.segment_total() <= small) {
-    std::vector<Vec3> ends;
-    for (const frame::Instance& i : forest.instances()) {
-      const Placed placed(i);
-      const Neuron& neuron = forest.neurons()[i.morphology];
+  const auto instances = forest.instances();
+  std::uint64_t total = 0;
+  for (std::uint32_t i = 0; i < instances.size(); ++i)
+    if (seen(i)) total += forest.neurons()[instances[i].morphology].original_count;
+  std::vector<Vec3> places;
+  if (total <= small) {
+    for (std::uint32_t i = 0; i < instances.size(); ++i) {
+      if (!seen(i)) continue;
+      const Placed placed(instances[i]);
+      const Neuron& neuron = forest.neurons()[instances[i].morphology];
       for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count))
-        ends.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
+        places.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
     }
-    return ends;
+    return places;
   }
   const auto bricks = forest.bricks();
-  if (bricks.empty()) return {};
-  const auto straws_from = [&](std::size_t brick) {
-    const Brick& first = bricks[brick];
+  const auto owners = forest.owners();
+  const std::size_t first_straw = forest.segments().size() - owners.size();
+  for (std::size_t level = 0; level < bricks.size(); level = bricks[level].first_child) {
+    const Brick& first = bricks[level];
     const std::size_t end =
         first.child_count ? bricks[first.first_child].first_segment : forest.segments().size();
-    return forest.segments().subspan(first.first_segment, end - first.first_segment);
-  };
-  std::size_t level = 0;
-  while (bricks[level].child_count && straws_from(level).size() < enough) level = bricks[level].first_child;
-  std::vector<Vec3> places;
-  for (const frame::Segment& s : straws_from(level))
-    places.emplace_back(.5f * (s.ax + s.bx), .5f * (s.ay + s.by), .5f * (s.az + s.bz));
+    places.clear();
+    for (std::size_t i = first.first_segment; i < end; ++i) {
+      const frame::Segment& s = forest.segments()[i];
+      if (seen(owners[i - first_straw].instance))
+        places.emplace_back(.5f * (s.ax + s.bx), .5f * (s.ay + s.by), .5f * (s.az + s.bz));
+    }
+    if (places.size() >= enough || !first.child_count) break;
+  }
   return places;
 }
 
@@ -605,7 +614,11 @@ std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
 std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }
 std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 
-View overview(const Forest& forest, float aspect) {
+View overview(const Forest& forest, float aspect, std::span<const frame::State> states) {
+  using frame::State;
+  const auto shown = [](const State& s) { return s.is(State::visible) || s.is(State::parted); };
+  const bool none = std::ranges::none_of(states, shown);
+  const auto seen = [&](std::uint32_t i) { return none || shown(states[i]); };
   View view;
   view.camera.near = 2.f;
   view.camera.up = forest.circuit().up;
@@ -614,12 +627,18 @@ View overview(const Forest& forest, float aspect) {
   const float slope = std::tan(.5f * radians(view.camera.field_of_view));
   Enclosing enclosing(looking.axes(), slope * aspect, slope);
 
-  const Bounds& somata = forest.soma_bounds();
-  for (const frame::Instance& i : forest.instances()) enclosing.add({i.x, i.y, i.z});
-  Bounds bounds = somata;
-  const float radius = forest.circuit().radius;
-  const Vec3 axis = radius > 0.f || somata.empty() ? Vec3(Vec3::Zero()) : somata.centre();
-  for (const auto& layer : forest.layers_in_place())
+  Bounds bounds;
+  bool all = true;
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
+    const frame::Instance& at = forest.instances()[i];
+    if (seen(i))
+      bounds.add({at.x, at.y, at.z}), enclosing.add({at.x, at.y, at.z});
+    else
+      all = false;
+  }
+  const float radius = all ? forest.circuit().radius : 0.f;
+  const Vec3 axis = radius > 0.f || bounds.empty() ? Vec3(Vec3::Zero()) : bounds.centre();
+  for (const auto& layer : all ? forest.layers_in_place() : std::vector<circuit::Layer>())
     for (const float y : {layer.bottom, layer.top}) {
       bounds.add({axis.x(), y, axis.z()});
       for (int i = 0; i < outline_corners; ++i) {
@@ -628,7 +647,7 @@ View overview(const Forest& forest, float aspect) {
       }
     }
   if (bounds.empty()) return view;
-  enclosing.add_most(sampled_branches(forest));
+  enclosing.add_most(sampled_branches(forest, seen));
   // The near side of a wide forest shall not hide what lies behind it.
   const float wide = std::max(radius, .25f * bounds.extent().norm()),
               high = std::max(height_of(forest, bounds), wide) + 120.f;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <optional>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -68,7 +69,8 @@ std::vector<ViewKey> plane_keys();     // of its `plane`
 
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture
-View overview(const Forest& forest, float aspect = 16.f / 9.f);
+/// @param states  of its instances: those that are hidden need no room, unless all are
+View overview(const Forest& forest, float aspect = 16.f / 9.f, std::span<const frame::State> states = {});
 
 /// A picture to hang on a wall: the column from its crown down, near enough to follow single dendrites.
 View portrait(const Forest& forest);

@@ -184,6 +184,24 @@ TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInTh
   }
 }
 
+TEST(View, WhatIsHiddenNeedsNoRoom) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(60), testing::sample_neurons()));
+  const frame::Camera whole = overview(forest, 1.5f).camera;
+  std::vector<frame::State> states(forest.instances().size());
+  EXPECT_EQ(overview(forest, 1.5f, states).camera, whole);
+  for (frame::State& s : states) s.flags = 0;
+  EXPECT_EQ(overview(forest, 1.5f, states).camera, whole);  // nothing is seen from anywhere
+  for (const std::size_t only : {5u, 59u}) {
+    states[only].flags = frame::State::visible;
+    const frame::Camera camera = overview(forest, 1.5f, states).camera;
+    states[only].flags = 0;
+    const frame::Instance& at = forest.instances()[only];
+    EXPECT_LT((camera.eye - camera.target).norm(), .7f * (whole.eye - whole.target).norm());
+    const Vec3 seen = project(camera, {900.f, 600.f}, {at.x, at.y, at.z});
+    EXPECT_TRUE(seen.x() > 0.f && seen.x() < 900.f && seen.y() > 0.f && seen.y() < 600.f) << seen.transpose();
+  }
+}
+
 TEST(View, NeuronsOfAColumnStandUprightAndThoseInAFoldDoNot) {
   circuit::Circuit circuit = testing::sample_circuit(20);
   const auto forest = [&] { return Forest::from_bytes(pack(circuit, testing::sample_neurons())); };
