@@ -49,9 +49,10 @@ scene::View default_view(const scene::Targets& targets, const std::vector<scene:
     view.fog = 0.f;
     return view;
   }
-  scene::View view;
+  scene::View plain;
+  plain.targets = shown;
+  scene::View view = scene::overview(targets.forest(), aspect, scene::colour(targets, plain).states);
   view.targets = shown;
-  view.camera = scene::overview(targets.forest(), aspect, scene::colour(targets, view).states).camera;
   return view;
 }
 
@@ -149,6 +150,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     play(artist, options->activity, view, console);
     if (options->outline && scene::outline(forest).empty())
       console.warn("the forest is neither a column nor planted in elements, so it has no outline");
+    view.samples = scene::still_samples(view, scene::colour(artist.targets(), view));
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())

@@ -19,7 +19,8 @@ Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
   if (!(strength > 0.f) || bounds.empty()) return {};
   const float extent = .5f * bounds.extent().norm() + 100.f;
   const float depth = -camera.axes().col(2).dot(bounds.centre() - camera.eye);
-  const float size = .5f * std::hypot(bounds.extent().x(), bounds.extent().z()) + 50.f;
+  const Vec3 level = bounds.extent() - bounds.extent().cwiseProduct(forest.circuit().up.cwiseAbs());
+  const float size = .5f * level.norm() + 50.f;
   // Within the forest one sees a hundred micrometres or two, whatever its size.
   const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
   const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);

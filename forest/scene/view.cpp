@@ -647,6 +647,9 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
       }
     }
   if (bounds.empty()) return view;
+  // Fog is as deep as the whole forest, and would only dim a part of it.
+  constexpr float least = .2f;
+  if (!all) view.fog = std::clamp(bounds.extent().norm() / forest.soma_bounds().extent().norm(), least, 1.f);
   enclosing.add_most(sampled_branches(forest, seen));
   // The near side of a wide forest shall not hide what lies behind it.
   const float wide = std::max(radius, .25f * bounds.extent().norm()),
@@ -682,6 +685,15 @@ View portrait(const Forest& forest) {
   view.fog = 1.4f, view.halo = 1.5f;
   view.samples = 24;
   return view;
+}
+
+std::uint32_t still_samples(const View& view, const Colouring& colouring) {
+  // A thin line lies in half of the samples of a pixel: a fifth of sixteen leaves it one or two of them, and dotted.
+  constexpr std::uint32_t see_through = 64, quick = 15;
+  if (view.samples <= quick) return view.samples;  // as asked for
+  frame::Frame f;
+  f.opacities = colouring.opacities, f.states = colouring.states;
+  return frame::transparent(f) ? std::max(view.samples, see_through) : view.samples;
 }
 
 float thinnest_of(const View& view) {

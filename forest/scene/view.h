@@ -69,7 +69,7 @@ std::vector<ViewKey> plane_keys();     // of its `plane`
 
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture
-/// @param states  of its instances: those that are hidden need no room, unless all are
+/// @param states  of its instances: those that are hidden need no room, unless all are; what is seen has less fog, the smaller it is
 View overview(const Forest& forest, float aspect = 16.f / 9.f, std::span<const frame::State> states = {});
 
 /// A picture to hang on a wall: the column from its crown down, near enough to follow single dendrites.
@@ -101,6 +101,8 @@ View within(View view, const Budget& budget);
 float fog_strength(const View& view);
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
+/// Samples of a picture of that view at rest: more than it says where something is seen through, of which each sample shows all or nothing.
+std::uint32_t still_samples(const View& view, const Colouring& colouring);
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 

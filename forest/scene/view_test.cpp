@@ -184,6 +184,19 @@ TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInTh
   }
 }
 
+TEST(View, WhatIsSeenThroughHasMoreSamplesAtRest) {
+  const Targets targets(sample());
+  View view = overview(targets.forest());
+  EXPECT_EQ(still_samples(view, colour(targets, view)), view.samples);
+  view.targets.resize(1);
+  view.targets[0].name = "all", view.targets[0].opacity = .2f;
+  const Colouring clear = colour(targets, view);
+  for (const auto& [asked, has] : {std::pair{1u, 1u}, {4u, 4u}, {16u, 64u}, {100u, 100u}}) {
+    view.samples = asked;
+    EXPECT_EQ(still_samples(view, clear), has);
+  }
+}
+
 TEST(View, WhatIsHiddenNeedsNoRoom) {
   const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(60), testing::sample_neurons()));
   const frame::Camera whole = overview(forest, 1.5f).camera;
