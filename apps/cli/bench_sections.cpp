@@ -11,11 +11,10 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/file.h"
-#include "forest/core/parallel.h"
 #include "forest/cortex/surfaces.h"
 #include "forest/geometry/isosurface.h"
 #include "forest/geometry/self_intersection.h"
-#include "forest/geometry/triangle_tree.h"
+#include "forest/geometry/surface_distance.h"
 #include "forest/io/surface.h"
 
 #include "apps/cli/bench.h"
@@ -31,42 +30,6 @@ struct Options {
   double spacing = 1., voxel = 0., error = .02;
   bool curves = false;
 };
-
-struct Distances {
-  double mean = 0., p95 = 0.;  // mm
-};
-Distances distances(const std::vector<Eigen::Vector3d>& places, const TriangleTree& from) {
-  std::vector<double> found(places.size());
-  parallel_for(places.size(), 256,
-               [&](std::size_t i) { found[i] = from.nearest(places[i])->distance / 1e3; });
-  Distances result;
-  for (const double d : found) result.mean += d / double(found.size());
-  const auto at = found.begin() + std::ptrdiff_t(.95 * double(found.size() - 1));
-  std::nth_element(found.begin(), at, found.end());
-  result.p95 = *at;
-  return result;
-}
-
-// A place for every quarter of a mm², the centre of the triangle that it falls in.
-std::vector<Eigen::Vector3d> evenly_on(const Mesh& mesh) {
-  constexpr double each = 2.5e5;  // µm²
-  std::vector<Eigen::Vector3d> places;
-  double passed = 0.;
-  for (const Triangle& t : mesh.triangles) {
-    const Eigen::Vector3d a = mesh.positions[t[0]].cast<double>(), b = mesh.positions[t[1]].cast<double>(),
-                          c = mesh.positions[t[2]].cast<double>();
-    passed += (b - a).cross(c - a).norm() / 2.;
-    if (passed > each) places.emplace_back((a + b + c) / 3.), passed = std::fmod(passed, each);
-  }
-  return places;
-}
-
-// Of surfaces that are brought over from a template vertices crowd in sulci, so that these say more of sulci.
-std::vector<Eigen::Vector3d> at_vertices(const Mesh& mesh) {
-  std::vector<Eigen::Vector3d> places;
-  for (const Vec3& p : mesh.positions) places.push_back(p.cast<double>());
-  return places;
-}
 
 void run(const Options& options, Console& console) {
   const auto read = [](const std::filesystem::path& path) {
@@ -106,15 +69,19 @@ void run(const Options& options, Console& console) {
     const Distances to = distances(evenly_on(mesh), TriangleTree(given[i])),
                     from = distances(evenly_on(given[i]), tree),
                     vertices = distances(at_vertices(given[i]), tree);
+    const auto figures = [](const Distances& d) {
+      return nlohmann::ordered_json{{"mean", d.mean / 1e3}, {"p95", d.p95 / 1e3}};
+    };
+    const auto text = [](const char* what, const Distances& d) {
+      return fmt::format("{} {:.3f} / {:.3f} mm", what, d.mean / 1e3, d.p95 / 1e3);
+    };
     out["surfaces"].push_back({{"object", stacks[i].objects[0]},
                                {"euler", euler_number(mesh)},
-                               {"made_to_given", {{"mean", to.mean}, {"p95", to.p95}}},
-                               {"given_to_made", {{"mean", from.mean}, {"p95", from.p95}}},
-                               {"vertices_to_made", {{"mean", vertices.mean}, {"p95", vertices.p95}}}});
-    table.push_back({stacks[i].objects[0] + " surface",
-                     fmt::format("made → given {:.3f} / {:.3f} mm", to.mean, to.p95),
-                     fmt::format("given → made {:.3f} / {:.3f} mm", from.mean, from.p95),
-                     fmt::format("its vertices → made {:.3f} / {:.3f} mm", vertices.mean, vertices.p95)});
+                               {"made_to_given", figures(to)},
+                               {"given_to_made", figures(from)},
+                               {"vertices_to_made", figures(vertices)}});
+    table.push_back({stacks[i].objects[0] + " surface", text("made → given", to), text("given → made", from),
+                     text("its vertices → made", vertices)});
   }
   console.print(out);
   console.table({"of", "mean / 95th percentile", "", ""}, table);

@@ -332,6 +332,10 @@ constexpr Verb actions[] = {
      "brainforest cortex compare lh.contours --svg overlays", cortex_compare},
     {"surfaces", "Make the outer and the inner surface of contours",
      "brainforest cortex surfaces lh.contours -o outer.surf.gii inner.surf.gii", cortex_surfaces},
+    {"distance", "Tell how far two surfaces are from one another",
+     "brainforest cortex distance lh.pial outer.surf.gii --values away.txt\n"
+     "  brainforest render lh.pial --overlay away.txt -o away.png",
+     cortex_distance},
     {"build", "Fill the space between two surfaces with certified elements",
      "brainforest cortex build lh.pial lh.white -o elements.h5", build},
     {"report", "Measure a file of elements",

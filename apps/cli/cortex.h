@@ -14,6 +14,7 @@ class Console;
 
 std::function<void()> cortex_compare(CLI::App& command, Console& console);
 std::function<void()> cortex_contours(CLI::App& command, Console& console);
+std::function<void()> cortex_distance(CLI::App& command, Console& console);
 std::function<void()> cortex_faces(CLI::App& command, Console& console);
 std::function<void()> cortex_grid(CLI::App& command, Console& console);
 std::function<void()> cortex_surfaces(CLI::App& command, Console& console);

@@ -134,6 +134,16 @@ $BRAINFOREST cortex surfaces s.contours -o outer_all.gii inner_all.gii --error 0
 told surfaces.json 'd["triangles_before"] > 2 * sum(s["triangles"] for s in d["surfaces"])'
 told all.json 'd["triangles_before"] == sum(s["triangles"] for s in d["surfaces"])'
 told surfaces.json 'all(s["euler"] == 2 for s in d["surfaces"])'
+# How far it is from the one that was cut.
+$BRAINFOREST cortex distance outer outer_all.gii --values away.txt --json >distance.json
+told distance.json 'len(d) == 4 and d[0]["from"] == "outer" and d[1]["to"] == "outer" and all(r["count"] > 500 for r in d)'
+told distance.json 'all(0 < r["median"] < r["mean"] * 2 < .5 and r["p95"] <= r["greatest"] for r in d)'
+$BRAINFOREST cortex distance outer outer --json >self.json
+told self.json 'all(r["greatest"] < 1e-6 for r in d)'
+[ "$(wc -l <away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
+refuses 'already' $BRAINFOREST cortex distance outer inner --values away.txt
+refuses 'no_such' $BRAINFOREST cortex distance outer no_such
+refuses 'nan: has a vertex that is nowhere' $BRAINFOREST cortex distance nan inner
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
 
