@@ -70,8 +70,8 @@ void run(const Options& o, Console& console) {
                                    d.farthest.z() / 1e3)});
     }
   console.print(out);
-  console.table({"from → to", "places", "count", "mean mm", "median mm", "p95 mm", "greatest mm", "there, mm"},
-                table);
+  console.table(
+      {"from → to", "places", "count", "mean mm", "median mm", "p95 mm", "greatest mm", "there, mm"}, table);
 }
 
 }  // namespace

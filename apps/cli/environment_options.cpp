@@ -46,8 +46,7 @@ cortex::Environment read(const std::string& file, Console& console) {
     return circuit::environment(circuit.circuit, radii);
   }
   if (fs::exists(file, none)) return circuit::read_environment(file);
-  const auto layers = circuit::column(find_recipe(file)).layers();
-  return cortex::Environment({layers.begin(), layers.end()});
+  return cortex::Environment(circuit::slabs(find_recipe(file)));
 }
 
 }  // namespace

@@ -118,16 +118,15 @@ void grow_in_place(Planted& planted, const std::vector<std::optional<Seedlings>>
 }
 
 /// The neurons of every population that the recipe plants from.
-std::vector<NeuronRow> rows_for(const circuit::Recipe& recipe, const std::string& repo) {
-  const auto wanted = circuit::counts(recipe);
+std::vector<NeuronRow> rows_for(const circuit::Recipe& recipe, const std::vector<bool>& wanted,
+                                const std::string& repo) {
   std::vector<NeuronRow> rows;
   std::optional<Repository> repository;
   std::set<std::string> populations;
   std::vector<std::string> empty;
   for (std::size_t type = 0; type < recipe.types.size(); ++type) {
     const std::string& population = recipe.types[type].population;
-    if (std::ranges::all_of(wanted, [&](const auto& layer) { return layer[type] == 0; }) ||
-        !grammar_of(recipe, type).empty() || !populations.insert(population).second)
+    if (!wanted[type] || !grammar_of(recipe, type).empty() || !populations.insert(population).second)
       continue;
     if (repo.empty())
       throw Error(fmt::format("recipe {} plants {}s from population {}; name its repository with --repo",
@@ -179,8 +178,9 @@ circuit::Recipe find_recipe(const std::string& name_or_path) {
                                fmt::join(names, ", ")));
 }
 
-Stock stock_of(const circuit::Recipe& recipe, const std::string& repo, Progress& progress) {
-  const auto rows = rows_for(recipe, repo);
+Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, const std::string& repo,
+               Progress& progress) {
+  const auto rows = rows_for(recipe, wanted, repo);
   const auto names = names_of(rows);
   Stock stock{std::vector<circuit::Candidate>(rows.size()), std::vector<Morphology>(rows.size())};
   progress.begin("loading", rows.size());
@@ -214,7 +214,11 @@ void mark_glia(Planted& planted) {
 Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
                               Progress& progress) {
   const auto seedlings = seedlings_of(recipe, seed);
-  auto [candidates, neurons] = stock_of(recipe, repo, progress);
+  std::vector<bool> wanted(recipe.types.size());
+  for (const auto& layer : circuit::counts(recipe))
+    for (std::size_t type = 0; type < wanted.size(); ++type)
+      if (layer[type]) wanted[type] = true;
+  auto [candidates, neurons] = stock_of(recipe, wanted, repo, progress);
 
   // A candidate for all seedlings of a type; its population is one that no repository has.
   circuit::Recipe planted_by = recipe;

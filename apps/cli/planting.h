@@ -22,8 +22,10 @@ struct Stock {
   std::vector<Morphology> neurons;  // one for each
 };
 /// Throws Error when a population that the recipe plants from is empty, with the commands that fill it.
+/// @param wanted  of each type whether any of it is planted
 /// @param repo  may be empty when all types have a grammar
-Stock stock_of(const circuit::Recipe& recipe, const std::string& repo, Progress& progress);
+Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, const std::string& repo,
+               Progress& progress);
 
 struct Planted {
   circuit::Circuit circuit;

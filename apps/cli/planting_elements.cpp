@@ -293,7 +293,12 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
         fmt::format("there are {} and no {} elements in {}", all.elements.size(), asked,
                     options.row > 1 ? "that row, which ends or comes back there" : options.file.string()));
 
-  Stock stock = stock_of(recipe, repo, progress);
+  std::vector<bool> wanted_types(recipe.types.size());
+  for (const auto& layer : recipe.layers)
+    for (std::size_t type = 0; type < wanted_types.size(); ++type)
+      if (layer.mix[type] > 0. && (layer.count ? *layer.count > 0 : layer.density > 0.))
+        wanted_types[type] = true;
+  Stock stock = stock_of(recipe, wanted_types, repo, progress);
   const auto start = Clock::now();
   double scale = options.scale;
   if (options.density > 0.) {

@@ -49,8 +49,7 @@ cortex::Environment parse_environment(std::string_view text, const std::string& 
   const toml::table value = parse_toml(text, file);
   const Node root(value, file, "the environment");
   if (root.find("type")) {
-    const cortex::Column tissue = column(parse_recipe(text, file));
-    return cortex::Environment({tissue.layers().begin(), tissue.layers().end()});
+    return cortex::Environment(slabs(parse_recipe(text, file)));
   }
   root.allow({"name", "layer", "soma", "attractor"});
   auto layers = slabs(read_all(root, "layer", read_layer));

@@ -50,7 +50,7 @@ double mean_density(const Recipe& recipe) {
   const auto densities = densities_of(recipe);
   double sum = 0.;
   for (std::size_t l = 0; l < densities.size(); ++l) sum += densities[l] * double(recipe.layers[l].thickness);
-  return sum / double(column(recipe).height());
+  return sum / double(slabs(recipe).front().top);
 }
 
 ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates,
@@ -60,7 +60,7 @@ ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> 
   if (!(options.scale > 0. && std::isfinite(options.scale)))
     throw Error(fmt::format("densities cannot be scaled by {}; give a positive number", options.scale));
   const std::size_t layers = recipe.layers.size();
-  const double height = double(column(recipe).height());
+  const double height = double(slabs(recipe).front().top);
   double depth = 0.;
   for (const Recipe::Layer& layer : recipe.layers)
     depths_.push_back(depth += double(layer.thickness) / height);

@@ -76,9 +76,11 @@ Recipe read_root(const Node& root) {
   recipe.name = root.at("name").string();
   if (const auto neurons = root.find("neurons")) recipe.neurons = neurons->whole();
   if (const auto rotate = root.find("rotate")) recipe.rotate = rotate->boolean();
-  const Node column = root.at("column");
-  column.allow({"radius"});
-  recipe.radius = float(column.at("radius").number(1e-3, longest, "µm"));
+  const auto column = root.find("column");
+  if (column) {
+    column->allow({"radius"});
+    recipe.radius = float(column->at("radius").number(1e-3, longest, "µm"));
+  }
   if (const auto soma = root.find("soma")) {
     soma->allow({"gap"});
     recipe.soma_gap = float(soma->at("gap").number(0., 1e4, "µm"));
@@ -103,7 +105,7 @@ Recipe read_root(const Node& root) {
   try {
     check(recipe);
   } catch (const Error& error) {  // a sentence about the numbers as a whole
-    (root.find("neurons") ? root.at("neurons") : column).refuse(error.what());
+    (root.find("neurons") ? root.at("neurons") : column ? *column : root).refuse(error.what());
   }
   return recipe;
 }
@@ -120,7 +122,7 @@ Recipe read_recipe(const std::filesystem::path& path) {
 }
 
 void check(const Recipe& recipe) {
-  column(recipe);  // throws when a length is none
+  (void)slabs(recipe);  // throws when a length is none
   if (recipe.types.empty()) throw Error("a recipe needs at least one cell type");
   if (!(recipe.soma_gap >= 0.f)) throw Error("the gap between somata must not be negative");
   for (const Recipe::Layer& layer : recipe.layers) {
@@ -132,13 +134,32 @@ void check(const Recipe& recipe) {
     if (!(layer.density >= 0.))
       throw Error(fmt::format("the density of layer {} must not be negative", layer.name));
   }
-  counts(recipe);  // throws when they do not work out
+  const bool counted =
+      recipe.neurons || std::ranges::any_of(recipe.layers, [](const auto& l) { return l.count.has_value(); });
+  if (recipe.radius != 0.f || counted) counts(recipe);  // throws when they do not work out
 }
 
-cortex::Column column(const Recipe& recipe) {
+namespace {
+
+cortex::Column column_of(const Recipe& recipe, float radius) {
   std::vector<cortex::Column::Layer> layers;
   for (const Recipe::Layer& layer : recipe.layers) layers.push_back({layer.name, layer.thickness});
-  return cortex::Column(recipe.radius, layers);
+  return cortex::Column(radius, layers);
+}
+
+}  // namespace
+
+cortex::Column column(const Recipe& recipe) {
+  if (recipe.radius == 0.f)
+    throw Error(
+        "the recipe speaks of no column, in which so many neurons could stand; add [column] with its radius, "
+        "or give densities and plant it in elements (--elements)");
+  return column_of(recipe, recipe.radius);
+}
+
+std::vector<cortex::Slab> slabs(const Recipe& recipe) {
+  const cortex::Column tissue = column_of(recipe, 1.f);  // whatever its radius
+  return {tissue.layers().begin(), tissue.layers().end()};
 }
 
 std::vector<std::uint32_t> apportion(std::uint32_t total, std::span<const double> weights) {

@@ -27,7 +27,7 @@ struct Recipe {
   };
 
   std::string name = "column";
-  float radius = 0.f;  // of the column, µm, > 0
+  float radius = 0.f;  // of the column, µm; 0: of a tissue of which only densities are known
   std::vector<CellType> types;
   /// Of each type the grammar by which its neurons grow where they stand, among the others; empty: they come from its
   /// population. A vector shorter than `types` stands for empty ones.
@@ -48,11 +48,13 @@ Recipe read_recipe(const std::filesystem::path& path);
 /// Throws Error that says which of the sentences above is violated.
 void check(const Recipe& recipe);
 
-/// The column a recipe speaks of.
+/// The column a recipe speaks of. Throws Error where it speaks of none.
 cortex::Column column(const Recipe& recipe);
+/// Its layers, from the pia downwards; y is 0 at their lower end.
+std::vector<cortex::Slab> slabs(const Recipe& recipe);
 
 /// The number of neurons to plant, exactly: [layer][type]. Whole numbers by largest remainder, first among
-/// the layers, then among the types of a layer. Throws Error when the explicit counts exceed `neurons`.
+/// the layers, then among the types of a layer. Throws Error when the explicit counts exceed `neurons`, or it speaks of no column.
 std::vector<std::vector<std::uint32_t>> counts(const Recipe& recipe);
 
 /// Shares out `total` in proportion to `weights` (>= 0) by Hamilton's method of largest remainders: the sum

@@ -180,6 +180,23 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{"small = 0.75", "giant = 0.75", 23, "add a [[type]]"},
                     Mistake{"density = 3000", "count = 11", 2, "raise \"neurons\""}));
 
+TEST(Recipe, WithoutAColumnSpeaksOfTissue) {
+  std::string text(good);
+  const auto cut = [&](const std::string& what) { text.erase(text.find(what), what.size()); };
+  text.erase(text.find("[column]"), text.find('\n', text.find("radius")) - text.find("[column]"));
+  EXPECT_THROW((void)parse_recipe(text, "tissue.toml"), InputError);  // ten neurons, but in what?
+  cut("neurons = 10");
+  const Recipe recipe = parse_recipe(text, "tissue.toml");
+  EXPECT_EQ(recipe.radius, 0.f);
+  EXPECT_EQ(slabs(recipe).size(), recipe.layers.size());
+  try {
+    (void)counts(recipe);
+    FAIL();
+  } catch (const Error& error) {
+    EXPECT_THAT(error.what(), HasSubstr("speaks of no column"));
+  }
+}
+
 TEST(Recipe, TruncatedAnywhereIsAnErrorOrAValueNeverACrash) {
   for (std::size_t length = 0; length < good.size(); ++length) {
     try {

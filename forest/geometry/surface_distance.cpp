@@ -43,8 +43,7 @@ Distances distances(std::span<const Place> places, const TriangleTree& surface) 
   Distances d;
   d.each.resize(places.size());
   if (places.empty()) return d;
-  parallel_for(places.size(), 256,
-               [&](std::size_t i) { d.each[i] = surface.nearest(places[i])->distance; });
+  parallel_for(places.size(), 256, [&](std::size_t i) { d.each[i] = surface.nearest(places[i])->distance; });
   const auto most = std::ranges::max_element(d.each);
   d.greatest = *most, d.farthest = places[std::size_t(most - d.each.begin())];
   d.mean = std::accumulate(d.each.begin(), d.each.end(), 0.) / double(places.size());

@@ -9,7 +9,8 @@ namespace forest {
 namespace {
 
 TEST(SurfaceDistance, OfNestedBallsIsTheDifferenceOfTheirRadii) {
-  const Mesh inner = icosphere(Vec3(5, 6, 7), 10'000.f, 5, 0), outer = icosphere(Vec3(5, 6, 7), 12'000.f, 5, 0);
+  const Mesh inner = icosphere(Vec3(5, 6, 7), 10'000.f, 5, 0),
+             outer = icosphere(Vec3(5, 6, 7), 12'000.f, 5, 0);
   for (const auto& [from, to] : {std::pair{&inner, &outer}, {&outer, &inner}}) {
     const TriangleTree tree(*to);
     for (const auto& places : {evenly_on(*from), at_vertices(*from)}) {

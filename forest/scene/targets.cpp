@@ -188,9 +188,22 @@ Members Targets::named(const std::string& name) const {
     meant = std::move(members);
   }
   if (!meant)
-    throw Error(
-        fmt::format("there is no target '{}' in this forest; 'brainforest targets' lists them", name));
+    throw Error(fmt::format("there is no target '{}' in this forest, which has {}", name, some_names()));
   return *meant;
+}
+
+std::string Targets::some_names() const {
+  constexpr std::size_t few = 12;
+  std::vector<std::string> names;
+  for (const circuit::NodeSet& set : sets_.sets) names.push_back(set.name);
+  for (const Family& family : families)
+    for (const std::string& word : attribute_of(forest_, family.attribute).words)
+      if (const std::string shown(shown_word(word)); std::ranges::find(names, shown) == names.end())
+        names.push_back(shown);
+  names.emplace_back("all");
+  const std::size_t more = names.size() > few ? names.size() - few : 0;
+  names.resize(names.size() - more);
+  return fmt::format("{}{}", fmt::join(names, ", "), more ? fmt::format(" and {} more", more) : "");
 }
 
 std::vector<TargetFacts> Targets::list() const {

@@ -42,6 +42,7 @@ class Targets {
 
  private:
   circuit::Members named(const std::string& name) const;
+  std::string some_names() const;
 
   Forest forest_;
   circuit::NodeSets sets_;

@@ -45,6 +45,29 @@ assert np.array_equal(one, two[-len(one):])            # an element is the same 
 assert np.all((np.linalg.norm(one, axis=1) > 5900) & (np.linalg.norm(one, axis=1) < 8100))
 PY
 
+# A recipe that speaks of no column does as well, and of none at all here.
+sed '/^\[column\]/,/^$/d' "$FOREST_SOURCE_DIR/data/recipes/human-frontal.toml" >tissue.toml
+$BRAINFOREST plant --elements e.h5 --recipe tissue.toml --repo cells.db --element 7 --seed 2 --scale .1 --out no_column >/dev/null
+cmp one/nodes.h5 no_column/nodes.h5
+refuses 'speaks of no column' $BRAINFOREST plant --recipe tissue.toml --repo cells.db --out no
+[ ! -e no ]
+
+# The lines that bound the element, and the way up.
+python3 - <<'PY'
+import json
+ours = json.load(open("one/circuit_config.json"))["brainforest"]
+lines = json.load(open("one/outline.json"))
+assert ours["outline"] == "$BASE_DIR/outline.json" and len(lines) > 12 + 4 * 5, (ours, len(lines))
+for line in lines:
+    assert all(5900 < sum(c * c for c in p) ** .5 < 8100 for p in line), line
+middle = [sum(p[k] for line in lines for p in line) for k in range(3)]
+length = sum(c * c for c in middle) ** .5
+assert sum(a * b for a, b in zip(middle, ours["up"])) / length > .99, (middle, ours["up"])   # away from the centre of the ball
+PY
+cp -r one damaged && echo '[[[1,2]]]' >damaged/outline.json
+refuses 'a point of the "outline" must be three numbers' $BRAINFOREST pack damaged -o no.forest
+[ ! -e no.forest ]
+
 # Every soma is found again in its element, by the file of elements alone: the polynomial through 4×4×4 places.
 /usr/bin/python3 - <<'PY'
 import h5py, numpy as np
