@@ -6,6 +6,8 @@
 namespace forest {
 namespace {
 
+constexpr std::size_t most_triangles_at_rest = 4'000'000;
+
 bool has_skin(const frame::State& state) { return state.kind == frame::Kind::skin; }
 
 bool forced(const scene::Colouring& colouring) {
@@ -33,15 +35,26 @@ bool Dressing::wanted(const scene::View& view, const scene::Colouring& colouring
          (synapses && view.synapses != scene::SynapseColour::none);
 }
 
+std::uint32_t Dressing::still_samples(const scene::View& view, const scene::Colouring& colouring) const {
+  const bool skin_begins = view.skin && (skinned || forced(colouring)),
+             clear = !surfaces.empty() && surfaces.visibility > 0.f && surfaces.visibility < 1.f;
+  return scene::still_samples(view, colouring, skin_begins || clear);
+}
+
 void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut,
                       const scene::Eye& eye, const scene::Colouring& colouring, bool playing,
                       const scene::Chooser::Painter& painter, const DressingLimits& limits) {
   rest();
   surfaces.show(frame, colouring, playing);
+  // A picture at rest has time for what its pixels can show: a voxel is some pixels wide, and half of the triangles are averted.
+  scene::SkinLimits most = limits.skin;
+  if (frame.subframes >= scene::samples_at_rest)
+    most.triangles =
+        std::clamp(3 * std::size_t(frame.width) * frame.height, most.triangles, most_triangles_at_rest);
   if (view.skin && skinned)
-    skin.show(frame, cut, eye, colouring, painter, limits.skin);
+    skin.show(frame, cut, eye, colouring, painter, most);
   else if (view.skin && forced(colouring))
-    skin.show(frame, cut, eye, alone(colouring), painter, limits.skin);
+    skin.show(frame, cut, eye, alone(colouring), painter, most);
   if (!synapses) return;
   const bool taken = playing && view.synapses == scene::SynapseColour::target;
   chosen =

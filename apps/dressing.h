@@ -29,6 +29,8 @@ struct Dressing {
 
   /// Whether a picture of the view shows anything of them.
   bool wanted(const scene::View& view, const scene::Colouring& colouring) const;
+  /// scene::still_samples, which skin that begins and surfaces that are seen through need, too.
+  std::uint32_t still_samples(const scene::View& view, const scene::Colouring& colouring) const;
   /// Adds them to a frame composed of `cut`, as the view wants them. The frame must not outlive this object, or its next call.
   /// @param playing  activity takes the palette entries of branches
   void put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut, const scene::Eye& eye,

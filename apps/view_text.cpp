@@ -11,7 +11,7 @@
 
 namespace forest {
 
-scene::View view_of(std::string_view text, const std::string& name) {
+scene::View view_of(std::string_view text, const std::string& name, const Vec3& up) {
   try {
     [[maybe_unused]] const auto json = nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {
@@ -19,17 +19,17 @@ scene::View view_of(std::string_view text, const std::string& name) {
   } catch (const nlohmann::json::exception&) {
     throw InputError(name, 1, "holds a number too large for any view; write it smaller");
   }
-  return scene::parse_view(text, name);
+  return scene::parse_view(text, name, up);
 }
 
-scene::View read_view(const std::string& file_or_text) {
+scene::View read_view(const std::string& file_or_text, const Vec3& up) {
   const std::size_t first = file_or_text.find_first_not_of(" \t\r\n");
-  if (first != std::string::npos && file_or_text[first] == '{') return view_of(file_or_text, "--view");
+  if (first != std::string::npos && file_or_text[first] == '{') return view_of(file_or_text, "--view", up);
   const MappedFile file(file_or_text);
-  return view_of(file.text(), file_or_text);
+  return view_of(file.text(), file_or_text, up);
 }
 
-std::vector<scene::View> read_views(const std::string& name) {
+std::vector<scene::View> read_views(const std::string& name, const Vec3& up) {
   const MappedFile file(name);
   std::string_view text = file.text();
   std::vector<scene::View> views;
@@ -39,7 +39,7 @@ std::vector<scene::View> read_views(const std::string& name) {
     text.remove_prefix(std::min(end + 1, text.size()));
     if (row.find_first_not_of(" \t\r") == row.npos) continue;
     try {
-      views.push_back(view_of(row, name));
+      views.push_back(view_of(row, name, up));
     } catch (const InputError& error) {
       throw InputError(name, line, error.sentence());
     }

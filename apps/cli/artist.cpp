@@ -168,15 +168,17 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   progress.begin("filming", std::size_t(count));
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
-    view.samples = plan.samples;
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
+    view.samples = scene::samples_at_rest;
+    const bool clear = artist.still_samples(view) > view.samples;
+    view.samples = plan.samples.value_or(clear ? 32 : 8);
     if (plan.synapses) view.synapses = *plan.synapses;
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {
       view.activity = activity;
       view.activity->time = plan.from + i * picture_ms;
     }
-    Drawn drawn = artist.draw(view, plan.width, plan.height);
+    Drawn drawn = artist.draw(view, plan.width, plan.height, plan.outline);
     segments += drawn.segments;
     figures.covered += drawn.image.covered / count;
     artist.explain(view, plan.marks, drawn.image);

@@ -48,6 +48,10 @@ class Artist {
   /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  /// How many samples a picture of the view at rest has (Dressing::still_samples).
+  std::uint32_t still_samples(const scene::View& view) const {
+    return dressing_.still_samples(view, scene::colour(targets_, view));
+  }
   /// Draws into a picture how it is to be read. Small pictures stay as they are.
   /// @return  what was asked for and is not in it, a sentence; or nothing
   std::string explain(const scene::View& view, const Marks& marks, frame::Image& image) const;
@@ -92,12 +96,14 @@ struct FilmFigures {
 };
 
 struct FilmPlan {
-  std::uint32_t width = 1280, height = 720, samples = 4;
+  std::uint32_t width = 1280, height = 720;
+  std::optional<std::uint32_t> samples;  // of a pixel; none: 8, where something is seen through 32
   int frames_per_second = 25;
   double seconds = 5.;
   std::optional<scene::Scanpath> gaze;  // replayed from its begin; none: that of the views
   std::filesystem::path pictures;       // when not empty: a folder for the single pictures as PNG files
   Marks marks{.legend = false};
+  bool outline = false;                          // of the column or the elements
   std::vector<scene::Appearance> targets;        // after those of the path's views
   std::optional<scene::SynapseColour> synapses;  // none: as the path's views say
   double from = 0., rate = 0.;                   // of activity: ms at the first picture, ms a second of film

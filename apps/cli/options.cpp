@@ -38,7 +38,7 @@ void must_be_within(CLI::Option& option, double low, double high) {
     const auto [rest, error] = std::from_chars(text.data(), end, value);
     return error == std::errc() && rest == end && value >= low && value <= high  // no NaN is
                ? std::string()
-               : fmt::format("{} is no number from {} to {}", repository::shown(text), low, high);
+               : fmt::format("{} is no number from {:g} to {:g}", repository::shown(text), low, high);
   });
 }
 

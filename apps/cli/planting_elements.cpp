@@ -67,6 +67,7 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
   parallel_for(elements.size(), 256, [&](std::size_t e) { middles[e] = elements[e].at(.5, .5, .5); });
   if (!options.near.empty()) {
     const Place near(options.near[0], options.near[1], options.near[2]);
+    if (!near.allFinite()) throw Error("--near must be three numbers, µm");
     std::vector<std::pair<double, std::uint32_t>> order;
     for (std::uint32_t e = 0; e < middles.size(); ++e)
       order.emplace_back((middles[e] - near).squaredNorm(), e);

@@ -120,10 +120,15 @@ std::function<void()> render(CLI::App& command, Console& console) {
     const auto [width, height] = parse_size(options->size);
     SurfaceOptions named = options->surfaces;
     const bool alone = is_surface(options->forest);
-    if (alone && (options->skin || options->outline))
+    const char* of_neurons = options->skin                    ? "--skin"
+                             : options->outline               ? "--outline"
+                             : !options->targets.only.empty() ? "--only"
+                             : !options->targets.hide.empty() ? "--hide"
+                                                              : nullptr;
+    if (alone && of_neurons)
       throw Error(
           fmt::format("{} is of neurons, and {} is a surface; name a forest file, and that by --surface",
-                      options->skin ? "--skin" : "--outline", options->forest.string()));
+                      of_neurons, options->forest.string()));
     if (alone) named.files.insert(named.files.begin(), options->forest);
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
@@ -132,7 +137,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     add_appearances(options->targets, shown);
     scene::View view = options->view.empty() ? default_view(artist.targets(), shown, surfaces, options->side,
                                                             float(width) / float(height))
-                                             : read_view(options->view);
+                                             : read_view(options->view, forest.circuit().up);
     if (!options->view.empty()) std::ranges::move(shown, std::back_inserter(view.targets));
     nlohmann::ordered_json of_surfaces;  // null where there are none
     if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();
@@ -150,7 +155,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     play(artist, options->activity, view, console);
     if (options->outline && scene::outline(forest).empty())
       console.warn("the forest is neither a column nor planted in elements, so it has no outline");
-    view.samples = scene::still_samples(view, scene::colour(artist.targets(), view));
+    view.samples = artist.still_samples(view);
     Drawn drawn = artist.draw(view, width, height, options->outline);
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
@@ -227,9 +232,13 @@ std::function<void()> movie(CLI::App& command, Console& console) {
   command.add_option("--fps", options->plan.frames_per_second, "Pictures a second")
       ->check(CLI::Range(1, 120))
       ->capture_default_str();
-  command.add_option("--samples", options->plan.samples, "Subframes a picture: more is smoother and slower")
-      ->check(CLI::Range(1, 256))
-      ->capture_default_str();
+  command
+      .add_option("--samples", options->plan.samples,
+                  "Subframes a picture: more is smoother and slower; by default 8, where something is seen "
+                  "through 32")
+      ->check(CLI::Range(1, 256));
+  command.add_flag("--outline", options->plan.outline,
+                   "Draw the outline of the column or the elements, and their layers");
   command.add_option("--pictures", options->plan.pictures, "Also write every picture into this folder");
   options->plan.marks.legend = true;
   add_marks(command, options->plan.marks);
@@ -241,8 +250,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     std::tie(plan.width, plan.height) = parse_size(options->size);
     const scene::Forest forest = scene::Forest::open(options->forest);
     std::vector<scene::View> views;
-    for (const std::string& view : options->views) views.push_back(read_view(view));
-    if (!options->path.empty()) views = read_views(options->path);
+    for (const std::string& view : options->views) views.push_back(read_view(view, forest.circuit().up));
+    if (!options->path.empty()) views = read_views(options->path, forest.circuit().up);
     if (!options->scanpath.empty())
       plan.gaze = scene::parse_scanpath(MappedFile(options->scanpath).text(), options->scanpath);
     const bool playing = !options->activity.file.empty();
@@ -266,7 +275,11 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       plan.from = *look->activity->time;
       plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
     }
-    const scene::CameraPath path = views.empty() ? scene::walk(forest) : scene::CameraPath(std::move(views));
+    scene::View shown;
+    shown.targets = plan.targets;
+    const scene::CameraPath path = views.empty()
+                                       ? scene::walk(forest, scene::colour(artist.targets(), shown).states)
+                                       : scene::CameraPath(std::move(views));
     const FilmFigures figures =
         film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);
     if (figures.covered == 0.)

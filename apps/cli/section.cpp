@@ -55,17 +55,24 @@ std::vector<float> numbers_of(const std::string& text, std::size_t count, const 
   return numbers;
 }
 
+// The normal of a section along the columns: z, or where the pia lies nearly there, x.
+Vec3 beside(const scene::Forest& forest) {
+  const Vec3 up = forest.circuit().up.normalized();
+  const Vec3 wish = std::abs(up.z()) > .9f ? Vec3(Vec3::UnitX()) : Vec3(Vec3::UnitZ());
+  return (wish - wish.dot(up) * up).normalized();
+}
+
 Plane plane_of(const std::string& text, const scene::Forest& forest) {
   if (text.empty()) {
     if (forest.soma_bounds().empty())
       throw Error("the forest has no neurons, so there is no middle to cut; give --plane");
-    return Plane::through(forest.soma_bounds().centre(), Vec3::UnitZ());
+    return Plane::through(forest.soma_bounds().centre(), beside(forest), forest.circuit().up);
   }
   const auto n = numbers_of(text, 6, "x,y,z,nx,ny,nz: a point of the plane in µm and its normal");
   const Vec3 normal(n[3], n[4], n[5]);
   if (!(normal.norm() > 1e-6f * normal.cwiseAbs().sum()) || normal.isZero())
     throw Error(fmt::format("'{}' has no direction: its last three numbers are the normal", text));
-  return Plane::through({n[0], n[1], n[2]}, normal);
+  return Plane::through({n[0], n[1], n[2]}, normal, forest.circuit().up);
 }
 
 std::string csv_of(const scene::Forest& forest, const std::vector<scene::ProfileArea>& areas) {

@@ -242,10 +242,14 @@ void Viewport::set_playing(bool playing) {
   Q_EMIT moved();
 }
 
+std::uint32_t Viewport::samples_at_rest() const {
+  return dressing_.still_samples(settings_.view, colouring_);
+}
+
 frame::Image Viewport::picture() {
   if (!renderer_) throw Error("there is no picture yet; wait until one is drawn");
   makeCurrent();
-  const std::uint32_t samples = std::max(scene::still_samples(settings_.view, colouring_), 16u);
+  const std::uint32_t samples = std::max(samples_at_rest(), 16u);
   draw_still(samples, 0, samples);
   frame::Image image = united_ ? *united_ : renderer_->read();
   for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
@@ -435,7 +439,7 @@ void Viewport::draw_still(std::uint32_t samples, std::uint32_t first, std::uint3
 void Viewport::refine() {
   QElapsedTimer clock;
   clock.start();
-  const std::uint32_t samples = scene::still_samples(settings_.view, colouring_);
+  const std::uint32_t samples = samples_at_rest();
   const std::uint32_t group = processor_ ? frame::drawn_together(samples) : 1;
   const auto affordable =
       std::uint32_t(std::max(1.f, slice_milliseconds / sample_milliseconds_ / float(group)));

@@ -151,6 +151,7 @@ class Viewport final : public QOpenGLWidget {
                   const DressingLimits& limits = {});
   void draw_part(const scene::View& view, std::uint32_t first, std::uint32_t last,
                  const DressingLimits& limits);
+  std::uint32_t samples_at_rest() const;
   void refine();
   void took(float milliseconds);
   void paint(const frame::Image& drawn, float softness);

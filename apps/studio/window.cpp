@@ -381,7 +381,7 @@ void Window::play_path() {
                                    nullptr, QFileDialog::DontUseNativeDialog);
   if (path.isEmpty()) return;
   try {
-    viewport_->fly_along(read_views(path.toStdString()));
+    viewport_->fly_along(read_views(path.toStdString(), viewport_->forest().circuit().up));
   } catch (const std::exception& error) {
     QMessageBox::warning(this, tr("Path of views"), QString::fromUtf8(error.what()));
   }
@@ -390,7 +390,9 @@ void Window::play_path() {
 void Window::paste_view() {
   try {
     Settings settings = viewport_->settings();
-    set_view(settings, view_of(QApplication::clipboard()->text().toStdString(), "clipboard"),
+    set_view(settings,
+             view_of(QApplication::clipboard()->text().toStdString(), "clipboard",
+                     viewport_->forest().circuit().up),
              viewport_->forest().soma_bounds().centre());
     viewport_->change(settings);
   } catch (const std::exception& error) {

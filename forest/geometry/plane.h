@@ -14,11 +14,13 @@ struct Plane {
   Vec3 origin = Vec3::Zero();
   Vec3 normal = Vec3::UnitZ(), right = Vec3::UnitX(), up = Vec3::UnitY();  // orthonormal, right-handed
 
-  /// Up is as near to y (towards the pia) as the plane allows, and -z in a plane across y.
+  /// Up is as near to the pia as the plane allows, and -z in a plane across y where that lies.
   /// @param normal  of any length but zero
-  static Plane through(const Vec3& origin, const Vec3& normal) {
+  /// @param pia     towards it, likewise
+  static Plane through(const Vec3& origin, const Vec3& normal, const Vec3& pia = Vec3::UnitY()) {
     Plane plane{.origin = origin, .normal = normal.stableNormalized()};
-    const Vec3 wish = std::abs(plane.normal.y()) > .9999f ? Vec3(0.f, 0.f, -1.f) : Vec3(Vec3::UnitY());
+    const Vec3 beside = pia == Vec3::UnitY() ? Vec3(0.f, 0.f, -1.f) : pia.unitOrthogonal();
+    const Vec3 wish = std::abs(plane.normal.dot(pia.normalized())) > .9999f ? beside : pia;
     plane.right = wish.cross(plane.normal).normalized();
     plane.up = plane.normal.cross(plane.right);
     return plane;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <functional>
 #include <limits>
+#include <memory>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -44,11 +45,10 @@ Made made(std::size_t neurons = 25, std::size_t steps = 150) {
 std::vector<std::byte> bytes_of(const Made& m) {
   std::string name = (fs::temp_directory_path() / "forest-activity.XXXXXX").string();
   ::close(::mkstemp(name.data()));
+  const std::shared_ptr<void> removed(nullptr, [&](void*) { fs::remove(name); });  // if it throws, too
   pack(m.report, m.circuit, m.neurons, m.nodes, m.spikes, name, m.options);
   const MappedFile file(name);
-  std::vector<std::byte> bytes(file.bytes().begin(), file.bytes().end());
-  fs::remove(name);
-  return bytes;
+  return {file.bytes().begin(), file.bytes().end()};
 }
 
 Activity packed(const Made& m) { return Activity::from_bytes(bytes_of(m)); }

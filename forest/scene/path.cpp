@@ -92,34 +92,47 @@ float soma_clearance(const Forest& forest, const Vec3& point) {
   return nearest;
 }
 
-CameraPath walk(const Forest& forest) {
-  const View start = overview(forest);
-  const Bounds bounds = forest.soma_bounds();
+CameraPath walk(const Forest& forest, std::span<const frame::State> states) {
+  const View start = overview(forest, 16.f / 9.f, states);
+  // In axes of which y is the forest's way up.
+  const Vec3& up = forest.circuit().up;
+  const Mat3 turn = up == Vec3::UnitY() ? Mat3(Mat3::Identity())
+                                        : Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
+  Bounds bounds;
+  const auto seen = seen_in(states);
+  bool all = true;
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i)
+    if (const frame::Instance& at = forest.instances()[i]; seen(i))
+      bounds.add(turn.transpose() * Vec3(at.x, at.y, at.z));
+    else
+      all = false;
   if (bounds.empty()) return CameraPath({start});
-  const Vec3 centre = bounds.centre();
-  const float radius = std::max(forest.circuit().radius, 50.f), height = bounds.extent().y();
+  const Vec3 centre = bounds.centre(), from = turn.transpose() * start.camera.eye;
+  const float height = bounds.extent().y(), of_column = all ? forest.circuit().radius : 0.f;
+  const float radius =
+      std::max(of_column > 0.f ? of_column : .5f * std::min(bounds.extent().x(), bounds.extent().z()), 50.f);
 
   // The clearest of a few places around a wish: a walk must not end inside a soma.
   const auto clear_place = [&](const Vec3& wish, float spread) {
     Vec3 best = wish;
     float most = -INFINITY;
     for (int i = 0; i < 64; ++i) {
-      const float turn = 2.3999632f * float(i), out = spread * std::sqrt(float(i) / 64.f);
+      const float angle = 2.3999632f * float(i), out = spread * std::sqrt(float(i) / 64.f);
       const Vec3 place =
-          wish + Vec3(out * std::cos(turn), .5f * out * std::sin(1.7f * turn), out * std::sin(turn));
-      const float clearance = soma_clearance(forest, place);
+          wish + Vec3(out * std::cos(angle), .5f * out * std::sin(1.7f * angle), out * std::sin(angle));
+      const float clearance = soma_clearance(forest, turn * place);
       if (clearance > most) most = clearance, best = place;
     }
     return best;
   };
   const auto look = [&](const Vec3& eye, const Vec3& target, float field_of_view) {
     View view = start;
-    view.camera.eye = eye, view.camera.target = target, view.camera.field_of_view = field_of_view;
+    view.camera.eye = turn * eye, view.camera.target = turn * target;
+    view.camera.field_of_view = field_of_view;
     view.camera.near = .5f;
     return view;
   };
-  const Vec3 inward =
-      Vec3(centre.x() - start.camera.eye.x(), 0.f, centre.z() - start.camera.eye.z()).normalized();
+  const Vec3 inward = Vec3(centre.x() - from.x(), 0.f, centre.z() - from.z()).normalized();
   const Vec3 side = Vec3::UnitY().cross(inward);
   const float y = bounds.low.y() + .62f * height;
   const Vec3 level(centre.x(), y, centre.z());

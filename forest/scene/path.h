@@ -22,7 +22,8 @@ class CameraPath {
 };
 
 /// The demo's walk: from outside the column to a clear place inside, between the dendrites, never through a soma.
-CameraPath walk(const Forest& forest);
+/// @param states  of its instances: around and into those that are seen
+CameraPath walk(const Forest& forest, std::span<const frame::State> states = {});
 
 /// From outside the column straight to one soma near its middle, until it fills half the height: what `bench seam` walks.
 /// In equal times the distance to it shrinks by equal shares, slow at both ends, so that it grows evenly.

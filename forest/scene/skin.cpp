@@ -370,6 +370,8 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   const auto level_at = [](float magnification, float coarser) {
     return std::clamp(int(std::ceil(std::log2(magnification / (voxel_pixels * coarser)))), coarsest, finest);
   };
+  // How much smaller than usual voxels must be for a branch of so many pixels that is forced to have a skin.
+  const auto fineness = [](float width, float share) { return std::clamp(width / skin_begins, share, 1.f); };
   // Somewhere along a segment, which may be long: its parts that are in sight, as long as they are wide.
   struct Stretch {
     RoundCone cone;
@@ -402,11 +404,11 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
     for (const Stretch& part : parts) {
       if (part.width * part.magnification < skin_begins * part.share * coarser) continue;
       // Half of them are averted; and not more than fill the picture.
-      const double voxel = double(voxel_pixels * coarser * part.share);
-      expected +=
-          std::min(.5 * expected_triangles({{part.cone, 0, 0}},
-                                           voxel_of(level_at(part.magnification, coarser * part.share))),
-                   25. * pixels / (voxel * voxel));
+      const float finer = coarser * fineness(part.width * part.magnification, part.share);
+      const double voxel = double(voxel_pixels * finer);
+      expected += std::min(
+          .5 * expected_triangles({{part.cone, 0, 0}}, voxel_of(level_at(part.magnification, finer))),
+          25. * pixels / (voxel * voxel));
     }
     if (expected <= double(limits.triangles)) break;
     coarser *= float(std::clamp(std::sqrt(expected / double(limits.triangles)), 1.05, 2.));
@@ -440,7 +442,10 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
       for (const std::uint32_t k : spines)
         if (meet(ball, spine_ball(k))) on.push_back(k);
       if (here.empty() && (on.empty() || magnification < spines_begin * coarser)) return;
-      if (level < level_at(magnification, coarser * list[n].share)) {
+      float finer = 1.f;
+      for (const std::uint32_t segment : here)
+        finer = std::min(finer, fineness(of.widths[of.cones[segment].branch] * magnification, list[n].share));
+      if (level < level_at(magnification, coarser * finer)) {
         for (std::int64_t child = 0; child < 8; ++child)
           self(self, level + 1,
                PieceLattice::Cell{2 * cell[0] + (child & 1), 2 * cell[1] + (child >> 1 & 1),

@@ -478,7 +478,7 @@ constexpr int outline_corners = 16;
 /// @param seen  whether an instance is
 template <class Seen>
 std::vector<Vec3> sampled_branches(const Forest& forest, const Seen& seen) {
-  constexpr std::size_t enough = 4096, small = 200'000;
+  constexpr std::size_t enough = 4096, small = 1'000'000;
   const auto instances = forest.instances();
   std::uint64_t total = 0;
   for (std::uint32_t i = 0; i < instances.size(); ++i)
@@ -532,12 +532,18 @@ class Enclosing {
   /// All but a few that reach far beyond the others.
   void add_most(std::span<const Vec3> points) {
     if (points.empty()) return;
+    constexpr float beyond = .15f;  // of what the others take
+    std::array<float, 4> most, all;
     std::vector<float> reaches(points.size());
     for (std::size_t n = 0; n < 4; ++n) {
       std::ranges::transform(points, reaches.begin(), [&](const Vec3& p) { return normals_[n].dot(p); });
       const auto last = reaches.end() - 1 - std::ptrdiff_t(points.size() / few);
       std::ranges::nth_element(reaches, last);
-      reach_[n] = std::max(reach_[n], *last);
+      most[n] = *last, all[n] = *std::max_element(last, reaches.end());
+    }
+    for (std::size_t n = 0; n < 4; ++n) {
+      const float taken = most[n] + most[n ^ 1];
+      reach_[n] = std::max(reach_[n], all[n] <= most[n] + beyond * taken ? all[n] : most[n]);
     }
   }
   /// The eye, with a little room on all sides and no nearer than `least` µm, and what it looks at, as far away as `depth_of`.
@@ -574,7 +580,7 @@ float height_of(const Forest& forest, const Bounds& box) {
 
 }  // namespace
 
-View parse_view(std::string_view text, const std::string& name) {
+View parse_view(std::string_view text, const std::string& name, const Vec3& up) {
   Json json;
   try {
     std::vector<std::set<std::string>> open;  // objects, with the keys that each has had
@@ -591,6 +597,7 @@ View parse_view(std::string_view text, const std::string& name) {
   if (!json.is_object())
     throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
   View v;
+  v.camera.up = up;
   read_all(v, json, keys_of_view(), name, "");  // what is misspelt first
   for (const char* needed : {"eye", "target"})
     if (!json.contains(needed))
@@ -615,10 +622,7 @@ std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }
 std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 
 View overview(const Forest& forest, float aspect, std::span<const frame::State> states) {
-  using frame::State;
-  const auto shown = [](const State& s) { return s.is(State::visible) || s.is(State::parted); };
-  const bool none = std::ranges::none_of(states, shown);
-  const auto seen = [&](std::uint32_t i) { return none || shown(states[i]); };
+  const auto seen = seen_in(states);
   View view;
   view.camera.near = 2.f;
   view.camera.up = forest.circuit().up;
@@ -687,13 +691,14 @@ View portrait(const Forest& forest) {
   return view;
 }
 
-std::uint32_t still_samples(const View& view, const Colouring& colouring) {
+std::uint32_t still_samples(const View& view, const Colouring& colouring, bool more) {
   // A thin line lies in half of the samples of a pixel: a fifth of sixteen leaves it one or two of them, and dotted.
-  constexpr std::uint32_t see_through = 64, quick = 15;
-  if (view.samples <= quick) return view.samples;  // as asked for
+  constexpr std::uint32_t see_through = 64;
+  if (view.samples < samples_at_rest) return view.samples;  // as asked for
   frame::Frame f;
   f.opacities = colouring.opacities, f.states = colouring.states;
-  return frame::transparent(f) ? std::max(view.samples, see_through) : view.samples;
+  more = more || view.plane || frame::transparent(f);
+  return more ? std::max(view.samples, see_through) : view.samples;
 }
 
 float thinnest_of(const View& view) {

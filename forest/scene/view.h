@@ -2,6 +2,7 @@
 // A view as text: where the eye is, where it looks, what colours mean. One line of JSON can be pasted to a colleague.
 #pragma once
 
+#include <algorithm>
 #include <optional>
 #include <span>
 #include <string>
@@ -54,7 +55,8 @@ struct View {
 ///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5},
 ///  "plane":{"at":[0,1000,0],"normal":[0,0,1],"opacity":.18}}; only eye and target are needed.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
-View parse_view(std::string_view json, const std::string& name = "view");
+/// @param up  of the camera where nothing is said of it: the forest's (circuit::Circuit::up)
+View parse_view(std::string_view json, const std::string& name = "view", const Vec3& up = Vec3::UnitY());
 std::string to_json(const View& view);
 
 /// A key of that object, and what it may hold: words, or the range of a number as "1–170"; none where there is more to say. So
@@ -66,6 +68,16 @@ struct ViewKey {
 std::vector<ViewKey> view_keys();
 std::vector<ViewKey> activity_keys();  // of its `activity`
 std::vector<ViewKey> plane_keys();     // of its `plane`
+
+/// Whether an instance is seen, or a branch of it, as states say; where all are hidden, or nothing is said, all are.
+inline auto seen_in(std::span<const frame::State> states) {
+  const auto shown = [](const frame::State& s) {
+    return s.is(frame::State::visible) || s.is(frame::State::parted);
+  };
+  return [states, shown, all = std::ranges::none_of(states, shown)](std::uint32_t instance) {
+    return all || shown(states[instance]);
+  };
+}
 
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture
@@ -101,8 +113,11 @@ View within(View view, const Budget& budget);
 float fog_strength(const View& view);
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
+/// Samples from which on a picture is one at rest, and none of those that follow one another quickly.
+inline constexpr std::uint32_t samples_at_rest = 16;
 /// Samples of a picture of that view at rest: more than it says where something is seen through, of which each sample shows all or nothing.
-std::uint32_t still_samples(const View& view, const Colouring& colouring);
+/// @param more  something is seen through beside neurons and the view's plane
+std::uint32_t still_samples(const View& view, const Colouring& colouring, bool more = false);
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 
