@@ -60,7 +60,8 @@ Writing writing_in(const frame::Image& image, Background background) {
 
 Vec3 ColourBar::at(float t) const {
   const bool below = threshold && low + t * (high - low) < *threshold;
-  return below ? Vec3(.25f, .28f, .32f) : map->screen(t);
+  if (below) return Vec3(.25f, .28f, .32f);
+  return branches ? screen_of(on_branches(*map, t, *branches)) : map->screen(t);
 }
 
 ColourBar bar_of(const ActivityView& activity, double time, const std::string& units, Background background) {
@@ -73,7 +74,8 @@ ColourBar bar_of(const ActivityView& activity, double time, const std::string& u
           .units = units,
           .threshold = activity.threshold,
           .title = fmt::format("{:.1f} ms", time),
-          .note = flashes ? note_of(activity) : ""};
+          .note = flashes ? note_of(activity) : "",
+          .branches = background};
 }
 
 ColourBar bar_of_spikes(const ActivityView& activity, double time, Background background) {

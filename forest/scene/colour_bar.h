@@ -30,6 +30,7 @@ struct ColourBar {
   std::string units{};                            // of them; may be empty
   std::optional<float> threshold{};               // what is less is grey
   std::string title{}, note{};                    // above and below; may be empty
+  std::optional<Background> branches{};           // its colours are those of branches there (on_branches)
 
   Vec3 at(float t) const;  // the colour at a share 0–1 of its length, sRGB 0–1
 };

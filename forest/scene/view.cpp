@@ -455,13 +455,14 @@ std::vector<ViewKey> facts_of(Keys<Of> keys) {
 void paint(frame::Palette& palette, const ActivityView& a, bool light) {
   const std::uint32_t steps = a.neuron ? half_map_steps : map_steps;
   for (std::uint32_t i = 0; i < steps; ++i)
-    palette[i] = (*a.map)(float(i) / float(steps - 1)) * (light ? .85f : 1.f);
+    palette[i] =
+        on_branches(*a.map, float(i) / float(steps - 1), light ? Background::light : Background::dark);
   const float kept = light ? .25f : .15f;
   const Vec3 ground = light ? light_of(0xDDE3EB) : Vec3::Zero();
   for (std::uint32_t i = steps; i < map_steps; ++i)
     palette[i] = kept * palette[i - steps] + (1.f - kept) * ground;
-  palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x2A303A);
-  palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x3C4450);
+  palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x383E46);
+  palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x475160);
   const Vec3 dim = palette[no_value_entry];
   const auto [bright, fading] = flash_colours(light ? Background::light : Background::dark);
   for (std::uint32_t i = 0; i < flash_steps; ++i) {
@@ -475,9 +476,13 @@ constexpr int outline_corners = 16;
 
 /// Places on branches of neurons that are seen: of few the ends of all segments, else spread evenly over their area, the straws of
 /// one level of bricks.
+struct Places {
+  std::vector<Vec3> places;
+  bool all = true;  // else a sample
+};
 /// @param seen  whether an instance is
 template <class Seen>
-std::vector<Vec3> sampled_branches(const Forest& forest, const Seen& seen) {
+Places places_on_branches(const Forest& forest, const Seen& seen) {
   constexpr std::size_t enough = 4096, small = 1'000'000;
   const auto instances = forest.instances();
   std::uint64_t total = 0;
@@ -492,7 +497,7 @@ std::vector<Vec3> sampled_branches(const Forest& forest, const Seen& seen) {
       for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count))
         places.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
     }
-    return places;
+    return {std::move(places), true};
   }
   const auto bricks = forest.bricks();
   const auto owners = forest.owners();
@@ -509,7 +514,7 @@ std::vector<Vec3> sampled_branches(const Forest& forest, const Seen& seen) {
     }
     if (places.size() >= enough || !first.child_count) break;
   }
-  return places;
+  return {std::move(places), false};
 }
 
 /// Where an eye must be so that a pyramid of view of given directions and slopes encloses points. With axes r (right) and d
@@ -529,8 +534,8 @@ class Enclosing {
   void add(const Vec3& p) {
     for (std::size_t n = 0; n < 4; ++n) reach_[n] = std::max(reach_[n], normals_[n].dot(p));
   }
-  /// All but a few that reach far beyond the others.
-  void add_most(std::span<const Vec3> points) {
+  /// All but a few that reach far beyond the others; of a sample, which has few of the farthest, all but those.
+  void add_most(std::span<const Vec3> points, bool sample) {
     if (points.empty()) return;
     constexpr float beyond = .15f;  // of what the others take
     std::array<float, 4> most, all;
@@ -543,7 +548,7 @@ class Enclosing {
     }
     for (std::size_t n = 0; n < 4; ++n) {
       const float taken = most[n] + most[n ^ 1];
-      reach_[n] = std::max(reach_[n], all[n] <= most[n] + beyond * taken ? all[n] : most[n]);
+      reach_[n] = std::max(reach_[n], !sample && all[n] <= most[n] + beyond * taken ? all[n] : most[n]);
     }
   }
   /// The eye, with a little room on all sides and no nearer than `least` µm, and what it looks at, as far away as `depth_of`.
@@ -612,6 +617,12 @@ std::string to_json(const View& view) { return write_all(view, keys_of_view()).d
 
 // On dark ground through a colour of its own, for between white and the grey of what has no value lies grey; on light ground
 // black, then a green that hardly any map has.
+Vec3 on_branches(const ColourMap& map, float t, Background background) {
+  if (background == Background::light) return .85f * map(t);
+  constexpr float least = .07f;
+  return (1.f - least) * map(t) + least * Vec3(.8f, .9f, 1.2f);
+}
+
 FlashColours flash_colours(Background background) {
   if (background == Background::dark) return {Vec3(1.f, 1.f, .92f), light_of(0x2FD6FF)};
   return {light_of(0x000000), light_of(0x00A040)};
@@ -654,7 +665,8 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   // Fog is as deep as the whole forest, and would only dim a part of it.
   constexpr float least = .2f;
   if (!all) view.fog = std::clamp(bounds.extent().norm() / forest.soma_bounds().extent().norm(), least, 1.f);
-  enclosing.add_most(sampled_branches(forest, seen));
+  const Places branches = places_on_branches(forest, seen);
+  enclosing.add_most(branches.places, !branches.all);
   // The near side of a wide forest shall not hide what lies behind it.
   const float wide = std::max(radius, .25f * bounds.extent().norm()),
               high = std::max(height_of(forest, bounds), wide) + 120.f;

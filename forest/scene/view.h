@@ -94,6 +94,10 @@ inline constexpr std::uint32_t map_steps = 96, below_entry = 96, no_value_entry 
 /// Where a neuron stands out (ActivityView::neuron) the map has half as many steps, and after them the same for the others.
 inline constexpr std::uint32_t half_map_steps = map_steps / 2;
 
+/// The colour of a branch whose value is a share 0–1 of the map's range, linear light: thin branches need some distance from the ground,
+/// on which the ends of most maps would be lost.
+Vec3 on_branches(const ColourMap& map, float t, Background background);
+
 /// Of a flash on a branch that has a value: when it is new, and half faded. Linear light.
 struct FlashColours {
   Vec3 bright, fading;
