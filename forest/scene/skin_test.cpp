@@ -228,6 +228,23 @@ TEST(Skin, KindsAreObeyed) {
   for (const frame::Surface& s : close.frame.surfaces) EXPECT_NE(s.instance, 0u);
 }
 
+TEST(Skin, WhereItIsForcedWideBranchesAreNoFiner) {
+  Appearance all;
+  all.name = "all", all.kind = frame::Kind::skin;
+  Appearance bare;  // … and where it is not
+  bare.name = "all";
+  const SkinLimits much{.triangles = 100'000'000};
+  const auto triangles = [&](const Appearance& a) {
+    Close close(40.f, {a});
+    close.show(much);
+    return double(close.skin.figures().triangles);
+  };
+  const double own = triangles(bare), forced = triangles(all);
+  EXPECT_GT(own, 10'000.) << forced;
+  EXPECT_GT(forced, own);        // thinner branches have it, too
+  EXPECT_LT(forced, 2.5 * own) << own;  // four times as many where all voxels are half as wide
+}
+
 TEST(Skin, IsTheSameAtAnyNumberOfThreads) {
   std::vector<std::vector<float>> seen[2];
   for (const unsigned threads : {1u, 4u}) {

@@ -37,6 +37,9 @@ refuses "'big' is no size" env -u DISPLAY -u WAYLAND_DISPLAY "$program" view a.f
 "$program" view --help | grep -q -e '--synapses' || fail "view does not tell of --synapses"
 
 "$program" movie a.forest --seconds 0.2 --size 160x90 --samples 1 -o walk.mp4 >/dev/null
+"$program" movie a.forest --outline --seconds 0.04 --size 160x90 --samples 1 --pictures with -o outline.mp4 >/dev/null
+"$program" movie a.forest --seconds 0.04 --size 160x90 --samples 1 --pictures without -o bare.mp4 >/dev/null
+! cmp -s with/00000.png without/00000.png
 [[ $(head -c 8 walk.mp4 | tail -c 4) == ftyp ]] || fail "walk.mp4 is no MP4 file"
 
 refuses "forest file" "$program" render view.json -o x.png
