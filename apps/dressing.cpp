@@ -46,9 +46,10 @@ void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene:
                       const scene::Chooser::Painter& painter, const DressingLimits& limits) {
   rest();
   surfaces.show(frame, colouring, playing);
-  // A picture at rest has time for what its pixels can show: a voxel is some pixels wide, and half of the triangles are averted.
+  // Where there is time to make pieces there is some for what the pixels can show: a voxel is some pixels wide, and half of the
+  // triangles are averted.
   scene::SkinLimits most = limits.skin;
-  if (frame.subframes >= scene::samples_at_rest)
+  if (most.new_pieces > 0)
     most.triangles =
         std::clamp(3 * std::size_t(frame.width) * frame.height, most.triangles, most_triangles_at_rest);
   if (view.skin && skinned)

@@ -763,7 +763,7 @@ frame::Frame compose(const Forest& forest, const View& view, const Colouring& co
 }
 
 std::vector<frame::Overlay> outline(const Forest& forest) {
-  constexpr float width = .5f;  // µm, half
+  constexpr float width = .12f;  // µm, half: thinner than the dendrites among which it is seen
   std::vector<frame::Overlay> lines;
   for (const auto& line : forest.circuit().outline)
     for (std::size_t i = 0; i + 1 < line.size(); ++i)
