@@ -58,7 +58,7 @@ void SectionView::draw() {
     coloured_by_ = settings_.view.colour_by;
     coloured_ = true;
   }
-  const Plane plane = plane_of(settings_, forest_.soma_bounds().centre());
+  const Plane plane = plane_of(settings_, forest_.soma_bounds().centre(), forest_.circuit().up);
   if (!centre_) centre_ = opening(plane);
   const scene::SlicePicture drawn = picture();
   const frame::Image image = scene::paint(scene::slice(forest_, plane, drawn.sheet()), colouring_, drawn);

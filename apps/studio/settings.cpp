@@ -174,12 +174,12 @@ constexpr Toggle toggle_table[] = {
 
 }  // namespace
 
-Plane plane_of(const Settings& s, const Vec3& middle) {
+Plane plane_of(const Settings& s, const Vec3& middle, const Vec3& pia) {
   const float azimuth = radians(s.normal_azimuth), elevation = radians(s.normal_elevation);
   const Vec3 normals[] = {Vec3::UnitX(), Vec3::UnitY(), Vec3::UnitZ(),
                           Vec3(std::cos(elevation) * std::sin(azimuth), std::sin(elevation),
                                -std::cos(elevation) * std::cos(azimuth))};
-  return Plane::through(middle, normals[int(s.across)]).moved(s.plane_at);
+  return Plane::through(middle, normals[int(s.across)], pia).moved(s.plane_at);
 }
 
 scene::View whole_view(const Settings& settings, const Vec3& middle) {

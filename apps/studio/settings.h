@@ -32,7 +32,7 @@ struct Settings {
 };
 
 /// The plane of intersection, `middle` being that of the forest.
-Plane plane_of(const Settings& settings, const Vec3& middle);
+Plane plane_of(const Settings& settings, const Vec3& middle, const Vec3& pia = Vec3::UnitY());
 
 /// The view as text has it: with the plane in it, where it is shown.
 scene::View whole_view(const Settings& settings, const Vec3& middle);
