@@ -293,6 +293,21 @@ void refuse_unused(const Options& options, const Used& used) {
       throw Error(fmt::format("{} is {}, and none is given; leave it out", option, of));
 }
 
+// The sections of a surface; what is wrong with it is said with the name of its file.
+cortex::ContourStack cut(const Mesh& surface, const std::string& name, const fs::path& file,
+                         cortex::Axis axis, std::span<const double> planes) {
+  if (volume(surface) < 0.)
+    throw InputError(file.string(), 0,
+                     "has triangles that face inwards, so that its inside is outside; turn them");
+  try {
+    return cortex::cut(surface, name, axis, planes);
+  } catch (const InputError&) {
+    throw;
+  } catch (const Error& error) {
+    throw InputError(file.string(), 0, error.what());
+  }
+}
+
 void run(const Options& options, Console& console) {
   if (options.out.extension() == ".contours") {
     must_take_files({options.out}, options.force);
@@ -307,6 +322,7 @@ void run(const Options& options, Console& console) {
   std::vector<cortex::ContourStack> stacks;
   std::vector<Mesh> surfaces;
   std::vector<std::string> surface_names;
+  std::vector<fs::path> surface_files;
   double low = HUGE_VAL, high = -HUGE_VAL;
   const cortex::Axis axis = axis_of(options.axis);
   Used used;
@@ -348,6 +364,7 @@ void run(const Options& options, Console& console) {
     }
     if (lower.ends_with(".png")) throw Error(lower + ": is one section; give the folder of all");
     surfaces.push_back(io::read_surface(file.text(), path.string()));
+    surface_files.push_back(path);
     surface_names.push_back(must_be_new(name));
     for (const Vec3& p : surfaces.back().positions)
       low = std::min(low, double(p[int(axis)])), high = std::max(high, double(p[int(axis)]));
@@ -357,7 +374,7 @@ void run(const Options& options, Console& console) {
   const auto planes =
       surfaces.empty() ? std::vector<double>{} : planes_of(low, high, options, options.inputs.front());
   for (std::size_t i = 0; i < surfaces.size(); ++i)
-    stacks.push_back(cortex::cut(surfaces[i], surface_names[i], axis, planes));
+    stacks.push_back(cut(surfaces[i], surface_names[i], surface_files[i], axis, planes));
   cortex::ContourStack stack = cortex::together(stacks);
   const std::string fault = cortex::fault_of(stack);
   if (!fault.empty()) throw Error(options.inputs.front().string() + ": " + fault);

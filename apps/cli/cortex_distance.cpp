@@ -9,6 +9,7 @@
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
+#include "forest/core/bounds.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/geometry/surface_distance.h"
@@ -36,9 +37,27 @@ Mesh read(const fs::path& path) {
   return mesh;
 }
 
+// What is a hundred times as large as the other is in other units.
+void must_be_alike(const Options& o, const Mesh (&meshes)[2]) {
+  constexpr double most = 100.;
+  double size[2];
+  for (const std::size_t i : {0u, 1u}) {
+    Bounds bounds;
+    for (const Vec3& p : meshes[i].positions) bounds.add(p);
+    size[i] = double(bounds.extent().norm()) / 1e3;
+  }
+  if (!(size[0] <= most * size[1] && size[1] <= most * size[0]))
+    throw Error(fmt::format("{} reaches over {:.3g} mm and {} over {:.3g} mm; check that both are in mm",
+                            o.first.string(), size[0], o.second.string(), size[1]));
+}
+
 void run(const Options& o, Console& console) {
   if (!o.values.empty()) must_take_files({o.values}, o.force);
+  for (const fs::path& read_here : {o.first, o.second})
+    if (std::error_code none; !o.values.empty() && fs::equivalent(o.values, read_here, none))
+      throw Error(fmt::format("{} is read here; give --values another name", o.values.string()));
   const Mesh meshes[] = {read(o.first), read(o.second)};
+  must_be_alike(o, meshes);
   const TriangleTree trees[] = {TriangleTree(meshes[0]), TriangleTree(meshes[1])};
   const std::string names[] = {o.first.filename().string(), o.second.filename().string()};
   nlohmann::ordered_json out = nlohmann::ordered_json::array();

@@ -73,7 +73,7 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
       order.emplace_back((middles[e] - near).squaredNorm(), e);
     const auto count = std::min<std::size_t>(options.count, order.size());
     std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(count), order.end());
-    constexpr double farthest = 5e3;
+    constexpr double farthest = 2e3;  // an element is about a mm wide, and its middle the cortex's
     if (const double away = std::sqrt(order.front().first); !(away <= farthest))
       throw Error(
           fmt::format("the element nearest to ({:g}, {:g}, {:g}) µm is {:.3g} mm away; give --near in µm",
@@ -216,6 +216,15 @@ std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& op
   return cortex::MeasuredBorders(elements, surface, cortex::shares_of(surface, maps));
 }
 
+void refuse_too_many(std::size_t elements, double neurons, bool bent) {
+  constexpr double most = 50e6, most_bent = 200'000;
+  if (neurons > (bent ? most_bent : most))
+    throw Error(fmt::format(
+        "{} elements would have some {:.2g} neurons, and {:.3g} is the most{}; choose fewer elements "
+        "or lower --scale",
+        elements, neurons, bent ? most_bent : most, bent ? " of distinct shapes (--bend grid)" : ""));
+}
+
 // Towards the pia, in the mean over some elements; y where they cancel out.
 Vec3 up_of(std::span<const cortex::Hexahedron> elements, std::span<const std::uint32_t> chosen) {
   Place sum = Place::Zero();
@@ -273,11 +282,11 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty())
     throw Error("say which elements are planted: --element, --near, --sphere or --box");
   const io::ElementsFile file = io::read_elements(options.file);
+  const bool bent = options.bend == "grid";
   std::vector<cortex::Hexahedron> elements(file.cortex.elements.size());
   parallel_for(elements.size(), 64, [&](std::size_t e) { elements[e] = file.cortex.elements.hexahedron(e); });
   PlantedElements all;
   all.elements = choose(options, elements);
-  const bool bent = options.bend == "grid";
   const std::vector<cortex::Junctions> junctions = cortex::junctions(elements);
   std::optional<cortex::Locator> locator;
   if (bent) locator.emplace(elements);
@@ -294,6 +303,21 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
         fmt::format("there are {} and no {} elements in {}", all.elements.size(), asked,
                     options.row > 1 ? "that row, which ends or comes back there" : options.file.string()));
 
+  double scale = options.scale;
+  if (options.density > 0.) {
+    const double mean = circuit::mean_density(recipe);
+    if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
+    scale = options.density / mean;
+  }
+  // Far too many are told before anything is loaded; how many exactly follows from the borders of layers.
+  std::vector<double> volumes(all.elements.size());
+  parallel_for(volumes.size(), 64,
+               [&](std::size_t i) { volumes[i] = elements[all.elements[i]].volume() * 1e-9; });
+  constexpr double certainly = 1.5;
+  refuse_too_many(
+      all.elements.size(),
+      scale * circuit::mean_density(recipe) * std::accumulate(volumes.begin(), volumes.end(), 0.) / certainly,
+      bent);
   std::vector<bool> wanted_types(recipe.types.size());
   for (const auto& layer : recipe.layers)
     for (std::size_t type = 0; type < wanted_types.size(); ++type)
@@ -301,12 +325,6 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
         wanted_types[type] = true;
   Stock stock = stock_of(recipe, wanted_types, repo, progress);
   const auto start = Clock::now();
-  double scale = options.scale;
-  if (options.density > 0.) {
-    const double mean = circuit::mean_density(recipe);
-    if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
-    scale = options.density / mean;
-  }
   const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
                                         {.scale = scale, .element = file.volume});
   for (std::size_t l = 0; l < recipe.layers.size(); ++l)
@@ -317,6 +335,10 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
                       counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
   const auto measured = measured_borders(options, recipe, file.cortex.elements);
   all.measured = measured.has_value();
+  if (const std::string doubt =
+          measured ? circuit::doubt_of_maps(recipe, options.layers.size()) : std::string();
+      !doubt.empty())
+    all.left_out.push_back(doubt);
   const auto borders_of = [&](std::uint32_t e) {
     return measured ? measured->of(file.cortex.elements, e)
                     : planter.by_volume(cortex::Layers(file.cortex.elements, e));
@@ -336,13 +358,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
       all.layer_volumes[l] += borders.volume(elements[e], l);
   }
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
-  constexpr double most = 50e6, most_bent = 200'000;
-  if (wanted > (bent ? most_bent : most))
-    throw Error(
-        fmt::format("{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
-                    "or lower --scale",
-                    all.elements.size(), wanted, bent ? most_bent : most,
-                    bent ? " of distinct shapes (--bend grid)" : ""));
+  refuse_too_many(all.elements.size(), wanted, bent);
 
   std::vector<circuit::Rooted> rooted;
   progress.begin("planting", all.elements.size());

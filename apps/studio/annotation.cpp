@@ -57,13 +57,14 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
     const char* name;
     Vec3 way;
     QColor colour;
+    qreal beyond = 10.;  // the tip, where the name is
   };
   // Okabe & Ito's vermilion, green and blue.
   const bool along_y = pia == Vec3(Vec3::UnitY());
   std::vector<Axis> axes{{"x", Vec3::UnitX(), {213, 94, 0}},
                          {along_y ? "y pia" : "y", Vec3::UnitY(), {0, 178, 130}},
                          {"z", Vec3::UnitZ(), {70, 150, 220}}};
-  if (pia && !along_y) axes.push_back({"pia", *pia, ink.text});
+  if (pia && !along_y) axes.push_back({"pia", *pia, ink.text, 22.});  // beside that of the nearest axis
   const Mat3 seen = camera.axes().transpose();
   std::ranges::sort(axes, {}, [&](const Axis& a) { return (seen * a.way).z(); });  // far ones first
   for (const Axis& a : axes) {
@@ -72,7 +73,8 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
     painter.setPen(QPen(a.colour, 2, Qt::SolidLine, Qt::RoundCap));
     painter.drawLine(centre, tip);
     painter.setPen(ink.text);
-    const QRectF box(centre + (length + 10.) * QPointF(way.x(), -way.y()) - QPointF(24, 8), QSizeF(48, 16));
+    const QRectF box(centre + (length + a.beyond) * QPointF(way.x(), -way.y()) - QPointF(24, 8),
+                     QSizeF(48, 16));
     painter.drawText(box, Qt::AlignCenter, a.name);
   }
 }

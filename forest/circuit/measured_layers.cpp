@@ -35,12 +35,19 @@ struct Named {
   std::vector<LayerNumbers> numbers;  // of the recipe's layers
   std::vector<double> thickness;      // of each map: of all layers that share it
   std::string fault;                  // a sentence; empty: names say it all
+  bool unknown = false;               // … because a name says nothing
 };
 Named by_name(const Recipe& recipe, std::size_t maps) {
   Named named{{}, std::vector<double>(maps, 0.), {}};
   for (const Recipe::Layer& layer : recipe.layers) {
     const auto found = layer_numbers(layer.name);
-    if (!found || found->last > maps) {
+    if (found && found->last > maps) {
+      named.fault = fmt::format("layer {} of the recipe needs a measured layer {}, and {} {} given; give all",
+                                layer.name, found->last, maps, maps == 1 ? "is" : "are");
+      return named;
+    }
+    if (!found) {
+      named.unknown = true;
       named.fault = fmt::format(
           "layer {} of the recipe is none of the {} measured ones by its name; call it L1, L2/3 or Va, or "
           "give one map for each of its {} layers",
@@ -87,6 +94,13 @@ std::optional<LayerNumbers> layer_numbers(std::string_view name) {
     numbers.last = next, name = rest;
   }
   return numbers;
+}
+
+std::string doubt_of_maps(const Recipe& recipe, std::size_t maps) {
+  const Named named = by_name(recipe, maps);
+  if (named.fault.empty() || named.unknown || recipe.layers.size() != maps) return {};
+  return fmt::format("the {} maps are taken for the {} layers of the recipe in their order, though {}", maps,
+                     recipe.layers.size(), named.fault);
 }
 
 std::vector<std::vector<float>> maps_of_layers(const Recipe& recipe,

@@ -8,6 +8,7 @@
 
 #include <cstddef>
 #include <optional>
+#include <string>
 #include <string_view>
 #include <vector>
 
@@ -22,6 +23,10 @@ struct LayerNumbers {
   bool operator==(const LayerNumbers&) const = default;
 };
 std::optional<LayerNumbers> layer_numbers(std::string_view name);
+
+/// A sentence where there are as many maps as layers, which are therefore taken in their order, though the layers' names speak of other
+/// ones; else nothing.
+std::string doubt_of_maps(const Recipe& recipe, std::size_t maps);
 
 /// Of each layer of a recipe the thickness at each vertex, from the maps of measured layers: by the layers' names, or, where these do
 /// not say it and there are as many of both, in their order.

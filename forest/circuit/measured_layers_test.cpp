@@ -44,7 +44,12 @@ TEST(MapsOfLayers, ArePartsOfOneAndSumsOfSeveral) {
 
 TEST(MapsOfLayers, AreInTheirOrderWhereNamesDoNotSayItAndThereAreAsMany) {
   EXPECT_EQ(maps_of_layers(recipe_of({{"a", 1.f}, {"b", 1.f}, {"L1", 1.f}, {"d", 1.f}}), maps), maps);
-  EXPECT_EQ(maps_of_layers(recipe_of({{"L1", 1.f}, {"L2/3", 1.f}, {"L4", 1.f}, {"L5", 1.f}}), maps), maps);
+  const Recipe merged = recipe_of({{"L1", 1.f}, {"L2/3", 1.f}, {"L4", 1.f}, {"L5", 1.f}});
+  EXPECT_EQ(maps_of_layers(merged, maps), maps);
+  EXPECT_THAT(doubt_of_maps(merged, 4),
+              HasSubstr("in their order, though layer L5 of the recipe needs a measured layer 5"));
+  EXPECT_EQ(doubt_of_maps(merged, 5), "");
+  EXPECT_EQ(doubt_of_maps(recipe_of({{"a", 1.f}, {"b", 1.f}}), 2), "");
 }
 
 TEST(MapsOfLayers, AreRefusedWhereNamesDoNotFit) {
@@ -55,7 +60,7 @@ TEST(MapsOfLayers, AreRefusedWhereNamesDoNotFit) {
   EXPECT_THAT(refused([&] {
                 maps_of_layers(recipe_of({{"L1", 1.f}, {"L2/3", 1.f}, {"L5", 1.f}}), maps);
               }),
-              HasSubstr("layer L5 of the recipe is none of the 4"));
+              HasSubstr("layer L5 of the recipe needs a measured layer 5, and 4 are given"));
   EXPECT_THAT(refused([&] {
                 maps_of_layers(recipe_of({{"L1", 1.f}, {"L4", 1.f}, {"L2/3", 1.f}}), maps);
               }),

@@ -143,6 +143,8 @@ told self.json 'all(r["greatest"] < 1e-6 for r in d)'
 [ "$(wc -l <away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
 refuses 'already' $BRAINFOREST cortex distance outer inner --values away.txt
 refuses 'no_such' $BRAINFOREST cortex distance outer no_such
+refuses 'check that both are in mm' $BRAINFOREST cortex distance outer small
+refuses 'is read here' $BRAINFOREST cortex distance outer inner --values inner --force
 refuses 'nan: has a vertex that is nowhere' $BRAINFOREST cortex distance nan inner
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5

@@ -129,7 +129,7 @@ PY
 sed 's/"IV"/"fourth"/' "$FOREST_SOURCE_DIR/data/recipes/human-frontal.toml" >odd.toml
 fails_with 1 'layer fourth of the recipe is none of the 6 measured ones' \
   $BRAINFOREST plant --elements e.h5 --recipe odd.toml --repo cells.db --element 1 $measured --out no
-fails_with 1 'none of the 5 measured ones' plant --element 1 --layers layer1.txt layer2.txt layer3.txt layer4.txt layer5.txt --layers-on outer --out no
+fails_with 1 'needs a measured layer 6, and 5 are given' plant --element 1 --layers layer1.txt layer2.txt layer3.txt layer4.txt layer5.txt --layers-on outer --out no
 fails_with 1 'lie more than .3 mm from the surface of the maps' plant --element 1 ${measured/-on outer/-on inner} --out no
 sed '3s/.*/-2/' layer2.txt >below.txt
 fails_with 1 'below.txt: has -2 at vertex 2' plant --element 1 ${measured/layer2/below} --out no
