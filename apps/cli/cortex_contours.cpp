@@ -188,7 +188,7 @@ std::vector<double> planes_of(double low, double high, const Options& options, c
 }
 
 // What contours would cross, before they are found.
-void check_threshold(const cortex::Volume& volume, const fs::path& path, double threshold) {
+void check_threshold(const cortex::Volume& volume, const fs::path& path, double threshold, Console& console) {
   float least = INFINITY, most = -INFINITY;
   for (const float v : volume.values)
     if (std::isfinite(v)) least = std::min(least, v), most = std::max(most, v);
@@ -196,6 +196,13 @@ void check_threshold(const cortex::Volume& volume, const fs::path& path, double 
   if (!(threshold >= least && threshold < most))
     throw Error(fmt::format("{}: no boundary lies at --threshold {:g}: its values are {:g} to {:g}",
                             path.string(), threshold, least, most));
+  // A share of the range is easily given where a value is wanted.
+  constexpr double rim = .01;
+  if (threshold - double(least) < rim * double(most - least))
+    console.warn(
+        fmt::format("{}: --threshold {:g} lies within a hundredth of the least of its values, {:g} to {:g}; "
+                    "half way is {:g}",
+                    path.string(), threshold, least, most, .5 * (double(least) + double(most))));
 }
 
 // What is inside at the edge of a picture is closed along it, wherever the tissue goes on.
@@ -226,7 +233,7 @@ cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& pat
                                const Options& options, bool pictures, Console& console) {
   if (std::isnan(options.threshold))
     throw Error(path.string() + ": what is inside is a question of grey; give --threshold");
-  check_threshold(volume, path, options.threshold);
+  check_threshold(volume, path, options.threshold, console);
   const cortex::Axis axis = axis_of(options.axis);
   const double low = volume.origin[int(axis)],
                high = low + volume.step[int(axis)] * double(volume.size[std::size_t(axis)] - 1);
@@ -480,7 +487,8 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
     }
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3, console);
     if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
-      throw Error(fmt::format("{}: has no object '{}'", o->file.string(), o->object));
+      throw Error(fmt::format("{}: has no object '{}'; it has {}", o->file.string(), o->object,
+                              fmt::join(stack.objects, ", ")));
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto mm = [](double um) {
