@@ -11,6 +11,7 @@
 #include "forest/io/new_folder.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 
 namespace forest::cli {
 
@@ -37,10 +38,16 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
   return io::gathered(drawings);
 }
 
-void write_contour_files(const cortex::ContourStack& stack, const fs::path& path, bool overlay) {
-  if (path.extension() == ".contours") return write_file(path, io::write_contours(stack));
+void must_take_contours(const fs::path& path, bool force) {
+  if (path.extension() == ".contours") return must_take_files({path}, force);
   if (path.has_extension())
     throw Error(path.string() + ": is neither FILE.contours nor a folder for drawings; give one of them");
+  must_have_folder(path);
+  if (!force) refuse_existing({path});
+}
+
+void write_contour_files(const cortex::ContourStack& stack, const fs::path& path, bool overlay) {
+  if (path.extension() == ".contours") return write_file(path, io::write_contours(stack));
   // All drawings or none, and none of earlier sections between them.
   if (fs::is_directory(path))
     for (const auto& entry : fs::directory_iterator(path))

@@ -17,6 +17,10 @@ cortex::Axis axis_of(const std::string& name);  // "x", "y" or "z"
 /// @param unit  µm of one unit, where a format does not say it
 cortex::ContourStack read_contour_files(const std::filesystem::path& path, double unit, Console& console);
 
+/// Throws Error where contours cannot be put there in the end: a file whose name ends in .contours, or a folder of drawings whose name
+/// has no ending, that is missing or, unless `force` is given, not there yet.
+void must_take_contours(const std::filesystem::path& path, bool force);
+
 /// A file where the name ends in .contours, else a folder of drawings, one a section.
 /// @param overlay  each drawn over the one before it
 void write_contour_files(const cortex::ContourStack& stack, const std::filesystem::path& path,

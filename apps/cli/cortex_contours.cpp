@@ -316,12 +316,7 @@ cortex::ContourStack cut(const Mesh& surface, const std::string& name, const fs:
 }
 
 void run(const Options& options, Console& console) {
-  if (options.out.extension() == ".contours") {
-    must_take_files({options.out}, options.force);
-  } else {
-    must_have_folder(options.out);
-    if (!options.force) refuse_existing({options.out});
-  }
+  must_take_contours(options.out, options.force);
   if (options.names.size() > options.inputs.size())
     throw Error(fmt::format("{} are named for {}; name each once",
                             counted(options.names.size(), "boundary", "boundaries"),
@@ -481,10 +476,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
       ->type_name("FOLDER");
   add_force(command, o->force);
   return [o, &console] {
-    if (!o->svg.empty()) {
-      must_have_folder(o->svg);
-      if (!o->force) refuse_existing({o->svg});
-    }
+    if (!o->svg.empty()) must_take_contours(o->svg, o->force);
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3, console);
     if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
       throw Error(fmt::format("{}: has no object '{}'; it has {}", o->file.string(), o->object,

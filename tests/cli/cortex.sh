@@ -153,6 +153,7 @@ refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
 refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
 refuses 'its folder is not there' $BRAINFOREST cortex contours outer inner -o nowhere/s.contours
 refuses 'its folder is not there' $BRAINFOREST cortex compare s.contours --svg nowhere/drawn
+refuses 'is neither FILE.contours nor a folder for drawings' $BRAINFOREST cortex contours outer inner -o no.foo
 refuses 'is named twice' $BRAINFOREST cortex surfaces s.contours -o no.gii no.gii
 refuses "'outer' is to be both boundaries" $BRAINFOREST cortex surfaces s.contours --inner outer -o no.gii no2.gii
 refuses 'not as .obj' $BRAINFOREST cortex surfaces s.contours -o no.gii no2.obj
