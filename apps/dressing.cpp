@@ -35,10 +35,13 @@ bool Dressing::wanted(const scene::View& view, const scene::Colouring& colouring
          (synapses && view.synapses != scene::SynapseColour::none);
 }
 
+bool Dressing::sees_through(const scene::View& view, const scene::Colouring& colouring) const {
+  return scene::sees_through(view, colouring) || (view.skin && (skinned || forced(colouring))) ||
+         (!surfaces.empty() && surfaces.visibility > 0.f && surfaces.visibility < 1.f);
+}
+
 std::uint32_t Dressing::still_samples(const scene::View& view, const scene::Colouring& colouring) const {
-  const bool skin_begins = view.skin && (skinned || forced(colouring)),
-             clear = !surfaces.empty() && surfaces.visibility > 0.f && surfaces.visibility < 1.f;
-  return scene::still_samples(view, colouring, skin_begins || clear);
+  return scene::still_samples(view, colouring, sees_through(view, colouring));
 }
 
 void Dressing::put_on(frame::Frame& frame, const scene::View& view, const scene::Cut& cut,

@@ -29,6 +29,8 @@ struct Dressing {
 
   /// Whether a picture of the view shows anything of them.
   bool wanted(const scene::View& view, const scene::Colouring& colouring) const;
+  /// scene::sees_through, or skin that begins, or surfaces that are clear.
+  bool sees_through(const scene::View& view, const scene::Colouring& colouring) const;
   /// scene::still_samples, which skin that begins and surfaces that are seen through need, too.
   std::uint32_t still_samples(const scene::View& view, const scene::Colouring& colouring) const;
   /// Adds them to a frame composed of `cut`, as the view wants them. The frame must not outlive this object, or its next call.

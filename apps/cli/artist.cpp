@@ -169,9 +169,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
   for (int i = 0; i < count; ++i) {
     scene::View view = path.at(count > 1 ? float(i) / float(count - 1) : 0.f);
     view.targets.insert(view.targets.end(), plan.targets.begin(), plan.targets.end());
-    view.samples = scene::samples_at_rest;
-    const bool clear = artist.still_samples(view) > view.samples;
-    view.samples = plan.samples.value_or(clear ? 32 : 8);
+    view.samples = plan.samples.value_or(artist.sees_through(view) ? 32 : 8);
     if (plan.synapses) view.synapses = *plan.synapses;
     if (plan.gaze) view.detail.gaze = plan.gaze->at(1000. * i / plan.frames_per_second);
     if (activity) {

@@ -48,6 +48,10 @@ class Artist {
   /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h).
   /// @param with_outline  the column's outline too
   Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  /// Whether something may be seen through (Dressing::sees_through).
+  bool sees_through(const scene::View& view) const {
+    return dressing_.sees_through(view, scene::colour(targets_, view));
+  }
   /// How many samples a picture of the view at rest has (Dressing::still_samples).
   std::uint32_t still_samples(const scene::View& view) const {
     return dressing_.still_samples(view, scene::colour(targets_, view));

@@ -308,8 +308,6 @@ cortex::ContourStack cut(const Mesh& surface, const std::string& name, const fs:
                      "has triangles that face inwards, so that its inside is outside; turn them");
   try {
     return cortex::cut(surface, name, axis, planes);
-  } catch (const InputError&) {
-    throw;
   } catch (const Error& error) {
     throw InputError(file.string(), 0, error.what());
   }

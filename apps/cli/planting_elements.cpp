@@ -216,11 +216,12 @@ std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& op
   return cortex::MeasuredBorders(elements, surface, cortex::shares_of(surface, maps));
 }
 
-void refuse_too_many(std::size_t elements, double neurons, bool bent) {
+// @param leeway  how many times too large the number may be, when it is roughly known
+void refuse_too_many(std::size_t elements, double neurons, bool bent, double leeway = 1.) {
   constexpr double most = 50e6, most_bent = 200'000;
-  if (neurons > (bent ? most_bent : most))
+  if (neurons > leeway * (bent ? most_bent : most))
     throw Error(fmt::format(
-        "{} elements would have some {:.2g} neurons, and {:.3g} is the most{}; choose fewer elements "
+        "{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
         "or lower --scale",
         elements, neurons, bent ? most_bent : most, bent ? " of distinct shapes (--bend grid)" : ""));
 }
@@ -313,11 +314,9 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   std::vector<double> volumes(all.elements.size());
   parallel_for(volumes.size(), 64,
                [&](std::size_t i) { volumes[i] = elements[all.elements[i]].volume() * 1e-9; });
-  constexpr double certainly = 1.5;
-  refuse_too_many(
-      all.elements.size(),
-      scale * circuit::mean_density(recipe) * std::accumulate(volumes.begin(), volumes.end(), 0.) / certainly,
-      bent);
+  refuse_too_many(all.elements.size(),
+                  scale * circuit::mean_density(recipe) * std::accumulate(volumes.begin(), volumes.end(), 0.),
+                  bent, 1.5);
   std::vector<bool> wanted_types(recipe.types.size());
   for (const auto& layer : recipe.layers)
     for (std::size_t type = 0; type < wanted_types.size(); ++type)

@@ -36,8 +36,15 @@ const std::map<std::string, scene::Side> sides{{"left", scene::Side::left},   {"
 
 scene::Forest empty_forest() { return scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {})); }
 
+// Who is visible in a view that says nothing of it.
+std::vector<frame::State> states_of(const scene::Targets& targets, const TargetOptions& shown) {
+  scene::View plain;
+  add_appearances(shown, plain.targets);
+  return scene::colour(targets, plain).states;
+}
+
 // What is shown when nobody says what: the neurons that are visible, or the surfaces from one side.
-scene::View default_view(const scene::Targets& targets, const std::vector<scene::Appearance>& shown,
+scene::View default_view(const scene::Targets& targets, const TargetOptions& shown,
                          const scene::Surfaces& surfaces, std::optional<scene::Side> side, float aspect) {
   if (side && surfaces.empty())
     throw Error(
@@ -49,11 +56,7 @@ scene::View default_view(const scene::Targets& targets, const std::vector<scene:
     view.fog = 0.f;
     return view;
   }
-  scene::View plain;
-  plain.targets = shown;
-  scene::View view = scene::overview(targets.forest(), aspect, scene::colour(targets, plain).states);
-  view.targets = shown;
-  return view;
+  return scene::overview(targets.forest(), aspect, states_of(targets, shown));
 }
 
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.
@@ -133,12 +136,10 @@ std::function<void()> render(CLI::App& command, Console& console) {
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
-    std::vector<scene::Appearance> shown;
-    add_appearances(options->targets, shown);
-    scene::View view = options->view.empty() ? default_view(artist.targets(), shown, surfaces, options->side,
-                                                            float(width) / float(height))
+    scene::View view = options->view.empty() ? default_view(artist.targets(), options->targets, surfaces,
+                                                            options->side, float(width) / float(height))
                                              : read_view(options->view, forest.circuit().up);
-    if (!options->view.empty()) std::ranges::move(shown, std::back_inserter(view.targets));
+    add_appearances(options->targets, view.targets);
     nlohmann::ordered_json of_surfaces;  // null where there are none
     if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();
     if (surfaces.has_values()) {
@@ -275,10 +276,8 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       plan.from = *look->activity->time;
       plan.rate = options->rate.value_or((artist.playback()->end() - plan.from) / plan.seconds);
     }
-    scene::View shown;
-    shown.targets = plan.targets;
     const scene::CameraPath path = views.empty()
-                                       ? scene::walk(forest, scene::colour(artist.targets(), shown).states)
+                                       ? scene::walk(forest, states_of(artist.targets(), options->targets))
                                        : scene::CameraPath(std::move(views));
     const FilmFigures figures =
         film(artist, path, plan, options->out, console.progress(), look ? look->activity : std::nullopt);

@@ -95,9 +95,7 @@ float soma_clearance(const Forest& forest, const Vec3& point) {
 CameraPath walk(const Forest& forest, std::span<const frame::State> states) {
   const View start = overview(forest, 16.f / 9.f, states);
   // In axes of which y is the forest's way up.
-  const Vec3& up = forest.circuit().up;
-  const Mat3 turn = up == Vec3::UnitY() ? Mat3(Mat3::Identity())
-                                        : Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
+  const Mat3 turn = standing(forest);
   Bounds bounds;
   const auto seen = seen_in(states);
   bool all = true;

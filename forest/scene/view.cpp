@@ -571,19 +571,16 @@ class Enclosing {
   std::array<float, 4> reach_{};
 };
 
-/// A direction seen from which y is up, turned to where the forest's way up is; of unit length.
-Vec3 standing(const Forest& forest, const Vec3& direction) {
-  const Vec3& up = forest.circuit().up;
-  return (up == Vec3::UnitY() ? Quat::Identity() : Quat::FromTwoVectors(Vec3::UnitY(), up)) *
-         direction.normalized();
-}
-
-/// How far what lies in that box reaches at most along the forest's way up, µm.
-float height_of(const Forest& forest, const Bounds& box) {
-  return box.extent().dot(forest.circuit().up.cwiseAbs());
-}
+/// How far what lies in that box reaches at most along a direction, µm.
+float height_of(const Bounds& box, const Vec3& up) { return box.extent().dot(up.cwiseAbs()); }
 
 }  // namespace
+
+Mat3 standing(const Forest& forest) {
+  const Vec3& up = forest.circuit().up;
+  if (up == Vec3::UnitY()) return Mat3::Identity();
+  return Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
+}
 
 View parse_view(std::string_view text, const std::string& name, const Vec3& up) {
   Json json;
@@ -636,9 +633,10 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   const auto seen = seen_in(states);
   View view;
   view.camera.near = 2.f;
-  view.camera.up = forest.circuit().up;
+  const Mat3 stands = standing(forest);
+  view.camera.up = stands.col(1);
   frame::Camera looking = view.camera;
-  looking.eye = standing(forest, {.42f, .16f, 1.f}), looking.target = Vec3::Zero();
+  looking.eye = stands * Vec3(.42f, .16f, 1.f).normalized(), looking.target = Vec3::Zero();
   const float slope = std::tan(.5f * radians(view.camera.field_of_view));
   Enclosing enclosing(looking.axes(), slope * aspect, slope);
 
@@ -669,7 +667,7 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   enclosing.add_most(branches.places, !branches.all);
   // The near side of a wide forest shall not hide what lies behind it.
   const float wide = std::max(radius, .25f * bounds.extent().norm()),
-              high = std::max(height_of(forest, bounds), wide) + 120.f;
+              high = std::max(height_of(bounds, stands.col(1)), wide) + 120.f;
   const auto [eye, middle] =
       enclosing.camera(bounds.centre(), 1.08f * std::max(.5f * high, wide) / slope + wide);
   view.camera.eye = eye, view.camera.target = middle;
@@ -689,28 +687,32 @@ View portrait(const Forest& forest) {
   View view = overview(forest);
   const Bounds& bounds = forest.soma_bounds();
   if (bounds.empty()) return view;
-  const float radius = std::max(forest.circuit().radius, 50.f), height = height_of(forest, bounds);
+  const Mat3 stands = standing(forest);
+  const float radius = std::max(forest.circuit().radius, 50.f), height = height_of(bounds, stands.col(1));
   const Vec3 centre = bounds.centre();
   view.camera.field_of_view = 46.f;
   // The whole column, a little from above; what roots out of it below may be cut off.
   const float half = .56f * height + radius;
   const float away = half / std::tan(.5f * radians(view.camera.field_of_view)) + radius;
-  view.camera.target = centre + .03f * height * forest.circuit().up;
-  view.camera.eye = view.camera.target + away * standing(forest, {.45f, .16f, 1.f});
+  view.camera.target = centre + .03f * height * stands.col(1);
+  view.camera.eye = view.camera.target + away * (stands * Vec3(.45f, .16f, 1.f).normalized());
   view.camera.near = .5f;
   view.fog = 1.4f, view.halo = 1.5f;
   view.samples = 24;
   return view;
 }
 
+bool sees_through(const View& view, const Colouring& colouring) {
+  frame::Frame f;
+  f.opacities = colouring.opacities, f.states = colouring.states;
+  return view.plane || frame::transparent(f);
+}
+
 std::uint32_t still_samples(const View& view, const Colouring& colouring, bool more) {
   // A thin line lies in half of the samples of a pixel: a fifth of sixteen leaves it one or two of them, and dotted.
   constexpr std::uint32_t see_through = 64;
   if (view.samples < samples_at_rest) return view.samples;  // as asked for
-  frame::Frame f;
-  f.opacities = colouring.opacities, f.states = colouring.states;
-  more = more || view.plane || frame::transparent(f);
-  return more ? std::max(view.samples, see_through) : view.samples;
+  return more || sees_through(view, colouring) ? std::max(view.samples, see_through) : view.samples;
 }
 
 float thinnest_of(const View& view) {

@@ -117,6 +117,8 @@ View within(View view, const Budget& budget);
 float fog_strength(const View& view);
 /// `view.detail` with the gaze in pixels of a picture of that size.
 Detail detail_for(const View& view, std::uint32_t width, std::uint32_t height);
+/// Whether something may be seen through: neurons, or the view's plane.
+bool sees_through(const View& view, const Colouring& colouring);
 /// Samples from which on a picture is one at rest, and none of those that follow one another quickly.
 inline constexpr std::uint32_t samples_at_rest = 16;
 /// Samples of a picture of that view at rest: more than it says where something is seen through, of which each sample shows all or nothing.
@@ -125,6 +127,8 @@ std::uint32_t still_samples(const View& view, const Colouring& colouring, bool m
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 
+/// Turns y, which is up in a column, to the forest's way up (circuit::Circuit::up).
+Mat3 standing(const Forest& forest);
 /// Which way the pia lies: as the circuit says, or along y where neurons stand along it. Nothing where they stand in all directions.
 std::optional<Vec3> towards_pia(const Forest& forest);
 

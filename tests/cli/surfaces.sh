@@ -62,6 +62,8 @@ done
 import json
 a, b, c = (json.load(open(f"x{o}.json"))["covered"] for o in ("0", ".3", "1"))
 assert a < .02 and .1 < c < .8 and .25 * c < b < .65 * c, (a, b, c)  # two sides, three tenths each: half'
+"$program" render a.forest --surface lh.pial --from left --only all --hide all --size 160x120 -o none.png --json >none.json 2>/dev/null
+told none.json 'len(d["view"]["targets"]) == 3'
 refuses "--only is of neurons, and lh.pial is a surface" "$program" render lh.pial --only all -o no.png
 "$program" movie a.forest --surface lh.pial --surface-opacity .3 --seconds .2 --size 160x120 -o a.mp4 >/dev/null
 [[ $(head -c 8 a.mp4 | tail -c 4) == ftyp ]] || fail "a.mp4 is no MP4 file"
