@@ -59,6 +59,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
   const auto [width, height] = parse_size(options.size);
   scene::Budget budget(options.budget);
   Part part;
+  frame::Image image;
   console.progress().begin("drawing", options.frames);
   for (std::uint32_t i = 0; i < options.frames; ++i) {
     const auto start = Clock::now();
@@ -70,15 +71,15 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
       view.activity->time = playback->activity().facts().time(i % options.steps);
       touched = playback->activity().touched();
     }
-    Drawn drawn = artist.draw(view, width, height);
-    frame::soften(drawn.image, budget.softness());
+    const Drawn drawn = artist.draw(view, width, height);
+    frame::soften(drawn.image, budget.softness(), image);
     const double seconds = seconds_since(start);
-    if (drawn.image.covered < .02)
+    if (image.covered < .02)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was measured", i,
-                              100. * drawn.image.covered));
+                              100. * image.covered));
     part.frames += 1, part.seconds += seconds;
     part.cull += drawn.cull / options.frames, part.draw += drawn.draw / options.frames;
-    part.resolve += drawn.resolve / options.frames, part.covered += drawn.image.covered / options.frames;
+    part.resolve += drawn.resolve / options.frames, part.covered += image.covered / options.frames;
     if (artist.playback()) {
       part.values += double(drawn.activity.values) / options.frames;
       part.segments += double(drawn.segments) / options.frames;
@@ -91,7 +92,7 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
         part.pixel += double(view.detail.pixel) / options.frames;
     budget.took(1000. * seconds, drawn.segments);
     if (!options.out.empty() && i + 1 == options.frames)
-      io::write_png(options.out / fmt::format("{}.png", name), width, height, drawn.image.pixels);
+      io::write_png(options.out / fmt::format("{}.png", name), width, height, image.pixels);
     console.progress().advance();
   }
   console.progress().end();

@@ -135,12 +135,12 @@ class Bench {
     constexpr std::uint32_t settling = 20;
     const scene::Colouring colouring = scene::colour(forest_, scene::ColourBy::type, scene::Background::dark);
     scene::Budget budget(options_.budget);
+    frame::Image image;
     for (std::uint32_t i = 0; i < settling + std::uint32_t(part.frames); ++i) {
       const scene::View view =
           scene::within(view_of(i < settling ? i % options_.frames : i - settling), budget);
       const auto start = Clock::now();
-      frame::Image image = foveated_.draw(view, size_.first, size_.second, colouring);
-      frame::soften(image, budget.softness());
+      frame::soften(foveated_.draw(view, size_.first, size_.second, colouring), budget.softness(), image);
       const double seconds = seconds_since(start);
       if (i >= settling)
         part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames;

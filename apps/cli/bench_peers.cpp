@@ -233,14 +233,15 @@ void draw_ours(const Options& options) {
   const std::vector<std::uint32_t> measured = measured_pictures(options.frames);
   Json frames = Json::array(), cores = Json::array();
   double first = 0.;
+  frame::Image image;
   for (std::uint32_t picture = 0; picture <= measured.back(); ++picture) {
     if (*std::ranges::lower_bound(measured, picture) > picture + settling) continue;
     const auto start = Clock::now();
     const std::clock_t core = std::clock();
     scene::View view = scene::within(view_at(dolly, picture, 1), budget);
     view.samples = options.quick_samples.value_or(view.samples);
-    Drawn drawn = artist.draw(view, width, height);
-    if (!options.quick_samples) frame::soften(drawn.image, budget.softness());
+    const Drawn drawn = artist.draw(view, width, height);
+    frame::soften(drawn.image, options.quick_samples ? 0.f : budget.softness(), image);
     const double seconds = seconds_since(start);
     const double core_seconds = double(std::clock() - core) / CLOCKS_PER_SEC;
     budget.took(1000. * seconds, drawn.segments);
@@ -248,7 +249,7 @@ void draw_ours(const Options& options) {
     for (std::size_t i = 0; i < measured.size(); ++i) {
       if (measured[i] != picture) continue;
       frames.push_back(seconds), cores.push_back(core_seconds);
-      io::write_png(options.draw / fmt::format("ours-{}.png", i), width, height, drawn.image.pixels);
+      io::write_png(options.draw / fmt::format("ours-{}.png", i), width, height, image.pixels);
     }
   }
   fmt::print("{}\n", Json{{"frame_seconds", frames},

@@ -104,13 +104,12 @@ class Walk {
     Drawn drawn = artist_.draw(view, size_.first, size_.second);
     const auto softening = Clock::now();
     const bool budgeted = !options_.error && !options_.quick_samples;
-    frame::soften(drawn.image, options_.softness.value_or(budgeted ? budget_.softness() : 0.f));
+    frame::soften(drawn.image, options_.softness.value_or(budgeted ? budget_.softness() : 0.f), quick.image);
     quick.milliseconds = drawn.cull + drawn.draw + drawn.resolve + milliseconds_since(softening);
     budget_.took(quick.milliseconds, drawn.segments);
     if (drawn.image.covered < .005)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was compared", picture,
                               100. * drawn.image.covered));
-    quick.image = std::move(drawn.image);
     quick.drawn = connectedness_(cut(view), view.camera, viewport_);
     return quick;
   }

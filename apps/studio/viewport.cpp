@@ -494,7 +494,7 @@ void Viewport::paintGL() {
 
 void Viewport::paint(const frame::Image& drawn, float softness) {
   if (drawn.pixels.empty()) return;
-  if (softness > 0.f) frame::soften(softened_ = drawn, softness);
+  if (softness > 0.f) frame::soften(drawn, softness, softened_);
   const frame::Image& image = softness > 0.f ? softened_ : drawn;
   QOpenGLPaintDevice device(size() * devicePixelRatioF());
   QPainter painter(&device);

@@ -4,14 +4,15 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/clones.h"
 #include "forest/core/parallel.h"
 
 namespace forest::frame {
 namespace {
 
 /// A row of bytes of which each gives a share to those at the same place of `before` and `after`.
-void mix(const std::uint8_t* before, const std::uint8_t* at, const std::uint8_t* after, std::size_t count,
-         std::uint16_t share, std::uint8_t* out) {
+FOREST_CLONES void mix(const std::uint8_t* before, const std::uint8_t* at, const std::uint8_t* after,
+                       std::size_t count, std::uint16_t share, std::uint8_t* __restrict out) {
   const auto own = std::uint16_t(256 - 2 * share);
   for (std::size_t i = 0; i < count; ++i) {
     const auto around = std::uint16_t(share * std::uint16_t(before[i] + after[i]));
@@ -19,27 +20,36 @@ void mix(const std::uint8_t* before, const std::uint8_t* at, const std::uint8_t*
   }
 }
 
+void mix_across(const std::uint8_t* in, std::size_t row, std::uint16_t share, std::uint8_t* out) {
+  mix(in, in + 4, in + 8, row - 8, share, out + 4);
+  mix(in, in, in + 4, 4, share, out);
+  mix(in + row - 8, in + row - 4, in + row - 4, 4, share, out + row - 4);
+}
+
 }  // namespace
 
-void soften(Image& image, float share) {
+void soften(const Image& from, float share, Image& to) {
   const auto part = std::uint16_t(std::lround(256.f * std::clamp(share, 0.f, .25f)));
-  const std::size_t row = std::size_t(4) * image.width, rows = image.height;
-  if (part == 0 || image.width < 2 || rows == 0) return;
-  std::vector<std::uint8_t> across(image.pixels.size());
+  const std::size_t row = std::size_t(4) * from.width, rows = from.height;
+  if (part == 0 || from.width < 2 || rows == 0) {
+    to = from;
+    return;
+  }
+  to.width = from.width, to.height = from.height, to.covered = from.covered;
+  to.pixels.resize(from.pixels.size());
   constexpr std::size_t together = 32;
-  parallel_ranges(rows, together, [&](std::size_t from, std::size_t to) {
-    for (std::size_t y = from; y < to; ++y) {
-      const std::uint8_t* in = &image.pixels[y * row];
-      std::uint8_t* out = &across[y * row];
-      mix(in, in + 4, in + 8, row - 8, part, out + 4);
-      mix(in, in, in + 4, 4, part, out);
-      mix(in + row - 8, in + row - 4, in + row - 4, 4, part, out + row - 4);
+  parallel_ranges(rows, together, [&](std::size_t begin, std::size_t end) {
+    // Three rows whose pixels have their shares of their neighbours already: they stay in the first cache.
+    std::vector<std::uint8_t> across(3 * row);
+    const auto at = [&](std::size_t y) { return &across[y % 3 * row]; };
+    const auto mix_row = [&](std::size_t y) { mix_across(&from.pixels[y * row], row, part, at(y)); };
+    if (begin > 0) mix_row(begin - 1);
+    mix_row(begin);
+    for (std::size_t y = begin; y < end; ++y) {
+      const std::size_t above = y ? y - 1 : y, below = std::min(y + 1, rows - 1);
+      if (below > y) mix_row(below);
+      mix(at(above), at(y), at(below), row, part, &to.pixels[y * row]);
     }
-  });
-  parallel_ranges(rows, together, [&](std::size_t from, std::size_t to) {
-    for (std::size_t y = from; y < to; ++y)
-      mix(&across[(y ? y - 1 : y) * row], &across[y * row], &across[std::min(y + 1, rows - 1) * row], row,
-          part, &image.pixels[y * row]);
   });
 }
 

@@ -23,8 +23,8 @@ Image noise(std::uint32_t width, std::uint32_t height) {
 TEST(Soften, IsTheProductOfTwoKernelsToARounding) {
   for (const auto& [width, height] : {std::pair{2u, 1u}, {3u, 5u}, {97u, 70u}}) {
     const Image before = noise(width, height);
-    Image after = before;
-    soften(after, .125f);
+    Image after;
+    soften(before, .125f, after);
     const auto at = [&](int x, int y, std::size_t c) {
       const auto column = std::size_t(std::clamp(x, 0, int(width) - 1)),
                  line = std::size_t(std::clamp(y, 0, int(height) - 1));
@@ -47,21 +47,22 @@ TEST(Soften, LeavesOneColourAndNoShareAlone) {
   Image flat = noise(9, 4);
   flat.pixels.assign(flat.pixels.size(), 255);
   const auto before = flat.pixels;
-  soften(flat, .25f);
-  EXPECT_EQ(flat.pixels, before);
-  Image image = noise(9, 4);
-  const auto noisy = image.pixels;
-  soften(image, 0.f);
-  EXPECT_EQ(image.pixels, noisy);
+  Image soft;
+  soften(flat, .25f, soft);
+  EXPECT_EQ(soft.pixels, before);
+  const Image noisy = noise(9, 4);
+  soften(noisy, 0.f, soft);
+  EXPECT_EQ(soft.pixels, noisy.pixels);
 }
 
 TEST(Soften, IsTheSameAtAnyNumberOfThreads) {
-  Image one = noise(300, 200), many = one;
+  const Image image = noise(300, 200);
+  Image one, many;
   {
     const ThreadLimit limit(1);
-    soften(one, .1f);
+    soften(image, .1f, one);
   }
-  soften(many, .1f);
+  soften(image, .1f, many);
   EXPECT_EQ(one.pixels, many.pixels);
 }
 
