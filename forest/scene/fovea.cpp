@@ -13,6 +13,8 @@ namespace forest::scene {
 namespace {
 
 constexpr std::uint32_t coarsest = 8;
+constexpr float least_step =
+    2.f;  // from the finest layer to the next: to look at a branch twice costs more than a few pixels
 constexpr std::uint32_t coarse_samples = 4;
 constexpr float fade = .2f;  // of the eccentricity at which a layer ends: how far it reaches into the next
 constexpr float least_fade = .5f;  // degrees
@@ -187,7 +189,7 @@ std::vector<Layer> layers_of(const View& view, std::uint32_t width, std::uint32_
   for (const Vec2& corner : {Vec2(0, 0), Vec2(w, 0), Vec2(0, h), Vec2(w, h)})
     farthest = std::max(farthest, gaze.eccentricity(corner));
   for (std::uint32_t k = 2; k <= coarsest && height / k >= 16; k *= 2) {
-    if (float(k) <= view.detail.pixel) continue;
+    if (float(k) < least_step * view.detail.pixel) continue;
     // From here on the eye resolves nothing smaller than k pixels.
     const float from =
         std::max(gaze.where_resolved(float(k), detail), layers.size() == 1 ? detail.fovea : 0.f);
