@@ -48,9 +48,13 @@ void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> ey
     const bool knows = c.before_ && first && c.eye_->camera() == first->camera();
     sights.push_back({eyes[i], knows ? &*c.before_ : nullptr, c.horizons_[0]});
   }
-  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown);
+  std::shared_ptr<Closeness>& closeness = choosers.front()->closeness_;
+  if (!closeness) closeness = std::make_shared<Closeness>(choosers.front()->forest_);
+  closeness->seen_by(eyes.front());
+  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown, closeness.get());
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];
+    c.closeness_ = closeness;
     c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
     c.revealed_segments_ = c.drawings_ = 0;
     c.cut_ = std::move(cuts[i]);
@@ -70,7 +74,7 @@ void Chooser::complete(frame::Frame& frame) {
       // A map of nothing hides nothing: there is no use in rounds.
       const bool rounds = !seen.depths.empty() && round_ + 1 < horizons_.size();
       const float horizon = rounds ? horizons_[round_ + 1] : INFINITY;
-      revealed_ = revealed(forest_, {*eye_, &now, horizon}, left, shown_);
+      revealed_ = revealed(forest_, {*eye_, &now, horizon}, left, shown_, closeness_.get());
       in_sight_.add(revealed_);
       ++round_;
     } while (revealed_.lists().empty());

@@ -6,6 +6,7 @@
 #include <array>
 #include <cmath>
 #include <functional>
+#include <memory>
 #include <optional>
 
 #include "forest/scene/cut.h"
@@ -42,6 +43,7 @@ class Chooser {
   frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
+  std::shared_ptr<Closeness> closeness_;  // of all that are asked together
   using Horizons = std::array<float, 3>;  // µm along the view
   static Horizons horizons_of(const frame::DepthMap& seen);
   static Horizons first_horizons(const Forest& forest, const Eye& eye);

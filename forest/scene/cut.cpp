@@ -34,7 +34,7 @@ constexpr float dot_limit = 24.f;  // a soma of a larger radius, in pixels, is d
 constexpr float group_limit =
     12.f;               // groups of a cluster of a larger radius, in pixels, are looked at one by one
 constexpr int few = 8;  // segments of a cluster; its groups are not looked at for so few
-constexpr std::size_t left_out_at_once = 64, neurons_at_once = 64,
+constexpr std::size_t left_out_at_once = 512, neurons_at_once = 64,
                       bricks_at_least = 128;  // fixed, so that the result does not depend on threads
 
 frame::Item item(std::uint32_t instance, std::uint32_t first, std::uint32_t drawn, const Sphere& sphere) {
@@ -59,13 +59,6 @@ struct Cameras {
       if (sight.before) before = sight.before->viewer();
     same = now == before;
   }
-  // For spheres of a neuron.
-  Cameras within(const Placed& placed) const {
-    Cameras cameras = *this;
-    cameras.now = now.within(placed.position, placed.turn);
-    cameras.before = same ? cameras.now : before.within(placed.position, placed.turn);
-    return cameras;
-  }
 };
 
 // What is looked at, by whom, and what is known to be hidden.
@@ -74,6 +67,10 @@ struct Look {
   std::span<const Sight> sights;
   bool keep;  // what is hidden
   const Shown& shown;
+  Closeness& closeness;
+  std::span<const Cluster> clusters = forest.clusters();
+  std::span<const Neuron> neurons = forest.neurons();
+  std::span<const Standing> standing = forest.standing();
   Cameras cameras{sights};
   Fog fog = fog_of(forest, sights.front().eye.camera(), sights.front().eye.detail().fog);
   bool plain = plainly();  // all neurons are visible, whole, and drawn as fits their size
@@ -82,14 +79,11 @@ struct Look {
   // What is read of a neuron, into the cache.
   void fetch(const Standing& one) const {
     const Neuron& neuron = neuron_of(one);
-    if (neuron.cluster_count) __builtin_prefetch(&forest.clusters()[neuron.first_cluster]);
+    if (neuron.cluster_count) __builtin_prefetch(&clusters[neuron.first_cluster]);
     if (!plain) __builtin_prefetch(&shown.states[one.index]);
   }
-  const Neuron& neuron_of(const Standing& one) const { return forest.neurons()[one.instance.morphology]; }
+  const Neuron& neuron_of(const Standing& one) const { return neurons[one.instance.morphology]; }
   frame::State state(std::uint32_t index) const { return plain ? frame::State{} : shown.states[index]; }
-  bool in_sight(const Sight& sight, const Seen& seen) const {
-    return seen.nearest < fog.end() && sight.eye.may_see(seen);
-  }
   // For the eye, through what fog there is.
   bool good_enough(const Sight& sight, const Seen& seen, float error) const {
     return sight.eye.good_enough(seen, error) ||
@@ -126,69 +120,38 @@ struct Look {
   }
 };
 
-// A neuron where it stands, and as its own coordinates are seen.
-class Turned {
+// A neuron that is looked at.
+class Subject {
  public:
   std::uint32_t standing, index;  // of the instance
   Placed placed;
-  Cameras cameras;
+  frame::State state;
+  std::vector<const frame::State*> parts;  // of its sections; empty: it is shown as one
+  std::uint32_t seen_by = 0;               // sights that may see its root
 
-  Turned(const Look& look, std::uint32_t number)
+  Subject(const Look& look, std::uint32_t number)
       : standing(number),
-        index(look.forest.standing()[number].index),
-        placed(look.forest.standing()[number].instance),
-        cameras(look.cameras.within(placed)),
-        look_(look),
-        neuron_(look.neuron_of(look.forest.standing()[number])),
-        first_(neuron_.first_cluster) {}
+        index(look.standing[number].index),
+        placed(look.standing[number].instance),
+        state(look.state(index)),
+        look_(&look),
+        neuron_(&look.neuron_of(look.standing[number])) {
+    if (parted()) parts = section_states(look.forest, look.shown, index);
+  }
 
-  // What decides which thin branches of a cluster are drawn: its closeness (Seen::closeness), or that of something it grows
-  // into, where that is closer. So nothing that is drawn ends where a branch goes into the depth and gets thin there. It
-  // depends on the camera alone, not on what is chosen or hidden.
+  std::uint32_t root() const { return neuron_->first_cluster; }
+  bool parted() const { return state.is(frame::State::parted); }
+
+  // As Closeness has it.
   float closeness(std::uint32_t cluster) {
-    if (!whole_) look_at_all();
-    return cluster == first_ || close_.empty() ? *whole_ : close_[cluster - first_];
+    if (!closeness_) closeness_ = look_->closeness.of(standing, placed);
+    return (*closeness_)(cluster - root());
   }
 
  private:
-  // Most neurons are so far that one end of them is as close as the other.
-  void look_at_all() {
-    constexpr float flat = .1f, deep = .2f;  // radius by distance
-    const frame::Camera& camera = look_.sights.front().eye.camera();
-    const auto clusters = look_.forest.clusters().subspan(first_, neuron_.cluster_count);
-    const Seen seen = cameras.now(clusters.front().sphere());
-    whole_ = seen.closeness(camera.near);
-    const float depth = seen.at.z() > seen.radius ? seen.radius / seen.at.z() : 1.f;
-    if (seen.orthographic || depth < flat) return;
-    const float share = std::min(1.f, (depth - flat) / (deep - flat));
-    // The leaves lie behind all others, the last of them first.
-    const std::size_t count = clusters.size(), leaves = (count + 1) / 2, first_leaf = count - leaves;
-    const auto place_of = [&](std::size_t leaf) { return count - 1 - leaf; };
-    close_.resize(count);
-    thread_local std::vector<std::size_t> behind;  // of a leaf, the next that it does not lead to
-    behind.resize(leaves);
-    for (std::size_t leaf = leaves; leaf-- > 0;) {
-      const Cluster& c = clusters[place_of(leaf)];
-      const Seen one = cameras.now(c.sphere());
-      float close = 0.f;
-      if (look_.sights.front().eye.may_be_in_picture(one))
-        close = *whole_ + share * (one.closeness(camera.near) - *whole_);
-      const std::size_t end = std::min<std::size_t>(leaf + 1 + c.outgrowth, leaves);
-      std::size_t next = leaf + 1;
-      for (; next < end; next = behind[next]) close = std::max(close, close_[place_of(next)]);
-      behind[leaf] = next, close_[place_of(leaf)] = close;
-    }
-    for (std::size_t at = first_leaf; at-- > 0;) {
-      const auto [a, b] = clusters[at].children;
-      close_[at] = std::max(close_[a - first_], close_[b - first_]);
-    }
-  }
-
-  const Look& look_;
-  const Neuron& neuron_;
-  std::uint32_t first_;  // of its clusters
-  std::optional<float> whole_;
-  std::vector<float> close_;  // of every cluster but the first; empty: as the whole neuron
+  const Look* look_;
+  const Neuron* neuron_;
+  std::optional<Closeness::OfNeuron> closeness_;
 };
 
 // Adds a run to the list that it belongs to, drawn as `kind` or, for `any`, by its width in pixels.
@@ -214,7 +177,7 @@ void add(Cut& cut, const frame::Item& run, frame::Kind kind, bool thin) {
 // A leaf of a neuron with parts: runs of segments of one state.
 void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, std::uint32_t shown,
                const Sphere& sphere, bool thin, std::span<const frame::State* const> states, Cut& cut) {
-  const Neuron& neuron = look.forest.neurons()[look.forest.instances()[index].morphology];
+  const Neuron& neuron = look.neurons[look.forest.instances()[index].morphology];
   const frame::State whole = look.state(index);
   const auto state_of = [&](std::uint32_t segment) -> const frame::State* {
     const std::uint32_t section =
@@ -234,32 +197,43 @@ void add_parts(const Look& look, std::uint32_t index, const Cluster& leaf, std::
   }
 }
 
-// A sphere as all sights see it, and as the camera of the pictures before saw it; that once somebody asks.
+// Spheres as all sights see them, and as the camera of the pictures before saw them; that once somebody asks.
 class Judged {
  public:
-  Judged(const Cameras& cameras, const Sphere& sphere)
-      : cameras_(cameras), sphere_(sphere), seen_(cameras.now(sphere)) {}
+  Judged(const Cameras& cameras, const Spheres& spheres) : cameras_(cameras), spheres_(spheres) {
+    cameras.now(spheres_, seen_);
+  }
+  Judged(const Cameras& cameras, const Sphere& sphere) : Judged(cameras, Spheres(sphere)) {}
 
-  const Seen& seen() const { return seen_; }
-  bool hidden(const Sight& sight) {
+  Seen seen(std::size_t i = 0) const { return seen_[i]; }
+  std::uint32_t may_see(const Sight& sight) const { return sight.eye.may_see(seen_); }
+  // … and through the fog.
+  bool in_sight(const Look& look, const Sight& sight) const {
+    return seen_.nearest[0] < look.fog.end() && (may_see(sight) & 1u);
+  }
+  bool hidden(const Sight& sight, std::size_t i = 0) {
     if (!sight.before) return false;
-    if (cameras_.same) return sight.before->hide(seen_);
-    if (!before_) before_ = cameras_.before(sphere_);
-    return sight.before->hide(*before_);
+    if (cameras_.same) return sight.before->hide(seen_.glimpse(i));
+    if (!before_) cameras_.before(spheres_, before_.emplace());
+    return sight.before->hide(before_->glimpse(i));
   }
   // Whether it is left out for now, or for good.
-  bool left_out(const Look& look, const Sight& sight, const LeftOut& what, Cut& cut) {
-    const bool far = seen_.nearest > sight.horizon;
-    if (!far && !hidden(sight)) return false;
-    if (far || look.keep) cut.left_out.push_back(what);
+  bool left_out(const Look& look, const Sight& sight, const LeftOut& what, Cut& cut, std::size_t i = 0) {
+    const bool far = seen_.nearest[i] > sight.horizon;
+    if (!far && !hidden(sight, i)) return false;
+    if (far || look.keep) leave_out(what, cut, i);
     return true;
+  }
+  void leave_out(LeftOut what, Cut& cut, std::size_t i = 0) const {
+    what.seen = seen_.glimpse(i);
+    cut.left_out.push_back(what);
   }
 
  private:
   const Cameras& cameras_;
-  const Sphere& sphere_;
-  Seen seen_;
-  std::optional<Seen> before_;
+  Spheres spheres_;
+  SeenTogether seen_;
+  std::optional<SeenTogether> before_;
 };
 
 // Calls take(i) for each of a set of sights, a bit for each.
@@ -268,90 +242,115 @@ void each_of(std::uint32_t sights, auto&& take) {
 }
 
 // Which segments of a cluster are wide enough to be drawn, or drawn for their like.
-std::uint32_t shown_of(const Sight& sight, Turned& neuron, const Cluster& c, std::uint32_t at) {
+std::uint32_t shown_of(const Sight& sight, Subject& neuron, const Cluster& c, std::uint32_t at) {
   const float thinnest = sight.eye.detail().thinnest;
   return thinnest > 0.f ? c.visible_at(sight.eye.magnification(neuron.closeness(at)) / thinnest) : c.all();
 }
 
 // Of a cluster that is good enough, these groups.
-void choose_groups(const Look& look, const Sight& sight, Turned& neuron, std::uint32_t at,
+void choose_groups(const Look& look, const Sight& sight, Subject& neuron, std::uint32_t at,
                    std::uint32_t groups, const Seen& seen, Cut& cut) {
   const std::uint32_t index = neuron.index;
-  const Cluster& c = look.forest.clusters()[at];
-  const frame::Kind kind = look.state(index).kind;
+  const Cluster& c = look.clusters[at];
+  const frame::Kind kind = neuron.state.kind;
   const std::uint32_t all = shown_of(sight, neuron, c, at);
   if (groups == every_group &&
       (std::popcount(all) <= few || seen.radius * sight.eye.magnification(seen) <= group_limit))
     return add(cut, item(index, c.first_segment, all, neuron.placed(c)), kind,
                sight.eye.thin(seen, c.thickness));
-  std::uint32_t hidden = 0;
-  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) {
+  Spheres spheres;
+  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) spheres.put(g, neuron.placed(c.group(g)));
+  Judged judged(look.cameras, spheres);
+  for (std::uint32_t rest = groups & judged.may_see(sight); rest; rest &= rest - 1) {
+    const auto g = std::uint32_t(std::countr_zero(rest));
     const std::uint32_t first = g * Cluster::group_size, drawn = all >> first & 255u;
-    if (!(groups >> g & 1u) || !drawn) continue;
-    const Sphere around = c.group(g);
-    Judged judged(neuron.cameras, around);
-    if (!sight.eye.may_see(judged.seen())) continue;
-    if (judged.hidden(sight))
-      hidden |= 1u << g;
-    else
-      add(cut, item(index, c.first_segment + first, drawn, neuron.placed(around)), kind,
-          sight.eye.thin(judged.seen(), c.thickness));
+    if (!drawn) continue;
+    if (!judged.hidden(sight, g))
+      add(cut, item(index, c.first_segment + first, drawn, spheres[g]), kind,
+          sight.eye.thin(judged.seen(g), c.thickness));
+    else if (look.keep)
+      judged.leave_out({LeftOut::cluster, neuron.standing, at, 1u << g}, cut, g);
   }
-  if (hidden && look.keep) cut.left_out.push_back({LeftOut::cluster, neuron.standing, at, hidden});
 }
 
-// For each sight, from one cluster on; returns which of them may see it.
-std::uint32_t choose_clusters(const Look& look, Turned& neuron, std::uint32_t from, std::uint32_t of_sights,
-                              std::span<Cut> cuts) {
-  const std::uint32_t index = neuron.index;
-  const auto clusters = look.forest.clusters();
-  const frame::State state = look.state(index);
-  const bool parted =
-      state.is(frame::State::parted);  // drawn in full: coarse clusters do not know their branches
-  const auto states =
-      parted ? section_states(look.forest, look.shown, index) : std::vector<const frame::State*>();
-  if (state.kind == frame::Kind::somata && !parted) return of_sights;
-  struct Open {
-    std::uint32_t cluster, sights;  // those for which its parent was too coarse
-  };
+// Some neurons on their way down from the coarsest clusters, all together, so that vectors are full.
+class Descent {
+ public:
+  Descent(const Look& look, std::span<Cut> cuts) : look_(look), cuts_(cuts) {}
+
+  void add(std::uint32_t standing) { subjects_.emplace_back(look_, standing); }
+  std::span<const Subject> subjects() const { return subjects_; }
+  Subject& last() { return subjects_.back(); }
+  // Of the neuron added last.
+  void add(std::uint32_t cluster, std::uint32_t sights) {
+    open_.push_back({std::uint32_t(subjects_.size() - 1), cluster, sights});
+  }
+
   // Level by level: until a cluster's turn comes it has been fetched.
-  thread_local std::vector<Open> open;
-  open.assign(1, {from, of_sights});
-  std::uint32_t may_see = 0;
-  for (std::size_t next = 0; next < open.size(); ++next) {
-    const auto [at, sights] = open[next];
-    const Cluster& c = clusters[at];
-    const Sphere sphere = c.sphere();
-    Judged judged(neuron.cameras, sphere);
-    const Seen& seen = judged.seen();
-    std::uint32_t finer = 0;
-    each_of(sights, [&](std::size_t s) {
-      const Sight& sight = look.sights[s];
-      Cut& cut = cuts[s];
-      // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
-      if (!sight.eye.may_see(seen)) return;
-      if (at == from) may_see |= 1u << s;
-      if (judged.left_out(look, sight, {LeftOut::cluster, neuron.standing, at, 0}, cut)) {
-      } else if (!c.is_leaf() && (parted || !look.good_enough(sight, seen, c.error))) {
-        finer |= 1u << s;
-      } else if (parted) {
-        add_parts(look, index, c, shown_of(sight, neuron, c, at), neuron.placed(c),
-                  sight.eye.thin(seen, c.thickness), states, cut);
-      } else {
-        choose_groups(look, sight, neuron, at, every_group, seen, cut);
+  void run() {
+    for (std::size_t next = 0; next < open_.size();) {
+      const std::size_t count = std::min(Spheres::most, open_.size() - next);
+      std::copy_n(open_.begin() + std::ptrdiff_t(next), count, some_.begin());
+      next += count;
+      Spheres spheres;
+      std::uint32_t of_sights = 0;
+      for (std::size_t i = 0; i < count; ++i) {
+        const Open& o = some_[i];
+        spheres.put(i, subjects_[o.subject].placed(look_.clusters[o.cluster]));
+        of_sights |= o.sights;
       }
-    });
-    if (!finer) continue;
-    for (const std::uint32_t child : c.children) {
-      fetch(clusters[child]);
-      open.push_back({child, finer});
+      Judged judged(look_.cameras, spheres);
+      const std::uint32_t all = (1u << count) - 1u;
+      std::array<std::uint32_t, Spheres::most> finer{};
+      each_of(of_sights, [&](std::size_t s) {
+        // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
+        for (std::uint32_t rest = all & judged.may_see(look_.sights[s]); rest; rest &= rest - 1)
+          if (const auto i = std::size_t(std::countr_zero(rest)); some_[i].sights >> s & 1u)
+            finer[i] |= std::uint32_t(too_coarse(judged, i, s)) << s;
+      });
+      for (std::size_t i = 0; i < count; ++i) {
+        if (!finer[i]) continue;
+        for (const std::uint32_t child : look_.clusters[some_[i].cluster].children) {
+          fetch(look_.clusters[child]);
+          open_.push_back({some_[i].subject, child, finer[i]});
+        }
+      }
     }
   }
-  return may_see;
-}
+
+ private:
+  struct Open {
+    std::uint32_t subject, cluster, sights;  // those for which its parent was too coarse
+  };
+  const Look& look_;
+  std::span<Cut> cuts_;
+  std::vector<Subject> subjects_;
+  std::vector<Open> open_;
+  std::array<Open, Spheres::most> some_;
+
+  // Of those at work, one that a sight may see: it is drawn, or left out, or its children are to be looked at.
+  bool too_coarse(Judged& judged, std::size_t i, std::size_t s) {
+    const std::uint32_t at = some_[i].cluster;
+    const Cluster& c = look_.clusters[at];
+    const Sight& sight = look_.sights[s];
+    Subject& neuron = subjects_[some_[i].subject];
+    Cut& cut = cuts_[s];
+    if (at == neuron.root()) neuron.seen_by |= 1u << s;
+    if (judged.left_out(look_, sight, {LeftOut::cluster, neuron.standing, at, 0}, cut, i)) return false;
+    const Seen seen = judged.seen(i);
+    // Those with parts are drawn in full: coarse clusters do not know their branches.
+    if (!c.is_leaf() && (neuron.parted() || !look_.good_enough(sight, seen, c.error))) return true;
+    if (neuron.parted())
+      add_parts(look_, neuron.index, c, shown_of(sight, neuron, c, at), neuron.placed(c),
+                sight.eye.thin(seen, c.thickness), neuron.parts, cut);
+    else
+      choose_groups(look_, sight, neuron, at, every_group, seen, cut);
+    return false;
+  }
+};
 
 void choose_soma(const Look& look, std::uint32_t number, std::uint32_t sights, std::span<Cut> cuts) {
-  const Standing& one = look.forest.standing()[number];
+  const Standing& one = look.standing[number];
   const auto& [around, instance, index] = one;
   const Neuron& neuron = look.neuron_of(one);
   const Sphere sphere{{instance.x, instance.y, instance.z}, neuron.soma_radius};
@@ -366,7 +365,7 @@ void choose_soma(const Look& look, std::uint32_t number, std::uint32_t sights, s
   Judged judged(look.cameras, sphere);
   each_of(sights, [&](std::size_t s) {
     const Sight& sight = look.sights[s];
-    if (!look.in_sight(sight, judged.seen())) return;
+    if (!judged.in_sight(look, sight)) return;
     if (judged.left_out(look, sight, {LeftOut::soma, number, 0, 0}, cuts[s])) return;
     const bool large = neuron.soma_radius * sight.eye.magnification(judged.seen()) > dot_limit;
     (large ? cuts[s].capsules : cuts[s].dots).push_back(ball);
@@ -374,18 +373,29 @@ void choose_soma(const Look& look, std::uint32_t number, std::uint32_t sights, s
   });
 }
 
-void choose_neuron(const Look& look, std::uint32_t number, std::uint32_t sights, std::span<Cut> cuts) {
-  const Standing& one = look.forest.standing()[number];
-  if (!(look.state(one.index).flags & (frame::State::visible | frame::State::parted))) return;
-  const Neuron& neuron = look.neuron_of(one);
-  if (!neuron.cluster_count) return;
-  if (const std::uint32_t far = look.far(one.index, one.sphere, sights)) {
+void choose_neurons(const Look& look, std::uint32_t first, std::uint32_t end, std::uint32_t of_sights,
+                    std::span<Cut> cuts) {
+  const auto standing = look.standing;
+  Descent descent(look, cuts);
+  for (std::uint32_t i = first; i < end; ++i) {
+    if (i + 2 < end) look.fetch(standing[i + 2]);
+    const Standing& one = standing[i];
+    const frame::State state = look.state(one.index);
+    if (!(state.flags & (frame::State::visible | frame::State::parted))) continue;
+    if (!look.neuron_of(one).cluster_count) continue;
+    const std::uint32_t far = look.far(one.index, one.sphere, of_sights), near = of_sights & ~far;
     each_of(far, [&](std::size_t s) { ++cuts[s].far; });
-    if (!(sights &= ~far)) return;
+    if (!near) continue;
+    descent.add(i);
+    if (state.kind == frame::Kind::somata && !descent.last().parted())
+      descent.last().seen_by = near;
+    else
+      descent.add(descent.last().root(), near);
   }
+  descent.run();
   // The soma lies within its root.
-  Turned turned(look, number);
-  choose_soma(look, number, choose_clusters(look, turned, neuron.first_cluster, sights, cuts), cuts);
+  for (const Subject& neuron : descent.subjects())
+    if (neuron.seen_by) choose_soma(look, neuron.standing, neuron.seen_by, cuts);
 }
 
 struct Open {
@@ -404,7 +414,7 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     std::uint32_t within = 0;
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
-      if (!look.in_sight(sight, judged.seen())) return;
+      if (!judged.in_sight(look, sight)) return;
       if (look.plain && look.straws_do(sight, judged.seen())) {
         cuts[s].far += node.count;
         return;
@@ -413,12 +423,7 @@ void choose_grove(const Look& look, Open from, std::span<Cut> cuts) {
     });
     if (!within) continue;
     for (std::uint32_t c = node.child_count; c-- > 0;) open.push_back({node.first_child + c, within});
-    if (node.child_count) continue;
-    const auto standing = look.forest.standing();
-    for (std::uint32_t i = node.first, end = node.first + node.count; i < end; ++i) {
-      if (i + 2 < end) look.fetch(standing[i + 2]);
-      choose_neuron(look, i, within, cuts);
-    }
+    if (!node.child_count) choose_neurons(look, node.first, node.first + node.count, within, cuts);
   }
 }
 
@@ -444,19 +449,17 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
     cut.segments += std::uint32_t(std::popcount(drawn));
   };
   if (groups == every_group && sphere.radius * magnification <= group_limit) return put(shown, sphere);
-  std::uint32_t hidden = 0;
   for (std::uint32_t g = 0; g < Brick::group_count; ++g) {
     const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
     if (!drawn || !(groups >> g & 1u)) continue;
     const Sphere around = b.group(g);
     Judged judged(look.cameras, around);
-    if (!look.in_sight(sight, judged.seen())) continue;
-    if (judged.hidden(sight))
-      hidden |= 1u << g;
-    else
+    if (!judged.in_sight(look, sight)) continue;
+    if (!judged.hidden(sight))
       put(drawn, around);
+    else if (look.keep)
+      judged.leave_out({LeftOut::brick, 0, at, 1u << g}, cut);
   }
-  if (hidden && look.keep) cut.left_out.push_back({LeftOut::brick, 0, at, hidden});
 }
 
 void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
@@ -468,11 +471,11 @@ void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {
     const Brick& b = bricks[at];
     const Sphere sphere = b.sphere();
     Judged judged(look.cameras, sphere);
-    const Seen& seen = judged.seen();
+    const Seen seen = judged.seen();
     std::uint32_t finer = 0;
     each_of(sights, [&](std::size_t s) {
       const Sight& sight = look.sights[s];
-      if (!look.in_sight(sight, seen) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s]))
+      if (!judged.in_sight(look, sight) || judged.left_out(look, sight, {LeftOut::brick, 0, at, 0}, cuts[s]))
         return;
       if (b.child_count && !look.straws_do(sight, seen, b.error()))
         finer |= 1u << s;
@@ -567,6 +570,19 @@ std::vector<frame::Band> bands_of(const Starts& dots, const Starts& lines, const
   return bands;
 }
 
+// What is given, or else one of its own.
+class KnownCloseness {
+ public:
+  KnownCloseness(const Forest& forest, const Eye& eye, Closeness* given) : given_(given) {
+    if (!given) own_.emplace(forest).seen_by(eye);
+  }
+  Closeness& operator*() { return given_ ? *given_ : *own_; }
+
+ private:
+  Closeness* given_;
+  std::optional<Closeness> own_;
+};
+
 // From near to far, in bands.
 void arrange(Cut& cut, const Eye& eye) {
   const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
@@ -605,8 +621,10 @@ void NeuronsInSight::add(const Cut& cut) {
     }
 }
 
-std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown) {
-  const Look look{forest, sights, true, shown};
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown,
+                        Closeness* closeness) {
+  KnownCloseness known(forest, sights.front().eye, closeness);
+  const Look look{forest, sights, true, shown, *known};
   const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
   std::vector<Cut> cuts = in_chunks(groves.size() + bricks.size(), 1, sights.size(),
                                     [&](std::size_t i, std::size_t, std::span<Cut> parts) {
@@ -624,17 +642,16 @@ Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const S
   return std::move(choose(forest, std::span(&sight, 1), shown).front());
 }
 
-Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown) {
-  const Look look{forest, std::span(&now, 1), false, shown};
+Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out, const Shown& shown,
+             Closeness* closeness) {
+  KnownCloseness known(forest, now.eye, closeness);
+  const Look look{forest, std::span(&now, 1), false, shown, *known};
   const auto reveal = [&](std::size_t begin, std::size_t end, std::span<Cut> cuts) {
-    std::optional<Turned> turned;  // what was left out of a neuron lies together
-    for (std::size_t n = begin; n < end; ++n) {
-      if (const LeftOut& soon = left_out[std::min(n + 4, left_out.size() - 1)];
-          soon.what == LeftOut::cluster) {
-        look.fetch(look.forest.standing()[soon.standing]);
-        fetch(forest.clusters()[soon.number]);
-      }
-      const LeftOut& l = left_out[n];
+    Descent descent(look, cuts);
+    for (const LeftOut& l : left_out.subspan(begin, end - begin)) {
+      // Most are asked no more than this: the camera is that of the cut.
+      if (l.seen.nearest > now.horizon) cuts.front().left_out.push_back(l);
+      if (l.seen.nearest > now.horizon || (now.before && now.before->hide(l.seen))) continue;
       switch (l.what) {
         case LeftOut::grove:
           choose_grove(look, {l.number, 1}, cuts);
@@ -647,14 +664,17 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
                    : choose_bricks(look, {l.number, 1}, cuts);
           break;
         case LeftOut::cluster:
-          if (!turned || turned->standing != l.standing) turned.emplace(look, l.standing);
-          if (l.groups)
-            choose_groups(look, now, *turned, l.number, l.groups,
-                          turned->cameras.now(forest.clusters()[l.number].sphere()), cuts.front());
-          else
-            choose_clusters(look, *turned, l.number, 1, cuts);
+          if (descent.subjects().empty() || descent.last().standing != l.standing) descent.add(l.standing);
+          if (!l.groups) {
+            descent.add(l.number, 1);
+            break;
+          }
+          const Sphere sphere = descent.last().placed(look.clusters[l.number]);
+          choose_groups(look, now, descent.last(), l.number, l.groups, look.cameras.now(sphere),
+                        cuts.front());
       }
     }
+    descent.run();
   };
   Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
   arrange(cut, now.eye);

@@ -9,13 +9,14 @@
 #include <vector>
 
 #include "forest/frame/frame.h"
+#include "forest/scene/closeness.h"
 #include "forest/scene/forest.h"
 #include "forest/scene/level.h"
 #include "forest/scene/occlusion.h"
 
 namespace forest::scene {
 
-/// What was left out because an earlier picture hid it, or because it is far: a cluster or a brick and all below it, some of the groups that it
+/// What was left out because an earlier picture hid it, or because it is far: a cluster or a brick and all below it, one of the groups that it
 /// draws, a soma, or the neurons of a grove.
 struct LeftOut {
   enum What : std::uint32_t { cluster, soma, grove, brick };
@@ -23,6 +24,7 @@ struct LeftOut {
   std::uint32_t standing = 0;  // of a cluster or a soma: whose, in Forest::standing()
   std::uint32_t number = 0;    // of the cluster, the grove or the brick
   std::uint32_t groups = 0;    // bit i: group i; 0: all of it, and all below
+  Glimpse seen = {};           // by the camera of the cut
 };
 
 /// A branch that is shown otherwise than its neuron: a section and all that grows out of it.
@@ -90,12 +92,14 @@ inline constexpr std::size_t most_sights = 32;
 /// What is drawn for each sight, the same as for it alone, in one walk over the forest.
 /// Pure: depends on its arguments alone, and is the same at any number of threads.
 /// @param sights  what they leave out goes to `left_out`: earlier pictures are a guess
-std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {});
+/// @param closeness  that of this camera; null: it is worked out
+std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {},
+                        Closeness* closeness = nullptr);
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
 
 /// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its
 /// horizon is left out again. Drawn besides until nothing is left out, it gives the picture without any guess.
 Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> left_out,
-             const Shown& shown = {});
+             const Shown& shown = {}, Closeness* closeness = nullptr);
 
 }  // namespace forest::scene

@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "forest/core/clones.h"
+
 namespace forest::scene {
 
 namespace {
@@ -52,38 +54,49 @@ Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Det
   const frame::Area& area =
       detail.area.value_or(frame::Area{0, 0, std::uint32_t(viewport.width), std::uint32_t(viewport.height)});
   const Vec2 low(float(area.left), float(area.top)), high(float(area.right), float(area.bottom));
-  low_ = (low - middle_) / focal_, high_ = (high - middle_) / focal_;
-  const auto length = [&](float slope) {
-    return camera.orthographic() ? 1.f : std::sqrt(1.f + slope * slope);
+  const auto borders_of = [&](const Vec2& from, const Vec2& to) {
+    Borders b;
+    b.low = (from - middle_) / focal_, b.high = (to - middle_) / focal_;
+    if (camera.orthographic())
+      b.converge = 0.f, b.parallel = 1.f;
+    else
+      b.low_length = (1.f + b.low.array().square()).sqrt(),
+      b.high_length = (1.f + b.high.array().square()).sqrt();
+    return b;
   };
-  low_length_ = low_.unaryExpr(length), high_length_ = high_.unaryExpr(length);
-  end_ = middle_ / focal_, end_length_ = end_.unaryExpr(length);
+  wanted_ = borders_of(low, high), whole_ = borders_of(Vec2::Zero(), 2.f * middle_);
+  if (detail.hole) {
+    const Borders hole =
+        borders_of({float(detail.hole->left) + margin, float(detail.hole->top) + margin},
+                   {float(detail.hole->right) - margin, float(detail.hole->bottom) - margin});
+    wanted_.hole_low = hole.low, wanted_.hole_high = hole.high;
+  }
   if (!detail.gaze) return;
   for (const Vec2& corner : {low, high, Vec2(low.x(), high.y()), Vec2(high.x(), low.y())})
     most_acceptable_ =
         std::max(most_acceptable_, detail.error * gaze_.resolved(gaze_.eccentricity(corner), detail));
 }
 
-bool Eye::may_see(const Seen& seen) const {
-  // Distances from the planes through the borders of what is wanted, as in frame::Frustum.
-  const float across = camera_.orthographic() ? 1.f : seen.at.z();
-  const Vec2 at(seen.at.x(), -seen.at.y());
-  if (!(seen.at.z() >= -seen.radius &&
-        ((at - across * low_).array() >= -seen.radius * low_length_.array()).all() &&
-        ((across * high_ - at).array() >= -seen.radius * high_length_.array()).all()))
-    return false;
-  if (!detail_.hole || !seen.known) return true;
-  const frame::Area& hole = *detail_.hole;
-  const Vec2 place = middle_ + focal_ * seen.place();
-  const float reach = focal_ * seen.reach() + margin;
-  return !(place.x() - reach >= float(hole.left) && place.y() - reach >= float(hole.top) &&
-           place.x() + reach <= float(hole.right) && place.y() + reach <= float(hole.bottom));
-}
-
-bool Eye::may_be_in_picture(const Seen& seen) const {
-  const float across = camera_.orthographic() ? 1.f : seen.at.z();
-  return seen.at.z() >= -seen.radius &&
-         (across * end_ - seen.at.head<2>().cwiseAbs()).cwiseQuotient(end_length_).minCoeff() >= -seen.radius;
+// Distances from the planes through the borders, as in frame::Frustum.
+FOREST_CLONES std::uint32_t Eye::within(const Borders& b, const SeenTogether& seen) {
+  const float low_x = b.low.x(), high_x = b.high.x(), low_y = b.low.y(), high_y = b.high.y();
+  const float low_x_length = b.low_length.x(), high_x_length = b.high_length.x(),
+              low_y_length = b.low_length.y(), high_y_length = b.high_length.y();
+  const float left = b.hole_low.x(), right = b.hole_high.x(), top = b.hole_low.y(), bottom = b.hole_high.y();
+  std::uint32_t in[SeenTogether::most], in_hole[SeenTogether::most];
+  FOREST_LANES
+  for (std::size_t i = 0; i < SeenTogether::most; ++i) {
+    const float radius = seen.radius[i], x = seen.x[i], y = -seen.y[i], z = seen.z[i],
+                across = b.converge * z + b.parallel;
+    in[i] = (z >= -radius) & (x - across * low_x >= -radius * low_x_length) &
+            (across * high_x - x >= -radius * high_x_length) &
+            (y - across * low_y >= -radius * low_y_length) & (across * high_y - y >= -radius * high_y_length);
+    const float reach = seen.reach[i], px = seen.place_x[i], py = seen.place_y[i];
+    in_hole[i] = (px - reach >= left) & (px + reach <= right) & (py - reach >= top) & (py + reach <= bottom);
+  }
+  std::uint32_t all = 0, hole = 0;
+  for (std::size_t i = 0; i < SeenTogether::most; ++i) all |= in[i] << i, hole |= in_hole[i] << i;
+  return all & ~(hole & seen.known);
 }
 
 float Eye::acceptable(const Seen& seen) const {

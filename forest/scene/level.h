@@ -90,10 +90,10 @@ class Eye {
   /// The same for all eyes whose cameras are the same, whatever the size of their pictures.
   Seen see(const Sphere& sphere) const { return viewer_(sphere); }
   const Viewer& viewer() const { return viewer_; }
-  /// Whether anything of it may be in what is wanted of the picture.
-  bool may_see(const Seen& seen) const;
+  /// Of which anything may be in what is wanted of the picture.
+  std::uint32_t may_see(const SeenTogether& seen) const { return within(wanted_, seen); }
   /// … and in the picture, wanted or not.
-  bool may_be_in_picture(const Seen& seen) const;
+  std::uint32_t may_be_in_picture(const SeenTogether& seen) const { return within(whole_, seen); }
 
   /// Depth along the view of the nearest point of a sphere, never less than the near distance, µm.
   float nearest_depth(const Sphere& sphere) const { return nearest_depth(see(sphere)); }
@@ -130,9 +130,17 @@ class Eye {
   Viewer viewer_;
   float focal_;
   Vec2 middle_;  // of the picture, pixels
-  // What is wanted, as Seen::place has it, and what the distances from its borders are to be divided by to be µm.
-  Vec2 low_, high_, low_length_, high_length_;
-  Vec2 end_, end_length_;  // the same of the whole picture, whose middle the eye looks at
+  // A rectangle of the picture without another, as Seen::place has places.
+  struct Borders {
+    Vec2 low = Vec2::Zero(), high = Vec2::Zero();
+    Vec2 low_length = Vec2::Ones(),
+         high_length = Vec2::Ones();  // what distances from them are divided by to be µm
+    Vec2 hole_low = Vec2::Constant(INFINITY), hole_high = Vec2::Constant(-INFINITY);
+    float converge = 1.f,
+          parallel = 0.f;  // what a length is divided by to be seen: converge × depth + parallel
+  };
+  static std::uint32_t within(const Borders& borders, const SeenTogether& seen);
+  Borders wanted_, whole_;
   Gaze gaze_;
   float most_acceptable_;  // error anywhere in what is wanted, pixels
 };

@@ -63,11 +63,10 @@ float Occluders::farthest(std::uint32_t left, std::uint32_t top, std::uint32_t r
   }
 }
 
-bool Occluders::hide(const Seen& seen) const {
-  if (squares_.empty() || !seen.known) return false;
-  const float reach = focal_ * seen.reach() + margin;
-  const Vec2 place = seen.place();
-  const float x = centre_x_ + focal_ * place.x(), y = centre_y_ + focal_ * place.y();
+bool Occluders::hide(const Glimpse& seen) const {
+  if (squares_.empty() || !(seen.reach < INFINITY)) return false;
+  const float reach = focal_ * seen.reach + margin;
+  const float x = centre_x_ + focal_ * seen.x, y = centre_y_ + focal_ * seen.y;
   const float wide = float(width_) * tile, high = float(height_) * tile;
   if (!(x + reach >= 0.f && y + reach >= 0.f && x - reach < wide && y - reach < high)) return false;
   constexpr float tiles = 1.f / tile;

@@ -20,7 +20,7 @@ class Occluders {
   const Viewer& viewer() const { return viewer_; }
   /// Whether everything within a sphere, seen by viewer(), lies behind what the picture shows. False for what was beside the picture,
   /// too near or in doubt: only true is certain.
-  bool hide(const Seen& seen) const;
+  bool hide(const Glimpse& seen) const;
 
  private:
   float farthest(std::uint32_t left, std::uint32_t top, std::uint32_t right, std::uint32_t bottom) const;

@@ -1,8 +1,12 @@
 // SPDX-License-Identifier: Apache-2.0
-// A sphere as a camera sees it: worked out once, then asked about by everybody who decides what is drawn of it.
+// A sphere as a camera sees it: worked out once, then asked about by everybody who decides what is drawn of it. Hundreds of
+// thousands are looked at for a picture, so several that belong together are beside one another, for vector instructions.
 #pragma once
 
 #include <algorithm>
+#include <cmath>
+#include <cstddef>
+#include <cstdint>
 
 #include "forest/core/bounds.h"
 #include "forest/frame/camera.h"
@@ -30,6 +34,46 @@ struct Seen {
 
  private:
   float scale() const { return orthographic ? 1.f : 1.f / at.z(); }
+};
+
+/// Spheres that are looked at together. Those that nobody put in are points at the origin, and cost nothing more.
+struct Spheres {
+  static constexpr std::size_t most = 8;
+  float x[most] = {}, y[most] = {}, z[most] = {}, radius[most] = {};
+
+  Spheres() = default;
+  explicit Spheres(const Sphere& sphere) { put(0, sphere); }
+  void put(std::size_t i, const Sphere& sphere) {
+    x[i] = sphere.centre.x(), y[i] = sphere.centre.y(), z[i] = sphere.centre.z(), radius[i] = sphere.radius;
+  }
+  Sphere operator[](std::size_t i) const { return {{x[i], y[i], z[i]}, radius[i]}; }
+};
+
+/// What decides whether a sphere is hidden, in a picture of any size: its place and how far beside it anything of it is seen (as
+/// Seen has them), and how far ahead its nearest point lies.
+struct Glimpse {
+  float x = 0.f, y = 0.f, reach = INFINITY,
+        nearest = 0.f;  // of a sphere that is not wholly before the eye: anywhere
+};
+
+/// The same of each as Seen has of one; sets of them are bits, that of sphere i being 1 << i.
+struct SeenTogether {
+  static constexpr std::size_t most = Spheres::most;
+  float x[most], y[most], z[most], radius[most], nearest[most];
+  float place_x[most], place_y[most], reach[most];  // of the known
+  std::uint32_t known = 0;
+  bool orthographic = false;
+
+  Glimpse glimpse(std::size_t i) const {
+    if (!(known >> i & 1u)) return {};
+    return {place_x[i], place_y[i], reach[i], nearest[i]};
+  }
+  Seen operator[](std::size_t i) const {
+    Seen seen;
+    seen.at = {x[i], y[i], z[i]}, seen.radius = radius[i], seen.nearest = nearest[i];
+    seen.known = known >> i & 1u, seen.orthographic = orthographic;
+    return seen;
+  }
 };
 
 /// From where spheres are seen.
@@ -61,6 +105,7 @@ class Viewer {
     seen.orthographic = orthographic_;
     return seen;
   }
+  void operator()(const Spheres& spheres, SeenTogether& seen) const;
 
  private:
   Mat3 to_camera_;  // rows: right, up, forward
