@@ -17,10 +17,8 @@ void look_at_all(std::span<const Cluster> clusters, const Viewer& viewer, const 
   const auto place_of = [&](std::size_t leaf) { return count - 1 - leaf; };
   for (std::size_t begin = first_leaf; begin < count; begin += Spheres::most) {
     const std::size_t some = std::min(Spheres::most, count - begin);
-    Spheres spheres;
-    for (std::size_t i = 0; i < some; ++i) spheres.put(i, clusters[begin + i].sphere());
     SeenTogether seen;
-    viewer(spheres, seen);
+    viewer(Spheres(some, [&](std::size_t i) { return clusters[begin + i].sphere(); }), seen);
     const std::uint32_t in_picture = eye.may_be_in_picture(seen);
     for (std::size_t i = 0; i < some; ++i) {
       const float here = 1.f / std::max(seen.z[i], eye.camera().near);

@@ -124,6 +124,7 @@ struct Look {
 class Subject {
  public:
   std::uint32_t standing, index;  // of the instance
+  std::uint32_t root;             // of its clusters
   Placed placed;
   frame::State state;
   std::vector<const frame::State*> parts;  // of its sections; empty: it is shown as one
@@ -132,25 +133,23 @@ class Subject {
   Subject(const Look& look, std::uint32_t number)
       : standing(number),
         index(look.standing[number].index),
+        root(look.neuron_of(look.standing[number]).first_cluster),
         placed(look.standing[number].instance),
         state(look.state(index)),
-        look_(&look),
-        neuron_(&look.neuron_of(look.standing[number])) {
+        look_(&look) {
     if (parted()) parts = section_states(look.forest, look.shown, index);
   }
 
-  std::uint32_t root() const { return neuron_->first_cluster; }
   bool parted() const { return state.is(frame::State::parted); }
 
   // As Closeness has it.
   float closeness(std::uint32_t cluster) {
     if (!closeness_) closeness_ = look_->closeness.of(standing, placed);
-    return (*closeness_)(cluster - root());
+    return (*closeness_)(cluster - root);
   }
 
  private:
   const Look* look_;
-  const Neuron* neuron_;
   std::optional<Closeness::OfNeuron> closeness_;
 };
 
@@ -207,10 +206,8 @@ class Judged {
 
   Seen seen(std::size_t i = 0) const { return seen_[i]; }
   std::uint32_t may_see(const Sight& sight) const { return sight.eye.may_see(seen_); }
-  // … and through the fog.
-  bool in_sight(const Look& look, const Sight& sight) const {
-    return seen_.nearest[0] < look.fog.end() && (may_see(sight) & 1u);
-  }
+  bool in_fog(const Look& look, std::size_t i = 0) const { return !(seen_.nearest[i] < look.fog.end()); }
+  bool in_sight(const Look& look, const Sight& sight) const { return !in_fog(look) && (may_see(sight) & 1u); }
   bool hidden(const Sight& sight, std::size_t i = 0) {
     if (!sight.before) return false;
     if (cameras_.same) return sight.before->hide(seen_.glimpse(i));
@@ -258,19 +255,18 @@ void choose_groups(const Look& look, const Sight& sight, Subject& neuron, std::u
       (std::popcount(all) <= few || seen.radius * sight.eye.magnification(seen) <= group_limit))
     return add(cut, item(index, c.first_segment, all, neuron.placed(c)), kind,
                sight.eye.thin(seen, c.thickness));
-  Spheres spheres;
-  for (std::uint32_t g = 0; g < Cluster::group_count; ++g) spheres.put(g, neuron.placed(c.group(g)));
+  const Spheres spheres(Cluster::group_count,
+                        [&](std::size_t g) { return neuron.placed(c.group(std::uint32_t(g))); });
   Judged judged(look.cameras, spheres);
-  for (std::uint32_t rest = groups & judged.may_see(sight); rest; rest &= rest - 1) {
-    const auto g = std::uint32_t(std::countr_zero(rest));
-    const std::uint32_t first = g * Cluster::group_size, drawn = all >> first & 255u;
-    if (!drawn) continue;
+  each_of(groups & judged.may_see(sight), [&](std::size_t g) {
+    const auto first = std::uint32_t(g) * Cluster::group_size, drawn = all >> first & 255u;
+    if (!drawn) return;
     if (!judged.hidden(sight, g))
       add(cut, item(index, c.first_segment + first, drawn, spheres[g]), kind,
           sight.eye.thin(judged.seen(g), c.thickness));
     else if (look.keep)
       judged.leave_out({LeftOut::cluster, neuron.standing, at, 1u << g}, cut, g);
-  }
+  });
 }
 
 // Some neurons on their way down from the coarsest clusters, all together, so that vectors are full.
@@ -289,30 +285,29 @@ class Descent {
   // Level by level: until a cluster's turn comes it has been fetched.
   void run() {
     for (std::size_t next = 0; next < open_.size();) {
-      const std::size_t count = std::min(Spheres::most, open_.size() - next);
-      std::copy_n(open_.begin() + std::ptrdiff_t(next), count, some_.begin());
+      const std::size_t first = next, count = std::min(Spheres::most, open_.size() - next);
       next += count;
-      Spheres spheres;
       std::uint32_t of_sights = 0;
-      for (std::size_t i = 0; i < count; ++i) {
-        const Open& o = some_[i];
-        spheres.put(i, subjects_[o.subject].placed(look_.clusters[o.cluster]));
-        of_sights |= o.sights;
-      }
-      Judged judged(look_.cameras, spheres);
-      const std::uint32_t all = (1u << count) - 1u;
+      for (std::size_t i = first; i < next; ++i) of_sights |= open_[i].sights;
+      Judged judged(look_.cameras, Spheres(count, [&](std::size_t i) {
+                      const Open& o = open_[first + i];
+                      return subjects_[o.subject].placed(look_.clusters[o.cluster]);
+                    }));
       std::array<std::uint32_t, Spheres::most> finer{};
       each_of(of_sights, [&](std::size_t s) {
         // Fog takes whole neurons: a branch that goes on into it is not to come apart there.
-        for (std::uint32_t rest = all & judged.may_see(look_.sights[s]); rest; rest &= rest - 1)
-          if (const auto i = std::size_t(std::countr_zero(rest)); some_[i].sights >> s & 1u)
-            finer[i] |= std::uint32_t(too_coarse(judged, i, s)) << s;
+        const std::uint32_t seen = ((1u << count) - 1u) & judged.may_see(look_.sights[s]);
+        each_of(seen, [&](std::size_t i) {
+          if (const Open& o = open_[first + i]; o.sights >> s & 1u)
+            finer[i] |= std::uint32_t(too_coarse(o, judged, i, s)) << s;
+        });
       });
       for (std::size_t i = 0; i < count; ++i) {
         if (!finer[i]) continue;
-        for (const std::uint32_t child : look_.clusters[some_[i].cluster].children) {
+        const auto [subject, cluster, sights] = open_[first + i];
+        for (const std::uint32_t child : look_.clusters[cluster].children) {
           fetch(look_.clusters[child]);
-          open_.push_back({some_[i].subject, child, finer[i]});
+          open_.push_back({subject, child, finer[i]});
         }
       }
     }
@@ -326,16 +321,15 @@ class Descent {
   std::span<Cut> cuts_;
   std::vector<Subject> subjects_;
   std::vector<Open> open_;
-  std::array<Open, Spheres::most> some_;
 
-  // Of those at work, one that a sight may see: it is drawn, or left out, or its children are to be looked at.
-  bool too_coarse(Judged& judged, std::size_t i, std::size_t s) {
-    const std::uint32_t at = some_[i].cluster;
+  // One that a sight may see: it is drawn, or left out, or its children are to be looked at.
+  bool too_coarse(const Open& o, Judged& judged, std::size_t i, std::size_t s) {
+    const std::uint32_t at = o.cluster;
     const Cluster& c = look_.clusters[at];
     const Sight& sight = look_.sights[s];
-    Subject& neuron = subjects_[some_[i].subject];
+    Subject& neuron = subjects_[o.subject];
     Cut& cut = cuts_[s];
-    if (at == neuron.root()) neuron.seen_by |= 1u << s;
+    if (at == neuron.root) neuron.seen_by |= 1u << s;
     if (judged.left_out(look_, sight, {LeftOut::cluster, neuron.standing, at, 0}, cut, i)) return false;
     const Seen seen = judged.seen(i);
     // Those with parts are drawn in full: coarse clusters do not know their branches.
@@ -390,7 +384,7 @@ void choose_neurons(const Look& look, std::uint32_t first, std::uint32_t end, st
     if (state.kind == frame::Kind::somata && !descent.last().parted())
       descent.last().seen_by = near;
     else
-      descent.add(descent.last().root(), near);
+      descent.add(descent.last().root, near);
   }
   descent.run();
   // The soma lies within its root.
@@ -449,17 +443,16 @@ void choose_straws(const Look& look, std::size_t s, std::uint32_t at, std::uint3
     cut.segments += std::uint32_t(std::popcount(drawn));
   };
   if (groups == every_group && sphere.radius * magnification <= group_limit) return put(shown, sphere);
-  for (std::uint32_t g = 0; g < Brick::group_count; ++g) {
+  const Spheres spheres(Brick::group_count, [&](std::size_t g) { return b.group(std::uint32_t(g)); });
+  Judged judged(look.cameras, spheres);
+  each_of(groups & judged.may_see(sight), [&](std::size_t g) {
     const std::uint32_t drawn = shown & 255u << g * Brick::group_size;
-    if (!drawn || !(groups >> g & 1u)) continue;
-    const Sphere around = b.group(g);
-    Judged judged(look.cameras, around);
-    if (!judged.in_sight(look, sight)) continue;
-    if (!judged.hidden(sight))
-      put(drawn, around);
+    if (!drawn || judged.in_fog(look, g)) return;
+    if (!judged.hidden(sight, g))
+      put(drawn, spheres[g]);
     else if (look.keep)
-      judged.leave_out({LeftOut::brick, 0, at, 1u << g}, cut);
-  }
+      judged.leave_out({LeftOut::brick, 0, at, 1u << g}, cut, g);
+  });
 }
 
 void choose_bricks(const Look& look, Open from, std::span<Cut> cuts) {

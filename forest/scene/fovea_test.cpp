@@ -300,9 +300,9 @@ TEST(Viewer, SpheresSeenTogetherAreSeenAsEachAlone) {
     frame::Camera camera{.eye = any(50.), .target = any(50.)};
     if (round % 2) camera.projection = frame::Projection::orthographic;
     const Viewer viewer(camera);
-    Spheres spheres;
-    for (std::size_t i = 0; i < Spheres::most; ++i)
-      spheres.put(i, {any(100.), float(random.uniform(.1, 20.))});
+    const Spheres spheres(Spheres::most, [&](std::size_t) {
+      return Sphere{any(100.), float(random.uniform(.1, 20.))};
+    });
     SeenTogether together;
     viewer(spheres, together);
     for (std::size_t i = 0; i < Spheres::most; ++i) {

@@ -8,16 +8,12 @@
 namespace forest::scene {
 namespace {
 
-// A camera as plain numbers: rows of the turn, then the eye.
-struct Turn {
-  float m[9], eye[3], near, converge,
-      parallel;  // what a length is divided by to be seen: converge z + parallel
-};
-
-FOREST_CLONES void see(const Turn& turn, const Spheres& spheres, SeenTogether& __restrict seen) {
-  const auto [m00, m01, m02, m10, m11, m12, m20, m21, m22] = turn.m;
-  const auto [eye_x, eye_y, eye_z] = turn.eye;
-  const float near = turn.near, converge = turn.converge, parallel = turn.parallel;
+// The camera as Viewer has it; a length is divided by converge × depth + parallel to be seen.
+FOREST_CLONES std::uint32_t see(const Mat3& turn, const Vec3& eye, float near, float converge, float parallel,
+                                const Spheres& spheres, SeenTogether& __restrict seen) {
+  const float m00 = turn(0, 0), m01 = turn(0, 1), m02 = turn(0, 2), m10 = turn(1, 0), m11 = turn(1, 1),
+              m12 = turn(1, 2), m20 = turn(2, 0), m21 = turn(2, 1), m22 = turn(2, 2);
+  const float eye_x = eye.x(), eye_y = eye.y(), eye_z = eye.z();
   std::uint32_t known[Spheres::most];
   FOREST_LANES
   for (std::size_t i = 0; i < Spheres::most; ++i) {
@@ -34,19 +30,14 @@ FOREST_CLONES void see(const Turn& turn, const Spheres& spheres, SeenTogether& _
   }
   std::uint32_t all = 0;
   for (std::size_t i = 0; i < Spheres::most; ++i) all |= known[i] << i;
-  seen.known = all;
+  return all;
 }
 
 }  // namespace
 
 void Viewer::operator()(const Spheres& spheres, SeenTogether& seen) const {
-  Turn turn;
-  for (int row = 0; row < 3; ++row) {
-    for (int column = 0; column < 3; ++column) turn.m[3 * row + column] = to_camera_(row, column);
-    turn.eye[row] = eye_[row];
-  }
-  turn.near = near_, turn.converge = orthographic_ ? 0.f : 1.f, turn.parallel = orthographic_ ? 1.f : 0.f;
-  see(turn, spheres, seen);
+  seen.known =
+      see(to_camera_, eye_, near_, orthographic_ ? 0.f : 1.f, orthographic_ ? 1.f : 0.f, spheres, seen);
   seen.orthographic = orthographic_;
 }
 

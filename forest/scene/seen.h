@@ -36,17 +36,23 @@ struct Seen {
   float scale() const { return orthographic ? 1.f : 1.f / at.z(); }
 };
 
-/// Spheres that are looked at together. Those that nobody put in are points at the origin, and cost nothing more.
+/// Spheres that are looked at together.
 struct Spheres {
   static constexpr std::size_t most = 8;
-  float x[most] = {}, y[most] = {}, z[most] = {}, radius[most] = {};
+  float x[most], y[most], z[most], radius[most];
 
-  Spheres() = default;
-  explicit Spheres(const Sphere& sphere) { put(0, sphere); }
+  /// What sphere(i) returns for each of a few; where there are fewer than the most, the first stands in for the others.
+  Spheres(std::size_t count, auto&& sphere) {
+    for (std::size_t i = 0; i < count; ++i) put(i, sphere(i));
+    for (std::size_t i = count; i < most; ++i) x[i] = x[0], y[i] = y[0], z[i] = z[0], radius[i] = radius[0];
+  }
+  explicit Spheres(const Sphere& sphere) : Spheres(1, [&](std::size_t) { return sphere; }) {}
+  Sphere operator[](std::size_t i) const { return {{x[i], y[i], z[i]}, radius[i]}; }
+
+ private:
   void put(std::size_t i, const Sphere& sphere) {
     x[i] = sphere.centre.x(), y[i] = sphere.centre.y(), z[i] = sphere.centre.z(), radius[i] = sphere.radius;
   }
-  Sphere operator[](std::size_t i) const { return {{x[i], y[i], z[i]}, radius[i]}; }
 };
 
 /// What decides whether a sphere is hidden, in a picture of any size: its place and how far beside it anything of it is seen (as
