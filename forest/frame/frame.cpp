@@ -62,7 +62,7 @@ void check(const Frame& frame, const Geometry& geometry) {
   for (const Vec3& colour : frame.palette)
     require(colour.allFinite() && colour.minCoeff() >= 0.f, "colours must not be negative");
   require(frame.states.size() == geometry.instances.size(), "every instance needs a state");
-  require(bits_of(frame.states).any.colour_class < 16, "a colour class must be below 16");
+  require(frame.states.bits().any.colour_class < 16, "a colour class must be below 16");
   check(static_cast<const Lists&>(frame), geometry);
   if (const auto& g = frame.glass)
     require(g->plane.origin.allFinite() && g->plane.normal.allFinite() && g->colour.allFinite() &&
@@ -110,7 +110,7 @@ void check(const Surface& s, const Geometry& geometry) {
 
 bool transparent(const Frame& frame) {
   // Lists that come later, by `rest`, hold no item whose state is not announced by its neuron's being parted.
-  const auto [any, all] = bits_of(frame.states);
+  const auto [any, all] = frame.states.bits();
   std::uint8_t least = all.opacity;
   for (const Ball& b : frame.balls) least = std::min(least, b.opacity);
   return least < 255 || any.is(State::parted) || frame.opacities != opaque();

@@ -4,6 +4,7 @@
 
 #include <array>
 #include <bit>
+#include <concepts>
 #include <cstdint>
 #include <functional>
 #include <optional>
@@ -60,6 +61,20 @@ struct StateBits {
 };
 /// Of none: no bit, and all bits.
 StateBits bits_of(std::span<const State> states);
+
+/// States that stay as they are, which are looked at for their bits once.
+class States : public std::span<const State> {
+ public:
+  States() = default;
+  template <class List>
+  requires std::convertible_to<const List&, std::span<const State>> States(const List& states)
+      : span(states), bits_(bits_of(*this)) {}
+
+  const StateBits& bits() const { return bits_; }
+
+ private:
+  StateBits bits_ = bits_of({});
+};
 
 /// Colours are linear light, 0–1. An instance of colour class c (0–15) shows its sections of kind k as entry 8 c + k.
 using Palette = std::array<Vec3, 128>;
@@ -184,7 +199,7 @@ struct Frame : Lists {
   Style style;
   Palette palette = black_palette();
   Opacities opacities = opaque();
-  std::span<const State> states;  // one an instance
+  States states;  // one an instance
   std::span<const Overlay> overlays;
   std::span<const Ball> balls;
   std::span<const Surface> surfaces;

@@ -115,7 +115,7 @@ struct Look {
 
  private:
   bool plainly() const {
-    const auto [any, all] = frame::bits_of(shown.states);
+    const auto [any, all] = shown.states.bits();
     return any.kind == frame::Kind::any && all.is(frame::State::visible) && !any.is(frame::State::parted);
   }
 };

@@ -35,8 +35,8 @@ struct Part {
 
 /// How neurons are shown. Lists that are not there: all are visible, each drawn with the kind that fits its size.
 struct Shown {
-  std::span<const frame::State> states;  // one an instance
-  std::span<const Part> parts;           // by instance; later ones win. Their neurons are flagged as parted
+  frame::States states;         // one an instance
+  std::span<const Part> parts;  // by instance; later ones win. Their neurons are flagged as parted
 };
 
 /// The states of the sections of a neuron that has parts; null: that of the neuron.
