@@ -113,6 +113,8 @@ constexpr std::uint8_t whole_share = 128;  // of what is mixed
 struct Between {
   std::vector<std::uint32_t> first;  // of two neighbours
   std::vector<std::uint8_t> share;   // of the second
+  std::vector<std::uint32_t>
+      starts;  // of each of the layer's: where it begins to be the first, and where the last one ends
   Between(std::uint32_t size, const Layer& layer, std::uint32_t layer_size, std::uint32_t low,
           std::uint32_t high)
       : first(size), share(size) {
@@ -122,8 +124,32 @@ struct Between {
       first[i] = std::min(std::uint32_t(at), std::max(low, high >= 2 ? high - 2 : 0));
       share[i] = std::uint8_t(std::clamp(at - float(first[i]), 0.f, 1.f) * float(whole_share) + .5f);
     }
+    for (std::uint32_t i = 0; i < size; ++i) starts.resize(first[i] + 1u, i);
+    starts.resize(layer_size + 1u, size);
   }
 };
+
+// Of each of the picture's pixels [left, right) its two neighbours in a row of a layer that begins with its pixel `first`.
+struct Neighbours {
+  const std::uint32_t* row;
+  const std::uint32_t* starts;  // as Between has them, from `first` on
+  std::size_t count;            // in the row
+  std::uint32_t left, right;
+};
+constexpr std::size_t at_once = 8;  // copies of a pixel that are written: those too many are written over
+FOREST_CLONES void repeat(const Neighbours& n, std::uint32_t* __restrict lefts,
+                          std::uint32_t* __restrict rights) {
+  for (std::size_t at = 0; at < n.count; ++at) {
+    const std::uint32_t begin = std::max(n.starts[at], n.left), end = std::min(n.starts[at + 1], n.right);
+    const std::uint32_t one = n.row[at], next = n.row[at + 1 < n.count ? at + 1 : at];
+    for (std::uint32_t i = begin; i < end; i += at_once) {
+      FOREST_LANES
+      for (std::size_t k = 0; k < at_once; ++k) lefts[i - n.left + k] = one;
+      FOREST_LANES
+      for (std::size_t k = 0; k < at_once; ++k) rights[i - n.left + k] = next;
+    }
+  }
+}
 
 // a + share × (b - a), byte by byte: of all the same share, or of each its own. Flat loops become vector instructions.
 FOREST_CLONES void mix(const std::uint8_t* a, const std::uint8_t* b, std::uint8_t share, std::size_t count,
@@ -288,8 +314,8 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
   std::atomic<std::uint64_t> covered = 0;
   parallel_ranges(height, rows_at_once, [&](std::size_t begin, std::size_t end) {
     // A row of a layer, its pixels that are the neighbours of the picture's, those mixed, and how much of each shows.
-    std::vector<std::uint8_t> mixed, shares(4 * std::size_t(width)), colours(4 * std::size_t(width));
-    std::vector<std::uint32_t> lefts(width), rights(width);
+    std::vector<std::uint8_t> shares(4 * std::size_t(width)), colours(4 * std::size_t(width));
+    std::vector<std::uint32_t> mixed, lefts(width + at_once), rights(width + at_once);
     const auto bytes = [](const std::vector<std::uint32_t>& pixels) {
       return reinterpret_cast<const std::uint8_t*>(pixels.data());
     };
@@ -301,18 +327,15 @@ void unite(const View& view, std::span<const Layer> layers, std::span<const fram
         // The layer's two rows mixed, then its columns.
         const std::uint32_t first = s.columns.first[s.left],
                             last = std::min(s.columns.first[s.right - 1] + 2, s.picture.width);
-        mixed.resize(4 * std::size_t(last - first));
+        mixed.resize(last - first);
         const std::size_t upper = s.rows.first[y],
                           lower = std::min<std::size_t>(upper + 1, s.picture.height - 1);
         const std::size_t pitch = 4 * std::size_t(s.picture.width);
         const std::uint8_t* source = s.picture.pixels.data() + 4 * std::size_t(first);
-        mix(source + upper * pitch, source + lower * pitch, s.rows.share[y], mixed.size(), mixed.data());
-        const std::uint32_t* columns = &s.columns.first[s.left];
-        for (std::size_t i = 0; i < count; ++i) {
-          const std::size_t at = columns[i] - first, next = std::min<std::size_t>(at + 1, last - first - 1);
-          std::memcpy(&lefts[i], &mixed[4 * at], 4);
-          std::memcpy(&rights[i], &mixed[4 * next], 4);
-        }
+        mix(source + upper * pitch, source + lower * pitch, s.rows.share[y], 4 * mixed.size(),
+            reinterpret_cast<std::uint8_t*>(mixed.data()));
+        repeat({mixed.data(), &s.columns.starts[first], mixed.size(), s.left, s.right}, lefts.data(),
+               rights.data());
         std::uint8_t* to = row + 4 * std::size_t(s.left);
         const bool fades = s.none >= -1.f;
         mix(bytes(lefts), bytes(rights), &s.shares[4 * std::size_t(s.left)], 4 * count,
