@@ -42,7 +42,7 @@ Closeness::Closeness(Forest forest)
     : forest_(std::move(forest)), known_(new std::atomic<const float*>[forest_.standing().size()] {}) {}
 
 void Closeness::seen_by(const Eye& eye) {
-  const bool same = eye_ && eye_->camera() == eye.camera();
+  const bool same = eye_ && eye_->sees_the_same(eye);
   eye_ = eye;
   if (same) return;
   for (const std::uint32_t standing : standing_) known_[standing].store(nullptr, std::memory_order_relaxed);

@@ -16,8 +16,8 @@
 namespace forest::scene {
 
 /// The closeness (Seen::closeness) of clusters, or that of something they grow into, where that is closer. So nothing that is
-/// drawn ends where a branch goes into the depth and gets thin there. It depends on the camera alone, not on what is chosen or
-/// hidden, and is worked out once for all that ask as long as the camera stays; any number of threads may ask at a time.
+/// drawn ends where a branch goes into the depth and gets thin there. It depends on the picture alone, not on what is chosen or
+/// hidden, and is worked out once for all that ask as long as the picture stays; any number of threads may ask at a time.
 class Closeness {
  public:
   explicit Closeness(Forest forest);

@@ -87,6 +87,10 @@ class Eye {
   const Detail& detail() const { return detail_; }
   const frame::Frustum& frustum() const { return frustum_; }  // of what is wanted of the picture
 
+  /// Whether another one's picture shows the same, whatever its size.
+  bool sees_the_same(const Eye& other) const {
+    return camera_ == other.camera_ && whole_.low == other.whole_.low && whole_.high == other.whole_.high;
+  }
   /// The same for all eyes whose cameras are the same, whatever the size of their pictures.
   Seen see(const Sphere& sphere) const { return viewer_(sphere); }
   const Viewer& viewer() const { return viewer_; }
