@@ -218,6 +218,7 @@ TEST_P(RendererLaws, TransparentThingsBlendAsTheirOpacitiesSayInAnyOrder) {
         const double green = middle_of(f.draw()).second;
         f.frame.capsules = both;
         f.states[front].opacity = std::uint8_t(near), f.states[1 - front].opacity = std::uint8_t(far);
+        f.frame.states = f.states;
         const auto [seen_red, seen_green] = middle_of(f.draw());
         EXPECT_NEAR(seen_red / red, near / 255., .05) << subframes << " " << near << " " << far;
         EXPECT_NEAR(seen_green / green, (1. - near / 255.) * far / 255., .05)
@@ -565,11 +566,13 @@ TEST_P(RendererLaws, OpacityOfAKindAndOfAPartAreObeyed) {
     f.frame.opacities = frame::opaque();
     // A part of the neuron, in a state of its own: the announcement is the neuron's.
     f.states[0].flags |= frame::State::parted;
+    f.frame.states = f.states;
     const frame::State part{.opacity = 64};
     const std::vector<frame::Item> parts{{0, 0, 1, 0, 0, 0, 0, 80}, {0, 1, 1, packed(part), 0, 0, 0, 80}};
     f.frame.capsules = parts;
     EXPECT_NEAR(red_area(f.draw()), (.5 + .5 * 64. / 255.) * whole, .03 * whole);
     f.states[0].flags = frame::State::visible;
+    f.frame.states = f.states;
   }
 }
 

@@ -116,8 +116,10 @@ TEST(ReferenceRenderer, TransparentThingsBlendAsTheirOpacitiesSayInAnyOrder) {
       const std::size_t front = swapped ? 1 : 0, back = 1 - front;
       const double near = middle()[front];
       f.states[front].opacity = 0;
+      f.frame.states = f.states;
       const double far = middle()[back];
       f.states[front].opacity = 77, f.states[back].opacity = 160;
+      f.frame.states = f.states;
       const auto seen = middle();
       EXPECT_NEAR(seen[front] / near, 77. / 255., .03) << subframes;
       EXPECT_NEAR(seen[back] / far, (1. - 77. / 255.) * 160. / 255., .03) << subframes;
