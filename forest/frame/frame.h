@@ -62,7 +62,7 @@ struct StateBits {
 /// Of none: no bit, and all bits.
 StateBits bits_of(std::span<const State> states);
 
-/// States that stay as they are, which are looked at for their bits once.
+/// States that are looked at for their bits once: whoever changes one of them makes these anew.
 class States : public std::span<const State> {
  public:
   States() = default;
