@@ -7,6 +7,7 @@
 #include <cmath>
 #include <numeric>
 
+#include "forest/core/lent.h"
 #include "forest/core/parallel.h"
 #include "forest/scene/placed.h"
 
@@ -505,17 +506,28 @@ void join(std::vector<Thing>& to, std::vector<Thing> Cut::*member, std::span<con
     to.insert(to.end(), (cuts[p].*member).begin(), (cuts[p].*member).end());
 }
 
+// So many cuts of nothing, with the memory that they had.
+std::span<Cut> emptied(std::vector<Cut>& cuts, std::size_t count) {
+  if (cuts.size() < count) cuts.resize(count);
+  for (Cut& cut : std::span(cuts).first(count)) {
+    cut.dots.clear(), cut.lines.clear(), cut.capsules.clear(), cut.left_out.clear();
+    cut.segments = 0, cut.far = 0;
+  }
+  return std::span(cuts).first(count);
+}
+
 // What `choose_some(begin, end, cuts)` adds to each of so many cuts for those below `count`, in this order; `chunk` of them at
 // a time.
 std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_some) {
-  std::vector<Cut> parts((count + chunk - 1) / chunk * cuts);
+  Lent<std::vector<Cut>> lent;
+  const std::span<Cut> parts = emptied(*lent, (count + chunk - 1) / chunk * cuts);
   parallel_for(parts.size() / cuts, 1, [&](std::size_t p) {
-    choose_some(p * chunk, std::min(count, (p + 1) * chunk), std::span(parts).subspan(p * cuts, cuts));
+    choose_some(p * chunk, std::min(count, (p + 1) * chunk), parts.subspan(p * cuts, cuts));
   });
   std::vector<Cut> whole(cuts);
   parallel_for(cuts, 1, [&](std::size_t c) {
     const auto take = [&](auto member) {
-      join(whole[c].*member, member, std::span(std::as_const(parts)), c, cuts);
+      join(whole[c].*member, member, std::span<const Cut>(parts), c, cuts);
     };
     take(&Cut::dots), take(&Cut::lines), take(&Cut::capsules), take(&Cut::left_out);
     for (std::size_t p = c; p < parts.size(); p += cuts) {
