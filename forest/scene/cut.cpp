@@ -50,6 +50,11 @@ void fetch(const Cluster& cluster) {
 
 constexpr std::uint32_t every_group = (1u << Cluster::group_count) - 1u;
 
+// Calls take(i) for each of a set, a bit for each.
+void each_of(std::uint32_t bits, auto&& take) {
+  for (; bits; bits &= bits - 1) take(std::size_t(std::countr_zero(bits)));
+}
+
 // The camera of all sights, and that of the pictures before.
 struct Cameras {
   Viewer now, before;
@@ -109,8 +114,7 @@ struct Look {
     if (s.kind != frame::Kind::any) return 0;
     const Seen seen = sights.front().eye.see(sphere);
     std::uint32_t result = 0;
-    for (std::uint32_t rest = of_sights; rest; rest &= rest - 1)
-      if (const auto i = std::size_t(std::countr_zero(rest)); straws_do(sights[i], seen)) result |= 1u << i;
+    each_of(of_sights, [&](std::size_t i) { result |= std::uint32_t(straws_do(sights[i], seen)) << i; });
     return result;
   }
 
@@ -233,11 +237,6 @@ class Judged {
   SeenTogether seen_;
   std::optional<SeenTogether> before_;
 };
-
-// Calls take(i) for each of a set of sights, a bit for each.
-void each_of(std::uint32_t sights, auto&& take) {
-  for (; sights; sights &= sights - 1) take(std::size_t(std::countr_zero(sights)));
-}
 
 // Which segments of a cluster are wide enough to be drawn, or drawn for their like.
 std::uint32_t shown_of(const Sight& sight, Subject& neuron, const Cluster& c, std::uint32_t at) {

@@ -315,9 +315,8 @@ TEST(Viewer, SpheresSeenTogetherAreSeenAsEachAlone) {
         EXPECT_TRUE(std::isinf(glimpse.reach));  // nothing hides it
         continue;
       }
-      EXPECT_NEAR((Vec2(glimpse.x, glimpse.y) - alone.place()).norm(), 0.f,
-                  1e-3f * (1.f + alone.place().norm()));
-      EXPECT_NEAR(glimpse.reach, alone.reach(), 1e-3f * (1.f + alone.reach()));
+      EXPECT_NEAR((Vec2(glimpse.x, glimpse.y) - alone.place).norm(), 0.f, 1e-3f * (1.f + alone.place.norm()));
+      EXPECT_NEAR(glimpse.reach, alone.reach, 1e-3f * (1.f + alone.reach));
     }
   }
 }
@@ -346,8 +345,8 @@ TEST(Eye, SeesASphereWhereItsPointsAreSeen) {
       const Vec3 pixel = frame::project(camera, viewport, point);
       if (pixel.z() < camera.near) continue;
       if (seen.known) {
-        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place()).norm(),
-                  1.001f * focal * seen.reach() + .01f);
+        EXPECT_LE((pixel.head<2>() - Vec2(320, 180) - focal * seen.place).norm(),
+                  1.001f * focal * seen.reach + .01f);
         EXPECT_GE(pixel.z(), seen.nearest - 1e-3f);
       }
       const auto in = [&](const frame::Area& a) {

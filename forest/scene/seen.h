@@ -21,19 +21,15 @@ struct Seen {
   float nearest = 0.f;     // how far ahead its nearest point lies, µm
   bool known = false;      // whether it is wholly before the eye; of others nothing below is known
   bool orthographic = false;
+  // In a picture of any size, times that picture's focal length (frame::Camera::focal): pixels from its middle to where the
+  // centre is seen, y downwards; and how far beside it anything of the sphere is seen at most. A point at distance r from the
+  // centre is seen f · r · |p| / (depth · nearest) beside it at most.
+  Vec2 place = Vec2::Zero();
+  float reach = 0.f;
 
   /// What a length at its centre measures in a picture, times that picture's focal length; what lies behind the eye's near
   /// distance is as close as that.
   float closeness(float near) const { return orthographic ? 1.f : 1.f / std::max(at.z(), near); }
-  /// In a picture of any size, times that picture's focal length (frame::Camera::focal): pixels from its middle to where the
-  /// centre is seen, y downwards.
-  Vec2 place() const { return Vec2(at.x(), -at.y()) * scale(); }
-  /// The same: how far beside it anything of the sphere is seen at most. A point at distance r from the centre is seen
-  /// f · r · |p| / (depth · nearest) beside it at most.
-  float reach() const { return scale() * radius * (orthographic ? 1.f : at.norm() / nearest); }
-
- private:
-  float scale() const { return orthographic ? 1.f : 1.f / at.z(); }
 };
 
 /// Spheres that are looked at together.
@@ -78,6 +74,7 @@ struct SeenTogether {
     Seen seen;
     seen.at = {x[i], y[i], z[i]}, seen.radius = radius[i], seen.nearest = nearest[i];
     seen.known = known >> i & 1u, seen.orthographic = orthographic;
+    seen.place = {place_x[i], place_y[i]}, seen.reach = reach[i];
     return seen;
   }
 };
@@ -103,13 +100,9 @@ class Viewer {
     return viewer;
   }
   Seen operator()(const Sphere& sphere) const {
-    Seen seen;
-    seen.at = to_camera_ * (sphere.centre - eye_);
-    seen.radius = sphere.radius;
-    seen.nearest = seen.at.z() - sphere.radius;
-    seen.known = seen.nearest > near_;
-    seen.orthographic = orthographic_;
-    return seen;
+    SeenTogether seen;
+    (*this)(Spheres(sphere), seen);
+    return seen[0];
   }
   void operator()(const Spheres& spheres, SeenTogether& seen) const;
 
