@@ -11,6 +11,8 @@
 #include <sys/wait.h>
 
 #include "forest/core/file.h"
+#include "forest/render/opengl/context.h"
+#include "forest/render/opengl/opengl_renderer.h"
 #include "forest/scene/synapses.h"
 
 #include "tests/sample_activity.h"
@@ -210,6 +212,21 @@ Target clear_target(Random& random, const scene::View& view, const frame::Viewpo
     if (something && exact && rough && exact->instance == rough->instance && exact->section == rough->section)
       return {pixel, exact};
   }
+}
+
+io::Picture without_a_window(scene::View view, std::uint32_t width, std::uint32_t height,
+                             scene::Playback* playback) {
+  const render::OffscreenContext context;
+  render::OpenGLRenderer renderer;
+  renderer.load(sample().geometry());
+  view.samples = 16;
+  const frame::Viewport pixels{float(width), float(height)};
+  const scene::Colouring colouring = scene::colour(sample(), view.colour_by, view.background);
+  const scene::Eye eye(view.camera, pixels, scene::detail_for(view, width, height));
+  scene::Cut cut = scene::choose(sample(), eye, pixels);
+  if (playback) playback->colour(cut, eye, view.activity.value());
+  renderer.draw(scene::compose(sample(), view, colouring, cut, width, height));
+  return {width, height, renderer.read().pixels};
 }
 
 double difference(const io::Picture& a, const io::Picture& b) {

@@ -18,6 +18,7 @@
 #include "forest/core/random.h"
 #include "forest/io/png.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/playback.h"
 #include "forest/scene/view.h"
 
 namespace forest::studio {
@@ -103,6 +104,10 @@ struct Target {
 };
 /// A pixel that shows a branch (or nothing) so clearly that a few pixels more or less do not matter.
 Target clear_target(Random& random, const scene::View& view, const frame::Viewport& viewport, bool something);
+
+/// What the window shows of a view, drawn without one; with a playback, of the view's moment.
+io::Picture without_a_window(scene::View view, std::uint32_t width, std::uint32_t height,
+                             scene::Playback* playback = nullptr);
 
 /// Share of the pixels that differ visibly.
 double difference(const io::Picture& a, const io::Picture& b);

@@ -4,8 +4,6 @@
 #include <set>
 
 #include "forest/core/file.h"
-#include "forest/render/opengl/context.h"
-#include "forest/render/opengl/opengl_renderer.h"
 
 #include "tests/studio/driven_studio.h"
 
@@ -86,18 +84,7 @@ TEST_F(Window, SavedPictureIsThatOfTheViewDrawnWithoutAWindow) {
   key("o");  // no outline
   settle();
   const io::Picture seen = saved("window.png");
-  const render::OffscreenContext context;
-  render::OpenGLRenderer renderer;
-  renderer.load(sample().geometry());
-  scene::View view = view_;
-  view.samples = 16;
-  const auto width = seen.width, height = seen.height;
-  const frame::Viewport pixels{float(width), float(height)};
-  const scene::Colouring colouring = scene::colour(sample(), view.colour_by, view.background);
-  const scene::Cut cut = scene::choose(
-      sample(), scene::Eye(view.camera, pixels, scene::detail_for(view, width, height)), pixels);
-  renderer.draw(scene::compose(sample(), view, colouring, cut, width, height));
-  EXPECT_LT(difference(seen, {width, height, renderer.read().pixels}), .001);
+  EXPECT_LT(difference(seen, without_a_window(view_, seen.width, seen.height)), .001);
 }
 
 TEST_F(Window, WheelComesNearerToWhatIsUnderTheMouse) {
