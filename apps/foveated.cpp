@@ -62,7 +62,7 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
     render::Renderer& renderer = *layers_[i]->renderer;
     if (dress) dress(frames[i], choosers[i]->cut(), eyes[i]);
     timings[i] = renderer.draw(frames[i]);
-    choosers[i]->remember(renderer.seen());
+    choosers[i]->remember(renderer.seen(), renderer.reached());
     if (!renderer.image()) layers_[i]->image = renderer.read();
   };
   if (!painter && !dress && layers_.front()->renderer->concurrent())

@@ -94,7 +94,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.cull += milliseconds_since(start);
   drawn.synapses = dressing_.chosen.balls.size();
   const frame::Timing timing = renderer_->draw(frame);
-  chooser_.remember(renderer_->seen());
+  chooser_.remember(renderer_->seen(), renderer_->reached());
   drawn.segments = chooser_.segments();
   drawn.neurons = chooser_.neurons();
   drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;

@@ -416,7 +416,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
           scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)));
   frame.first_subframe = first, frame.last_subframe = last;
   renderer_->draw(frame);
-  chooser_.remember(renderer_->seen());
+  chooser_.remember(renderer_->seen(), renderer_->reached());
   figures_.segments = chooser_.segments(), figures_.neurons = chooser_.neurons();
   figures_.samples = last, figures_.error = view.detail.error;
 }

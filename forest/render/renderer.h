@@ -2,6 +2,9 @@
 // The seam between pictures as data and pictures as pixels.
 #pragma once
 
+#include <cstdint>
+#include <span>
+
 #include "forest/frame/frame.h"
 
 namespace forest::render {
@@ -21,6 +24,9 @@ class Renderer {
   virtual const frame::Image* image() const { return nullptr; }
   /// How far one saw in the last subframe of the last frame, before its `rest` was drawn; empty when it had none.
   virtual const frame::DepthMap& seen() const = 0;
+  /// One an instance: whether anything of it in the last frame's lists was neither beside the picture nor hidden by what had been
+  /// drawn. Empty where nobody looks.
+  virtual std::span<const std::uint8_t> reached() const { return {}; }
   /// Whether renderers of this kind may draw at the same time, each on any thread.
   virtual bool concurrent() const { return false; }
   /// Who draws, for people ("llvmpipe (LLVM 15.0.6, 256 bits)").

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <functional>
 
 namespace forest::scene {
 
@@ -39,19 +40,29 @@ const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, cons
 
 void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
                      std::span<const frame::Viewport> viewports, const Shown& shown, const Painter& painter) {
-  const auto& first = choosers.front()->eye_;
+  Chooser& front = *choosers.front();
+  const auto& first = front.eye_;
+  const std::uint32_t turns = eyes.front().detail().turns;
+  Turn turn{{}, front.pictures_++ % turns, turns};
+  bool all_know = turns > 1;
   std::vector<Sight> sights;
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];
     if (!c.before_) c.horizons_ = first_horizons(c.forest_, eyes[i]);
     // One that was not asked for a while knows what another camera saw.
     const bool knows = c.before_ && first && c.eye_->camera() == first->camera();
+    all_know = all_know && knows && !c.reached_.empty();
     sights.push_back({eyes[i], knows ? &*c.before_ : nullptr, c.horizons_[0]});
   }
-  std::shared_ptr<Closeness>& closeness = choosers.front()->closeness_;
-  if (!closeness) closeness = std::make_shared<Closeness>(choosers.front()->forest_);
+  if (all_know) {
+    for (const Chooser* c : choosers.subspan(1))
+      std::ranges::transform(front.reached_, c->reached_, front.reached_.begin(), std::bit_or());
+    turn.seen = front.reached_;
+  }
+  std::shared_ptr<Closeness>& closeness = front.closeness_;
+  if (!closeness) closeness = std::make_shared<Closeness>(front.forest_);
   closeness->seen_by(eyes.front());
-  std::vector<Cut> cuts = scene::choose(choosers.front()->forest_, sights, shown, closeness.get());
+  std::vector<Cut> cuts = scene::choose(front.forest_, sights, shown, closeness.get(), turn);
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];
     c.closeness_ = closeness;
@@ -84,7 +95,8 @@ void Chooser::complete(frame::Frame& frame) {
   };
 }
 
-void Chooser::remember(const frame::DepthMap& seen) {
+void Chooser::remember(const frame::DepthMap& seen, std::span<const std::uint8_t> reached) {
+  reached_.assign(reached.begin(), reached.end());
   before_.emplace(seen, eye_->camera(), viewport_);
   horizons_ = horizons_of(seen);
 }

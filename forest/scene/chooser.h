@@ -31,7 +31,8 @@ class Chooser {
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
   void complete(frame::Frame& frame);
   /// To be told after each drawing of such a frame.
-  void remember(const frame::DepthMap& seen);
+  /// @param reached  as render::Renderer::reached
+  void remember(const frame::DepthMap& seen, std::span<const std::uint8_t> reached = {});
 
   /// Of the last picture, chosen and revealed: segments, all subframes' mean, and neurons in sight.
   std::uint64_t segments() const { return cut_.segments + (drawings_ ? revealed_segments_ / drawings_ : 0); }
@@ -44,6 +45,8 @@ class Chooser {
   Shown shown_;
   std::optional<Occluders> before_;
   std::shared_ptr<Closeness> closeness_;  // of all that are asked together
+  std::vector<std::uint8_t> reached_;     // in the picture before; empty: nobody knows
+  std::uint32_t pictures_ = 0;
   using Horizons = std::array<float, 3>;  // µm along the view
   static Horizons horizons_of(const frame::DepthMap& seen);
   static Horizons first_horizons(const Forest& forest, const Eye& eye);

@@ -74,6 +74,7 @@ struct Look {
   bool keep;  // what is hidden
   const Shown& shown;
   Closeness& closeness;
+  Turn turn = {};
   std::span<const Cluster> clusters = forest.clusters();
   std::span<const Neuron> neurons = forest.neurons();
   std::span<const Standing> standing = forest.standing();
@@ -376,7 +377,7 @@ void choose_neurons(const Look& look, std::uint32_t first, std::uint32_t end, st
     const Standing& one = standing[i];
     const frame::State state = look.state(one.index);
     if (!(state.flags & (frame::State::visible | frame::State::parted))) continue;
-    if (!look.neuron_of(one).cluster_count) continue;
+    if (!look.neuron_of(one).cluster_count || !look.turn.has(i, one.index)) continue;
     const std::uint32_t far = look.far(one.index, one.sphere, of_sights), near = of_sights & ~far;
     each_of(far, [&](std::size_t s) { ++cuts[s].far; });
     if (!near) continue;
@@ -626,9 +627,9 @@ void NeuronsInSight::add(const Cut& cut) {
 }
 
 std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown,
-                        Closeness* closeness) {
+                        Closeness* closeness, const Turn& turn) {
   KnownCloseness known(forest, sights.front().eye, closeness);
-  const Look look{forest, sights, true, shown, *known};
+  const Look look{forest, sights, true, shown, *known, turn};
   const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
   std::vector<Cut> cuts = in_chunks(groves.size() + bricks.size(), 1, sights.size(),
                                     [&](std::size_t i, std::size_t, std::span<Cut> parts) {

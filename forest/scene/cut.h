@@ -89,12 +89,25 @@ struct Sight {
 };
 inline constexpr std::size_t most_sights = 32;
 
+/// Which neurons are looked at (Detail::turns): those of which something was seen in the picture before, and of the others every
+/// so-many-th.
+struct Turn {
+  std::span<const std::uint8_t> seen = {};  // one an instance; empty: nothing is known, and all are looked at
+  std::uint32_t turn = 0, of = 1;           // turn < of
+
+  /// @param standing  its number in Forest::standing()
+  bool has(std::uint32_t standing, std::uint32_t instance) const {
+    return seen.empty() || seen[instance] || standing % of == turn;
+  }
+};
+
 /// What is drawn for each sight, the same as for it alone, in one walk over the forest.
 /// Pure: depends on its arguments alone, and is the same at any number of threads.
 /// @param sights  what they leave out goes to `left_out`: earlier pictures are a guess
 /// @param closeness  that of this camera; null: it is worked out
+/// @param turn       neurons that do not have it are as if they were not there
 std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {},
-                        Closeness* closeness = nullptr);
+                        Closeness* closeness = nullptr, const Turn& turn = {});
 Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
 
 /// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its

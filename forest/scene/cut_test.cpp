@@ -229,6 +229,28 @@ TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
               same(all.dots, single.dots));
 }
 
+TEST(Cut, ShowsEveryNeuronInItsTurn) {
+  const Forest forest = sample();
+  const View view = overview(forest);
+  const Eye eye(view.camera, viewport, view.detail);
+  const Sight sight{eye};
+  std::vector<std::uint8_t> seen(forest.instances().size());
+  for (std::size_t i = 0; i < seen.size(); i += 5) seen[i] = 1;
+  const Cut whole = choose(forest, eye, viewport);
+  std::map<std::uint32_t, std::uint64_t> times, all;  // of every instance, items
+  const auto count = [](const Cut& cut, std::map<std::uint32_t, std::uint64_t>& of) {
+    for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
+      for (const frame::Item& item : *list)
+        if (item.instance != FOREST_IN_WORLD) ++of[item.instance];
+  };
+  count(whole, all);
+  for (std::uint32_t turn = 0; turn < 3; ++turn)
+    count(choose(forest, std::span(&sight, 1), {}, nullptr, {seen, turn, 3}).front(), times);
+  ASSERT_EQ(times.size(), all.size());
+  for (const auto& [instance, items] : all)
+    EXPECT_EQ(times[instance], (seen[instance] ? 3 : 1) * items) << instance;
+}
+
 TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
   const Forest forest = sample();
   for (const Cluster& c : forest.clusters()) {

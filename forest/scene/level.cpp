@@ -115,23 +115,25 @@ struct Step {
   std::uint32_t samples;         // of a pixel
   float finest, coarsest;        // acceptable error, pixels
   float from_below, from_above;  // the error that takes about as long as the step left
+  std::uint32_t turns;           // as Detail::turns
   double longer;   // times what a picture at the finest error takes: one of the next step as it begins
   float softness;  // by which pictures are most like the truth
 };
 // Most time goes to segments and not to samples, so that four samples at an error of five pixels take little more than one at
 // one, and are as much like the truth (docs/scene/seam.md); so are sixteen at three and four at two.
-constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
-                                     {2.f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .2f},
-                                     {1.4f, 1, 3.f, 6.f, 4.f, 4.f, 1.3, .16f},
-                                     {1.f, 1, 1.f, 6.f, 4.f, 1.f, 1.4, .12f},
-                                     {1.f, 4, .5f, 5.f, 4.f, 2.f, 1.3, .06f},
-                                     {1.f, 16, .5f, 3.f, 1.f, 1.f, 1., 0.f}}};
+constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .2f},
+                                     {2.f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .2f},
+                                     {1.4f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .16f},
+                                     {1.f, 1, 1.f, 6.f, 4.f, 1.f, 1, 1.4, .12f},
+                                     {1.f, 4, .5f, 5.f, 4.f, 2.f, 1, 1.3, .06f},
+                                     {1.f, 16, .5f, 3.f, 1.f, 1.f, 1, 1., 0.f}}};
 
 }  // namespace
 
 float Budget::pixel() const { return steps[step_].pixel; }
 std::uint32_t Budget::samples() const { return steps[step_].samples; }
 float Budget::thinnest() const { return samples() == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
+std::uint32_t Budget::turns() const { return steps[step_].turns; }
 float Budget::softness() const { return steps[step_].softness; }
 
 // The highest step for which a picture of the present one at its finest leaves time; from large pixels one at a time, as those

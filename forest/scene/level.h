@@ -33,6 +33,9 @@ struct Detail {
   // Pixels of the picture as wide as one that is drawn: a picture for which there is no time is drawn smaller and enlarged
   // (fovea.h). All else here counts pixels that are drawn.
   float pixel = 1.f;
+  // Neurons of which nothing was seen in the picture before are looked at in every so-many-th one only, where there is no time for all:
+  // what comes into sight is seen as much later.
+  std::uint32_t turns = 1;
   float fog =
       0.f;  // strength of the depth cue, as View::fog: what is seen through it may be wrong by more; 0: none
 };
@@ -165,6 +168,8 @@ class Budget {
   /// As Detail::pixel.
   float pixel() const;
   float error() const { return error_; }
+  /// As Detail::turns.
+  std::uint32_t turns() const;
   /// As Detail::thinnest: what is smaller than the error need not be there one by one.
   float thinnest() const;
   /// As frame::soften: what is drawn is nearer to the truth so, the more the fewer its samples.

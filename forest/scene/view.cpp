@@ -723,6 +723,7 @@ View within(View view, const Budget& budget) {
   view.samples = budget.samples();
   view.detail.error *= budget.error();
   view.detail.thinnest = budget.thinnest(), view.detail.pixel = budget.pixel();
+  view.detail.turns = budget.turns();
   return view;
 }
 

@@ -26,6 +26,7 @@ struct CpuRenderer::State {
   cpu::Splatter splatter;
   cpu::SurfaceDrawer surfaces;
   frame::DepthMap seen;
+  std::vector<std::uint8_t> reached;
   cpu::Sums sums;
   frame::Image image;
 };
@@ -39,6 +40,7 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
   State& s = *state_;
   frame::check(f, s.picture.geometry);
   s.seen = {};
+  s.reached.assign(s.picture.geometry.instances.size(), 0);
   s.picture.states = f.states, s.picture.opacities = f.opacities;
   s.picture.transparent = frame::transparent(f);
   const frame::Area area = f.area.value_or(frame::Area{0, 0, f.width, f.height});
@@ -63,13 +65,13 @@ frame::Timing CpuRenderer::draw(const frame::Frame& f) {
       parallel_for(s.canvas.squares(), 1, [&](std::size_t n) { s.canvas.clear(s.canvas.square(n)); });
       s.surfaces.draw(s.picture, f.surfaces, s.canvas);
     }
-    timing.drawn = s.splatter.draw(s.picture, f, s.canvas, f.surfaces.empty());
+    timing.drawn = s.splatter.draw(s.picture, f, s.canvas, f.surfaces.empty(), s.reached);
     for (std::uint32_t round = 0; f.rest; ++round) {
       s.seen = s.canvas.depth_map();
       const frame::Lists more = f.rest(s.seen, round);
       if (more.empty()) break;
       frame::check(more, s.picture.geometry);
-      timing.drawn += s.splatter.draw(s.picture, more, s.canvas, false);
+      timing.drawn += s.splatter.draw(s.picture, more, s.canvas, false, s.reached);
     }
     s.splatter.draw(s.picture, f.balls, s.canvas);
     s.splatter.draw(s.picture, f.overlays, s.canvas);
@@ -95,6 +97,8 @@ frame::Image CpuRenderer::read() {
 const frame::Image* CpuRenderer::image() const { return &state_->image; }
 
 const frame::DepthMap& CpuRenderer::seen() const { return state_->seen; }
+
+std::span<const std::uint8_t> CpuRenderer::reached() const { return state_->reached; }
 
 std::string CpuRenderer::name() const { return "the processor"; }
 

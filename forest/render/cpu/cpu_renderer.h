@@ -21,6 +21,7 @@ class CpuRenderer final : public Renderer {
   frame::Image read() override;
   const frame::Image* image() const override;
   const frame::DepthMap& seen() const override;
+  std::span<const std::uint8_t> reached() const override;
   bool concurrent() const override { return true; }
   std::string name() const override;
 

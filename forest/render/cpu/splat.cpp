@@ -366,7 +366,8 @@ void draw_squares(const Picture& picture, const Splatter::Sorted& sorted, Canvas
 Splatter::Splatter() : sorted_(std::make_unique<Sorted>()) {}
 Splatter::~Splatter() = default;
 
-std::uint64_t Splatter::draw(const Picture& picture, const frame::Lists& lists, Canvas& canvas, bool clear) {
+std::uint64_t Splatter::draw(const Picture& picture, const frame::Lists& lists, Canvas& canvas, bool clear,
+                             std::span<std::uint8_t> reached) {
   if (clear) parallel_for(canvas.squares(), 1, [&](std::size_t n) { canvas.clear(canvas.square(n)); });
   using Kind = Gatherer::Kind;
   const std::array<std::span<const frame::Item>, 3> items{lists.capsules, lists.dots, lists.lines};
@@ -398,8 +399,12 @@ std::uint64_t Splatter::draw(const Picture& picture, const frame::Lists& lists, 
       std::uint64_t added = 0;
       for (std::size_t i = piece.begin; i < piece.end; ++i) {
         if (i + ahead < piece.end) prefetch(picture.geometry, list[i + ahead]);
-        added += gatherer.add(list[i], entries[kind].empty() ? nullptr : &entries[kind][i * each], piece.kind,
-                              chunk);
+        const std::uint64_t of_item = gatherer.add(
+            list[i], entries[kind].empty() ? nullptr : &entries[kind][i * each], piece.kind, chunk);
+        if (!of_item) continue;
+        added += of_item;
+        if (!picture.geometry.straw(list[i]))
+          std::atomic_ref(reached[list[i].instance]).store(1, std::memory_order_relaxed);
       }
       drawn += added;
     });

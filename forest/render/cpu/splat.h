@@ -19,8 +19,10 @@ class Splatter {
 
   /// Draws the lists from near to far; the picture is the same in any order and at any number of threads. Returns how many
   /// segments were neither beside the picture nor hidden by those of the bands before.
-  /// @param clear  empties the canvas before
-  std::uint64_t draw(const Picture& picture, const frame::Lists& lists, Canvas& canvas, bool clear);
+  /// @param clear    empties the canvas before
+  /// @param reached  one an instance: set to 1 where any of them is its
+  std::uint64_t draw(const Picture& picture, const frame::Lists& lists, Canvas& canvas, bool clear,
+                     std::span<std::uint8_t> reached);
   /// Overlays: at least two pixels wide, in the world.
   void draw(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas);
   /// Balls, in the world.
