@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <functional>
+#include <utility>
 
 namespace forest::scene {
 
@@ -44,7 +45,7 @@ void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> ey
   const auto& first = front.eye_;
   const std::uint32_t turns = eyes.front().detail().turns;
   Turn turn{{}, front.pictures_++ % turns, turns};
-  bool all_know = turns > 1;
+  bool all_know = std::exchange(front.together_, choosers.size()) == choosers.size() && turns > 1;
   std::vector<Sight> sights;
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];

@@ -46,6 +46,7 @@ class Chooser {
   std::optional<Occluders> before_;
   std::shared_ptr<Closeness> closeness_;  // of all that are asked together
   std::vector<std::uint8_t> reached_;     // in the picture before; empty: nobody knows
+  std::size_t together_ = 0;              // parts of that picture, if this chose for the first of them
   std::uint32_t pictures_ = 0;
   using Horizons = std::array<float, 3>;  // µm along the view
   static Horizons horizons_of(const frame::DepthMap& seen);

@@ -9,6 +9,7 @@
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/scene/chooser.h"
 #include "forest/scene/path.h"
 #include "forest/scene/view.h"
 
@@ -249,6 +250,30 @@ TEST(Cut, ShowsEveryNeuronInItsTurn) {
   ASSERT_EQ(times.size(), all.size());
   for (const auto& [instance, items] : all)
     EXPECT_EQ(times[instance], (seen[instance] ? 3 : 1) * items) << instance;
+}
+
+// What was seen is known of the whole picture only if all of its parts tell.
+TEST(Chooser, LooksAtAllNeuronsUnlessAllPartsOfThePictureTellWhatWasSeen) {
+  const Forest forest = sample();
+  View view = overview(forest);
+  view.detail.turns = 2;
+  Chooser one(forest), other(forest);
+  Chooser* both[] = {&one, &other};
+  const std::vector<Eye> eyes(2, Eye(view.camera, viewport, view.detail));
+  const std::vector<frame::Viewport> viewports(2, viewport);
+  const std::vector<std::uint8_t> nothing(forest.instances().size());
+  const auto segments = [&](std::size_t parts) {
+    Chooser::choose(std::span(both, parts), std::span(eyes).first(parts), std::span(viewports).first(parts));
+    for (Chooser* c : std::span(both, parts)) c->remember({}, nothing);
+    return one.cut().segments;
+  };
+  const std::uint64_t all = segments(2);
+  EXPECT_LT(segments(2), all);
+  EXPECT_EQ(segments(1), all);  // the other one told of a part
+  EXPECT_LT(segments(1), all);
+  EXPECT_EQ(segments(2), all);
+  one.remember({});
+  EXPECT_EQ(segments(2), all);
 }
 
 TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
