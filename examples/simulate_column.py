@@ -214,6 +214,8 @@ def main():
     options = arguments()
     if not all(0. < value < math.inf for value in (options.ms, options.step, options.dt, options.rate)):
         sys.exit("--ms, --step, --dt and --rate must be numbers above zero")
+    if abs(options.step / options.dt - round(options.step / options.dt)) > 1e-6 * options.step / options.dt:
+        sys.exit("--step must be a multiple of --dt, which is %g ms: rows lie at steps of the simulation" % options.dt)
     every, rows = round(options.step / options.dt), round(options.ms / options.step)
     if every < 1 or rows < 1:
         sys.exit("--step must be --dt or more, and --ms as long as a step")

@@ -28,6 +28,7 @@
 #include "apps/cli/bench.h"
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/options.h"
 
@@ -124,6 +125,8 @@ double worst_error(const Activity& activity, const reports::Report& report, std:
 }
 
 void run(const Options& options, Console& console) {
+  if (!options.keep.empty()) must_take(options.keep, activity_file);
+  if (!options.report.empty()) must_take(options.report, hdf5_file);
   std::string name =
       ((options.keep.empty() ? options.folder : options.keep.parent_path()) / "bench.activity.XXXXXX")
           .string();
@@ -259,7 +262,8 @@ void run(const Options& options, Console& console) {
 std::function<void()> bench_activity(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   add_whole(command, "--neurons", options->neurons, "Neurons reported", 1, 1'000'000);
-  add_whole(command, "--compartments", options->compartments, "Of each neuron", 1, 100'000);
+  add_whole(command, "--compartments", options->compartments,
+            "Of each neuron; more where it has more sections", 1, 100'000);
   add_whole(command, "--steps", options->steps, "Steps; 1,000 take some 10 GB of disk at the size given", 64,
             1'000'000);
   add_whole(command, "--seeks", options->seeks, "How often each is measured", 1, 100'000);

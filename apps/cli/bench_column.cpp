@@ -241,10 +241,11 @@ std::function<void()> bench_column(CLI::App& command, Console& console) {
   add_renderer(command, options->drawer);
   command.add_flag("--activity", options->activity,
                    "A made-up simulation plays on the branches, one step a picture");
-  must_be_whole(
-      *command.add_option("--compartments", options->compartments, "Of each neuron, with --activity")
-           ->capture_default_str(),
-      1, 100'000);
+  must_be_whole(*command
+                     .add_option("--compartments", options->compartments,
+                                 "Of each neuron, with --activity; more where it has more sections")
+                     ->capture_default_str(),
+                1, 100'000);
   must_be_whole(
       *command
            .add_option("--steps", options->steps, "With --activity; 64 take 0.7 GB of disk at the size given")

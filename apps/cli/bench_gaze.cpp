@@ -57,7 +57,7 @@ struct Part {
   std::vector<double> took;           // ms
   std::vector<std::uint64_t> layers;  // segments of each, of the last picture compared
   // The same within the budget, which moves the error.
-  double budget_seconds = 0., budget_error = 0.;
+  double budget_seconds = 0., budget_error = 0., budget_pixel = 0., budget_samples = 0.;
 
   double per_second_of_budget() const { return frames / budget_seconds; }
   double per_second() const { return frames / seconds; }
@@ -143,7 +143,9 @@ class Bench {
       frame::soften(foveated_.draw(view, size_.first, size_.second, colouring), budget.softness(), image);
       const double seconds = seconds_since(start);
       if (i >= settling)
-        part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames;
+        part.budget_seconds += seconds, part.budget_error += double(budget.error()) / part.frames,
+            part.budget_pixel += double(budget.pixel()) / part.frames,
+            part.budget_samples += double(budget.samples()) / part.frames;
       budget.took(1000. * seconds, foveated_.figures().segments);
     }
   }
@@ -211,23 +213,25 @@ void run(const Options& options, Console& console) {
     least_ratio = std::min(least_ratio, p.ratio()),
     least_rate = std::min(least_rate, p.per_second_of_budget());
     differ += p.fovea_differ;
-    json["parts"].push_back(
-        {{"part", p.name},
-         {"ratio", p.ratio()},
-         {"ratio_chosen", p.ratio_chosen()},
-         {"drawn", p.drawn / p.compared},
-         {"drawn_without", p.whole_drawn / p.compared},
-         {"frames_per_second", p.per_second()},
-         {"slowest_ms", p.slowest()},
-         {"within_budget",
-          {{"frames_per_second", p.per_second_of_budget()}, {"error_pixels", p.budget_error}}},
-         {"segments", p.segments / p.compared},
-         {"layers", p.layers},
-         {"segments_without", p.whole_segments / p.compared},
-         {"fovea_pixels", p.fovea_pixels},
-         {"fovea_differ", p.fovea_differ},
-         {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
-         {"covered", p.covered}});
+    json["parts"].push_back({{"part", p.name},
+                             {"ratio", p.ratio()},
+                             {"ratio_chosen", p.ratio_chosen()},
+                             {"drawn", p.drawn / p.compared},
+                             {"drawn_without", p.whole_drawn / p.compared},
+                             {"frames_per_second", p.per_second()},
+                             {"slowest_ms", p.slowest()},
+                             {"within_budget",
+                              {{"frames_per_second", p.per_second_of_budget()},
+                               {"error_pixels", p.budget_error},
+                               {"pixel", p.budget_pixel},
+                               {"samples", p.budget_samples}}},
+                             {"segments", p.segments / p.compared},
+                             {"layers", p.layers},
+                             {"segments_without", p.whole_segments / p.compared},
+                             {"fovea_pixels", p.fovea_pixels},
+                             {"fovea_differ", p.fovea_differ},
+                             {"milliseconds", {{"cull", p.cull}, {"draw", p.draw}, {"unite", p.unite}}},
+                             {"covered", p.covered}});
     rows.push_back({p.name, fmt::format("{:.1f} at {:.1f}", p.per_second_of_budget(), p.budget_error),
                     fmt::format("{:.1f}", p.per_second()), fmt::format("{:.1f}", p.cull),
                     fmt::format("{:.1f}", p.draw), fmt::format("{:.1f}", p.unite),

@@ -74,7 +74,8 @@ struct Product {
 };
 inline constexpr Product png_picture{"PNG picture", ".png", 0, "\x89PNG\r\n"},
     mp4_film{"MP4 film", ".mp4", 4, "ftyp"}, forest_file{"forest file", "", 0, "BFOREST\n"},
-    synapses_file{"file of synapses", "", 0, "BFSYNAP\n"}, activity_file{"activity file", "", 0, "BFACTIV\n"};
+    synapses_file{"file of synapses", "", 0, "BFSYNAP\n"}, activity_file{"activity file", "", 0, "BFACTIV\n"},
+    hdf5_file{"HDF5 file", "", 0, "\x89HDF\r\n\x1a\n"};
 
 /// Throws Error when a product cannot go there: its folder is missing, its name ends otherwise, something else is there.
 /// To be asked before the work begins. Where no file can lie (a pipe, /dev/stdout) anything goes.

@@ -52,12 +52,14 @@ float tick_step(double units_a_pixel, float apart) {
 // What lies around a raster: neurons down its left side, ms below, and what its colours mean.
 class Axes {
  public:
-  Axes(std::uint32_t width, std::uint32_t height, std::size_t neurons)
+  Axes(std::uint32_t width, std::uint32_t height, std::span<const reports::Row> neurons)
       : image_{width, height, std::vector<std::uint8_t>(std::size_t(width) * height * 4, 255), 0.},
         neurons_(neurons) {
+    std::uint32_t last = 0;
+    for (const reports::Row& neuron : neurons) last = std::max(last, neuron.instance);
     const float h = letters_.height =
         std::max(7.f, std::round(std::min(float(height) / 60.f, float(width) / 40.f)));
-    left_ = std::uint32_t(std::ceil(letters_.width(std::to_string(neurons)) + 3.f * h));
+    left_ = std::uint32_t(std::ceil(letters_.width(std::to_string(last)) + 3.f * h));
     top_ = std::uint32_t(3.f * h), right_ = std::uint32_t(2.f * h), bottom_ = std::uint32_t(8.f * h);
     if (width < left_ + right_ + std::uint32_t(24.f * h) || height < top_ + bottom_ + 16)
       throw Error(fmt::format("a picture of {}x{} leaves no room for axes; give a larger --size, or --plain",
@@ -74,11 +76,11 @@ class Axes {
     const float h = letters_.height, thin = std::max(1.f, std::round(.12f * h)), x0 = float(left_),
                 y0 = float(top_), y1 = y0 + float(height());
     letters_.write(image_, "neuron", x0, y0 - h);
-    const double each = double(height()) / double(neurons_);  // pixels
-    for (float n = 0.f, step = std::max(1.f, tick_step(1. / each, 2.5f * h)); n < float(neurons_);
+    const double each = double(height()) / double(neurons_.size());  // pixels
+    for (float n = 0.f, step = std::max(1.f, tick_step(1. / each, 2.5f * h)); n < float(neurons_.size());
          n += step) {
       const float y = y0 + float((double(n) + .5) * each);
-      const std::string label = fmt::format("{:.0f}", n);
+      const std::string label = std::to_string(neurons_[std::size_t(n)].instance);
       scene::fill(image_, {x0 - .7f * h, y - .5f * thin, x0, y + .5f * thin}, letters_.colour);
       letters_.write(image_, label, x0 - h - letters_.width(label), std::max(y, y0 + .4f * h) + .5f * h);
     }
@@ -102,7 +104,7 @@ class Axes {
 
  private:
   frame::Image image_;
-  std::size_t neurons_;
+  std::span<const reports::Row> neurons_;  // from the top
   scene::Lettering letters_{.colour = {.13f, .16f, .20f}};
   std::uint32_t left_ = 0, top_ = 0, right_ = 0, bottom_ = 0;
 };
@@ -132,7 +134,7 @@ void run(const Options& options, Console& console) {
                             options.from, options.to, facts.start, facts.time(facts.steps)));
   std::optional<Axes> axes;
   if (!options.plain) {
-    axes.emplace(width, height, activity.rows().size());
+    axes.emplace(width, height, activity.rows());
     width = axes->width(), height = axes->height();
   }
   const auto codes = activity.raster_picture(begin, end, width, height);

@@ -16,8 +16,8 @@ struct Settings {
   scene::View view;
   bool plane = false;         // of intersection, with its section in a panel
   Across across = Across::z;  // the axis that the plane stands across, or a direction of its own
-  float normal_azimuth = 0.f, normal_elevation = 0.f;  // of that direction, degrees, as those of the eye
-  float plane_at = 0.f;                                // along its normal from the middle of the forest, µm
+  float normal_azimuth = 135.f, normal_elevation = 35.f;  // of that direction, degrees, as those of the eye
+  float plane_at = 0.f;  // along its normal from the middle of the forest, µm
   float plane_opacity = .18f;
   bool fly = false;           // a drag looks around instead of orbiting
   float speed = 120.f;        // of flight, µm/s

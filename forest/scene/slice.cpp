@@ -2,6 +2,7 @@
 #include "forest/scene/slice.h"
 
 #include <algorithm>
+#include <cmath>
 
 #include "forest/core/half.h"
 #include "forest/core/parallel.h"
@@ -66,6 +67,18 @@ Sheet bounds_of(const Profile& profile) {
   return sheet;
 }
 
+// As large as the profile: else what is hidden by others would be taken away too small, since vertices lie on its rim.
+std::vector<Place> polygon_of(const CrossSection& shape) {
+  std::vector<Place> polygon = shape.outline(1e-2, 1e-3);
+  const double flat = area_of_union({&polygon, 1});
+  if (!(flat > 0.)) return polygon;
+  Place middle = Place::Zero();
+  for (const Place& place : polygon) middle += place / double(polygon.size());
+  const double larger = std::sqrt(shape.area() / flat);
+  for (Place& place : polygon) place = middle + larger * (place - middle);
+  return polygon;
+}
+
 bool beside(const Sheet& one, const Sheet& other) {
   return (one.low.array() > other.high.array()).any() || (one.high.array() < other.low.array()).any();
 }
@@ -99,13 +112,13 @@ std::vector<ProfileArea> areas(const Slice& slice) {
     std::vector<const Profile*> profiles;
     for (std::size_t i = starts[n]; i < end; ++i) profiles.push_back(&slice.profiles[i]);
     std::ranges::stable_sort(profiles, {}, &Profile::kind);
-    // Areas are exact one by one; only what overlaps, which is little, is measured on polygons.
+    // Areas are exact one by one; only what overlaps is measured, on polygons of the same areas.
     std::vector<std::vector<Place>> polygons;
     double before = 0., exact = 0., flat = 0.;
     for (std::size_t i = 0; i < profiles.size();) {
       ProfileArea area{profiles[i]->instance, profiles[i]->kind, 0, 0.};
       for (; i < profiles.size() && profiles[i]->kind == area.kind; ++i, ++area.profiles) {
-        polygons.push_back(profiles[i]->shape.outline(1e-2, 1e-3));
+        polygons.push_back(polygon_of(profiles[i]->shape));
         exact += profiles[i]->shape.area(), flat += area_of_union({&polygons.back(), 1});
       }
       const double sum = exact - std::max(0., flat - area_of_union(polygons));

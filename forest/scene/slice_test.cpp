@@ -2,6 +2,7 @@
 #include "forest/scene/slice.h"
 
 #include <map>
+#include <numbers>
 
 #include <gtest/gtest.h>
 
@@ -107,6 +108,25 @@ TEST(Slice, AreasAreThoseOfTheUnionOfANeuronsProfiles) {
     EXPECT_NEAR(share * box, area, 4. * box * std::sqrt(share * (1. - share) / count) + 1e-3 * area);
   }
   EXPECT_GT(looked_at, 1u);
+}
+
+// Stems that begin within the soma add nothing where it is cut, however many there are.
+TEST(Slice, WhatIsHiddenByOthersAddsNothing) {
+  const Plane plane = Plane::through({0, 3, 0}, {0, 1, 0});
+  Slice found{plane, {}};
+  const auto add = [&](std::uint32_t kind, const Vec3& a, const Vec3& b, double radius) {
+    found.profiles.push_back(
+        {0, 0, kind, CrossSection::of({a.cast<double>(), b.cast<double>(), radius, radius}, plane).value()});
+  };
+  add(1, Vec3::Zero(), Vec3::Zero(), 10.);
+  for (int i = 0; i < 12; ++i) {
+    const float turn = .5f * float(i);
+    add(3, {3 * std::cos(turn), -1, 3 * std::sin(turn)}, {5 * std::cos(turn), 8, 5 * std::sin(turn)}, 2.5);
+  }
+  double sum = 0.;
+  for (const ProfileArea& area : areas(found)) sum += area.area;
+  const double analytic = std::numbers::pi * (100. - 9.);
+  EXPECT_NEAR(sum, analytic, 2e-4 * analytic);
 }
 
 TEST(Slice, ThePictureFillsAsMuchAsTheAreasSay) {

@@ -23,3 +23,12 @@ PY
 status=0
 "$BRAINFOREST" bench activity --neurons 5 --folder no/folder 2>err.txt || status=$?
 [ $status = 1 ] && grep -q 'name another --folder' err.txt
+
+# What is there and of another kind stays.
+echo 'my notes' >made/notes
+for option in --keep --report; do
+  status=0
+  "$BRAINFOREST" bench activity --neurons 5 --compartments 1 --steps 64 --seeks 1 $option made/notes 2>err.txt || status=$?
+  [ $status = 1 ] && grep -q 'is there and is no' err.txt
+done
+[ "$(cat made/notes)" = 'my notes' ]

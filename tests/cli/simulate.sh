@@ -16,6 +16,8 @@ examples=$FOREST_SOURCE_DIR/examples
 /usr/bin/python3 "$examples/simulate_column.py" column --out run --ms 30 >simulated.txt 2>err.txt || { cat err.txt; exit 1; }
 grep -q '^20 neurons, [0-9]* compartments, 300 rows' simulated.txt
 [ ! -e run/compartments.h5.part ]
+if /usr/bin/python3 "$examples/simulate_column.py" column --out no --ms 1 --step .04 2>err.txt; then exit 1; fi
+grep -q 'must be a multiple of --dt' err.txt && [ ! -e no ]
 "$program" activity run/compartments.h5 --circuit column --spikes run/spikes.h5 --out run.activity --json >packed.json
 "$program" clamp run.activity --neuron 0 7 19 --csv traces.csv >/dev/null
 "$program" raster run.activity --out raster.png >/dev/null
