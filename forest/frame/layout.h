@@ -92,6 +92,8 @@ struct Constants {
 // Lines are drawn across the axis of the screen that they run along less: in a direction between, they measure this many
 // times their width there, on the mean over directions (4/pi ln(1 + sqrt 2)).
 #define FOREST_MEAN_STRETCH 1.1222
+// Ranks, which are 256ths, times this: their fractions follow one another as evenly spread as may be.
+#define FOREST_SPREAD 97.0
 // A straw that stands for many is drawn no thinner, and no shorter, than so many times the thinnest line: its area is that of
 // a dot as wide, and it shows where branches run.
 #define FOREST_STRAW_WIDTH 0.5

@@ -7,8 +7,10 @@
 #include <array>
 #include <bit>
 #include <cmath>
+#include <cstring>
 #include <numbers>
 #include <numeric>
+#include <utility>
 
 #include "forest/core/half.h"
 #include "forest/morphology/measure.h"
@@ -42,7 +44,7 @@ Sphere around(std::span<const Vec4> vertices) {
 // What a cluster says of the segments it draws.
 struct Drawn {
   float thickness = 0.f;
-  std::array<std::uint8_t, limit> appears{};
+  std::uint8_t appears[order_count][limit] = {};
   std::array<Sphere, Cluster::group_count> groups;
 };
 
@@ -83,7 +85,8 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
   std::uint32_t count = 0;
   for (const Strip& s : drawing.strips_of(draft)) {
     const std::uint32_t meta = s.kind | s.rank << 8 | to_half(s.mean) << 16;
-    const std::uint8_t appears = Cluster::step_of(s.appears * half_a_step);
+    std::array<std::uint8_t, order_count> appears;
+    for (std::size_t o = 0; o < order_count; ++o) appears[o] = Cluster::step_of(s.appears[o] * half_a_step);
     const Vec4* a = &drawing.vertices[s.first];
     std::uint32_t radius = to_half(a->w());
     for (std::uint32_t i = s.first + 1; i < s.first + s.count; ++i, ++count) {
@@ -93,7 +96,7 @@ Drawn emit(const Drawing& drawing, const Draft& draft, const Middle& middle, Clu
       out.places[out.segments.size() - 1] = middle(drawing.places[i - 1], drawing.places[i]);
       const float thickest = std::max(a->w(), b.w());
       if (*a != b) drawn.thickness = std::max(drawn.thickness, thickest);  // the soma itself is chosen apart
-      drawn.appears[count] = appears;
+      for (std::size_t o = 0; o < order_count; ++o) drawn.appears[o][count] = appears[o];
       Vec4 &l = low[count / size], &h = high[count / size];
       l = l.cwiseMin(*a).cwiseMin(b), h = h.cwiseMax(*a).cwiseMax(b);
       a = &b;
@@ -167,44 +170,74 @@ std::vector<std::uint32_t> branch_numbers(const Morphology& m, std::span<const d
 // How the branches of a neuron are ordered, and how thick they are; of every section.
 struct Branches {
   std::vector<std::uint32_t> numbers;
-  std::vector<std::uint32_t>
-      ranks;                 // the share of the neuron's length in branches of smaller number, in 256ths
-  std::vector<float> means;  // radius along the branch; never more than that of the branch it leaves
-  // The magnification from which on it shows, pixels a µm, where the thinnest lines are one pixel wide: when its mean width
-  // reaches its rank, or something of it, or of what grows out of it, is half as wide again. Never before the branch it leaves.
-  std::vector<float> appears;
+  std::vector<std::uint32_t> ranks;  // how far back in the first order, 256ths
+  std::vector<float> means;          // radius along the branch; never more than that of the branch it leaves
+  // The magnification from which on it shows, pixels a µm, where the thinnest lines are one pixel wide: when those before it in the
+  // order, drawn so, do not cover as much as all branches do as wide as they are; when it is as wide itself; or when something of
+  // it, or of what grows out of it, is half as wide again. Never before the branch it leaves.
+  std::vector<std::array<float, order_count>> appears;
 };
+
+// Where the branches lie when they are laid end to end in an order (order.h), µm: each at a part of its own length, which is
+// another in every order and of every neuron, so that on the mean no more lie below any length than it holds.
+// @param parents  of each branch, the one it leaves, which has a smaller number; itself where it leaves none
+std::vector<double> places_of(std::span<const double> lengths, std::span<const std::uint32_t> parents,
+                              double total, std::size_t order) {
+  const std::size_t count = lengths.size();
+  std::vector<std::uint32_t> lots(count), sorted(count);
+  const std::uint32_t own = frame::forest_mixed(std::bit_cast<std::uint32_t>(float(total)));  // of the neuron
+  for (std::uint32_t n = 0; n < count; ++n)
+    lots[n] = std::max(frame::forest_mixed(own + std::uint32_t(n * order_count + order)), lots[parents[n]]);
+  std::iota(sorted.begin(), sorted.end(), 0u);
+  std::ranges::stable_sort(sorted, {}, [&](std::uint32_t n) { return lots[n]; });
+  const double part = (double(order) + double(own) * 0x1p-32) / double(order_count);
+  std::vector<double> places(count);
+  double before = 0.;
+  for (const std::uint32_t n : sorted) places[n] = before + part * lengths[n], before += lengths[n];
+  return places;
+}
 
 Branches branches_of(const Morphology& m) {
   const std::size_t sections = m.sections().size();
   const Sizes sizes = sizes_of(m);
-  Branches branches{branch_numbers(m, sizes.lengths), {}, {}, std::vector<float>(sections)};
+  Branches branches{
+      branch_numbers(m, sizes.lengths), {}, {}, std::vector<std::array<float, order_count>>(sections)};
   const auto& numbers = branches.numbers;
-  std::vector<double> lengths(sections + 1), means(sections);  // of branches; lengths of all before
+  std::vector<double> lengths(sections), means(sections);  // of branches
+  std::vector<std::uint32_t> parents(sections);            // … and what they leave
+  std::iota(parents.begin(), parents.end(), 0u);
   for (std::size_t i = 0; i < sections; ++i) {
-    lengths[numbers[i] + 1] += sizes.lengths[i];
+    lengths[numbers[i]] += sizes.lengths[i];
     means[numbers[i]] += sizes.areas[i] / (2. * std::numbers::pi);
+    if (const SectionId parent = m.section(SectionId(i)).parent;
+        parent.valid() && numbers[parent.value()] != numbers[i])
+      parents[numbers[i]] = numbers[parent.value()];
   }
-  for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n + 1], 1e-9);
+  for (std::size_t n = 0; n < sections; ++n) means[n] /= std::max(lengths[n], 1e-9);
   // A branch that is thicker than the one it leaves must not be seen without it.
   for (std::size_t i = 0; i < sections; ++i)
     if (const SectionId parent = m.section(SectionId(i)).parent; parent.valid())
       means[numbers[i]] = std::min(means[numbers[i]], means[numbers[parent.value()]]);
-  std::partial_sum(lengths.begin(), lengths.end(), lengths.begin());
-  const double total = std::max(lengths.back(), 1e-9);
-  for (const std::uint32_t number : numbers) {
-    branches.ranks.push_back(std::uint32_t(std::min(255., 256. * lengths[number] / total)));
-    branches.means.push_back(float(means[number]));
-  }
-  constexpr float never_left_out = 1.5f, wide = 2.f * float(FOREST_MEAN_STRETCH);  // widths; of radii
+  constexpr float never_left_out = 1.5f;
+  constexpr double wide = 2. * FOREST_MEAN_STRETCH;  // widths; of radii
+  const double total = std::max(std::accumulate(lengths.begin(), lengths.end(), 0.), 1e-9),
+               area = std::max(wide * std::inner_product(lengths.begin(), lengths.end(), means.begin(), 0.),
+                               1e-9);
+  std::array<std::vector<double>, order_count> places;
+  for (std::size_t o = 0; o < order_count; ++o) places[o] = places_of(lengths, parents, total, o);
   std::vector<float> thickest(sections);
   for (std::size_t i = sections; i-- > 0;) {  // parents come first
     for (const Point& p : m.points(SectionId(i))) thickest[i] = std::max(thickest[i], p.radius);
     if (const SectionId parent = m.section(SectionId(i)).parent; parent.valid())
       thickest[parent.value()] = std::max(thickest[parent.value()], thickest[i]);
-    branches.appears[i] =
-        std::min((float(branches.ranks[i]) + .5f) / (256.f * wide * std::max(branches.means[i], 1e-6f)),
-                 .5f * never_left_out / std::max(thickest[i], 1e-6f));
+    const double as_wide = 1. / (wide * std::max(means[numbers[i]], 1e-6)),
+                 much_wider = double(.5f * never_left_out / std::max(thickest[i], 1e-6f));
+    for (std::size_t o = 0; o < order_count; ++o)
+      branches.appears[i][o] = float(std::min({places[o][numbers[i]] / area, as_wide, much_wider}));
+  }
+  for (const std::uint32_t number : numbers) {
+    branches.ranks.push_back(std::uint32_t(std::min(255., 256. * places[0][number] / total)));
+    branches.means.push_back(float(means[number]));
   }
   return branches;
 }
@@ -444,7 +477,7 @@ void write(const Drawing& drawing, const Middle& middle, ClusterTree& tree) {
               .leaf_count = d.leaf_count};
     std::ranges::transform(drawn[i].groups, c.groups,
                            [&](const Sphere& g) { return packed_group(g, sphere); });
-    std::ranges::copy(drawn[i].appears, c.appears);
+    std::memcpy(c.appears, drawn[i].appears, sizeof c.appears);
     tree.clusters.push_back(c);
   }
 }

@@ -22,10 +22,11 @@
 #include "forest/morphology/morphology.h"
 #include "forest/reports/layout.h"
 #include "forest/scene/group.h"
+#include "forest/scene/order.h"
 
 namespace forest::scene {
 
-/// Laid out for the forest file: 96 bytes. Its segments come in groups of 8 that follow one another along the branches, so
+/// Laid out for the forest file: 192 bytes, of which a walk reads the first 64. Its segments come in groups of 8 that follow one another along the branches, so
 /// that what is hidden, or beside the picture, can be told from what is not without a look at single segments.
 struct Cluster {
   static constexpr std::uint32_t group_size = 8, group_count = frame::cluster_size / group_size;
@@ -40,21 +41,22 @@ struct Cluster {
   std::uint32_t children[2] = {0, 0};  // clusters; both 0 for a leaf
   std::uint32_t leaf_first = 0;        // original segments below: the first, among the neuron's leaves …
   std::uint32_t leaf_count = 0;        // … and how many
-  std::uint32_t groups[group_count] = {};          // the sphere around each group: see group()
-  std::uint8_t appears[frame::cluster_size] = {};  // from which step of magnification on each segment shows
+  std::uint32_t groups[group_count] = {};  // the sphere around each group: see group()
+  // From which step of magnification on each segment shows, in each order in which branches may come (order.h).
+  std::uint8_t appears[order_count][frame::cluster_size] = {};
 
   Sphere sphere() const { return {{x, y, z}, radius}; }
   bool is_leaf() const { return children[0] == 0; }
 
   /// A thin branch shows from the magnification on, pixels a µm, at which its width reaches its rank, and none before the
   /// branch that it grows out of. Which segments show where one pixel is the thinnest line.
-  std::uint32_t visible_at(float magnification) const {
+  std::uint32_t visible_at(float magnification, std::size_t order) const {
     constexpr std::uint64_t ones = 0x0101010101010101ull, high = 0x80 * ones;
     const std::uint64_t step = step_of(magnification) * ones | high;
     std::uint32_t shown = 0;
     for (std::uint32_t i = 0; i < frame::cluster_size; i += 8) {  // eight at a time
       std::uint64_t at;
-      std::memcpy(&at, appears + i, sizeof at);
+      std::memcpy(&at, appears[order] + i, sizeof at);
       shown |= std::uint32_t((((step - at) & high) >> 7) * 0x0102040810204080ull >> 56) << i;
     }
     return shown & all();
@@ -71,7 +73,7 @@ struct Cluster {
     return std::uint8_t(std::clamp(step - first, 0, 127));
   }
 };
-static_assert(sizeof(Cluster) == 96);
+static_assert(sizeof(Cluster) == 192);
 
 struct ClusterTree {
   std::vector<frame::Segment> segments;  // the leaves' first (original_count), then the coarser ones

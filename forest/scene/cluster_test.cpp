@@ -2,6 +2,7 @@
 #include "forest/scene/cluster.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <functional>
 #include <map>
@@ -9,6 +10,7 @@
 
 #include <gtest/gtest.h>
 
+#include "forest/core/half.h"
 #include "forest/core/random.h"
 #include "forest/geometry/polyline.h"
 #include "forest/morphology/measure.h"
@@ -56,6 +58,36 @@ TEST(Cluster, LeavesHoldEverySegmentOnce) {
     }
   }
   EXPECT_EQ(covered, tree.original_count);
+}
+
+// Few branches are drawn as wide as the thinnest line for all: as many as cover the same area, on the mean over orders, and in
+// each order others.
+TEST(Cluster, FewBranchesCoverAsMuchAsAllInOrdersOfTheirOwn) {
+  std::size_t alike = 0, trees = 400;
+  for (const float magnification : {.01f, .03f, .1f, .3f}) {
+    double wanted = 0., shown = 0.;
+    for (std::uint64_t seed = 0; seed < trees; ++seed) {
+      const ClusterTree tree = build_clusters(random_tree(seed));
+      std::array<std::vector<bool>, order_count> drawn;
+      for (const Cluster& c : tree.clusters) {
+        if (!c.is_leaf()) continue;
+        for (std::size_t order = 0; order < order_count; ++order) {
+          const std::uint32_t visible = c.visible_at(magnification, order);
+          for (std::uint32_t i = 0; i < c.segment_count; ++i) {
+            const frame::Segment& s = tree.segments[c.first_segment + i];
+            const double length = double((finish(s) - start(s)).norm()),
+                         width = 2. * FOREST_MEAN_STRETCH * double(from_half(s.meta >> 16) * magnification);
+            if (width == 0. || width > 1.) continue;  // the soma's; one that is drawn as it is
+            drawn[order].push_back(visible >> i & 1u);
+            wanted += width * length, shown += drawn[order].back() ? length : 0.;
+          }
+        }
+      }
+      alike += std::ranges::count(drawn, drawn[0]) == order_count;
+    }
+    EXPECT_NEAR(shown / wanted, 1., .08) << magnification;
+  }
+  EXPECT_LT(alike, trees / 4);  // of four times as many
 }
 
 TEST(Cluster, ErrorsGrowUpwardsAndSpheresEnclose) {

@@ -242,7 +242,9 @@ class Judged {
 // Which segments of a cluster are wide enough to be drawn, or drawn for their like.
 std::uint32_t shown_of(const Sight& sight, Subject& neuron, const Cluster& c, std::uint32_t at) {
   const float thinnest = sight.eye.detail().thinnest;
-  return thinnest > 0.f ? c.visible_at(sight.eye.magnification(neuron.closeness(at)) / thinnest) : c.all();
+  return thinnest > 0.f
+             ? c.visible_at(sight.eye.magnification(neuron.closeness(at)) / thinnest, order_of(neuron.index))
+             : c.all();
 }
 
 // Of a cluster that is good enough, these groups.

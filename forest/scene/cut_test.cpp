@@ -280,19 +280,19 @@ TEST(Chooser, LooksAtAllNeuronsUnlessAllPartsOfThePictureTellWhatWasSeen) {
 TEST(Cut, LeavesOutOnlyBranchesTooThinToShow) {
   const Forest forest = sample();
   for (const Cluster& c : forest.clusters()) {
-    for (const float magnification : {.03f, .1f, .3f, 1.f, 3.f}) {
-      const std::uint32_t shown = c.visible_at(magnification);
-      ASSERT_EQ(shown & ~c.all(), 0u);
-      for (std::uint32_t i = 0; i < c.segment_count; ++i) {
-        if (shown >> i & 1u) continue;
-        const frame::Segment& s = forest.segments()[c.first_segment + i];
-        const float width = 2.f * std::max(from_half(s.radii), from_half(s.radii >> 16)) * magnification;
-        const float of_branch = 2.f * float(FOREST_MEAN_STRETCH) * from_half(s.meta >> 16) * magnification;
-        EXPECT_LE(of_branch * 256.f, (float(s.meta >> 8 & 255) + .5f) * 1.2f);
-        EXPECT_LT(width,
-                  (c.is_leaf() ? 1.5f : 3.f * 1.5f) * 1.2f);  // coarse ones are widened, up to three times
+    for (std::size_t order = 0; order < order_count; ++order)
+      for (const float magnification : {.03f, .1f, .3f, 1.f, 3.f}) {
+        const std::uint32_t shown = c.visible_at(magnification, order);
+        ASSERT_EQ(shown & ~c.all(), 0u);
+        for (std::uint32_t i = 0; i < c.segment_count; ++i) {
+          if (shown >> i & 1u) continue;
+          const frame::Segment& s = forest.segments()[c.first_segment + i];
+          const float width = 2.f * std::max(from_half(s.radii), from_half(s.radii >> 16)) * magnification;
+          EXPECT_LE(2.f * float(FOREST_MEAN_STRETCH) * from_half(s.meta >> 16) * magnification, 1.2f);
+          EXPECT_LT(width,
+                    (c.is_leaf() ? 1.5f : 3.f * 1.5f) * 1.2f);  // coarse ones are widened, up to three times
+        }
       }
-    }
   }
 }
 

@@ -14,7 +14,7 @@ static_assert(std::endian::native == std::endian::little,
               "the forest file is little-endian, as the graphics card is");
 
 inline constexpr std::array<char, 8> magic{'B', 'F', 'O', 'R', 'E', 'S', 'T', '\n'};
-inline constexpr std::uint32_t version = 6;
+inline constexpr std::uint32_t version = 7;
 inline constexpr std::size_t alignment = 64;
 
 // In the order of the file.

@@ -226,8 +226,9 @@ void Sketch::gather(const Links& links, Add&& add) {
       const Line& more = old[n];
       for (std::uint32_t v = more.first + 1; v < more.first + more.count; ++v) add(now, v);
       line.end = more.end;
-      if (more.appears < line.appears)
-        line.appears = more.appears, line.rank = more.rank, line.mean = more.mean;
+      if (more.appears[0] < line.appears[0]) line.rank = more.rank, line.mean = more.mean;
+      for (std::size_t o = 0; o < order_count; ++o)
+        line.appears[o] = std::min(line.appears[o], more.appears[o]);
     }
     if (links.next[i] != none) line.reach = -1.f;  // not known
     line.count = now.vertex_count - line.first;

@@ -11,6 +11,7 @@
 #include "forest/core/bounds.h"
 #include "forest/frame/layout.h"
 #include "forest/reports/layout.h"
+#include "forest/scene/order.h"
 
 namespace forest::scene {
 
@@ -18,9 +19,9 @@ namespace forest::scene {
 struct Strip {
   std::uint32_t first = 0, count = 0;  // its vertices
   std::uint32_t kind = 0, rank = 0;
-  float mean = 0.f;                  // radius of its branch
-  float appears = 0.f;               // from which magnification on it shows, pixels a µm
-  std::uint32_t begin = 0, end = 0;  // nodes of the neuron it runs between
+  float mean = 0.f;                          // radius of its branch
+  std::array<float, order_count> appears{};  // from which magnification on it shows, pixels a µm
+  std::uint32_t begin = 0, end = 0;          // nodes of the neuron it runs between
 };
 
 /// A cluster while it is made: its strips and the sphere around all original points below it.

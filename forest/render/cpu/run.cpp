@@ -228,8 +228,6 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
   const bool single = c.subframes == 1;
   const float thinnest = thinnest_of(c, straws);
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
-  const float last_rank =
-      straws ? INFINITY : 511.f / 512.f;  // of what is drawn: which branches are was chosen before
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
@@ -238,7 +236,9 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
     const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
     const bool thin = across < thinnest && r.mean_width[i] > 0.f;
     const float share = larger(smaller(r.mean_width[i] * per_thinnest, 1.f), 1e-6f);
-    const float rank = r.rank[i] + 1.f / 512.f, among = smaller(rank / share, last_rank);
+    // Which branches are drawn was chosen before; straws are drawn or not here.
+    const float rank = r.rank[i] + 1.f / 512.f,
+                among = straws ? rank / share : fraction(float(FOREST_SPREAD) * rank);
     const float instead = single ? std::floor(thinnest + 1.f - among) : across / share;
     const float whole = single ? std::floor(across + 1.f - rank) : across;
     const float line = thin ? (among < 1.f ? instead : 0.f) : whole;

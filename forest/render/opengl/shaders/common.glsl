@@ -223,7 +223,7 @@ void draw_line(Capsule c) {
     // It stands for its like, by its mean width in any direction. Which branches do was chosen before, so that none comes apart
     // (scene/cut.cpp); straws are drawn or left out here, as long as they are.
     float share = min(view.focal * c.mean * (1.0 / lens(c.a.z) + 1.0 / lens(c.b.z)) * FOREST_MEAN_STRETCH * shorter / thinnest, 1.0);
-    float among = c.straw ? rank / share : min(rank / share, 511.0 / 512.0);
+    float among = c.straw ? rank / share : fract(FOREST_SPREAD * rank);
     if (among >= 1.0) return;
     width = single ? floor(thinnest + 1.0 - among) : width / share;
   } else if (single) {
