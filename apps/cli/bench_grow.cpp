@@ -20,6 +20,7 @@
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/grow_cells.h"
+#include "apps/cli/options.h"
 #include "apps/cli/ranks.h"
 #include "apps/cli/verb.h"
 
@@ -102,9 +103,9 @@ std::function<void()> bench_grow(CLI::App& command, Console& console) {
   };
   const auto options = std::make_shared<Options>();
   command.add_option("--grammar", options->grammars, "Names or files; by default all that are built in");
-  command.add_option("--seconds", options->seconds, "To grow by each grammar")
-      ->check(CLI::PositiveNumber)
-      ->capture_default_str();
+  must_be_within(
+      *command.add_option("--seconds", options->seconds, "To grow by each grammar")->capture_default_str(),
+      1e-3, 3600.);
   command.add_option("--folder", options->folder, "For the file of cells, which is removed again")
       ->capture_default_str();
   return [options, &console] {

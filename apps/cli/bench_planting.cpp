@@ -16,6 +16,7 @@
 #include "apps/cli/bench.h"
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 
 namespace forest::cli {
 namespace {
@@ -65,9 +66,9 @@ void run(const Options& options, Console& console) {
 std::function<void()> bench_planting(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
   command.add_option("--neurons", options->neurons, "How many, one run each")->capture_default_str();
-  command.add_option("--radius", options->radius, "Of their somata, µm")
-      ->check(CLI::Range(.1, 20.))
-      ->capture_default_str();
+  must_be_within(
+      *command.add_option("--radius", options->radius, "Of their somata, µm")->capture_default_str(), .1,
+      20.);
   command.add_option("--seed", options->seed, "Seed of their places")->capture_default_str();
   return [options, &console] { run(*options, console); };
 }

@@ -77,12 +77,14 @@ reports::Trace find(const reports::Activity& activity, const Options& options, s
     std::size_t count = 0;
     for (const reports::SectionRun& run : layout.sections)
       if (run.section != reports::soma_run) most = std::max(most, run.section), ++count;
-    throw Error(section == reports::soma_run
-                    ? fmt::format("{}: the soma of node {} was not reported; {} of its sections were",
-                                  options.file.string(), node, count)
-                    : fmt::format("{}: section {} of node {} was not reported; {} of its sections were{}",
-                                  options.file.string(), section, node, count,
-                                  count ? fmt::format(", the last of them {}", most) : ""));
+    throw Error(
+        section == reports::soma_run
+            ? fmt::format("{}: the soma of node {} was not reported; {} of its sections were",
+                          options.file.string(), node, count)
+            : fmt::format("{}: section {} of node {} was not reported; {}", options.file.string(), section,
+                          node,
+                          count ? fmt::format("{} of its sections were, the last of them {}", count, most)
+                                : "its soma alone was"));
   }
   return reports::trace(activity, row, *compartment);
 }
@@ -184,11 +186,11 @@ std::function<void()> clamp(CLI::App& command, Console& console) {
                   "Their sections, numbered from 0 as the studio's selection shows them; or 'soma'")
       ->type_name("SECTION")
       ->capture_default_str();
-  command
-      .add_option("--position", options->positions,
-                  "Where along the sections, 0 to 1; the nearest compartment is shown")
-      ->check(CLI::Range(0., 1.))
-      ->capture_default_str();
+  must_be_within(*command
+                      .add_option("--position", options->positions,
+                                  "Where along the sections, 0 to 1; the nearest compartment is shown")
+                      ->capture_default_str(),
+                 0., 1.);
   command.add_option("--population", options->population, "Where several have such a node");
   command.add_option("--csv", options->csv, "Write every step into this table");
   add_force(command, options->force);

@@ -227,9 +227,9 @@ std::function<void()> movie(CLI::App& command, Console& console) {
       "--scanpath", options->scanpath,
       "A recorded gaze, a CSV file of time (ms), x, y: detail falls off around it (docs/scene/gaze.md)");
   add_size(command, options->size, true);
-  command.add_option("--seconds", options->plan.seconds, "Length of the film")
-      ->check(CLI::Range(0.04, 3600.))
-      ->capture_default_str();
+  must_be_within(
+      *command.add_option("--seconds", options->plan.seconds, "Length of the film")->capture_default_str(),
+      .04, 3600.);
   command.add_option("--fps", options->plan.frames_per_second, "Pictures a second")
       ->check(CLI::Range(1, 120))
       ->capture_default_str();

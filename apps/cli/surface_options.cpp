@@ -10,6 +10,7 @@
 #include "forest/core/error.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/options.h"
 #include "apps/surface_files.h"
 
 namespace forest::cli {
@@ -49,10 +50,11 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
   each(command.add_option(
       "--surface", options.files,
       "Surface of a cortex to show, too: GIFTI (.surf.gii), FreeSurfer (lh.pial), PLY, STL or OBJ, in mm"));
-  each(command.add_option(
-           "--surface-opacity", options.opacities,
-           "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow"))
-      ->check(CLI::Range(0., 1.));
+  CLI::Option* opacity = command.add_option(
+      "--surface-opacity", options.opacities,
+      "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow");
+  each(opacity);
+  must_be_within(*opacity, 0., 1.);
   each(command.add_option(
       "--overlay", options.overlays,
       "Values or areas that colour the surfaces, in their order: GIFTI (.shape.gii, .func.gii, .label.gii), "

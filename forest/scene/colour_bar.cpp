@@ -60,7 +60,7 @@ Writing writing_in(const frame::Image& image, Background background) {
 
 Vec3 ColourBar::at(float t) const {
   const bool below = threshold && low + t * (high - low) < *threshold;
-  if (below) return Vec3(.25f, .28f, .32f);
+  if (below) return screen_of(below_threshold(branches.value_or(Background::dark)));
   return branches ? screen_of(on_branches(*map, t, *branches)) : map->screen(t);
 }
 
@@ -106,6 +106,13 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
   const auto [low, high] = ends_of(bar);
   letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
+  if (!bar.threshold) return;
+  const std::string border = fmt::format("{:g}", *bar.threshold);
+  const float share = (*bar.threshold - bar.low) / (bar.high - bar.low), half = .5f * letters.width(border),
+              at = place.left + share * (place.right - place.left), apart = .8f * letters.height;
+  if (at - half > place.left + letters.width(low) + apart &&
+      at + half < place.right - letters.width(high) - apart)
+    letters.write(image, border, at - half, base);
 }
 
 bool paint(frame::Image& image, std::span<const ColourBar> bars, Background background) {

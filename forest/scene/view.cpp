@@ -461,7 +461,7 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
   const Vec3 ground = light ? light_of(0xDDE3EB) : Vec3::Zero();
   for (std::uint32_t i = steps; i < map_steps; ++i)
     palette[i] = kept * palette[i - steps] + (1.f - kept) * ground;
-  palette[below_entry] = light_of(light ? 0xC9CFD8 : 0x383E46);
+  palette[below_entry] = below_threshold(light ? Background::light : Background::dark);
   palette[no_value_entry] = light_of(light ? 0xB4BCC8 : 0x475160);
   const Vec3 dim = palette[no_value_entry];
   const auto [bright, fading] = flash_colours(light ? Background::light : Background::dark);
@@ -614,6 +614,10 @@ std::string to_json(const View& view) { return write_all(view, keys_of_view()).d
 
 // On dark ground through a colour of its own, for between white and the grey of what has no value lies grey; on light ground
 // black, then a green that hardly any map has.
+Vec3 below_threshold(Background background) {
+  return light_of(background == Background::light ? 0xC9CFD8 : 0x383E46);
+}
+
 Vec3 on_branches(const ColourMap& map, float t, Background background) {
   if (background == Background::light) return .85f * map(t);
   constexpr float least = .07f;

@@ -97,6 +97,8 @@ inline constexpr std::uint32_t half_map_steps = map_steps / 2;
 /// The colour of a branch whose value is a share 0–1 of the map's range, linear light: thin branches need some distance from the ground,
 /// on which the ends of most maps would be lost.
 Vec3 on_branches(const ColourMap& map, float t, Background background);
+/// The colour of branches that are below the threshold there.
+Vec3 below_threshold(Background background);
 
 /// Of a flash on a branch that has a value: when it is new, and half faded. Linear light.
 struct FlashColours {
