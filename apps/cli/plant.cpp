@@ -83,6 +83,14 @@ void run(const Options& options, Console& console) {
   for (const std::string& sentence : all.left_out) console.warn(sentence);
   const Planted& planted = all.planted;
   const circuit::Circuit& circuit = planted.circuit;
+  for (const circuit::TooTall& t : planted.too_tall)
+    if (2 * t.count > t.of)
+      console.warn(
+          fmt::format("{} of the {} neurons of type {} are taller than the tissue in which it is planted; {} "
+                      "there: give layers the "
+                      "thickness of the tissue that the neurons come from",
+                      t.count, t.of, circuit.types[t.type].name,
+                      t.count < t.of ? "only the others stand" : "the lowest stands for all"));
   std::vector<circuit::Projection> projections;
   if (options.synapses)
     projections.push_back(circuit::made_up_synapses(circuit, planted.morphologies,

@@ -229,7 +229,8 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
       candidates.push_back({planted_by.types[type].population, planted_by.types[type].population,
                             std::ranges::max(seedlings[type]->radii), 0.f});
     }
-  Planted planted{circuit::plant(planted_by, candidates, seed, progress), {}};
+  Planted planted{
+      circuit::plant(planted_by, candidates, seed, progress), {}, circuit::too_tall(planted_by, candidates)};
   planted.circuit.types = recipe.types;
   for (std::size_t i = 0; i < candidates.size(); ++i)  // the circuit keeps their order
     if (planted.morphologies.size() < planted.circuit.morphologies.size() &&

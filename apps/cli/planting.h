@@ -30,6 +30,7 @@ Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, c
 struct Planted {
   circuit::Circuit circuit;
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
+  std::vector<circuit::TooTall> too_tall = {};
 };
 
 /// A type all of whose cells have no other processes than those of glia is glia, also when the recipe does not say so.

@@ -224,6 +224,27 @@ std::vector<std::vector<std::uint32_t>> candidates_of(
   return result;
 }
 
+std::vector<TooTall> too_tall(const Recipe& recipe, std::span<const Candidate> candidates) {
+  const auto wanted = counts(recipe);
+  const auto choice = candidates_of(recipe, candidates, [](std::size_t) { return false; });
+  const cortex::Column tissue = column(recipe);
+  std::vector<TooTall> found;
+  for (std::uint32_t type = 0; type < choice.size(); ++type) {
+    const auto fits = [&](std::uint32_t c, std::uint32_t layer) {
+      return wanted[layer][type] && share_that_fits(tissue, layer, candidates[c].height) > 0.f;
+    };
+    bool planted = false;
+    for (const auto& layer : wanted) planted |= layer[type] > 0;
+    const auto tall = std::ranges::count_if(choice[type], [&](std::uint32_t c) {
+      for (std::uint32_t layer = 0; layer < wanted.size(); ++layer)
+        if (fits(c, layer)) return false;
+      return planted;
+    });
+    if (tall) found.push_back({type, std::size_t(tall), choice[type].size()});
+  }
+  return found;
+}
+
 Circuit plant(const Recipe& recipe, std::span<const Candidate> candidates, std::uint64_t seed,
               Progress& progress) {
   check(recipe);

@@ -37,6 +37,14 @@ std::vector<std::vector<std::uint32_t>> candidates_of(
     const Recipe& recipe, std::span<const Candidate> candidates,
     const std::function<bool(std::size_t type)>& is_planted);
 
+/// Candidates of a type that are taller than all tissue above the floor of every layer in which it is planted, so that they stand
+/// nowhere, unless all are and the lowest does.
+struct TooTall {
+  std::uint32_t type = 0;
+  std::size_t count = 0, of = 0;  // of so many candidates
+};
+std::vector<TooTall> too_tall(const Recipe& recipe, std::span<const Candidate> candidates);
+
 /// Circuit::morphologies holds the candidates that were planted, in their order; instances are in the order
 /// of layers, then types. Each instance has a candidate of its type's population and stands where that does not reach
 /// above the pia: the chance of a candidate is the share of the layer's depth in which it fits. Where none fits at all

@@ -220,6 +220,11 @@ TEST(Plant, NeuronsEndUnderThePia) {
   EXPECT_GT(count[1], count[2]);
   EXPECT_GT(count[0], count[1]);
   EXPECT_GT(count[2], 0);
+  const std::vector<TooTall> told = too_tall(recipe, tall);
+  ASSERT_EQ(told.size(), 1u);  // of the small ones the long one fits into the lower layer
+  EXPECT_EQ(told[0].type, 1u);
+  EXPECT_EQ(told[0].count, 2u);
+  EXPECT_EQ(told[0].of, 2u);
 }
 
 }  // namespace

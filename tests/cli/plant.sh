@@ -34,6 +34,11 @@ $BRAINFOREST plant --recipe column-1000 --repo names.db --out names >/dev/null
 [ "$(ls names/morphologies | wc -l)" = 3 ]
 /usr/bin/python3 "$FOREST_SOURCE_DIR/tests/sonata_layout.py" names 1000
 
+# Neurons that are taller than all tissue above them are told of.
+printf 'name = "thin"\nneurons = 20\n[column]\nradius = 200\n[[type]]\nname = "tall"\npopulation = "pyramidal"\n[[layer]]\nname = "L"\nthickness = 90\ndensity = 2000\nmix = { tall = 1 }\n' >thin.toml
+$BRAINFOREST plant --recipe thin.toml --repo names.db --out thin 2>thin.txt >/dev/null
+grep -q '^1 of the 1 neurons of type tall are taller than the tissue in which it is planted; the lowest stands for all' thin.txt
+
 # What is wrong is said in a sentence with what to do, and nothing is left behind.
 $BRAINFOREST import pyramidal-1.swc --repo few.db --population pyramidal >/dev/null
 fails_with 1 'populations purkinje, motoneuron, which are empty; grow' $BRAINFOREST plant --recipe column-1000 --repo few.db --out few
