@@ -104,10 +104,12 @@ class Painter {
   };
   using HueOf = std::function<std::uint16_t(std::uint32_t)>;
 
-  std::uint16_t add_hue(const Vec3& base, const std::string& name) {
+  /// @param flat  somata and axons have the same colour
+  std::uint16_t add_hue(const Vec3& base, const std::string& name, bool flat = false) {
     if (hues_.size() >= most_hues) return std::uint16_t(most_hues - 1);
     Hue hue{{}, {}};
-    for (std::uint32_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = of_kind(base, kind, light_ ? 0.f : 1.f);
+    for (std::uint32_t kind = 0; kind < 8; ++kind)
+      hue.kinds[kind] = flat ? base : of_kind(base, kind, light_ ? 0.f : 1.f);
     if (!name.empty()) hue.legend.push_back({name, base});
     hues_.push_back(std::move(hue));
     return std::uint16_t(hues_.size() - 1);
@@ -258,7 +260,7 @@ class Painter {
                                  ? fmt::format("neuron {}", a.branch->neuron)
                                  : fmt::format("neuron {}, a branch", a.branch->neuron);
     const auto [known, first] = flat_.try_emplace({*a.colour, name}, std::uint16_t(0));
-    if (first) known->second = add_hue(light_of(*a.colour), name);
+    if (first) known->second = add_hue(light_of(*a.colour), name, true);
     return known->second;
   }
 
