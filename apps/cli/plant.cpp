@@ -87,8 +87,7 @@ void run(const Options& options, Console& console) {
     if (2 * t.count > t.of)
       console.warn(
           fmt::format("{} of the {} neurons of type {} are taller than the tissue in which it is planted; {} "
-                      "there: give layers the "
-                      "thickness of the tissue that the neurons come from",
+                      "there: give layers the thickness of the tissue that the neurons come from",
                       t.count, t.of, circuit.types[t.type].name,
                       t.count < t.of ? "only the others stand" : "the lowest stands for all"));
   std::vector<circuit::Projection> projections;

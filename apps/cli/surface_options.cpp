@@ -50,11 +50,10 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
   each(command.add_option(
       "--surface", options.files,
       "Surface of a cortex to show, too: GIFTI (.surf.gii), FreeSurfer (lh.pial), PLY, STL or OBJ, in mm"));
-  CLI::Option* opacity = command.add_option(
-      "--surface-opacity", options.opacities,
-      "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow");
-  each(opacity);
-  must_be_within(*opacity, 0., 1.);
+  must_be_within(*each(command.add_option(
+                     "--surface-opacity", options.opacities,
+                     "How opaque surfaces are, 0 to 1, in their order; the last holds for all that follow")),
+                 0., 1.);
   each(command.add_option(
       "--overlay", options.overlays,
       "Values or areas that colour the surfaces, in their order: GIFTI (.shape.gii, .func.gii, .label.gii), "

@@ -230,15 +230,14 @@ std::vector<TooTall> too_tall(const Recipe& recipe, std::span<const Candidate> c
   const cortex::Column tissue = column(recipe);
   std::vector<TooTall> found;
   for (std::uint32_t type = 0; type < choice.size(); ++type) {
-    const auto fits = [&](std::uint32_t c, std::uint32_t layer) {
-      return wanted[layer][type] && share_that_fits(tissue, layer, candidates[c].height) > 0.f;
-    };
-    bool planted = false;
-    for (const auto& layer : wanted) planted |= layer[type] > 0;
+    std::vector<std::uint32_t> layers;  // in which it is planted
+    for (std::uint32_t layer = 0; layer < wanted.size(); ++layer)
+      if (wanted[layer][type]) layers.push_back(layer);
+    if (layers.empty()) continue;
     const auto tall = std::ranges::count_if(choice[type], [&](std::uint32_t c) {
-      for (std::uint32_t layer = 0; layer < wanted.size(); ++layer)
-        if (fits(c, layer)) return false;
-      return planted;
+      return std::ranges::none_of(layers, [&](std::uint32_t layer) {
+        return share_that_fits(tissue, layer, candidates[c].height) > 0.f;
+      });
     });
     if (tall) found.push_back({type, std::size_t(tall), choice[type].size()});
   }

@@ -114,14 +114,14 @@ std::vector<ProfileArea> areas(const Slice& slice) {
     std::ranges::stable_sort(profiles, {}, &Profile::kind);
     // Areas are exact one by one; only what overlaps is measured, on polygons of the same areas.
     std::vector<std::vector<Place>> polygons;
-    double before = 0., exact = 0., flat = 0.;
+    double before = 0., exact = 0.;
     for (std::size_t i = 0; i < profiles.size();) {
       ProfileArea area{profiles[i]->instance, profiles[i]->kind, 0, 0.};
       for (; i < profiles.size() && profiles[i]->kind == area.kind; ++i, ++area.profiles) {
         polygons.push_back(polygon_of(profiles[i]->shape));
-        exact += profiles[i]->shape.area(), flat += area_of_union({&polygons.back(), 1});
+        exact += profiles[i]->shape.area();
       }
-      const double sum = exact - std::max(0., flat - area_of_union(polygons));
+      const double sum = std::min(exact, area_of_union(polygons));
       area.area = std::max(0., sum - before);
       before = sum;
       found[n].push_back(area);
