@@ -2,6 +2,7 @@
 #include "forest/render/cpu/canvas.h"
 
 #include <algorithm>
+#include <bit>
 #include <cmath>
 
 #include "forest/core/clones.h"
@@ -11,7 +12,6 @@ namespace forest::render::cpu {
 namespace {
 
 constexpr std::int32_t tile = std::int32_t(FOREST_TILE), tile_of_tiles = tile * tile;
-constexpr std::int32_t most = 64;  // tiles of a level that a rectangle may cover
 
 std::int32_t parts(std::int32_t pixels, std::int32_t of) { return (pixels + of - 1) / of; }
 
@@ -65,10 +65,17 @@ void Canvas::resize(std::uint32_t width, std::uint32_t height, int samples, std:
   coarse_.width = parts(fine_.width, tile), coarse_.height = parts(fine_.height, tile);
   const std::size_t tiles = std::size_t(fine_.width) * std::size_t(fine_.height);
   keys_.resize(tiles * tile * tile * std::size_t(samples));
+  columns_.resize(std::size_t(fine_.width * tile)), rows_.resize(std::size_t(fine_.height * tile));
+  const auto in_tiles = [&](std::size_t i, std::size_t next_tile, std::size_t next) {
+    return std::uint32_t((i / tile * next_tile + i % tile * next) * std::size_t(samples));
+  };
+  for (std::size_t x = 0; x < columns_.size(); ++x) columns_[x] = in_tiles(x, tile * tile, 1);
+  for (std::size_t y = 0; y < rows_.size(); ++y)
+    rows_[y] = in_tiles(y, std::size_t(fine_.width) * tile * tile, tile);
   // Squares that are never cleared are beside the area.
   fine_.farthest.assign(tiles, 0u);
   coarse_.farthest.assign(std::size_t(coarse_.width) * std::size_t(coarse_.height), 0u);
-  side_ = side_for(samples);
+  side_ = side_for(samples), tiles_shift_ = std::countr_zero(std::uint32_t(side_ / tile));
   squares_left_ = std::int32_t(area.left) / side_, squares_top_ = std::int32_t(area.top) / side_;
   squares_wide_ = parts(std::int32_t(area.right), side_) - squares_left_;
   squares_high_ = parts(std::int32_t(area.bottom), side_) - squares_top_;
@@ -86,12 +93,10 @@ Square Canvas::square(std::size_t number) const {
 }
 
 Square Canvas::touched(float left, float top, float right, float bottom) const {
-  const auto part = [&](float x, std::int32_t first) {
-    return std::int32_t(std::floor(smaller(larger(x, -1e6f), 1e6f) / float(side_))) - first;
+  const auto part = [](float x) {
+    return std::int32_t(std::floor(smaller(larger(x, -1e6f), 1e6f))) >> std::countr_zero(FOREST_TILE);
   };
-  return {std::max(part(left, squares_left_), 0), std::max(part(top, squares_top_), 0),
-          std::min(part(right, squares_left_), squares_wide_ - 1),
-          std::min(part(bottom, squares_top_), squares_high_ - 1)};
+  return touched(Tiles{part(left), part(top), part(right), part(bottom)});
 }
 
 void Canvas::clear(const Square& s) {
@@ -195,20 +200,11 @@ bool Canvas::hidden(const Square& s, float left, float top, float right, float b
                     float nearest_code) const {
   if (!(left < float(s.right) && top < float(s.bottom) && right >= float(s.left) && bottom >= float(s.top)))
     return true;
-  std::int32_t x0 = std::int32_t(larger(left, float(s.left))) / tile,
-               y0 = std::int32_t(larger(top, float(s.top))) / tile;
-  std::int32_t x1 = std::int32_t(smaller(right, float(s.right - 1))) / tile,
-               y1 = std::int32_t(smaller(bottom, float(s.bottom - 1))) / tile;
-  const Level* level = &fine_;
-  if ((x1 - x0 + 1) * (y1 - y0 + 1) > most) {
-    level = &coarse_;
-    x0 /= tile, y0 /= tile, x1 /= tile, y1 /= tile;
-  }
-  const std::uint32_t key = key_of(nearest_code, 0);
-  for (std::int32_t y = y0; y <= y1; ++y)
-    for (std::int32_t x = x0; x <= x1; ++x)
-      if (level->farthest[std::size_t(y * level->width + x)] >= key) return false;
-  return true;
+  return hidden(
+      Tiles{std::int32_t(larger(left, float(s.left))) / tile, std::int32_t(larger(top, float(s.top))) / tile,
+            std::int32_t(smaller(right, float(s.right - 1))) / tile,
+            std::int32_t(smaller(bottom, float(s.bottom - 1))) / tile},
+      key_of(nearest_code, 0));
 }
 
 frame::DepthMap Canvas::depth_map() const {

@@ -8,6 +8,8 @@
 #include <span>
 #include <vector>
 
+#include <tbb/cache_aligned_allocator.h>
+
 #include "forest/frame/frame.h"
 #include "forest/render/cpu/arithmetic.h"
 
@@ -31,6 +33,11 @@ inline constexpr int most_samples = 16;
 
 /// Pixels of one square of the picture: all that a thread draws into is its own.
 struct Square {
+  std::int32_t left = 0, top = 0, right = 0, bottom = 0;
+};
+
+/// Tiles that something touches, the last ones included.
+struct Tiles {
   std::int32_t left = 0, top = 0, right = 0, bottom = 0;
 };
 
@@ -66,11 +73,38 @@ class Canvas {
   bool hidden(const Square& square, float left, float top, float right, float bottom,
               float nearest_code) const;
 
-  /// The samples of a pixel; those of the pixels to the right follow, up to the next multiple of FOREST_TILE.
-  std::uint32_t* at(std::int32_t x, std::int32_t y) { return &keys_[place(x, y) * std::size_t(samples_)]; }
-  const std::uint32_t* at(std::int32_t x, std::int32_t y) const {
-    return &keys_[place(x, y) * std::size_t(samples_)];
+  /// The same of tiles of the picture, and a key of that depth.
+  [[gnu::always_inline]] bool hidden(Tiles t, std::uint32_t nearest) const {
+    const Level* level = &fine_;
+    if ((t.right - t.left + 1) * (t.bottom - t.top + 1) > most_tiles) {
+      level = &coarse_;
+      t = {t.left >> 3, t.top >> 3, t.right >> 3, t.bottom >> 3};
+    }
+    const std::uint32_t* row = &level->farthest[std::size_t(t.top * level->width)];
+    for (std::int32_t y = t.top; y <= t.bottom; ++y, row += level->width)
+      for (std::int32_t x = t.left; x <= t.right; ++x)
+        if (row[x] >= nearest) return false;
+    return true;
   }
+  /// Which squares they lie in; nothing when left > right or top > bottom.
+  Square touched(const Tiles& t) const {
+    return {std::max((t.left >> tiles_shift_) - squares_left_, 0),
+            std::max((t.top >> tiles_shift_) - squares_top_, 0),
+            std::min((t.right >> tiles_shift_) - squares_left_, squares_wide_ - 1),
+            std::min((t.bottom >> tiles_shift_) - squares_top_, squares_high_ - 1)};
+  }
+
+  /// The samples of a pixel; those of the pixels to the right follow, up to the next multiple of FOREST_TILE.
+  std::uint32_t* at(std::int32_t x, std::int32_t y) {
+    return &keys_[columns_[std::size_t(x)] + rows_[std::size_t(y)]];
+  }
+  const std::uint32_t* at(std::int32_t x, std::int32_t y) const {
+    return &keys_[columns_[std::size_t(x)] + rows_[std::size_t(y)]];
+  }
+  /// The same: keys()[columns()[x] + rows()[y]] is the first sample of a pixel.
+  std::uint32_t* keys() { return keys_.data(); }
+  std::span<const std::uint32_t> columns() const { return columns_; }
+  std::span<const std::uint32_t> rows() const { return rows_; }
   /// The keys of pixels of one row, sample by sample.
   void read_row(std::int32_t y, std::int32_t from, std::int32_t to, std::uint32_t* keys) const;
   frame::DepthMap depth_map() const;
@@ -81,10 +115,7 @@ class Canvas {
     std::vector<std::uint32_t> farthest;
   };
   // The pixels of a tile are neighbours in memory, in rows: a line in any direction stays within few cache lines and pages.
-  static_assert(FOREST_TILE == 8);
-  std::size_t place(std::int32_t x, std::int32_t y) const {
-    return std::size_t((y >> 3) * fine_.width + (x >> 3)) * 64 + std::size_t((y & 7) << 3 | (x & 7));
-  }
+  std::vector<std::uint32_t> columns_, rows_;
 
   std::int32_t width_ = 0, height_ = 0;
   int samples_ = 1;
@@ -92,9 +123,12 @@ class Canvas {
   frame::Area area_;
   std::span<const std::uint8_t> unwanted_;
   float gaps_ = 0.f;
+  static constexpr std::int32_t most_tiles = 64;  // of a level that are looked at
+  int tiles_shift_ = 3;                           // from tiles to squares
   std::int32_t side_ = 64, squares_left_ = 0, squares_top_ = 0, squares_wide_ = 0, squares_high_ = 0;
-  std::vector<std::uint32_t> keys_;  // those of tiles that reach beyond the picture are 0 there
-  Level fine_, coarse_;              // tiles, and tiles of tiles
+  std::vector<std::uint32_t, tbb::cache_aligned_allocator<std::uint32_t>>
+      keys_;             // those of tiles that reach beyond the picture are 0 there
+  Level fine_, coarse_;  // tiles, and tiles of tiles
 
   bool whole(const Square& tiles) const;
   bool wanted(std::size_t tile) const { return unwanted_.empty() || !unwanted_[tile]; }

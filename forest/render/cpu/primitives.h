@@ -154,48 +154,60 @@ template <int S>
                                         auto& window) {
   const bool steep = r.steep;
   const Edges edges(window.square(), steep);
-  const float half = r.half, slope = r.slope, rise = r.rise;
+  const float half = r.half, slope = r.slope, rise = r.rise, y = r.y, z = r.z;
   const std::int32_t first = r.first, begin = std::max(first, edges.first),
                      end = std::min(std::int32_t(r.last), edges.last);
   const float nearest = r.nearest_code(),
               farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
-  if constexpr (S == 1) {
-    for (std::int32_t x = begin; x < end; ++x) {
-      const float steps = float(x - first), y = r.y + steps * slope;
-      const std::int32_t low = clipped(std::ceil(y - half), edges.low, edges.high),
-                         high = clipped(std::ceil(y + half), edges.low, edges.high);
-      const std::uint32_t key = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), r.payload);
-      for (std::int32_t across = low; across < high; ++across)
-        steep ? window.put(across, x, {key}) : window.put(x, across, {key});
-    }
-  } else {
-    const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
-    const float rank = r.rank * 7.f, per_half = 1.f / half, lit_side = r.lit_side, lit_front = r.lit_front;
-    const std::uint32_t entry = r.payload >> 5;
-    float beside[S], noise[S];  // its middle, at each sample
+  const std::uint32_t payload = S == 1 ? r.payload : r.payload & ~31u;
+  const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
+  const float rank = r.rank * 7.f, per_half = 1.f / half, lit_side = 31.f * r.lit_side,
+              lit_front = 31.f * r.lit_front, length = r.length;
+  const auto [least, most] = samples.beside(steep, slope);
+  float beside[S],
+      rounding[S];  // in halves of its width, the middle at each sample; what shades are rounded by
+  FOREST_LANES
+  for (int k = 0; k < S; ++k) {
+    beside[k] = (across[k] - slope * along[k]) * per_half;
+    rounding[k] = 15.5f + fraction(rank + samples.turn[k]);
+  }
+  constexpr std::int32_t at_once = 16;  // steps
+  for (std::int32_t from = begin; from < end; from += at_once) {
+    float middle[at_once];
+    std::int32_t low[at_once], high[at_once];
+    std::uint32_t key[at_once];
     FOREST_LANES
-    for (int k = 0; k < S; ++k) {
-      beside[k] = across[k] - slope * along[k];
-      noise[k] = fraction(rank + samples.turn[k]);
+    for (int i = 0; i < at_once; ++i) {
+      const float steps = float(from + i - first);
+      middle[i] = y + steps * slope;
+      low[i] = clipped(std::ceil(middle[i] + least - half), edges.low, edges.high);
+      high[i] = clipped(std::ceil(middle[i] + most + half), edges.low, edges.high);
+      key[i] = key_of(smaller(larger(z + steps * rise, nearest), farthest), payload);
     }
-    const float reach = half + .5f * (1.f + std::abs(slope)), length = r.length;
-    for (std::int32_t x = begin; x < end; ++x) {
-      const float steps = float(x - first), y = r.y + steps * slope, at = r.begin + steps;
-      const std::int32_t low = clipped(std::ceil(y - reach), edges.low, edges.high),
-                         high = clipped(std::ceil(y + reach), edges.low, edges.high);
-      const std::uint32_t depth = key_of(smaller(larger(r.z + steps * rise, nearest), farthest), 0);
-      const float past = at - length;
-      for (std::int32_t row = low; row < high; ++row) {
-        const float from_middle = float(row) - y;
-        Keys<S> keys;
+    const std::int32_t count = std::min(at_once, end - from);
+    for (std::int32_t i = 0; i < count; ++i) {
+      if constexpr (S == 1) {
+        for (std::int32_t row = low[i]; row < high[i]; ++row) window.put(steep, from + i, row, {key[i]});
+      } else {
+        const float at = r.begin + float(from + i - first), past = at - length;
+        std::uint32_t within[S];
         FOREST_LANES
-        for (int k = 0; k < S; ++k) {
-          const float t = (from_middle - beside[k]) * per_half;
-          const bool covered = (t >= -1.f) & (t < 1.f) & (at >= along[k]) & (past < along[k]);
-          const float shade = .5f + t * lit_side + std::sqrt(larger(1.f - t * t, 0.f)) * lit_front;
-          keys[k] = covered ? depth | payload_of(entry, shade, noise[k]) : FOREST_KEY_EMPTY;
+        for (int k = 0; k < S; ++k) within[k] = (at >= along[k]) & (past < along[k]);
+        const std::uint32_t nearest_key = key[i];
+        for (std::int32_t row = low[i]; row < high[i]; ++row) {
+          const float from_middle = (float(row) - middle[i]) * per_half;
+          Keys<S> keys;
+          FOREST_LANES
+          for (int k = 0; k < S; ++k) {
+            const float t = from_middle - beside[k], h = 1.f - t * t;
+            const float shade = rounding[k] + t * lit_side + std::sqrt(larger(h, 0.f)) * lit_front;
+            std::int32_t level = std::int32_t(shade);
+            level = level < 0 ? 0 : level;
+            level = level > 31 ? 31 : level;
+            keys[k] = (h > 0.f) & (within[k] != 0) ? nearest_key | std::uint32_t(level) : FOREST_KEY_EMPTY;
+          }
+          window.put(steep, from + i, row, keys);
         }
-        steep ? window.put(row, x, keys) : window.put(x, row, keys);
       }
     }
   }

@@ -113,38 +113,55 @@ FOREST_CLONES void find_empty(int samples, const std::uint32_t* keys, std::size_
     find_empty_of<16>(keys, pixels, ignored, empty);
 }
 
-FOREST_CLONES void octaves_of(const std::uint32_t* keys, std::size_t count, float* octaves) {
-  for (std::size_t i = 0; i < count; ++i)
-    octaves[i] = float(std::int32_t(keys[i] >> 12)) * (1.f / float(FOREST_DEPTH_STEPS));
+// What rims compare of a key: the upper 16 bits, of which 2,700 are an octave.
+using Far = std::uint16_t;
+FOREST_CLONES void fars_of(const std::uint32_t* __restrict keys, std::size_t count, Far* __restrict fars) {
+  for (std::size_t i = 0; i < count; ++i) fars[i] = Far(keys[i] >> 16);
 }
 
-[[gnu::always_inline]] inline float nearer(float octave, float other) {
-  return smaller(larger((octave - other) * 40.f, 0.f), 1.f);
+constexpr Far full_rim = 68;  // a fortieth of an octave before its neighbour
+[[gnu::always_inline]] inline Far nearer(Far far, Far other) {
+  const Far by = Far((far > other ? far : other) - other);
+  return by < full_rim ? by : full_rim;
 }
 
 // Of samples that follow one another: how much light each keeps, and how much fog lies before it.
 struct Shading {
-  const float* rows[5];  // octaves of the rows around
+  const Far* rows[5];  // of the rows around
   const std::uint32_t* keys;
   std::ptrdiff_t pixel;  // samples
   float halo, fog_start, fog_length;
 };
 
-FOREST_CLONES void shade(const Shading& s, std::size_t begin, std::size_t end, float* __restrict lit,
-                         float* __restrict fog) {
-  const float *up2 = s.rows[0], *up = s.rows[1], *here = s.rows[2], *down = s.rows[3], *down2 = s.rows[4];
-  const float strength = -1.1f * s.halo / 8.f * 1.44269504f, per_length = -1.44269504f / s.fog_length,
-              fog_start = s.fog_start;
+// How far its neighbours lie before each sample.
+FOREST_CLONES void find_rims(const Shading& s, std::size_t begin, std::size_t end, Far* __restrict rims) {
+  const Far *up2 = s.rows[0], *up = s.rows[1], *here = s.rows[2], *down = s.rows[3], *down2 = s.rows[4];
   const std::ptrdiff_t p = s.pixel, p2 = 2 * p;
   for (std::size_t i = begin; i < end; ++i) {
-    const float o = here[i];
-    const float rim = nearer(o, *(here + i + p)) + nearer(o, *(here + i - p)) + nearer(o, down[i]) +
-                      nearer(o, up[i]) + nearer(o, *(down2 + i + p2)) + nearer(o, *(down2 + i - p2)) +
-                      nearer(o, *(up2 + i + p2)) + nearer(o, *(up2 + i - p2));
+    const Far far = here[i];
+    Far rim = nearer(far, *(here + i + p));
+    rim = Far(rim + nearer(far, *(here + i - p)));
+    rim = Far(rim + nearer(far, down[i]));
+    rim = Far(rim + nearer(far, up[i]));
+    rim = Far(rim + nearer(far, *(down2 + i + p2)));
+    rim = Far(rim + nearer(far, *(down2 + i - p2)));
+    rim = Far(rim + nearer(far, *(up2 + i + p2)));
+    rim = Far(rim + nearer(far, *(up2 + i - p2)));
+    rims[i] = rim;
+  }
+}
+
+FOREST_CLONES void shade(const Shading& s, std::size_t begin, std::size_t end, const Far* __restrict rims,
+                         float* __restrict lit, float* __restrict fog) {
+  const float strength = -1.1f * s.halo / (8.f * float(full_rim)) * 1.44269504f,
+              per_length = -1.44269504f / s.fog_length, fog_start = s.fog_start;
+  for (std::size_t i = begin; i < end; ++i) {
     const float light = float(std::int32_t(s.keys[i] & 31)) * (1.f / 31.f);
-    const float z = exp2_of(o - float(FOREST_DEPTH_BASE));
-    lit[i] = (.16f + 1.05f * light * light) * exp2_of(strength * rim);
-    fog[i] = 1.f - exp2_of(larger(0.f, z - fog_start) * per_length);
+    const float octave =
+        float(std::int32_t(s.keys[i] >> 12)) * (1.f / float(FOREST_DEPTH_STEPS)) - float(FOREST_DEPTH_BASE);
+    lit[i] = (.16f + 1.05f * light * light) * roughly_exp2_of(strength * float(std::int32_t(rims[i])));
+    fog[i] =
+        1.f - roughly_exp2_of(larger(larger(0.f, roughly_exp2_of(octave) - fog_start) * per_length, -126.f));
   }
 }
 
@@ -253,7 +270,8 @@ void tint(const frame::Constants& c, const std::uint32_t* keys, std::uint32_t wa
 
 // What a block of pixels is worked out in; each thread keeps its own from picture to picture.
 struct Scratch {
-  std::vector<float> octaves, lit, fog;
+  std::vector<Far> fars, rims;
+  std::vector<float> lit, fog;
   std::vector<std::uint32_t> keys, shown;
   std::vector<std::int32_t> row_sums;
   std::vector<std::uint8_t> empty;
@@ -294,9 +312,9 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
     const auto S = std::size_t(samples), pixels = std::size_t(end_x - begin_x),
                row_size = (pixels + 2 * beside) * S;
     thread_local Scratch scratch;
-    auto& [octaves, lit, fog, keys, shown, row_sums, empty] = scratch;
-    octaves.resize((rows_at_once + 2 * beside) * row_size), keys.resize(octaves.size());
-    lit.resize(pixels * S), fog.resize(pixels * S);
+    auto& [fars, rims, lit, fog, keys, shown, row_sums, empty] = scratch;
+    fars.resize((rows_at_once + 2 * beside) * row_size), keys.resize(fars.size());
+    rims.resize(pixels * S), lit.resize(pixels * S), fog.resize(pixels * S);
     shown.resize(pixels), row_sums.resize(4 * pixels), empty.resize(pixels);
     // Rows and columns around the block; the picture's edges are repeated.
     const std::int32_t low = std::max(begin_x - beside, 0), up = std::min(end_x + beside, width);
@@ -307,14 +325,14 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
       canvas.read_row(y, low, up, at(low));
       for (std::int32_t x = begin_x - beside; x < low; ++x) std::copy(at(low), at(low) + S, at(x));
       for (std::int32_t x = up; x < end_x + beside; ++x) std::copy(at(up - 1), at(up - 1) + S, at(x));
-      octaves_of(row, row_size, &octaves[std::size_t(k) * row_size]);
+      fars_of(row, row_size, &fars[std::size_t(k) * row_size]);
     }
     std::uint64_t alpha = 0;
     for (std::int32_t y = begin_y; y < end_y; ++y) {
       const auto k = std::size_t(y - begin_y);
       const std::uint32_t* row_keys = &keys[(k + beside) * row_size + beside * S];
       Shading shading{{}, row_keys, samples, c.halo, c.fog_start, c.fog_length};
-      for (std::size_t i = 0; i < 5; ++i) shading.rows[i] = &octaves[(k + i) * row_size + beside * S];
+      for (std::size_t i = 0; i < 5; ++i) shading.rows[i] = &fars[(k + i) * row_size + beside * S];
       find_empty(samples, row_keys, pixels, ignored.data(), empty.data());
       const Vec3 sky = top + (float(y) + .5f) / float(height) * (bottom - top);
       std::int32_t sky_sum[4] = {};
@@ -342,7 +360,8 @@ void resolve(const Canvas& canvas, const Picture& picture, const frame::Palette&
         if (nothing && !tinted) {
           for (std::size_t i = 0; i < 4; ++i) std::fill_n(to[i], count, sky_sum[i]);
         } else {
-          shade(shading, from * S, x * S, lit.data(), fog.data());
+          find_rims(shading, from * S, x * S, rims.data());
+          shade(shading, from * S, x * S, rims.data(), lit.data(), fog.data());
           const Row row{count, row_keys + from * S, &lit[from * S], &fog[from * S], to};
           (samples == 1 ? set_1 : samples == 4 ? set_4 : set_16)(row, wanted, channels, mist, sky);
           for (std::size_t i = from; tinted && i < x; ++i)

@@ -227,6 +227,7 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
   const float thinnest = thinnest_of(c, straws);
+  constexpr int tile_bits = std::countr_zero(FOREST_TILE);
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
@@ -252,10 +253,15 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
                 last = smaller(larger(std::ceil(x1 - .5f + spread), 0.f), limit);
     const float inverse = 1.f / (x1 - x0), slope = (y1 - y0) * inverse, rise = (z1 - z0) * inverse;
     const float begin = first + .5f - x0, half = .5f * line + spread;
-    r.line_width[i] = r.width[i] >= 0.f && first < last && x0 < x1 ? line : 0.f;
-    r.left[i] = smaller(px, qx) - half, r.right[i] = larger(px, qx) + half;
-    r.top[i] = smaller(py, qy) - half, r.bottom[i] = larger(py, qy) + half;
-    r.nearest[i] = smaller(za, zb);
+    const float left = smaller(px, qx) - half, right = larger(px, qx) + half, top = smaller(py, qy) - half,
+                bottom = larger(py, qy) + half;
+    const bool inside = (left < width) & (right >= 0.f) & (top < height) & (bottom >= 0.f);
+    r.line_width[i] = inside & (r.width[i] >= 0.f) & (first < last) & (x0 < x1) ? line : 0.f;
+    r.tile_left[i] = std::int32_t(smaller(larger(left, 0.f), width)) >> tile_bits;
+    r.tile_top[i] = std::int32_t(smaller(larger(top, 0.f), height)) >> tile_bits;
+    r.tile_right[i] = std::int32_t(larger(smaller(right, width - 1.f), 0.f)) >> tile_bits;
+    r.tile_bottom[i] = std::int32_t(larger(smaller(bottom, height - 1.f), 0.f)) >> tile_bits;
+    r.nearest[i] = key_of(smaller(za, zb), 0);
     r.first[i] = first, r.last[i] = last;
     r.y[i] = y0 + begin * slope - .5f, r.slope[i] = slope;
     r.z[i] = z0 + begin * rise, r.rise[i] = rise;

@@ -48,9 +48,11 @@ struct Run {
   float px[run], py[run], qx[run], qy[run];  // pixels of both ends
   float code_a[run], code_b[run];            // of their depths
   // As a line: along the axis of the screen that it runs along more, from `first` to before `last`, where there is one.
-  float left[run], right[run], top[run], bottom[run],
-      nearest[run];       // pixels around it; code of its nearest depth
-  float line_width[run];  // across the axis; 0: nothing to draw
+  float left[run], right[run], top[run], bottom[run];  // pixels around it
+  std::int32_t tile_left[run], tile_right[run], tile_top[run],
+      tile_bottom[run];                                                // as a line: of the picture's tiles
+  std::uint32_t nearest[run];                                          // key of its nearest depth
+  float line_width[run];                                               // across the axis; 0: nothing to draw
   float first[run], last[run], y[run], slope[run], z[run], rise[run];  // y and z at the first step
   float begin[run], length[run];  // from its end to the middle of the first step, to its other end
   std::uint32_t steep[run], payload[run];

@@ -15,7 +15,7 @@
 namespace forest::render::cpu {
 namespace {
 
-constexpr std::size_t items_a_chunk = 256, balls_a_chunk = 4096;
+constexpr std::size_t items_a_chunk = 64, balls_a_chunk = 4096;
 constexpr std::uint32_t number_bits = 13;  // of a thing's number within its chunk
 static_assert(items_a_chunk * run <= 1u << number_bits && balls_a_chunk <= 1u << number_bits);
 constexpr float look_every = 16.f;  // of a square's pixels, drawn; between, what they hide is found out
@@ -205,9 +205,11 @@ class Gatherer {
   bool hidden(const Box& b, float nearest_code) const {
     return canvas_.hidden(whole_, b.left, b.top, b.right, b.bottom, nearest_code);
   }
-  // Adds make() to a list and to the squares that its box touches, where it touches one.
-  bool place_in(const Box& b, auto& list, std::vector<Chunk::Range>& ranges, auto&& make) const {
-    const Square s = canvas_.touched(b.left, b.top, b.right, b.bottom);
+  Tiles tiles_of_line(std::size_t i) const {
+    return {r_.tile_left[i], r_.tile_top[i], r_.tile_right[i], r_.tile_bottom[i]};
+  }
+  // Adds make() to a list and to the squares, where there are any.
+  static bool place_in(const Square& s, auto& list, std::vector<Chunk::Range>& ranges, auto&& make) {
     if (s.left > s.right || s.top > s.bottom) return false;
     list.push_back(make());
     ranges.push_back(
@@ -217,7 +219,9 @@ class Gatherer {
   template <class Thing>
   bool put(const Thing& thing, std::vector<Thing>& list, std::vector<Chunk::Range>& ranges) const {
     const Box box = thing.box(picture_.spread);
-    return !hidden(box, thing.nearest_code()) && place_in(box, list, ranges, [&] { return thing; });
+    return !hidden(box, thing.nearest_code()) &&
+           place_in(canvas_.touched(box.left, box.top, box.right, box.bottom), list, ranges,
+                    [&] { return thing; });
   }
   // How far a line of this width, pixels, is drawn beside its axis at most.
   float reach_of_lines(float thinnest, float width) const {
@@ -226,7 +230,7 @@ class Gatherer {
   }
   // Of lines, it is found out which can be seen, and then these are lit and added.
   void look_at_line(std::size_t i) {
-    if (r_.line_width[i] > 0.f && !hidden({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.nearest[i]))
+    if (r_.line_width[i] > 0.f && !canvas_.hidden(tiles_of_line(i), r_.nearest[i]))
       lines_[line_count_++] = std::uint8_t(i);
   }
   std::uint64_t add_lines(Chunk& chunk) {
@@ -234,8 +238,8 @@ class Gatherer {
     if (!lines.empty()) light(picture_.constants, picture_.light, lines, r_);
     std::uint64_t added = 0;
     for (const std::size_t i : lines)
-      added += place_in({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, chunk.strokes,
-                        chunk.ranges_of_strokes, [&] { return Stroke(r_, i); });
+      added += place_in(canvas_.touched(tiles_of_line(i)), chunk.strokes, chunk.ranges_of_strokes,
+                        [&] { return Stroke(r_, i); });
     return added;
   }
   // Of near ones, what is less than that wide at both ends is a line.
@@ -298,6 +302,7 @@ template <int S>
   Window<S> window(canvas, square);
   const float area = float((square.right - square.left) * (square.bottom - square.top));
   float drawn = 0.f;
+  bool looked = false;
   for (std::size_t n = 0; n < things.size(); ++n) {
     if (n + things_ahead < things.size())
       with(
@@ -308,7 +313,10 @@ template <int S>
     with(
         chunks, things[n], [&](const auto& t) __attribute__((always_inline)) {
           const Box b = t.box(picture.spread);
-          if (window.hidden(b.left, b.top, b.right, b.bottom, t.nearest_code())) return;
+          const bool within = b.left >= float(square.left) && b.right < float(square.right) &&
+                              b.top >= float(square.top) && b.bottom < float(square.bottom);
+          if ((looked || !within) && window.hidden(b.left, b.top, b.right, b.bottom, t.nearest_code()))
+            return;
           if (t.opacity == 255) {
             draw<S>(picture, samples, t, window);
           } else {
@@ -316,7 +324,7 @@ template <int S>
             if (!door.shut()) draw<S>(picture, samples, t, door);
           }
           drawn += pixels_of(b, square);
-          if (drawn > look_every * area) canvas.look(square), drawn = 0.f;
+          if (drawn > look_every * area) canvas.look(square), drawn = 0.f, looked = true;
         });
   }
 }

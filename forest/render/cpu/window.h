@@ -22,7 +22,29 @@ struct Samples {
       turn[k] = golden * float(k);
       subframe[k] = first + std::uint32_t(k);
     }
+    for (std::size_t steep = 0; steep < 2; ++steep)
+      for (std::size_t i = 0; i <= slopes; ++i) {
+        const float slope = 2.f / float(slopes) * float(i) - 1.f;
+        float least = INFINITY, most = -INFINITY;
+        for (int k = 0; k < S; ++k) {
+          const float at = steep ? x[k] - slope * y[k] : y[k] - slope * x[k];
+          least = std::min(least, at), most = std::max(most, at);
+        }
+        least_[steep][i] = least, most_[steep][i] = most;
+      }
   }
+  /// How far from a pixel's middle its samples lie, across a line.
+  /// @param steep  whether it runs along the vertical axis more, and then by how much it leaves that, within ± 1
+  std::pair<float, float> beside(bool steep, float slope) const {
+    // Between two slopes no sample lies farther away than at one of them.
+    const auto i =
+        std::size_t(smaller(larger((slope + 1.f) * (.5f * float(slopes)), 0.f), float(slopes - 1)));
+    return {smaller(least_[steep][i], least_[steep][i + 1]), larger(most_[steep][i], most_[steep][i + 1])};
+  }
+
+ private:
+  static constexpr std::size_t slopes = 32;
+  float least_[2][slopes + 1], most_[2][slopes + 1];
 };
 
 /// Keys of the samples of a pixel; FOREST_KEY_EMPTY leaves a sample as it is.
@@ -32,7 +54,12 @@ using Keys = std::uint32_t[S];
 template <int S>
 class Window {
  public:
-  Window(Canvas& canvas, const Square& square) : canvas_(canvas), square_(square) {}
+  Window(Canvas& canvas, const Square& square)
+      : canvas_(canvas),
+        square_(square),
+        keys_(canvas.keys()),
+        columns_(canvas.columns().data()),
+        rows_(canvas.rows().data()) {}
 
   const Square& square() const { return square_; }
   /// Of a pixel, from the picture's upper left corner on.
@@ -41,9 +68,12 @@ class Window {
   }
   /// The nearest keys win.
   [[gnu::always_inline]] void put(std::int32_t x, std::int32_t y, const Keys<S>& keys) {
-    std::uint32_t* pixel = canvas_.at(x, y);
-    FOREST_LANES
-    for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
+    put(keys_ + columns_[x] + rows_[y], keys);
+  }
+  /// @param steep  whether `along` is a row and `across` a column
+  [[gnu::always_inline]] void put(bool steep, std::int32_t along, std::int32_t across, const Keys<S>& keys) {
+    const std::uint32_t *of_along = steep ? rows_ : columns_, *of_across = steep ? columns_ : rows_;
+    put(keys_ + of_along[along] + of_across[across], keys);
   }
   /// Of single samples, the FOREST_TILE pixels from `x`, a multiple of as many, on.
   [[gnu::always_inline]] void put_row(std::int32_t x, std::int32_t y,
@@ -67,6 +97,13 @@ class Window {
  private:
   Canvas& canvas_;
   Square square_;
+  std::uint32_t* keys_;
+  const std::uint32_t *columns_, *rows_;
+
+  [[gnu::always_inline]] static void put(std::uint32_t* pixel, const Keys<S>& keys) {
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
+  }
 };
 
 /// A window seen through a screen door: only the samples at which something of that opacity shows.
@@ -102,6 +139,9 @@ class Door {
       seen[k] = shows ? keys[k] : FOREST_KEY_EMPTY;
     }
     window_.put(x, y, seen);
+  }
+  void put(bool steep, std::int32_t along, std::int32_t across, const Keys<S>& keys) {
+    steep ? put(across, along, keys) : put(along, across, keys);
   }
   void put_row(std::int32_t x, std::int32_t y, const std::uint32_t (&keys)[FOREST_TILE]) {
     for (std::int32_t k = 0; k < std::int32_t(FOREST_TILE); ++k)
