@@ -132,7 +132,9 @@ constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .2f},
 
 float Budget::pixel() const { return steps[step_].pixel; }
 std::uint32_t Budget::samples() const { return steps[step_].samples; }
-float Budget::thinnest() const { return samples() == 1 ? error_ : std::max(0.f, .25f * (error_ - 1.f)); }
+float Budget::thinnest() const {
+  return samples() == 1 ? error_ : .15f * error_ + .25f * std::max(0.f, error_ - 1.f);
+}
 std::uint32_t Budget::turns() const { return steps[step_].turns; }
 float Budget::softness() const { return steps[step_].softness; }
 

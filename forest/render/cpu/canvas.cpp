@@ -16,21 +16,26 @@ constexpr std::int32_t tile = std::int32_t(FOREST_TILE), tile_of_tiles = tile * 
 std::int32_t parts(std::int32_t pixels, std::int32_t of) { return (pixels + of - 1) / of; }
 
 // A square's keys stay within the second cache: 64 KiB with one sample, 256 KiB with more.
-std::int32_t side_for(int samples) { return samples <= 4 ? 128 : 64; }
+std::int32_t side_for(int samples) { return samples <= 4 ? Canvas::most_across : 64; }
 
 // Of tiles that follow one another, each of so many keys: the farthest key of each.
 FOREST_CLONES void find_farthest(const std::uint32_t* keys, std::size_t tiles, std::size_t keys_a_tile,
                                  std::uint32_t* far) {
-  for (std::size_t t = 0; t < tiles; ++t, keys += keys_a_tile) {
-    std::uint32_t farthest_of[16] = {};
-    for (std::size_t i = 0; i < keys_a_tile; i += 16) {
-      FOREST_LANES
-      for (std::size_t k = 0; k < 16; ++k)
-        farthest_of[k] = keys[i + k] > farthest_of[k] ? keys[i + k] : farthest_of[k];
-    }
+  constexpr std::size_t lanes = 16,
+                        part = 64;  // keys that are looked at before it is asked whether any is empty
+  for (std::size_t t = 0; t < tiles; ++t) {
+    const std::uint32_t* tile_keys = keys + t * keys_a_tile;
     std::uint32_t all = 0;
-    FOREST_LANES
-    for (std::size_t k = 0; k < 16; ++k) all = farthest_of[k] > all ? farthest_of[k] : all;
+    for (std::size_t from = 0; from < keys_a_tile && all != FOREST_KEY_EMPTY; from += part) {
+      std::uint32_t farthest_of[lanes] = {};
+      for (std::size_t i = from; i < std::min(from + part, keys_a_tile); i += lanes) {
+        FOREST_LANES
+        for (std::size_t k = 0; k < lanes; ++k)
+          farthest_of[k] = tile_keys[i + k] > farthest_of[k] ? tile_keys[i + k] : farthest_of[k];
+      }
+      FOREST_LANES
+      for (std::size_t k = 0; k < lanes; ++k) all = farthest_of[k] > all ? farthest_of[k] : all;
+    }
     far[t] = all;
   }
 }
@@ -64,8 +69,10 @@ void Canvas::resize(std::uint32_t width, std::uint32_t height, int samples, std:
   fine_.width = parts(width_, tile), fine_.height = parts(height_, tile);
   coarse_.width = parts(fine_.width, tile), coarse_.height = parts(fine_.height, tile);
   const std::size_t tiles = std::size_t(fine_.width) * std::size_t(fine_.height);
-  keys_.resize(tiles * tile * tile * std::size_t(samples));
-  columns_.resize(std::size_t(fine_.width * tile)), rows_.resize(std::size_t(fine_.height * tile));
+  lines_.resize(tiles * tile * tile * std::size_t(samples) / 16);
+  constexpr std::int32_t beyond = 2;
+  columns_.resize(std::size_t(fine_.width * tile + beyond)),
+      rows_.resize(std::size_t(fine_.height * tile + beyond));
   const auto in_tiles = [&](std::size_t i, std::size_t next_tile, std::size_t next) {
     return std::uint32_t((i / tile * next_tile + i % tile * next) * std::size_t(samples));
   };
@@ -94,7 +101,7 @@ Square Canvas::square(std::size_t number) const {
 
 Square Canvas::touched(float left, float top, float right, float bottom) const {
   const auto part = [](float x) {
-    return std::int32_t(std::floor(smaller(larger(x, -1e6f), 1e6f))) >> std::countr_zero(FOREST_TILE);
+    return std::int32_t(std::floor(smaller(larger(x, -1e6f), 1e6f))) >> tile_bits;
   };
   return touched(Tiles{part(left), part(top), part(right), part(bottom)});
 }

@@ -8,8 +8,6 @@
 #include <span>
 #include <vector>
 
-#include <tbb/cache_aligned_allocator.h>
-
 #include "forest/frame/frame.h"
 #include "forest/render/cpu/arithmetic.h"
 
@@ -30,6 +28,8 @@ namespace forest::render::cpu {
 }
 
 inline constexpr int most_samples = 16;
+inline constexpr int tile_bits = 3;
+static_assert(1u << tile_bits == FOREST_TILE);
 
 /// Pixels of one square of the picture: all that a thread draws into is its own.
 struct Square {
@@ -43,6 +43,7 @@ struct Tiles {
 
 class Canvas {
  public:
+  static constexpr std::int32_t most_across = 128;  // pixels of a square
   /// Sets the size; what the squares hold is undefined until each is cleared.
   /// Pixels beside the area may hold anything, and with those of unwanted tiles count as hidden.
   /// @param samples  of a pixel
@@ -78,7 +79,7 @@ class Canvas {
     const Level* level = &fine_;
     if ((t.right - t.left + 1) * (t.bottom - t.top + 1) > most_tiles) {
       level = &coarse_;
-      t = {t.left >> 3, t.top >> 3, t.right >> 3, t.bottom >> 3};
+      t = {t.left >> tile_bits, t.top >> tile_bits, t.right >> tile_bits, t.bottom >> tile_bits};
     }
     const std::uint32_t* row = &level->farthest[std::size_t(t.top * level->width)];
     for (std::int32_t y = t.top; y <= t.bottom; ++y, row += level->width)
@@ -96,13 +97,14 @@ class Canvas {
 
   /// The samples of a pixel; those of the pixels to the right follow, up to the next multiple of FOREST_TILE.
   std::uint32_t* at(std::int32_t x, std::int32_t y) {
-    return &keys_[columns_[std::size_t(x)] + rows_[std::size_t(y)]];
+    return keys() + columns_[std::size_t(x)] + rows_[std::size_t(y)];
   }
   const std::uint32_t* at(std::int32_t x, std::int32_t y) const {
-    return &keys_[columns_[std::size_t(x)] + rows_[std::size_t(y)]];
+    return keys() + columns_[std::size_t(x)] + rows_[std::size_t(y)];
   }
   /// The same: keys()[columns()[x] + rows()[y]] is the first sample of a pixel.
-  std::uint32_t* keys() { return keys_.data(); }
+  std::uint32_t* keys() { return reinterpret_cast<std::uint32_t*>(lines_.data()); }
+  const std::uint32_t* keys() const { return reinterpret_cast<const std::uint32_t*>(lines_.data()); }
   std::span<const std::uint32_t> columns() const { return columns_; }
   std::span<const std::uint32_t> rows() const { return rows_; }
   /// The keys of pixels of one row, sample by sample.
@@ -126,8 +128,11 @@ class Canvas {
   static constexpr std::int32_t most_tiles = 64;  // of a level that are looked at
   int tiles_shift_ = 3;                           // from tiles to squares
   std::int32_t side_ = 64, squares_left_ = 0, squares_top_ = 0, squares_wide_ = 0, squares_high_ = 0;
-  std::vector<std::uint32_t, tbb::cache_aligned_allocator<std::uint32_t>>
-      keys_;             // those of tiles that reach beyond the picture are 0 there
+  // The sixteen samples of a pixel lie on one line of the cache; those of tiles that reach beyond the picture are 0 there.
+  struct alignas(64) CacheLine {
+    std::uint32_t keys[16];
+  };
+  std::vector<CacheLine> lines_;
   Level fine_, coarse_;  // tiles, and tiles of tiles
 
   bool whole(const Square& tiles) const;

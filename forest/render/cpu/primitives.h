@@ -29,7 +29,9 @@ struct Stroke {
   std::int16_t first, last;   // steps, within the picture
   std::uint16_t payload;      // entry << 5 | its mean shade
   std::uint8_t opacity, steep;
-  std::uint32_t key;  // of its door
+  std::uint32_t key;                      // of its door
+  std::uint32_t nearest;                  // key of its nearest depth
+  std::int16_t left, top, right, bottom;  // tiles
 
   Stroke(const Run& r, std::size_t i)
       : y(r.y[i]),
@@ -47,13 +49,12 @@ struct Stroke {
         payload(std::uint16_t(r.payload[i])),
         opacity(std::uint8_t(r.opacity[i])),
         steep(std::uint8_t(r.steep[i])),
-        key(r.key[i]) {}
-  Box box(float spread) const {
-    const float end = y + slope * float(last - first - 1),
-                reach = half + spread * (1.f + std::abs(slope)) + 1.f;
-    const float low = smaller(y, end) - reach, high = larger(y, end) + reach;
-    return steep ? Box{low, float(first), high, float(last)} : Box{float(first), low, float(last), high};
-  }
+        key(r.key[i]),
+        nearest(r.nearest[i]),
+        left(std::int16_t(r.tile_left[i])),
+        top(std::int16_t(r.tile_top[i])),
+        right(std::int16_t(r.tile_right[i])),
+        bottom(std::int16_t(r.tile_bottom[i])) {}
   // Codes of the depths of its ends.
   float code_a() const { return z - begin * rise; }
   float code_b() const { return z + (length - begin) * rise; }
@@ -148,69 +149,131 @@ struct Edges {
         high(steep ? s.right : s.bottom) {}
 };
 
-// As draw_line in render/opengl/shaders/common.glsl.
+/// Lines, as the pixels across each of their steps, of which many are gathered before any is drawn: how many there are of a line
+/// no processor foresees. As draw_line in render/opengl/shaders/common.glsl.
 template <int S>
-[[gnu::always_inline]] inline void draw(const Picture&, const Samples<S>& samples, const Stroke& r,
-                                        auto& window) {
-  const bool steep = r.steep;
-  const Edges edges(window.square(), steep);
-  const float half = r.half, slope = r.slope, rise = r.rise, y = r.y, z = r.z;
-  const std::int32_t first = r.first, begin = std::max(first, edges.first),
-                     end = std::min(std::int32_t(r.last), edges.last);
-  const float nearest = r.nearest_code(),
-              farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
-  const std::uint32_t payload = S == 1 ? r.payload : r.payload & ~31u;
-  const float *along = steep ? samples.y : samples.x, *across = steep ? samples.x : samples.y;
-  const float rank = r.rank * 7.f, per_half = 1.f / half, lit_side = 31.f * r.lit_side,
-              lit_front = 31.f * r.lit_front, length = r.length;
-  const auto [least, most] = samples.beside(steep, slope);
-  float beside[S],
-      rounding[S];  // in halves of its width, the middle at each sample; what shades are rounded by
-  FOREST_LANES
-  for (int k = 0; k < S; ++k) {
-    beside[k] = (across[k] - slope * along[k]) * per_half;
-    rounding[k] = 15.5f + fraction(rank + samples.turn[k]);
-  }
-  constexpr std::int32_t at_once = 16;  // steps
-  for (std::int32_t from = begin; from < end; from += at_once) {
-    float middle[at_once];
-    std::int32_t low[at_once], high[at_once];
-    std::uint32_t key[at_once];
-    FOREST_LANES
-    for (int i = 0; i < at_once; ++i) {
-      const float steps = float(from + i - first);
-      middle[i] = y + steps * slope;
-      low[i] = clipped(std::ceil(middle[i] + least - half), edges.low, edges.high);
-      high[i] = clipped(std::ceil(middle[i] + most + half), edges.low, edges.high);
-      key[i] = key_of(smaller(larger(z + steps * rise, nearest), farthest), payload);
-    }
-    const std::int32_t count = std::min(at_once, end - from);
-    for (std::int32_t i = 0; i < count; ++i) {
-      if constexpr (S == 1) {
-        for (std::int32_t row = low[i]; row < high[i]; ++row) window.put(steep, from + i, row, {key[i]});
-      } else {
-        const float at = r.begin + float(from + i - first), past = at - length;
-        std::uint32_t within[S];
-        FOREST_LANES
-        for (int k = 0; k < S; ++k) within[k] = (at >= along[k]) & (past < along[k]);
-        const std::uint32_t nearest_key = key[i];
-        for (std::int32_t row = low[i]; row < high[i]; ++row) {
-          const float from_middle = (float(row) - middle[i]) * per_half;
-          Keys<S> keys;
-          FOREST_LANES
-          for (int k = 0; k < S; ++k) {
-            const float t = from_middle - beside[k], h = 1.f - t * t;
-            const float shade = rounding[k] + t * lit_side + std::sqrt(larger(h, 0.f)) * lit_front;
-            std::int32_t level = std::int32_t(shade);
-            level = level < 0 ? 0 : level;
-            level = level > 31 ? 31 : level;
-            keys[k] = (h > 0.f) & (within[k] != 0) ? nearest_key | std::uint32_t(level) : FOREST_KEY_EMPTY;
-          }
-          window.put(steep, from + i, row, keys);
-        }
+class Rows {
+ public:
+  explicit Rows(const Samples<S>& samples) : samples_(samples) {}
+
+  [[gnu::always_inline]] void add(const Stroke& r, auto& window) {
+    const bool steep = r.steep;
+    const Edges edges(window.square(), steep);
+    const float half = r.half, slope = r.slope, rise = r.rise, y = r.y, z = r.z, start = r.begin;
+    const std::int32_t first = r.first, begin = std::max(first, edges.first),
+                       end = std::min(std::int32_t(r.last), edges.last);
+    const float nearest = r.nearest_code(),
+                farthest = smaller(larger(r.code_a(), r.code_b()), float(FOREST_DEPTH_MAX));
+    const std::uint32_t payload = S == 1 ? r.payload : r.payload & ~31u;
+    const auto [least, most] = samples_.beside(steep, slope);
+    const float per_half = 1.f / half;
+    std::uint32_t line = line_of(r, per_half, window);
+    constexpr std::int32_t at_once = 16;  // steps
+    for (std::int32_t from = begin; from < end; from += at_once) {
+      float middle[at_once];
+      std::int32_t low[at_once], high[at_once];
+      std::uint32_t key[at_once];
+      FOREST_LANES
+      for (int i = 0; i < at_once; ++i) {
+        const float steps = float(from + i - first);
+        middle[i] = y + steps * slope;
+        low[i] = clipped(std::ceil(middle[i] + least - half), edges.low, edges.high);
+        high[i] = clipped(std::ceil(middle[i] + most + half), edges.low, edges.high);
+        key[i] = key_of(smaller(larger(z + steps * rise, nearest), farthest), payload);
+      }
+      const std::int32_t count = std::min(at_once, end - from);
+      for (std::int32_t i = 0; i < count; ++i) {
+        if (count_ > most_rows - most_across) draw(window), line = line_of(r, per_half, window);
+        const auto put = [&](std::int32_t row) __attribute__((always_inline)) {
+          rows_[count_] = {window.place(steep, from + i, row), key[i], (float(row) - middle[i]) * per_half,
+                           start + float(from + i - first), line};
+        };
+        // Most have one or two: both are written, and count if they are there.
+        std::int32_t row = low[i];
+        put(row), count_ += row < high[i], ++row;
+        put(row), count_ += row < high[i], ++row;
+        for (; row < high[i]; ++row) put(row), ++count_;
       }
     }
   }
+
+  [[gnu::always_inline]] void draw(auto& window) {
+    if (count_ == 0) return;
+    for (std::uint32_t n = 0; n < ahead; ++n) rows_[count_ + n].place = rows_[0].place;
+    for (std::uint32_t n = 0; n < count_; ++n) {
+      const Row& row = rows_[n];
+      const std::uint32_t key = row.key;
+      window.fetch(rows_[n + ahead].place);
+      Keys<S> keys;
+      if constexpr (S == 1) {
+        keys[0] = key;
+      } else {
+        const Line& line = lines_[row.line];
+        const float middle = row.middle, at = row.at, side = line.side, front = line.front;
+        FOREST_LANES
+        for (int k = 0; k < S; ++k) {
+          const float t = middle - line.beside[k], h = 1.f - t * t;
+          const float shade = line.rounding[k] + t * side + std::sqrt(larger(h, 0.f)) * front;
+          std::int32_t level = std::int32_t(shade);
+          level = level < 0 ? 0 : level;
+          level = level > 31 ? 31 : level;
+          const bool covered = (h > 0.f) & (at >= line.begin[k]) & (at < line.end[k]);
+          keys[k] = covered ? key | std::uint32_t(level) : FOREST_KEY_EMPTY;
+        }
+      }
+      window.put(row.place, keys);
+    }
+    drawn_ += count_;
+    count_ = line_count_ = 0;
+  }
+  /// So many since they were forgotten.
+  std::uint32_t count() const { return drawn_ + count_; }
+  void forget() { drawn_ = 0; }
+
+ private:
+  static constexpr std::uint32_t most_rows = 384, most_lines = 64,
+                                 most_across = Canvas::most_across + 2,  // of a step, and two that may not be
+      ahead = 12;                                                        // of which places are fetched
+  struct Row {
+    std::uint32_t place, key;
+    float middle, at;  // its middle beside the line's, in halves of the width; from the line's end
+    std::uint32_t line;
+  };
+  struct alignas(64) Line {
+    float beside[S], begin[S], end[S], rounding[S];  // at each sample, as Row's; what shades are rounded by
+    float side, front;                               // light, in shades
+  };
+  const Samples<S>& samples_;
+  std::uint32_t count_ = 0, line_count_ = 0, drawn_ = 0;
+  Row rows_[most_rows + ahead];
+  Line lines_[most_lines];
+
+  [[gnu::always_inline]] std::uint32_t line_of(const Stroke& r, float per_half, auto& window) {
+    if (line_count_ == most_lines) draw(window);
+    if constexpr (S > 1) set(lines_[line_count_], r, per_half);
+    return line_count_++;
+  }
+  [[gnu::always_inline]] void set(Line& line, const Stroke& r, float per_half) const {
+    const bool steep = r.steep;
+    const float *along = steep ? samples_.y : samples_.x, *across = steep ? samples_.x : samples_.y;
+    const float rank = r.rank * 7.f, slope = r.slope, length = r.length;
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) {
+      line.beside[k] = (across[k] - slope * along[k]) * per_half;
+      line.begin[k] = along[k];
+      line.end[k] = along[k] + length;
+      line.rounding[k] = 15.5f + fraction(rank + samples_.turn[k]);
+    }
+    line.side = 31.f * r.lit_side, line.front = 31.f * r.lit_front;
+  }
+};
+
+template <int S>
+[[gnu::always_inline]] inline void draw(const Picture&, const Samples<S>& samples, const Stroke& r,
+                                        auto& window) {
+  Rows<S> rows(samples);
+  rows.add(r, window);
+  rows.draw(window);
 }
 
 // A thin capsule by its distance from the axis on screen: as draw_tube in render/opengl/shaders/capsule.glsl.

@@ -227,22 +227,23 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
   const float width = float(c.width), height = float(c.height);
   const bool single = c.subframes == 1;
   const float thinnest = thinnest_of(c, straws);
-  constexpr int tile_bits = std::countr_zero(FOREST_TILE);
+  const float lot =
+      straws ? 1.f : 0.f;  // whether it is drawn here; a number, for vectors are made of numbers alone
   const float per_thinnest = float(FOREST_MEAN_STRETCH) / larger(thinnest, 1e-6f);
   for (std::size_t i = 0; i < count; ++i) {
     const float px = r.px[i], py = r.py[i], qx = r.qx[i], qy = r.qy[i], za = r.code_a[i], zb = r.code_b[i];
     const float dx = qx - px, dy = qy - py, wide = std::abs(dx), high = std::abs(dy);
     const bool steep = high > wide;
-    const float major = steep ? high : wide;
-    const float across = r.width[i] * (major > 0.f ? std::sqrt(dx * dx + dy * dy) / major : 1.f);
-    const bool thin = across < thinnest && r.mean_width[i] > 0.f;
-    const float share = larger(smaller(r.mean_width[i] * per_thinnest, 1.f), 1e-6f);
+    const float major = larger(high, wide), width_here = r.width[i], mean = r.mean_width[i];
+    const float across = width_here * larger(std::sqrt(dx * dx + dy * dy) / larger(major, 1e-20f), 1.f);
+    const bool thin = (across < thinnest) & (mean > 0.f);
+    const float share = larger(smaller(mean * per_thinnest, 1.f), 1e-6f);
     // Which branches are drawn was chosen before; straws are drawn or not here.
     const float rank = r.rank[i] + 1.f / 512.f,
-                among = straws ? rank / share : fraction(float(FOREST_SPREAD) * rank);
+                among = lot > 0.f ? rank / share : fraction(float(FOREST_SPREAD) * rank);
     const float instead = single ? std::floor(thinnest + 1.f - among) : across / share;
     const float whole = single ? std::floor(across + 1.f - rank) : across;
-    const float line = thin ? (among < 1.f ? instead : 0.f) : whole;
+    const float of_thin = among < 1.f ? instead : 0.f, line = thin ? of_thin : whole;
     // From the end of the smaller coordinate to the other.
     const float ax = steep ? py : px, ay = steep ? px : py, bx = steep ? qy : qx, by = steep ? qx : qy;
     const bool turned = ax > bx;
@@ -256,7 +257,8 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
     const float left = smaller(px, qx) - half, right = larger(px, qx) + half, top = smaller(py, qy) - half,
                 bottom = larger(py, qy) + half;
     const bool inside = (left < width) & (right >= 0.f) & (top < height) & (bottom >= 0.f);
-    r.line_width[i] = inside & (r.width[i] >= 0.f) & (first < last) & (x0 < x1) ? line : 0.f;
+    const bool any = inside & (width_here >= 0.f) & (first < last) & (x0 < x1);
+    r.line_width[i] = any ? line : 0.f;
     r.tile_left[i] = std::int32_t(smaller(larger(left, 0.f), width)) >> tile_bits;
     r.tile_top[i] = std::int32_t(smaller(larger(top, 0.f), height)) >> tile_bits;
     r.tile_right[i] = std::int32_t(larger(smaller(right, width - 1.f), 0.f)) >> tile_bits;
@@ -266,7 +268,7 @@ FOREST_CLONES void prepare_lines(const frame::Constants& c, bool straws, float s
     r.y[i] = y0 + begin * slope - .5f, r.slope[i] = slope;
     r.z[i] = z0 + begin * rise, r.rise[i] = rise;
     r.begin[i] = begin, r.length[i] = x1 - x0;
-    r.steep[i] = steep;
+    r.steep[i] = steep ? 1u : 0u;
   }
 }
 

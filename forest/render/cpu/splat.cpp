@@ -18,7 +18,11 @@ namespace {
 constexpr std::size_t items_a_chunk = 64, balls_a_chunk = 4096;
 constexpr std::uint32_t number_bits = 13;  // of a thing's number within its chunk
 static_assert(items_a_chunk * run <= 1u << number_bits && balls_a_chunk <= 1u << number_bits);
-constexpr float look_every = 16.f;  // of a square's pixels, drawn; between, what they hide is found out
+constexpr float look_every = 1.f;  // times a square's pixels are drawn; between, what they hide is found out
+
+// Which thing of which chunk: a number, above it the kind, above that the chunk.
+enum class What : std::uint32_t { solid, dot, stroke };
+constexpr std::uint32_t what_bits = 2;
 
 // What some items, that follow one another, give to be drawn.
 struct Chunk {
@@ -34,22 +38,24 @@ struct Chunk {
     solids.clear(), dots.clear(), strokes.clear();
     ranges_of_solids.clear(), ranges_of_dots.clear(), ranges_of_strokes.clear();
   }
-  // Calls take(range, number) for everything.
+  // Calls take(range, code) for everything, the codes without the chunk's number.
   void each(auto&& take) const {
-    std::uint32_t number = 0;
-    for (const auto* ranges : {&ranges_of_solids, &ranges_of_dots, &ranges_of_strokes})
-      for (const Range& range : *ranges) take(range, number++);
+    const auto all = [&](const std::vector<Range>& ranges, What what) {
+      std::uint32_t code = std::uint32_t(what) << number_bits;
+      for (const Range& range : ranges) take(range, code++);
+    };
+    all(ranges_of_solids, What::solid), all(ranges_of_dots, What::dot), all(ranges_of_strokes, What::stroke);
   }
 };
 
 // Calls take(thing) for that of a code.
 [[gnu::always_inline]] inline void with(const Chunk* chunks, std::uint32_t code, auto&& take) {
-  const Chunk& chunk = chunks[code >> number_bits];
-  std::size_t number = code & ((1u << number_bits) - 1);
-  if (number < chunk.solids.size()) return take(chunk.solids[number]);
-  number -= chunk.solids.size();
-  if (number < chunk.dots.size()) return take(chunk.dots[number]);
-  take(chunk.strokes[number - chunk.dots.size()]);
+  const Chunk& chunk = chunks[code >> (number_bits + what_bits)];
+  const std::size_t number = code & ((1u << number_bits) - 1);
+  const auto what = What(code >> number_bits & ((1u << what_bits) - 1));
+  if (what == What::stroke) return take(chunk.strokes[number]);
+  if (what == What::solid) return take(chunk.solids[number]);
+  take(chunk.dots[number]);
 }
 
 }  // namespace
@@ -87,9 +93,9 @@ class Splatter::Sorted {
     starts_[squares] = all;
     if (things_.size() < all) things_.resize(all);
     parallel_for(chunks, 1, [&](std::size_t c) {
-      chunks_[c].each([&](const Chunk::Range& range, std::uint32_t number) {
+      chunks_[c].each([&](const Chunk::Range& range, std::uint32_t code) {
         each_square(range, [&](std::size_t square) {
-          things_[places_[c * squares + square]++] = std::uint32_t(c) << number_bits | number;
+          things_[places_[c * squares + square]++] = std::uint32_t(c) << (number_bits + what_bits) | code;
         });
       });
     });
@@ -128,19 +134,6 @@ struct Extent {
   }
 };
 
-// Around all segments of an item that lie before the eye.
-struct Hull {
-  Box box{INFINITY, INFINITY, -INFINITY, -INFINITY};
-  float nearest = INFINITY, widest = 0.f;
-
-  void add(const Box& b, float nearest_code, float width) {
-    box = {smaller(box.left, b.left), smaller(box.top, b.top), larger(box.right, b.right),
-           larger(box.bottom, b.bottom)};
-    nearest = smaller(nearest, nearest_code), widest = larger(widest, width);
-  }
-  Box grown(float by) const { return {box.left - by, box.top - by, box.right + by, box.bottom + by}; }
-};
-
 // Items lie in the order of depth, their segments anywhere.
 constexpr std::size_t ahead = 3, things_ahead = 6;
 void prefetch(const frame::Geometry& geometry, const frame::Item& item) {
@@ -170,13 +163,6 @@ class Gatherer {
     if (kind == Kind::capsules) return add_near(chunk);
     const bool straws = picture_.geometry.straw(item);
     if (straws) lengthen(c, r_);
-    Hull hull;
-    for (std::size_t i = 0; i < r_.count; ++i)
-      if (r_.width[i] >= 0.f)
-        hull.add({std::min(r_.px[i], r_.qx[i]), std::min(r_.py[i], r_.qy[i]), std::max(r_.px[i], r_.qx[i]),
-                  std::max(r_.py[i], r_.qy[i])},
-                 std::min(r_.code_a[i], r_.code_b[i]), r_.width[i]);
-    if (hidden(hull.grown(reach_of_lines(thinnest_of(c, straws), hull.widest)), hull.nearest)) return 0;
     prepare_lines(c, straws, picture_.spread, r_);
     for (std::size_t i = 0; i < r_.count; ++i)
       if (r_.opacity[i]) look_at_line(i);
@@ -223,11 +209,6 @@ class Gatherer {
            place_in(canvas_.touched(box.left, box.top, box.right, box.bottom), list, ranges,
                     [&] { return thing; });
   }
-  // How far a line of this width, pixels, is drawn beside its axis at most.
-  float reach_of_lines(float thinnest, float width) const {
-    if (picture_.constants.subframes > 1) return INFINITY;  // few may be drawn for many
-    return .5f * (std::max(thinnest, 1.4143f * width) + 1.f) + picture_.spread;
-  }
   // Of lines, it is found out which can be seen, and then these are lit and added.
   void look_at_line(std::size_t i) {
     if (r_.line_width[i] > 0.f && !canvas_.hidden(tiles_of_line(i), r_.nearest[i]))
@@ -248,16 +229,8 @@ class Gatherer {
     const frame::Constants& c = picture_.constants;
     const float margin = margin_of(picture_.spread);
     surround(c, margin, r_);
-    Hull hull;
-    float thinnest = INFINITY;
-    for (std::size_t i = 0; i < r_.count; ++i) {
-      if (r_.width[i] < 0.f) continue;
-      hull.add({r_.left[i], r_.top[i], r_.right[i], r_.bottom[i]}, r_.front[i], r_.widest[i]);
-      thinnest = std::min(thinnest, r_.widest[i]);
-    }
-    const bool any_thin = thinnest < thin;
-    if (hidden(any_thin ? hull.grown(reach_of_lines(c.thinnest, 2.f * thin)) : hull.box, hull.nearest))
-      return 0;
+    bool any_thin = false;
+    for (std::size_t i = 0; i < r_.count; ++i) any_thin |= r_.width[i] >= 0.f && r_.widest[i] < thin;
     std::uint64_t added = 0;
     for (std::size_t i = 0; i < r_.count; ++i) {
       if (r_.opacity[i] == 0 || r_.width[i] < 0.f || r_.widest[i] < thin) continue;
@@ -300,9 +273,17 @@ template <int S>
                                                const Chunk* chunks, std::span<const std::uint32_t> things,
                                                const Square& square, Canvas& canvas) {
   Window<S> window(canvas, square);
+  Rows<S> rows(samples);
   const float area = float((square.right - square.left) * (square.bottom - square.top));
   float drawn = 0.f;
-  bool looked = false;
+  const auto hidden = [&](const auto& t) __attribute__((always_inline)) {
+    if constexpr (std::is_same_v<decltype(t), const Stroke&>) {
+      return window.hidden(Tiles{t.left, t.top, t.right, t.bottom}, t.nearest);
+    } else {
+      const Box b = t.box(picture.spread);
+      return window.hidden(b.left, b.top, b.right, b.bottom, t.nearest_code());
+    }
+  };
   for (std::size_t n = 0; n < things.size(); ++n) {
     if (n + things_ahead < things.size())
       with(
@@ -312,21 +293,21 @@ template <int S>
           });
     with(
         chunks, things[n], [&](const auto& t) __attribute__((always_inline)) {
-          const Box b = t.box(picture.spread);
-          const bool within = b.left >= float(square.left) && b.right < float(square.right) &&
-                              b.top >= float(square.top) && b.bottom < float(square.bottom);
-          if ((looked || !within) && window.hidden(b.left, b.top, b.right, b.bottom, t.nearest_code()))
-            return;
-          if (t.opacity == 255) {
-            draw<S>(picture, samples, t, window);
-          } else {
+          if (hidden(t)) return;
+          if (t.opacity != 255) {
             Door<S> door(window, samples, picture.constants.subframes, t.opacity, t.key);
             if (!door.shut()) draw<S>(picture, samples, t, door);
+          } else if constexpr (std::is_same_v<decltype(t), const Stroke&>) {
+            rows.add(t, window);
+          } else {
+            draw<S>(picture, samples, t, window);
+            drawn += pixels_of(t.box(picture.spread), square);
           }
-          drawn += pixels_of(b, square);
-          if (drawn > look_every * area) canvas.look(square), drawn = 0.f, looked = true;
         });
+    if (drawn + float(rows.count()) > look_every * area)
+      rows.draw(window), rows.forget(), canvas.look(square), drawn = 0.f;
   }
+  rows.draw(window);
 }
 
 // One square's part of a picture.

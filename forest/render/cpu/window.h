@@ -57,6 +57,8 @@ class Window {
   Window(Canvas& canvas, const Square& square)
       : canvas_(canvas),
         square_(square),
+        tiles_{square.left >> tile_bits, square.top >> tile_bits, (square.right - 1) >> tile_bits,
+               (square.bottom - 1) >> tile_bits},
         keys_(canvas.keys()),
         columns_(canvas.columns().data()),
         rows_(canvas.rows().data()) {}
@@ -68,13 +70,20 @@ class Window {
   }
   /// The nearest keys win.
   [[gnu::always_inline]] void put(std::int32_t x, std::int32_t y, const Keys<S>& keys) {
-    put(keys_ + columns_[x] + rows_[y], keys);
+    put(columns_[x] + rows_[y], keys);
   }
+  /// Where the keys of a pixel are.
   /// @param steep  whether `along` is a row and `across` a column
-  [[gnu::always_inline]] void put(bool steep, std::int32_t along, std::int32_t across, const Keys<S>& keys) {
+  [[gnu::always_inline]] std::uint32_t place(bool steep, std::int32_t along, std::int32_t across) const {
     const std::uint32_t *of_along = steep ? rows_ : columns_, *of_across = steep ? columns_ : rows_;
-    put(keys_ + of_along[along] + of_across[across], keys);
+    return of_along[along] + of_across[across];
   }
+  [[gnu::always_inline]] void put(std::uint32_t place, const Keys<S>& keys) {
+    std::uint32_t* pixel = keys_ + place;
+    FOREST_LANES
+    for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
+  }
+  void fetch(std::uint32_t place) const { __builtin_prefetch(keys_ + place, 1); }
   /// Of single samples, the FOREST_TILE pixels from `x`, a multiple of as many, on.
   [[gnu::always_inline]] void put_row(std::int32_t x, std::int32_t y,
                                       const std::uint32_t (&keys)[FOREST_TILE]) {
@@ -90,6 +99,12 @@ class Window {
     for (int k = 0; k < S * int(FOREST_TILE); ++k) farthest = pixel[k] > farthest ? pixel[k] : farthest;
     return farthest < key;
   }
+  /// The same of tiles, those of other squares left out, and a key.
+  bool hidden(const Tiles& t, std::uint32_t nearest) const {
+    return canvas_.hidden(Tiles{std::max(t.left, tiles_.left), std::max(t.top, tiles_.top),
+                                std::min(t.right, tiles_.right), std::min(t.bottom, tiles_.bottom)},
+                          nearest);
+  }
   bool hidden(float left, float top, float right, float bottom, float nearest_code) const {
     return canvas_.hidden(square_, left, top, right, bottom, nearest_code);
   }
@@ -97,13 +112,9 @@ class Window {
  private:
   Canvas& canvas_;
   Square square_;
+  Tiles tiles_;
   std::uint32_t* keys_;
   const std::uint32_t *columns_, *rows_;
-
-  [[gnu::always_inline]] static void put(std::uint32_t* pixel, const Keys<S>& keys) {
-    FOREST_LANES
-    for (int k = 0; k < S; ++k) pixel[k] = keys[k] < pixel[k] ? keys[k] : pixel[k];
-  }
 };
 
 /// A window seen through a screen door: only the samples at which something of that opacity shows.
@@ -140,8 +151,12 @@ class Door {
     }
     window_.put(x, y, seen);
   }
-  void put(bool steep, std::int32_t along, std::int32_t across, const Keys<S>& keys) {
-    steep ? put(across, along, keys) : put(along, across, keys);
+  std::uint32_t place(bool steep, std::int32_t along, std::int32_t across) const {
+    return std::uint32_t(steep ? along : across) << 16 | std::uint32_t(steep ? across : along);
+  }
+  void fetch(std::uint32_t) const {}
+  void put(std::uint32_t place, const Keys<S>& keys) {
+    put(std::int32_t(place & 0xffff), std::int32_t(place >> 16), keys);
   }
   void put_row(std::int32_t x, std::int32_t y, const std::uint32_t (&keys)[FOREST_TILE]) {
     for (std::int32_t k = 0; k < std::int32_t(FOREST_TILE); ++k)
