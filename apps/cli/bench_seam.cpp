@@ -34,7 +34,7 @@ using Json = nlohmann::ordered_json;
 struct Options {
   std::uint32_t neurons = 1000, frames = 20, samples = 16, rate = 25;
   double seconds = 10.;
-  double budget = 70.;  // what sixteen samples a pixel take on two cores; the studio's is Budget::usual
+  double budget = scene::Budget::usual;
   std::optional<float> error, thinnest, softness, pixel;
   std::optional<std::uint32_t> quick_samples;
   std::uint64_t seed = 1;

@@ -133,7 +133,7 @@ constexpr std::array<Step, 6> steps{{{2.8f, 1, 3.f, 6.f, 4.f, 4.f, 2, 1.3, .2f},
 float Budget::pixel() const { return steps[step_].pixel; }
 std::uint32_t Budget::samples() const { return steps[step_].samples; }
 float Budget::thinnest() const {
-  return samples() == 1 ? error_ : .15f * error_ + .25f * std::max(0.f, error_ - 1.f);
+  return samples() == 1 ? error_ : std::max(.15f * error_, .25f * (error_ - 1.f));
 }
 std::uint32_t Budget::turns() const { return steps[step_].turns; }
 float Budget::softness() const { return steps[step_].softness; }
@@ -176,9 +176,11 @@ void Budget::took(double milliseconds, std::uint64_t segments) {
     step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
     return;
   }
-  // The first picture of a large forest may take long.
+  // The first picture of a large forest may take long. Of later ones, one alone that does may be the machine's doing.
   const double most = of_few ? .8 : 16.;
-  const double ratio = std::clamp(milliseconds / milliseconds_, .5, most);
+  const double steady = std::min(milliseconds, std::max(before_, milliseconds_));
+  before_ = milliseconds;
+  const double ratio = std::clamp(steady / milliseconds_, .5, most);
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);
 }
 

@@ -170,36 +170,38 @@ class Rows {
     std::uint32_t line = line_of(r, per_half, window);
     constexpr std::int32_t at_once = 16;  // steps
     for (std::int32_t from = begin; from < end; from += at_once) {
-      float middle[at_once];
+      float beside[at_once], at[at_once];
       std::int32_t low[at_once], high[at_once];
       std::uint32_t key[at_once];
       FOREST_LANES
       for (int i = 0; i < at_once; ++i) {
-        const float steps = float(from + i - first);
-        middle[i] = y + steps * slope;
-        low[i] = clipped(std::ceil(middle[i] + least - half), edges.low, edges.high);
-        high[i] = clipped(std::ceil(middle[i] + most + half), edges.low, edges.high);
+        const float steps = float(from + i - first), middle = y + steps * slope;
+        low[i] = clipped(std::ceil(middle + least - half), edges.low, edges.high);
+        high[i] = clipped(std::ceil(middle + most + half), edges.low, edges.high);
+        beside[i] = (float(low[i]) - middle) * per_half;
+        at[i] = start + steps;
         key[i] = key_of(smaller(larger(z + steps * rise, nearest), farthest), payload);
       }
       const std::int32_t count = std::min(at_once, end - from);
       for (std::int32_t i = 0; i < count; ++i) {
         if (count_ > most_rows - most_across) draw(window), line = line_of(r, per_half, window);
-        const auto put = [&](std::int32_t row) __attribute__((always_inline)) {
-          rows_[count_] = {window.place(steep, from + i, row), key[i], (float(row) - middle[i]) * per_half,
-                           start + float(from + i - first), line};
+        std::int32_t row = low[i];
+        float middle = beside[i];
+        const auto put = [&] __attribute__((always_inline)) {
+          rows_[count_] = {window.place(steep, from + i, row), key[i], middle, at[i], line};
+          count_ += row < high[i];
+          ++row, middle += per_half;
         };
         // Most have one or two: both are written, and count if they are there.
-        std::int32_t row = low[i];
-        put(row), count_ += row < high[i], ++row;
-        put(row), count_ += row < high[i], ++row;
-        for (; row < high[i]; ++row) put(row), ++count_;
+        put(), put();
+        while (row < high[i]) put();
       }
     }
   }
 
   [[gnu::always_inline]] void draw(auto& window) {
-    if (count_ == 0) return;
-    for (std::uint32_t n = 0; n < ahead; ++n) rows_[count_ + n].place = rows_[0].place;
+    if (count_ > 0)
+      for (std::uint32_t n = 0; n < ahead; ++n) rows_[count_ + n].place = rows_[0].place;
     for (std::uint32_t n = 0; n < count_; ++n) {
       const Row& row = rows_[n];
       const std::uint32_t key = row.key;

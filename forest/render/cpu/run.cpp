@@ -147,23 +147,15 @@ FOREST_CLONES void surround(const frame::Constants& c, float margin, Run& r) {
   }
 }
 
-FOREST_CLONES void light(const frame::Constants& c, const Vec3& towards, std::span<const std::uint8_t> which,
-                         Run& r) {
-  // Of those that are wanted, beside one another: the axis, the way to the eye from twice the middle, and where it runs.
-  float x[run], y[run], z[run], to_x[run], to_y[run], to_z[run], steep[run], shade[run], front[run],
-      side[run];
-  for (std::size_t k = 0; k < which.size(); ++k) {
-    const std::size_t i = which[k];
-    x[k] = r.bx[i] - r.ax[i], y[k] = r.by[i] - r.ay[i], z[k] = r.bz[i] - r.az[i];
-    to_x[k] = r.ax[i] + r.bx[i], to_y[k] = r.ay[i] + r.by[i], to_z[k] = r.az[i] + r.bz[i];
-    steep[k] = std::abs(r.qy[i] - r.py[i]) - std::abs(r.qx[i] - r.px[i]);
-  }
+FOREST_CLONES void light(const frame::Constants& c, const Vec3& towards, Run& r) {
   const float lx = towards.x(), ly = towards.y(), lz = towards.z(), converge = c.converge;
-  const std::size_t count = whole_vectors(which.size());
+  const std::size_t count = whole_vectors(r.count);
   for (std::size_t i = 0; i < count; ++i) {
-    // The mean light of the half cylinder one sees: see draw_line in render/opengl/shaders/common.glsl.
-    const float dx = x[i], dy = y[i], dz = z[i];
-    const float ex = -converge * to_x[i], ey = -converge * to_y[i], ez = -to_z[i];
+    // The axis, and the way to the eye from twice the middle. The mean light of the half cylinder one sees: see draw_line in
+    // render/opengl/shaders/common.glsl.
+    const float dx = r.bx[i] - r.ax[i], dy = r.by[i] - r.ay[i], dz = r.bz[i] - r.az[i];
+    const float ex = -converge * (r.ax[i] + r.bx[i]), ey = -converge * (r.ay[i] + r.by[i]),
+                ez = -(r.az[i] + r.bz[i]);
     const float per_length = 1.f / std::sqrt(larger(dx * dx + dy * dy + dz * dz, 1e-18f)),
                 per_distance = 1.f / std::sqrt(ex * ex + ey * ey + ez * ez);
     const float along = (dx * lx + dy * ly + dz * lz) * per_length,
@@ -171,19 +163,15 @@ FOREST_CLONES void light(const frame::Constants& c, const Vec3& towards, std::sp
                 facing = (ex * lx + ey * ly + ez * lz) * per_distance;
     const float b = (facing - end_on * along) / std::sqrt(larger(1.f - end_on * end_on, 1e-4f));
     const float a2 = larger(0.f, 1.f - along * along - b * b);
-    shade[i] = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
-    front[i] = .5f * b;
+    const float shade = .5f * std::sqrt(larger(0.f, 1.f + 1.5707963f * b + (a2 + 2.f * b * b) * (1.f / 3.f)));
     // Across its axis and the way to the eye.
     const float sx = dy * ez - dz * ey, sy = dz * ex - dx * ez, sz = dx * ey - dy * ex;
     const float lit_side =
         .5f * (sx * lx + sy * ly + sz * lz) / std::sqrt(larger(sx * sx + sy * sy + sz * sz, 1e-30f));
-    const float downwards = steep[i] > 0.f ? sx : -sy;
-    side[i] = downwards < 0.f ? -lit_side : lit_side;
-  }
-  for (std::size_t k = 0; k < which.size(); ++k) {
-    const std::size_t i = which[k];
-    r.lit_front[i] = front[k], r.lit_side[i] = side[k];
-    r.payload[i] = payload_of(r.entry[i], shade[k], fraction(r.rank[i] * 7.f));
+    const float downwards = r.steep[i] != 0 ? sx : -sy;
+    r.lit_front[i] = .5f * b;
+    r.lit_side[i] = downwards < 0.f ? -lit_side : lit_side;
+    r.payload[i] = payload_of(r.entry[i], shade, fraction(r.rank[i] * 7.f));
   }
 }
 

@@ -81,10 +81,9 @@ void place(const frame::Constants& c, const Mat3& turn, const Vec3& at, Run& r);
 /// @param margin  pixels that are added around the box
 void surround(const frame::Constants& c, float margin, Run& r);
 
-/// Light on those that are to be drawn as lines: their payload and what the rims get.
+/// Light on them as lines, which are prepared: their payload and what the rims get.
 /// @param towards  the light, in camera coordinates
-/// @param which    numbers of segments
-void light(const frame::Constants& c, const Vec3& towards, std::span<const std::uint8_t> which, Run& r);
+void light(const frame::Constants& c, const Vec3& towards, Run& r);
 
 /// Cuts segment `i`, as a capsule, at the edges of the picture where it reaches far beyond them (capsule.h).
 /// @returns false where nothing is left

@@ -216,7 +216,7 @@ class Gatherer {
   }
   std::uint64_t add_lines(Chunk& chunk) {
     const std::span<const std::uint8_t> lines(lines_.data(), std::exchange(line_count_, 0));
-    if (!lines.empty()) light(picture_.constants, picture_.light, lines, r_);
+    if (!lines.empty()) light(picture_.constants, picture_.light, r_);
     std::uint64_t added = 0;
     for (const std::size_t i : lines)
       added += place_in(canvas_.touched(tiles_of_line(i)), chunk.strokes, chunk.ranges_of_strokes,
