@@ -163,6 +163,7 @@ class Gatherer {
     if (kind == Kind::capsules) return add_near(chunk);
     const bool straws = picture_.geometry.straw(item);
     if (straws) lengthen(c, r_);
+    if (lines_hidden(thinnest_of(c, straws))) return 0;
     prepare_lines(c, straws, picture_.spread, r_);
     for (std::size_t i = 0; i < r_.count; ++i)
       if (r_.opacity[i]) look_at_line(i);
@@ -190,6 +191,21 @@ class Gatherer {
 
   bool hidden(const Box& b, float nearest_code) const {
     return canvas_.hidden(whole_, b.left, b.top, b.right, b.bottom, nearest_code);
+  }
+  // Whether all lines of a run that is placed are hidden together; they are looked at one by one later. With more than one sample a line
+  // may stand for many, and be any width.
+  bool lines_hidden(float thinnest) const {
+    if (picture_.constants.subframes > 1) return false;
+    Box b{INFINITY, INFINITY, -INFINITY, -INFINITY};
+    float nearest = INFINITY, widest = 0.f;
+    for (std::size_t i = 0; i < r_.count; ++i) {
+      if (r_.width[i] < 0.f) continue;
+      b = {smaller(b.left, smaller(r_.px[i], r_.qx[i])), smaller(b.top, smaller(r_.py[i], r_.qy[i])),
+           larger(b.right, larger(r_.px[i], r_.qx[i])), larger(b.bottom, larger(r_.py[i], r_.qy[i]))};
+      nearest = smaller(nearest, smaller(r_.code_a[i], r_.code_b[i])), widest = larger(widest, r_.width[i]);
+    }
+    const float reach = .5f * (larger(thinnest, 1.4143f * widest) + 1.f) + picture_.spread;
+    return hidden({b.left - reach, b.top - reach, b.right + reach, b.bottom + reach}, nearest);
   }
   Tiles tiles_of_line(std::size_t i) const {
     return {r_.tile_left[i], r_.tile_top[i], r_.tile_right[i], r_.tile_bottom[i]};
