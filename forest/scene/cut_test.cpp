@@ -78,7 +78,7 @@ TEST(Budget, SlowPicturesRaiseTheErrorAndQuickOnesLowerIt) {
   EXPECT_GT(budget.softness(), 0.f);
   EXPECT_FLOAT_EQ(budget.thinnest(), 6.f);
   const float before = budget.error();
-  budget.took(30.);
+  budget.took(30.), budget.took(30.);
   EXPECT_LT(budget.error(), before);
   watch(budget, 40., 50);
   EXPECT_FLOAT_EQ(budget.error(), 1.f);
@@ -104,12 +104,14 @@ TEST(Budget, WhereThereIsNoTimeForOneSampleAPixelPixelsGrow) {
   EXPECT_FLOAT_EQ(budget.error(), 1.f);
 }
 
-TEST(Budget, OneSlowPictureAloneChangesNothing) {
+TEST(Budget, OneSlowOrQuickPictureAloneChangesNothing) {
   Budget budget(50.);
   watch(budget, 100., 50);
   const float before = budget.error();
-  budget.took(50.), budget.took(400.);
-  EXPECT_NEAR(budget.error(), before, 1e-3f);
+  for (const double alone : {400., 5.}) {
+    budget.took(50.), budget.took(alone), budget.took(50.);
+    EXPECT_NEAR(budget.error(), before, 1e-3f) << alone;
+  }
   budget.took(50.), budget.took(400.), budget.took(400.);
   EXPECT_GT(budget.error(), 1.5f * before);
 }

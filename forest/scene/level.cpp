@@ -176,9 +176,11 @@ void Budget::took(double milliseconds, std::uint64_t segments) {
     step_ = above, error_ = steps[step_].from_below, agreed_ = since_ = 0;
     return;
   }
-  // The first picture of a large forest may take long. Of later ones, one alone that does may be the machine's doing.
+  // The first picture of a large forest may take long. One alone that does, or does not, may be the machine's doing: of two, what
+  // both say.
   const double most = of_few ? .8 : 16.;
-  const double steady = std::min(milliseconds, std::max(before_, milliseconds_));
+  const auto [quicker, slower] = std::minmax({milliseconds, before_.value_or(milliseconds)});
+  const double steady = std::clamp(milliseconds_, quicker, slower);
   before_ = milliseconds;
   const double ratio = std::clamp(steady / milliseconds_, .5, most);
   error_ = std::clamp(error_ * float(std::sqrt(ratio)), now.finest, now.coarsest);

@@ -190,7 +190,7 @@ class Budget {
   std::array<double, 5> doubt_{1., 1., 1., 1., 1.};  // of each step but the last: the next was tried in vain
   std::uint32_t agreed_ = 0;                         // pictures that have asked for another step
   std::uint32_t since_ = 0;                          // pictures since the step was gone up to
-  double before_ = INFINITY;                         // milliseconds that the picture before took
+  std::optional<double> before_;                     // milliseconds that the picture before took
 };
 
 }  // namespace forest::scene
