@@ -160,7 +160,7 @@ class Budget {
   /// What a picture may take where nobody says otherwise, milliseconds: in the studio and in what measures it.
   static constexpr double usual = 30.;
   /// The same for pictures that follow a gaze: sixty a second.
-  static constexpr double with_gaze = 15.5;
+  static constexpr double with_gaze = 15.;
 
   explicit Budget(double milliseconds = usual) : milliseconds_(milliseconds) {}
   double milliseconds() const { return milliseconds_; }  // that a picture may take
