@@ -25,24 +25,12 @@ namespace forest::render::cpu {
   return exponent + t * (2.88539008f + t2 * (.96179669f + t2 * (.57707802f + t2 * .41219859f)));
 }
 
-/// 2 to the power x, for |x| < 126; 3e-7 of it off at most. The minimax polynomial on [0, 1] times a power of two.
-[[gnu::always_inline]] inline float exp2_of(float x) {
-  x = smaller(larger(x, -126.f), 126.f);
-  const float whole = std::floor(x), f = x - whole;
-  const float power =
-      1.f + f * (.69315308f + f * (.24015361f + f * (.05582631f + f * (.00898934f + f * .00187758f))));
-  return power * std::bit_cast<float>((std::int32_t(whole) + 127) << 23);
-}
-
-/// The same for -126 <= x < 127, 1e-4 of it off at most.
+/// 2 to the power x, for -126 <= x < 127; 1e-4 of it off at most. The minimax polynomial on [0, 1] times a power of two.
 [[gnu::always_inline]] inline float roughly_exp2_of(float x) {
   const float whole = std::floor(x), f = x - whole;
   const float power = .99992522f + f * (.69583356f + f * (.22606716f + f * .07802412f));
   return power * std::bit_cast<float>((std::int32_t(whole) + 127) << 23);
 }
-
-/// exp(x)
-[[gnu::always_inline]] inline float exp_of(float x) { return exp2_of(1.44269504f * x); }
 
 [[gnu::always_inline]] inline float fraction(float x) { return x - std::floor(x); }
 
