@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/fitting/mixing.h"
 #include "forest/fitting/traced.h"
 #include "forest/statistics/summary.h"
 #include "forest/statistics/two_samples.h"
@@ -23,9 +24,6 @@ namespace forest::fitting {
 namespace {
 
 using Out = std::back_insert_iterator<std::string>;
-
-// Degrees between basal and other stems that count as much as a standard deviation of a style, where mates are chosen.
-constexpr double near_angle = 6.;
 
 // What is a tracer's habit rather than a neuron's.
 constexpr bool habit(std::size_t style) { return style == grain || style == slope || style == kink; }
@@ -36,7 +34,7 @@ double deviation(const std::vector<double>& values) { return statistics::summari
 constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)\n", with_fibre = R"(module Begin
 axiom: Begin Plan(0)
 body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
-fibre: Begin -> Kind(plans.kind(plans(me, 0))) Fibre(cells.fibre(me))
+fibre: Begin -> Kind(plans.kind(plan(0))) Fibre(cells.fibre(me))
 )";
 
 // What grows of all this. @style stands for a neuron's own style.
@@ -45,11 +43,9 @@ constexpr std::string_view growth = R"(
 # stays single.
 function share(part, whole, n, others) =
   if(part == 1, 1, max(min(2, n - others), min(n - others, round(n * part / whole))))
-# The traced neuron whose stems of a kind these are, the stems of both, one after the other, and whether one is among them.
-function whose(kind) = if(kind == others_kind, mate, me)
-cell planned = cells.stems(me) + if(others_kind < 0, 0, cells.stems(mate))
-distribution plan(i) = if(i < cells.stems(me), plans(me, i), plans(mate, i - cells.stems(me)))
-distribution its(i) = if(i < planned, (plans.kind(plan(i)) == others_kind) == (i >= cells.stems(me)), 0)
+# The traced neuron whose style branches of a kind have, and the stems, one after the other.
+function whose(kind) = if(kind == 3, basal_as, others_as)
+distribution plan(i) = arbors.plan(arbors(me, i))
 # How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
@@ -75,8 +71,8 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 # A stem's direction turned about z.
 function swayed_x(angle, x, y) = cos(angle) * x - sin(angle) * y
 function swayed_y(angle, x, y) = sin(angle) * x + cos(angle) * y
-# How many times thicker this neuron is than the one whose stems it has, as the neuron is whose diameters it has.
-distribution thicker(kind) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(whose(kind), kind))))
+# How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
+distribution thicker(kind, cell) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
@@ -87,14 +83,14 @@ module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay,
 axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
-stem: Plan(i) : if(its(i), plans.length(plan(i)), 0) > 0
+stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
-    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind), d = thick * plans.d(p),
+    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p)), d = thick * plans.d(p),
     sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
     bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
     ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
-    r = stems(kind, whose(kind), log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    r = stems(kind, plans.cell(p), log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
     sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
@@ -102,16 +98,15 @@ stem: Plan(i) : if(its(i), plans.length(plan(i)), 0) > 0
        Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
-bud: Plan(i) : its(i)  # it forks where it leaves
+bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
-    away = ahead / max(1, plans.ahead(p)), d = thicker(kind) * plans.d(p), sway = normal(0, sways(kind)) }
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p)) * plans.d(p), sway = normal(0, sways(kind)) }
   -> [ Kind(kind) At(swayed_x(sway, plans.x(p), plans.y(p)), swayed_y(sway, plans.x(p), plans.y(p)), plans.z(p))
        Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * swayed_x(sway, plans.tx(p), plans.ty(p)), away * swayed_y(sway, plans.tx(p), plans.ty(p)), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
-passed: Plan(i) : i < planned -> Plan(i + 1)
 done: Plan(i) ->
 
 # A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
@@ -185,6 +180,7 @@ class Writer {
     styles_of_cells();
     alike();
     plans();
+    arbors();
     stems();
     forks();
     calibres();
@@ -202,12 +198,17 @@ class Writer {
 
   void cells() {
     put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
-        "(else -1), and how "
-        "many stems they have.\nsample cells(-> soma, fibre, stems, low, high) =");
-    for (const Cell& c : traced_.cells) {
-      row(&c == traced_.cells.data());
-      put("{} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), c.stems.size(), rounded(c.low, 10.),
-          rounded(c.high, 10.));
+        "(else -1), between which depths "
+        "they lie, how many stems one like this has, and the neurons in whose style its basal dendrites are, "
+        "in "
+        "whose all others, and whose diameters it has.\n"
+        "sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as) =");
+    for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
+      const Cell& c = traced_.cells[i];
+      const Mixed& m = mixed_[i];
+      row(!i);
+      put("{} {} {} {} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), rounded(c.low, 10.),
+          rounded(c.high, 10.), m.stems.size(), m.basal_as, m.others_as, m.thin_as);
     }
   }
 
@@ -236,87 +237,15 @@ class Writer {
   void alike() {
     put("\n\n# To each neuron those most like it in style, the most alike first.\nsample alike(cell =, rank "
         "= -> cell) =");
-    const auto apart = [](const Cell& a, const Cell& b) {
-      double sum = 0.;
-      for (const auto& [kind, of] : a.kinds) {
-        const auto found = b.kinds.find(kind);
-        for (std::size_t s = 0; s < styles; ++s)
-          if (s != slope && s != kink)
-            sum += std::pow(of.style[s] - (found == b.kinds.end() ? 0. : found->second.style[s]), 2);
-      }
-      return sum;
-    };
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
-      std::vector<std::pair<double, std::size_t>> others;
-      for (std::size_t j = 0; j < traced_.cells.size(); ++j)
-        if (j != i) others.emplace_back(apart(traced_.cells[i], traced_.cells[j]), j);
-      std::ranges::sort(others);
+      const std::vector<std::size_t> others = most_alike(traced_, i);
       for (std::size_t k = 0; k < kin(); ++k) {
         row(!i && !k);
-        put("{} {} -> {}", i, k, others[k].second);
+        put("{} {} -> {}", i, k, others[k]);
       }
       for (std::size_t k = 0; k < kin(); ++k)
-        for (std::size_t l = 0; l < kin(); ++l)
-          differ(traced_.cells[others[k].second], traced_.cells[others[l].second]);
+        for (std::size_t l = 0; l < kin(); ++l) differ(traced_.cells[others[k]], traced_.cells[others[l]]);
     }
-    put("\n\n# To each neuron another, whose stems of one kind it has: as alike as can be when each is "
-        "another's "
-        "only once.\nsample mates(cell = -> cell) =");
-    const std::vector<std::size_t> mate = mates(apart);
-    for (std::size_t i = 0; i < mate.size(); ++i) {
-      row(!i);
-      put("{} -> {}", i, mate[i]);
-    }
-  }
-
-  // Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
-  // where there are not both.
-  static std::optional<double> angle_between(const Cell& others, const Cell& basal) {
-    std::vector<double> least;
-    for (const Stem& s : basal.stems)
-      for (bool first = s.kind == int(SectionKind::basal); const Stem& o : others.stems)
-        if (s.kind == int(SectionKind::basal) && o.kind != s.kind) {
-          const double angle =
-              std::atan2(double(s.place.cross(o.place).norm()), double(s.place.dot(o.place))) * 180. /
-              std::numbers::pi;
-          if (std::exchange(first, false))
-            least.push_back(angle);
-          else
-            least.back() = std::min(least.back(), angle);
-        }
-    return least.empty() ? std::nullopt : std::optional(statistics::mean(least));
-  }
-  // By how much that angle changes in a neuron when its basal stems are those of another, degrees.
-  static double widened(const Cell& neuron, const Cell& mate) {
-    const std::optional<double> was = angle_between(neuron, neuron), is = angle_between(neuron, mate);
-    return was && is ? *is - *was : 0.;
-  }
-
-  // A permutation of the neurons that leaves none where it is: pairs change partners as long as this makes them more alike.
-  std::vector<std::size_t> mates(auto&& apart) const {
-    const std::size_t n = traced_.cells.size();
-    std::vector<double> between(n * n, 1e9);  // of itself: never
-    const auto basal = [](const Stem& s) { return s.kind == int(SectionKind::basal); };
-    for (std::size_t i = 0; i < n; ++i)
-      for (std::size_t j = 0; j < n; ++j)
-        if (const Cell& a = traced_.cells[i], &b = traced_.cells[j]; j != i)
-          between[i * n + j] = std::ranges::all_of(a.stems, basal) && std::ranges::none_of(b.stems, basal)
-                                   ? 1e6  // there would be no stem at all
-                                   : apart(a, b) + std::pow(widened(a, b) / near_angle, 2);
-    std::vector<std::size_t> mate(n);
-    for (std::size_t i = 0; i < n; ++i) mate[i] = (i + 1) % n;
-    for (bool better = true; std::exchange(better, false);)
-      for (std::size_t i = 0; i < n; ++i)
-        for (std::size_t j = 0; j < i; ++j)
-          if (between[i * n + mate[j]] + between[j * n + mate[i]] + 1e-9 <
-              between[i * n + mate[i]] + between[j * n + mate[j]])
-            std::swap(mate[i], mate[j]), better = true;
-    return mate;
-  }
-  // The kind of sections that come from the mate: basal dendrites, where there are others.
-  int others_kind() const {
-    const int basal = int(SectionKind::basal);
-    return traced_.means.size() > 1 && traced_.means.contains(basal) ? basal : -1;
   }
 
   void differ(const Cell& one, const Cell& other) {
@@ -334,19 +263,32 @@ class Writer {
   void plans() {
     put("\n\n# Their stems, in the order of the sample of stems: tips, where they leave the soma's centre "
         "(µm) and head, their diameter where they end, and the path to the farthest tip.\n"
-        "sample plans(cell =, stem = -> kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz) =");
+        "sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz) =");
     bool first = true;
-    for (std::size_t c = 0; c < traced_.cells.size(); ++c)
-      for (std::size_t i = 0; i < traced_.cells[c].stems.size(); ++i) {
-        const Stem& s = traced_.cells[c].stems[i];
+    for (const Cell& c : traced_.cells)
+      for (const Stem& s : c.stems) {
         row(std::exchange(first, false));
-        put("{} {} -> {} {} ", c, i, s.kind, s.tips);
+        put("{} {} {} ", s.cell, s.kind, s.tips);
         vector(s.place, 1e2);
         put(" ");
         vector(s.heading, 1e3);
         put(" {} {} {}", rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.), rounded(s.length, 1e2));
         put(" ");
         vector(s.aim, 10.);
+      }
+  }
+
+  void arbors() {
+    put("\n\n# The stems that one like each neuron has.\n"
+        "sample arbors(cell =, stem = -> plan) =");
+    std::vector<std::size_t> first_of(1, 0);  // the number of a neuron's first stem among all
+    for (const Cell& c : traced_.cells) first_of.push_back(first_of.back() + c.stems.size());
+    for (std::size_t i = 0; i < mixed_.size(); ++i)
+      for (std::size_t k = 0; k < mixed_[i].stems.size(); ++k) {
+        const Stem* stem = mixed_[i].stems[k];
+        row(!i && !k);
+        put("{} {} -> {}", i, k,
+            first_of[stem->cell] + std::size_t(stem - traced_.cells[stem->cell].stems.data()));
       }
   }
 
@@ -448,12 +390,12 @@ class Writer {
         "two neurons alike to it differ.\n"
         "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
-        "cell mate = mates.cell(mates(me))\n#define others_kind {}  # of the stems that are the mate's, -1: "
-        "none\n"
-        "cell thin_as = one\n#define stray {:.4g}\n"
+        "cell planned = cells.stems(me)\ncell basal_as = cells.basal_as(me)\ncell others_as = "
+        "cells.others_as(me)\ncell thin_as = "
+        "cells.thin_as(me)\n#define stray {:.4g}\n"
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
-        traced_.cells.size(), kin(), others_kind(), options_.smoothing, kept());
+        traced_.cells.size(), kin(), options_.smoothing, kept());
     for (const auto& [name, style] : {std::pair{"forks", number},
                                       {"extent", extent},
                                       {"wander", wander},
@@ -497,7 +439,7 @@ class Writer {
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
-        others_kind() < 0 ? options_.familiar : options_.familiar_to_two, options_.jitter);
+        options_.familiar, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
@@ -574,6 +516,7 @@ class Writer {
 
   const Traced& traced_;
   const Resampling& options_;
+  const std::vector<Mixed> mixed_ = mix(traced_, options_.kin);
   double squares_ = 0., differences_ = 0.;  // of the styles of neurons that are like the same one
   std::string kernels_, text_;
 };

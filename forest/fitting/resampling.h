@@ -11,9 +11,8 @@
 //   slice; daughters bear this together, so that a tuft stays over its trunk;
 // - a neuron has a style of its own, how long, winding, thick, finely and steeply traced its branches are, and forks of
 //   neurons of a like style are drawn for it: else neurons would be more alike than traced ones;
-// - where neurons have basal and other dendrites, the basal ones are those of another neuron alike, whose stems leave as far from
-//   the others as its own did, so that none is like one
-//   traced neuron all over; but how a tracer sets points is the same in both.
+// - a neuron is made of three traced ones that are alike (mixing.h): it has the stems of a second, of basal and other dendrites
+//   the basal ones alone, and the diameters of a third, so that none is like one of them all over.
 #pragma once
 
 #include <span>
@@ -35,13 +34,12 @@ struct Resampling {
   double lean = .12;                          // of how far aside of the way out it heads
   double style = .45;                         // in standard deviations among the neurons
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
-  double familiar = .5;         // how often a fork may come from the neuron whose stems these are
-  double familiar_to_two = 1.;  // … where a neuron has the stems of two
-  double smoothing = 1.2;       // of a neuron's style: 0 takes that of a traced neuron as it is
+  double familiar = 1.;   // how often a fork may come from the neuron whose style its branch has
+  double smoothing = .2;  // of a neuron's style: 0 takes that of a traced neuron as it is
   double sway =
       .2;  // of a stem's direction, in shares of how much directions differ in the plane of the slice
   double jitter = .1;   // of the logarithms of a stem's tips and reach
-  std::size_t kin = 4;  // neurons alike, by whose differences it is changed
+  std::size_t kin = 4;  // neurons alike, by whose differences it is changed, and none of which is its mate
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.

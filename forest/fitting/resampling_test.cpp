@@ -11,6 +11,8 @@
 #include "forest/core/error.h"
 #include "forest/core/random.h"
 #include "forest/fitting/copying.h"
+#include "forest/fitting/mixing.h"
+#include "forest/fitting/traced.h"
 #include "forest/lsystem/derive.h"
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/measure.h"
@@ -81,7 +83,8 @@ grow: Tip(n) : n < 8 -> ^(uniform(-climb, climb)) F(8) Tip(n + 1)
 )",
                                                                                  "steep"),
                                                                   30, 4);
-  const std::string text = resampling_grammar(models, "steep");
+  // Drawn for all alike, or only branches of neurons as steep would be drawn.
+  const std::string text = resampling_grammar(models, "steep", Resampling{.tracer = 5.});
   std::string evened = text;
   evened.replace(evened.find("#define steep 1"), 15, "#define steep 0");
   const auto spread = [](std::span<const Morphology> neurons) {
@@ -308,6 +311,8 @@ double aside(const Morphology& n) {
 TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) {
   const std::vector<Morphology> models = tufted(40);
   const std::string text = resampling_grammar(models, "t", Resampling{.sway = 0.});
+  const Traced learned = learn(models, statistics::dendrites);
+  const std::vector<Mixed> mixed = mix(learned, Resampling().kin);
   // How far grown neurons miss: the root of the mean square.
   const auto missed = [&](const std::string& grammar) {
     double sum = 0.;
@@ -315,7 +320,8 @@ TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) 
       const auto same = std::ranges::min_element(models, {}, [&](const Morphology& m) {
         return std::abs(m.soma().sphere().radius - grown.soma().sphere().radius);
       });
-      sum += std::pow(aside(grown) - aside(*same), 2);
+      const Stem& stem = *mixed[std::size_t(same - models.begin())].stems[0];
+      sum += std::pow(aside(grown) - aside(models[stem.cell]), 2);
     }
     return std::sqrt(sum / 200.);
   };

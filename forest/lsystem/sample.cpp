@@ -4,6 +4,8 @@
 #include <algorithm>
 #include <cmath>
 #include <map>
+#include <span>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -20,6 +22,21 @@ void add_kernel(const float* column, float wanted, std::size_t count, float* sum
     const float off = column[i] - wanted;
     sums[i] -= .5f * off * off;
   }
+}
+
+// Where it never changes, it does so evenly.
+std::vector<float> changes_of(std::span<const Trace::Stop> stops) {
+  std::vector<float> changes(stops.size(), 0.f);
+  for (std::size_t i = 1; i < stops.size(); ++i) {
+    const float before = stops[i - 1].diameter, after = stops[i].diameter;
+    changes[i] = changes[i - 1] + (before > 0.f && after > 0.f ? std::abs(std::log(after / before)) : 0.f);
+  }
+  const float all = changes.back();
+  for (std::size_t i = 0; i < changes.size(); ++i)
+    changes[i] =
+        all > 0.f ? changes[i] / all : float(i) / float(std::max<std::size_t>(1, changes.size() - 1));
+  changes.back() = 1.f;
+  return changes;
 }
 
 }  // namespace
@@ -71,15 +88,15 @@ Course::Course(const Trace& t, float scale) {
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = times * places[i] + rest * lengths[i];
 }
 
-float Calibre::next(float part, bool long_step) {
+std::size_t Calibre::next(float part, bool long_step) {
   const auto& lengths = of_.lengths;
   const float wanted = part * of_.length();
   const std::size_t end = lengths.size() - 1;
   auto at = std::min(end, std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin()));
   if (at > 0 && wanted - lengths[at - 1] < lengths[at] - wanted) --at;
+  if (last_ == none && part < 1.f) at = 0;
   if (at == last_ && at < end && long_step) ++at;
-  last_ = at;
-  return of_.stops[at].diameter;
+  return last_ = at;
 }
 
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,
@@ -92,6 +109,7 @@ void Sample::add(std::span<const double> condition_row, std::span<const double> 
     Vec3 last = Vec3::Zero();
     for (const Trace::Stop& stop : t.stops)
       t.lengths.push_back(length += (stop.at - last).norm()), last = stop.at;
+    t.changes = changes_of(t.stops);
   }
   branches_.push_back(std::move(branches));
 }

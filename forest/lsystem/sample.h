@@ -33,6 +33,7 @@ struct Trace {
   // Worked out by Sample::add().
   Vec3 ahead = Vec3::Zero();        // where it heads at its end
   std::vector<float> lengths = {};  // from its beginning to each place, µm
+  std::vector<float> changes = {};  // of how its diameter changes after the first place, the share up to each
 
   const Vec3& end() const { return stops.back().at; }
   float length() const { return lengths.back(); }
@@ -51,16 +52,18 @@ struct Course {
 
 /// Tells the diameters of one traced branch along another, place by place. A tracer sets them in steps, rather in long ones:
 /// each is that of the nearest place, but a long step does not end with the diameter that it begins with when the branch goes on.
-/// The first place of all is not asked, for what leads there belongs to the branch before.
+/// The first place has the first diameter: by how much that differs from what the branch leaves belongs to the fork.
 class Calibre {
  public:
   explicit Calibre(const Trace& of) : of_(of) {}
+  /// The number of the place whose diameter it is.
   /// @param part  share of the way, not less than the last time
-  float next(float part, bool long_step);
+  std::size_t next(float part, bool long_step);
 
  private:
   const Trace& of_;
-  std::size_t last_ = std::size_t(-1);
+  static constexpr std::size_t none = std::size_t(-1);
+  std::size_t last_ = none;
 };
 
 /// Where a path heads that ends with these places: the unit vector over its last `reach` µm, or over all of it when it is

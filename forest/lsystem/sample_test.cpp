@@ -189,12 +189,41 @@ Trace traced(std::vector<Trace::Stop> stops) {
 TEST(Calibre, IsThatOfTheNearestPlaceAndLongStepsGoOn) {
   const Trace t = traced({{{1, 0, 0}, 4}, {{2, 0, 0}, 3}, {{3, 0, 0}, 2}, {{4, 0, 0}, 1}});
   Calibre calibre(t);
-  EXPECT_EQ(calibre.next(.2f, true), 4.f);
-  EXPECT_EQ(calibre.next(.3f, false), 4.f);
-  EXPECT_EQ(calibre.next(.35f, true), 3.f);  // though the first is nearer
-  EXPECT_EQ(calibre.next(.7f, true), 2.f);
-  EXPECT_EQ(calibre.next(1.f, true), 1.f);
-  EXPECT_EQ(calibre.next(1.f, true), 1.f);
+  EXPECT_EQ(calibre.next(.2f, true), 0u);
+  EXPECT_EQ(calibre.next(.3f, false), 0u);
+  EXPECT_EQ(calibre.next(.35f, true), 1u);  // though the first is nearer
+  EXPECT_EQ(calibre.next(.7f, true), 2u);
+  EXPECT_EQ(calibre.next(1.f, true), 3u);
+  EXPECT_EQ(calibre.next(1.f, true), 3u);
+  EXPECT_EQ(Calibre(t).next(.9f, true), 0u);  // the first place, however far away
+  EXPECT_EQ(Calibre(t).next(1.f, true), 3u);  // … but for the only one
+}
+
+// Twice as thick where it begins, as thick where it ends, and in between as the diameter itself changes: at once, here.
+TEST(Trace, WhatIsAsThickAsWhatWasBeforeItRemainsSo) {
+  const Grammar g = parse(R"(sample twigs() = | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 2, 4 0 0 2;
+  | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 4
+axiom: Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 2, 0, 0, 0, 0, 1) Trace(twigs, 1, 0, 1, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0.25)
+none: A ->
+)",
+                          "t");
+  std::vector<float> radii;
+  const Morphology m = interpret(derive(g, 0, 0, 0), g);
+  for (const Point& p : m.points()) radii.push_back(p.radius);
+  EXPECT_EQ(radii, (std::vector<float>{4, 4, 4, 1, 1, 2, 1, .5f}));  // one that never changes does so evenly
+}
+
+// What multiplying a diameter and dividing it again leaves of it is not another diameter.
+TEST(Trace, DaughtersBeginWithThePointOfTheForkInAFileOfPoints) {
+  const Grammar g = parse(R"(sample twigs() = | 1 0 0 0.7: 1 0 0 0.7
+axiom: Soma(1) Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 0.37 / 0.7) [ Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 0.37000001 / 0.7) ] [ Head(0, 1, 0) Trace(twigs, 0, 0) ]
+none: A ->
+)",
+                          "t");
+  const Morphology m = interpret(derive(g, 0, 0, 0), g);
+  ASSERT_EQ(m.sections().size(), 3u);
+  EXPECT_EQ(m.points(SectionId(1)).front(), m.points(SectionId(0)).back());
+  EXPECT_NE(m.points(SectionId(2)).front(), m.points(SectionId(0)).back());  // this one is thicker
 }
 
 TEST(Course, IsLongerOrShorterByWholeStepsAndEndsWhereItShould) {

@@ -387,6 +387,9 @@ class Turtle {
       drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind});
       state_.node = std::uint32_t(drawn_.size() - 1);
     }
+    // What differs by rounding alone is the same: else a file of points has the place of a fork once for each daughter.
+    if (const float there = drawn_[state_.node].radius; std::abs(start_radius - there) <= 1e-5f * there)
+      start_radius = there;
     ++drawn_[state_.node].children;
     drawn_.push_back(
         {place, float(0.5 * state_.diameter), start_radius, state_.node, 0, state_.tag, state_.kind});
@@ -430,7 +433,8 @@ class Turtle {
     const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const double thickness_end = value(13, thickness);
-    // How many times as thick, from one share to the other by equal factors.
+    // How many times as thick: from the first to the last as the diameter itself changes, so that what is as thick as what was
+    // before it remains so.
     const auto thick = [&](float diameter, float part) {
       const double times = thickness_end == thickness || !(thickness > 0.)
                                ? thickness
@@ -453,7 +457,8 @@ class Turtle {
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
         const bool long_step = course.lengths[i] - std::exchange(way, course.lengths[i]) >= mean_step;
-        state_.diameter = thick(own ? t.stops[i].diameter : diameters.next(part, long_step), part);
+        const std::size_t like = own ? i : diameters.next(part, long_step);
+        state_.diameter = thick(calibre.stops[like].diameter, calibre.changes[like]);
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;

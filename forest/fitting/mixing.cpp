@@ -1,0 +1,161 @@
+// SPDX-License-Identifier: Apache-2.0
+#include "forest/fitting/mixing.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numbers>
+#include <optional>
+#include <utility>
+
+#include "forest/statistics/summary.h"
+
+namespace forest::fitting {
+namespace {
+
+// Degrees between basal and other stems that count as much as a standard deviation of a style, where mates are chosen.
+constexpr double near_angle = 6.;
+
+constexpr double never = 1e9, hardly = 1e6;
+
+double degrees(const Vec3& a, const Vec3& b) {
+  return std::atan2(double(a.cross(b).norm()), double(a.dot(b))) * 180. / std::numbers::pi;
+}
+
+bool is_basal(const Stem& s) { return s.kind == int(SectionKind::basal); }
+bool of_two_kinds(const Cell& c) {
+  return std::ranges::any_of(c.stems, is_basal) && !std::ranges::all_of(c.stems, is_basal);
+}
+// Whether the neuron has the basal stems of this mate.
+bool lends_basal(const Cell& neuron, const Cell& mate) {
+  return of_two_kinds(neuron) && std::ranges::any_of(mate.stems, is_basal);
+}
+
+// Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
+// where there are not both.
+std::optional<double> angle_between(const Cell& others, const Cell& basal) {
+  std::vector<double> least;
+  for (const Stem& s : basal.stems)
+    for (bool first = is_basal(s); const Stem& o : others.stems)
+      if (is_basal(s) && !is_basal(o)) {
+        const double angle = degrees(s.place, o.place);
+        if (std::exchange(first, false))
+          least.push_back(angle);
+        else
+          least.back() = std::min(least.back(), angle);
+      }
+  return least.empty() ? std::nullopt : std::optional(statistics::mean(least));
+}
+// By how much that angle changes in a neuron when its basal stems are those of another, degrees.
+double widened(const Cell& neuron, const Cell& mate) {
+  const std::optional<double> was = angle_between(neuron, neuron), is = angle_between(neuron, mate);
+  return was && is ? *is - *was : 0.;
+}
+
+// A permutation of `count` neurons with the least sum of costs, by shortest augmenting paths (Kuhn's Hungarian method; Jonker &
+// Volgenant 1987, Computing 38:325). @param cost  of row i and column j
+std::vector<std::size_t> assigned(std::size_t count, auto&& cost) {
+  constexpr std::size_t none = std::size_t(-1);
+  std::vector<double> row_price(count, 0.), column_price(count, 0.);
+  std::vector<std::size_t> row_of(count, none), column_of(count, none);
+  for (std::size_t start = 0; start < count; ++start) {
+    std::vector<double> least(count, std::numeric_limits<double>::infinity());  // to reach each column
+    std::vector<std::size_t> from(count, start);                                // … from this row
+    std::vector<bool> done(count, false);
+    std::size_t row = start, last = none;
+    double way = 0.;
+    while (last == none) {
+      std::size_t next = none;
+      for (std::size_t j = 0; j < count; ++j)
+        if (!done[j]) {
+          const double to = way + cost(row, j) - row_price[row] - column_price[j];
+          if (to < least[j]) least[j] = to, from[j] = row;
+          if (next == none || least[j] < least[next]) next = j;
+        }
+      way = least[next], done[next] = true;
+      if (row_of[next] == none)
+        last = next;
+      else
+        row = row_of[next];
+    }
+    row_price[start] += way;
+    for (std::size_t j = 0; j < count; ++j)
+      if (done[j] && j != last) row_price[row_of[j]] += way - least[j], column_price[j] -= way - least[j];
+    for (std::size_t j = last; j != none;) {
+      row_of[j] = from[j];
+      j = std::exchange(column_of[from[j]], j);
+    }
+  }
+  return column_of;
+}
+
+// To each neuron another, each once; of more than this many, those that follow one another are partners.
+constexpr std::size_t most_together = 1000;
+
+std::vector<std::size_t> partners(std::size_t count, auto&& cost) {
+  std::vector<std::size_t> of;
+  const std::size_t blocks = (count + most_together - 1) / most_together;
+  for (std::size_t block = 0; block < blocks; ++block) {
+    const std::size_t first = block * count / blocks, size = (block + 1) * count / blocks - first;
+    std::vector<double> costs;
+    for (std::size_t i = 0; i < size; ++i)
+      for (std::size_t j = 0; j < size; ++j)
+        costs.push_back(i == j ? never : cost(first + i, first + j));
+    for (const std::size_t j : assigned(size, [&](std::size_t row, std::size_t column) { return costs[row * size + column]; }))
+      of.push_back(first + j);
+  }
+  return of;
+}
+
+}  // namespace
+
+double apart(const Cell& one, const Cell& other) {
+  double sum = 0.;
+  for (const auto& [kind, of] : one.kinds) {
+    const auto found = other.kinds.find(kind);
+    for (std::size_t s = 0; s < styles; ++s)
+      if (s != slope && s != kink)
+        sum += std::pow(of.style[s] - (found == other.kinds.end() ? 0. : found->second.style[s]), 2);
+  }
+  return sum;
+}
+
+std::vector<std::size_t> most_alike(const Traced& traced, std::size_t neuron) {
+  std::vector<std::pair<double, std::size_t>> others;
+  for (std::size_t j = 0; j < traced.cells.size(); ++j)
+    if (j != neuron) others.emplace_back(apart(traced.cells[neuron], traced.cells[j]), j);
+  std::ranges::sort(others);
+  std::vector<std::size_t> order;
+  for (const auto& [far, j] : others) order.push_back(j);
+  return order;
+}
+
+std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
+  const std::vector<Cell>& cells = traced.cells;
+  std::vector<std::vector<std::size_t>> too_alike;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    too_alike.push_back(most_alike(traced, i));
+    too_alike[i].resize(std::min(kin, too_alike[i].size()));
+  }
+  const std::vector<std::size_t> mates = partners(cells.size(), [&](std::size_t i, std::size_t j) {
+    return apart(cells[i], cells[j]) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
+           (std::ranges::count(too_alike[i], j) ? hardly : 0.);
+  });
+  const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
+    return apart(cells[i], cells[j]) + (j == mates[i] ? hardly : 0.);
+  });
+  std::vector<Mixed> mixed;
+  for (std::size_t i = 0; i < cells.size(); ++i) {
+    const Cell &own = cells[i], &mate = cells[mates[i]];
+    const bool both = lends_basal(own, mate);
+    Mixed m{.stems = {}, .basal_as = mates[i], .others_as = both ? i : mates[i], .thin_as = thirds[i]};
+    for (const Stem& s : own.stems)
+      if (both && !is_basal(s)) m.stems.push_back(&s);
+    for (const Stem& s : mate.stems)
+      if (!both || is_basal(s)) m.stems.push_back(&s);
+    mixed.push_back(std::move(m));
+  }
+  return mixed;
+}
+
+}  // namespace forest::fitting

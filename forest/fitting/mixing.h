@@ -1,0 +1,35 @@
+// SPDX-License-Identifier: Apache-2.0
+// Of which traced neurons a grown one is made, so that it is like none of them all over and is still as a neuron can be. Private to
+// this room.
+//
+// Every neuron has a mate and a third, as alike to it as can be when each is another's mate only once, and third only once, and the
+// mate is not one of its kin, the few that are most like it: then what is grown would lie too near both. So many grown neurons
+// as were traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice and how its
+// tracer set points are its own, its diameters those of the third. The stems and their style are the mate's: where it has basal
+// and other dendrites, and the mate has basal ones, these alone.
+#pragma once
+
+#include <cstddef>
+#include <vector>
+
+#include "forest/fitting/traced.h"
+
+namespace forest::fitting {
+
+struct Mixed {
+  std::vector<const Stem*> stems;   // one after the other
+  std::size_t basal_as, others_as;  // the neurons whose style its basal dendrites have, and all else
+  std::size_t thin_as;              // … whose diameters it has
+};
+
+/// Of each neuron. At least two.
+/// @param kin  how many are too like it; where there are no others, they may be its mate
+std::vector<Mixed> mix(const Traced& traced, std::size_t kin);
+
+/// The others, the most alike first.
+std::vector<std::size_t> most_alike(const Traced& traced, std::size_t neuron);
+
+/// How little alike two neurons are: the sum of squares over their styles, but for what is a tracer's habit.
+double apart(const Cell& one, const Cell& other);
+
+}  // namespace forest::fitting
