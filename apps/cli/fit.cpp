@@ -135,12 +135,12 @@ std::function<void()> fit(CLI::App& command, Console& console) {
                        "standard deviations")
            ->capture_default_str(),
       .01, 100.);
-  must_be_within(*command
-                      .add_option("--smoothing", options->resampling.smoothing,
-                                  "How far a neuron's style may be from that of the traced one whose stems "
-                                  "it has; 0: not at all")
-                      ->capture_default_str(),
-                 0., 100.);
+  must_be_within(
+      *command.add_option("--smoothing", options->resampling.smoothing,
+                          "How far a neuron's style may be from that of the traced one whose stems "
+                          "it has; 0: not at all. Without it 10 over the number of neurons, at most "
+                          "1.2"),
+      0., 100.);
   CLI::Option* calibrate =
       command.add_flag("--calibrate", options->calibrate,
                        "Learn a taste: of some candidates of each neuron one is drawn, by weights from a "

@@ -99,9 +99,9 @@ std::vector<std::size_t> partners(std::size_t count, auto&& cost) {
     const std::size_t first = block * count / blocks, size = (block + 1) * count / blocks - first;
     std::vector<double> costs;
     for (std::size_t i = 0; i < size; ++i)
-      for (std::size_t j = 0; j < size; ++j)
-        costs.push_back(i == j ? never : cost(first + i, first + j));
-    for (const std::size_t j : assigned(size, [&](std::size_t row, std::size_t column) { return costs[row * size + column]; }))
+      for (std::size_t j = 0; j < size; ++j) costs.push_back(i == j ? never : cost(first + i, first + j));
+    for (const std::size_t j :
+         assigned(size, [&](std::size_t row, std::size_t column) { return costs[row * size + column]; }))
       of.push_back(first + j);
   }
   return of;

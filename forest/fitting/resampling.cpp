@@ -254,10 +254,12 @@ class Writer {
         for (std::size_t s = 0; s < styles; ++s, differences_ += 1.)
           squares_ += std::pow(of.style[s] - found->second.style[s], 2);
   }
+  double stray() const {
+    return options_.smoothing.value_or(std::min(1.2, 10. / double(traced_.cells.size())));
+  }
   // What keeps styles as different among neurons as they are, when the differences of like ones are added.
   double kept() const {
-    return differences_ > 0. ? 1. / std::sqrt(1. + std::pow(options_.smoothing, 2) * squares_ / differences_)
-                             : 1.;
+    return differences_ > 0. ? 1. / std::sqrt(1. + std::pow(stray(), 2) * squares_ / differences_) : 1.;
   }
 
   void plans() {
@@ -386,8 +388,8 @@ class Writer {
   }
 
   void productions() {
-    put("\n\n# This neuron has the stems of a traced one, and a style near that one's: it strays from it as "
-        "two neurons alike to it differ.\n"
+    put("\n\n# This neuron is made of three traced ones, and its style strays as two neurons alike to it "
+        "differ.\n"
         "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell planned = cells.stems(me)\ncell basal_as = cells.basal_as(me)\ncell others_as = "
@@ -395,7 +397,7 @@ class Writer {
         "cells.thin_as(me)\n#define stray {:.4g}\n"
         "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
-        traced_.cells.size(), kin(), options_.smoothing, kept());
+        traced_.cells.size(), kin(), stray(), kept());
     for (const auto& [name, style] : {std::pair{"forks", number},
                                       {"extent", extent},
                                       {"wander", wander},

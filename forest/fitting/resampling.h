@@ -15,6 +15,7 @@
 //   the basal ones alone, and the diameters of a third, so that none is like one of them all over.
 #pragma once
 
+#include <optional>
 #include <span>
 #include <string>
 
@@ -34,8 +35,10 @@ struct Resampling {
   double lean = .12;                          // of how far aside of the way out it heads
   double style = .45;                         // in standard deviations among the neurons
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
-  double familiar = 1.;   // how often a fork may come from the neuron whose style its branch has
-  double smoothing = .2;  // of a neuron's style: 0 takes that of a traced neuron as it is
+  double familiar = 1.;  // how often a fork may come from the neuron whose style its branch has
+  // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
+  // 10 over the number of neurons, at most 1.2: few show little of what there is.
+  std::optional<double> smoothing = {};
   double sway =
       .2;  // of a stem's direction, in shares of how much directions differ in the plane of the slice
   double jitter = .1;   // of the logarithms of a stem's tips and reach
