@@ -120,26 +120,28 @@ double apart(const Cell& one, const Cell& other) {
   return sum;
 }
 
-std::vector<std::size_t> most_alike(const Traced& traced, std::size_t neuron) {
+namespace {
+
+// Of the others, the most alike first.
+std::vector<std::size_t> most_alike(const std::vector<Cell>& cells, std::size_t neuron, std::size_t most) {
   std::vector<std::pair<double, std::size_t>> others;
-  for (std::size_t j = 0; j < traced.cells.size(); ++j)
-    if (j != neuron) others.emplace_back(apart(traced.cells[neuron], traced.cells[j]), j);
+  for (std::size_t j = 0; j < cells.size(); ++j)
+    if (j != neuron) others.emplace_back(apart(cells[neuron], cells[j]), j);
   std::ranges::sort(others);
   std::vector<std::size_t> order;
-  for (const auto& [far, j] : others) order.push_back(j);
+  for (std::size_t k = 0; k < std::min(most, others.size()); ++k) order.push_back(others[k].second);
   return order;
 }
 
+}  // namespace
+
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   const std::vector<Cell>& cells = traced.cells;
-  std::vector<std::vector<std::size_t>> too_alike;
-  for (std::size_t i = 0; i < cells.size(); ++i) {
-    too_alike.push_back(most_alike(traced, i));
-    too_alike[i].resize(std::min(kin, too_alike[i].size()));
-  }
+  std::vector<std::vector<std::size_t>> like;
+  for (std::size_t i = 0; i < cells.size(); ++i) like.push_back(most_alike(cells, i, kin));
   const std::vector<std::size_t> mates = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     return apart(cells[i], cells[j]) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
-           (std::ranges::count(too_alike[i], j) ? hardly : 0.);
+           (std::ranges::count(like[i], j) ? hardly : 0.);
   });
   const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     return apart(cells[i], cells[j]) + (j == mates[i] ? hardly : 0.);
@@ -148,7 +150,11 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell &own = cells[i], &mate = cells[mates[i]];
     const bool both = lends_basal(own, mate);
-    Mixed m{.stems = {}, .basal_as = mates[i], .others_as = both ? i : mates[i], .thin_as = thirds[i]};
+    Mixed m{.kin = std::move(like[i]),
+            .stems = {},
+            .basal_as = mates[i],
+            .others_as = both ? i : mates[i],
+            .thin_as = thirds[i]};
     for (const Stem& s : own.stems)
       if (both && !is_basal(s)) m.stems.push_back(&s);
     for (const Stem& s : mate.stems)

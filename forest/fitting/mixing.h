@@ -17,19 +17,17 @@
 namespace forest::fitting {
 
 struct Mixed {
+  std::vector<std::size_t> kin;     // the neurons most like it, the most alike first
   std::vector<const Stem*> stems;   // one after the other
   std::size_t basal_as, others_as;  // the neurons whose style its basal dendrites have, and all else
   std::size_t thin_as;              // … whose diameters it has
 };
 
 /// Of each neuron. At least two.
-/// @param kin  how many are too like it; where there are no others, they may be its mate
+/// @param kin  how many there are of these, as far as there are others; one of them is its mate only where there is nobody else
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin);
 
-/// The others, the most alike first.
-std::vector<std::size_t> most_alike(const Traced& traced, std::size_t neuron);
-
-/// How little alike two neurons are: the sum of squares over their styles, but for what is a tracer's habit.
+/// How little alike two neurons are: the sum of squares over their styles, but for how steep and kinked they were drawn.
 double apart(const Cell& one, const Cell& other);
 
 }  // namespace forest::fitting

@@ -238,7 +238,7 @@ class Writer {
     put("\n\n# To each neuron those most like it in style, the most alike first.\nsample alike(cell =, rank "
         "= -> cell) =");
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
-      const std::vector<std::size_t> others = most_alike(traced_, i);
+      const std::vector<std::size_t>& others = mixed_[i].kin;
       for (std::size_t k = 0; k < kin(); ++k) {
         row(!i && !k);
         put("{} {} -> {}", i, k, others[k]);
