@@ -6,6 +6,7 @@
 #include <limits>
 #include <numbers>
 #include <optional>
+#include <set>
 #include <utility>
 
 #include "forest/statistics/summary.h"
@@ -16,19 +17,28 @@ namespace {
 // Degrees between basal and other stems that count as much as a standard deviation of a style, where mates are chosen.
 constexpr double near_angle = 6.;
 
-constexpr double never = 1e9, hardly = 1e6;
+// What it costs to be a partner of who lends nothing, of oneself, of one's kin, and of who has other kinds of stems.
+constexpr double hardly = 1e7, oneself = 5e6, unlikely = 1e6, seldom = 1e3;
 
 double degrees(const Vec3& a, const Vec3& b) {
   return std::atan2(double(a.cross(b).norm()), double(a.dot(b))) * 180. / std::numbers::pi;
 }
 
-bool is_basal(const Stem& s) { return s.kind == int(SectionKind::basal); }
-bool of_two_kinds(const Cell& c) {
-  return std::ranges::any_of(c.stems, is_basal) && !std::ranges::all_of(c.stems, is_basal);
+constexpr int basal_kind = int(SectionKind::basal);
+bool is_basal(const Stem& s) { return s.kind == basal_kind; }
+
+std::set<int> kinds_of_stems(const Cell& c) {
+  std::set<int> kinds;
+  for (const Stem& s : c.stems) kinds.insert(s.kind);
+  return kinds;
 }
-// Whether the neuron has the basal stems of this mate.
-bool lends_basal(const Cell& neuron, const Cell& mate) {
-  return of_two_kinds(neuron) && std::ranges::any_of(mate.stems, is_basal);
+
+// Which stems a neuron has of its mate: none of a kind that it has not itself, for so often as they were traced.
+enum class Lent { nothing, basal_stems, all };
+Lent lent(const Cell& neuron, const Cell& mate) {
+  const std::set<int> kinds = kinds_of_stems(neuron), other = kinds_of_stems(mate);
+  if (kinds.contains(basal_kind) && other.contains(basal_kind)) return Lent::basal_stems;
+  return kinds == other ? Lent::all : Lent::nothing;
 }
 
 // Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
@@ -99,7 +109,7 @@ std::vector<std::size_t> partners(std::size_t count, auto&& cost) {
     const std::size_t first = block * count / blocks, size = (block + 1) * count / blocks - first;
     std::vector<double> costs;
     for (std::size_t i = 0; i < size; ++i)
-      for (std::size_t j = 0; j < size; ++j) costs.push_back(i == j ? never : cost(first + i, first + j));
+      for (std::size_t j = 0; j < size; ++j) costs.push_back(i == j ? oneself : cost(first + i, first + j));
     for (const std::size_t j :
          assigned(size, [&](std::size_t row, std::size_t column) { return costs[row * size + column]; }))
       of.push_back(first + j);
@@ -139,26 +149,30 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   const std::vector<Cell>& cells = traced.cells;
   std::vector<std::vector<std::size_t>> like;
   for (std::size_t i = 0; i < cells.size(); ++i) like.push_back(most_alike(cells, i, kin));
+  const auto cost = [&](std::size_t i, std::size_t j) {
+    return apart(cells[i], cells[j]) + (std::ranges::count(like[i], j) ? unlikely : 0.) +
+           (kinds_of_stems(cells[i]) == kinds_of_stems(cells[j]) ? 0. : seldom);
+  };
   const std::vector<std::size_t> mates = partners(cells.size(), [&](std::size_t i, std::size_t j) {
-    return apart(cells[i], cells[j]) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
-           (std::ranges::count(like[i], j) ? hardly : 0.);
+    return cost(i, j) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
+           (lent(cells[i], cells[j]) == Lent::nothing ? hardly : 0.);
   });
   const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
-    return apart(cells[i], cells[j]) + (j == mates[i] ? hardly : 0.);
+    return cost(i, j) + (j == mates[i] ? unlikely : 0.);
   });
   std::vector<Mixed> mixed;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell &own = cells[i], &mate = cells[mates[i]];
-    const bool both = lends_basal(own, mate);
+    const Lent of_mate = lent(own, mate);
     Mixed m{.kin = std::move(like[i]),
             .stems = {},
-            .basal_as = mates[i],
-            .others_as = both ? i : mates[i],
+            .basal_as = of_mate == Lent::nothing ? i : mates[i],
+            .others_as = of_mate == Lent::all ? mates[i] : i,
             .thin_as = thirds[i]};
     for (const Stem& s : own.stems)
-      if (both && !is_basal(s)) m.stems.push_back(&s);
+      if (of_mate == Lent::nothing || (of_mate == Lent::basal_stems && !is_basal(s))) m.stems.push_back(&s);
     for (const Stem& s : mate.stems)
-      if (!both || is_basal(s)) m.stems.push_back(&s);
+      if (of_mate == Lent::all || (of_mate == Lent::basal_stems && is_basal(s))) m.stems.push_back(&s);
     mixed.push_back(std::move(m));
   }
   return mixed;

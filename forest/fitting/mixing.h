@@ -2,11 +2,11 @@
 // Of which traced neurons a grown one is made, so that it is like none of them all over and is still as a neuron can be. Private to
 // this room.
 //
-// Every neuron has a mate and a third, as alike to it as can be when each is another's mate only once, and third only once, and the
-// mate is not one of its kin, the few that are most like it: then what is grown would lie too near both. So many grown neurons
-// as were traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice and how its
-// tracer set points are its own, its diameters those of the third. The stems and their style are the mate's: where it has basal
-// and other dendrites, and the mate has basal ones, these alone.
+// Every neuron has a mate and a third, as alike to it as can be when each is another's mate only once, and third only once, and
+// neither is one of its kin, the few that are most like it: then what is grown would lie too near. So many grown neurons as were
+// traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice and how its tracer set points are
+// its own, its diameters those of the third. The stems and their style are the mate's: where both have basal dendrites, these
+// alone; else all, if both have the same kinds of them. So no kind of dendrite comes more often than it was traced.
 #pragma once
 
 #include <cstddef>
@@ -24,7 +24,7 @@ struct Mixed {
 };
 
 /// Of each neuron. At least two.
-/// @param kin  how many there are of these, as far as there are others; one of them is its mate only where there is nobody else
+/// @param kin  how many there are of these, as far as there are others; one of them is its mate or third only where there is nobody else
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin);
 
 /// How little alike two neurons are: the sum of squares over their styles, but for how steep and kinked they were drawn.

@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <numeric>
+#include <set>
 #include <tuple>
+#include <utility>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -78,10 +80,29 @@ TEST(Mixing, OneKindComesFromTheMateAllOfIt) {
     const Traced t = traced(9, !basal, basal);
     for (const Mixed& m : mix(t, 0)) {
       EXPECT_EQ(m.stems.size(), basal ? 2u : 1u);
-      for (const Stem* s : m.stems) EXPECT_EQ(s->cell, m.others_as);
-      EXPECT_EQ(m.basal_as, m.others_as);
+      for (const Stem* s : m.stems) EXPECT_EQ(s->cell, basal ? m.basal_as : m.others_as);
     }
   }
+}
+
+// Interneurons of which some have an apical dendrite: as many have one when grown, each the one of a traced neuron.
+TEST(Mixing, NoKindOfStemComesMoreOftenThanItWasTraced) {
+  for (const std::size_t both : {1u, 2u, 5u, 20u})
+    for (const auto& [apical, basal] : {std::pair{false, true}, {true, false}}) {
+      Traced t = traced(20, true, true);
+      const Traced others = traced(20, apical, basal);
+      for (std::size_t i = both; i < 20; ++i) t.cells[i] = others.cells[i];
+      std::multiset<const Stem*> stems;
+      for (const Mixed& m : mix(t, 4)) stems.insert(m.stems.begin(), m.stems.end());
+      for (const Cell& c : t.cells)
+        for (const Stem& s : c.stems) EXPECT_EQ(stems.count(&s), 1u) << both;
+      for (std::size_t i = 0; const Mixed& m : mix(t, 4)) {
+        std::set<int> kinds, own;
+        for (const Stem* s : m.stems) kinds.insert(s->kind);
+        for (const Stem& s : t.cells[i++].stems) own.insert(s.kind);
+        EXPECT_EQ(kinds, own) << both;
+      }
+    }
 }
 
 // Of all permutations of six.
@@ -109,6 +130,7 @@ TEST(Mixing, NoMateIsOfTheKin) {
     std::size_t nearer = 0;
     for (const Cell& c : t.cells) nearer += apart(t.cells[i], c) < apart(t.cells[i], t.cells[m.basal_as]);
     EXPECT_GE(nearer, 4u);  // the kin, and itself
+    EXPECT_EQ(std::ranges::count(m.kin, m.thin_as), 0);
     ++i;
   }
 }

@@ -68,9 +68,9 @@ function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 +
 # The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
 function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
   min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
-# A stem's direction turned about z.
-function swayed_x(angle, x, y) = cos(angle) * x - sin(angle) * y
-function swayed_y(angle, x, y) = sin(angle) * x + cos(angle) * y
+# Tips as forks and stems are asked by them: as far apart as their logarithms but for few. A fork of two cannot bear three, as a daughter
+# that ended where it was traced has no way to go on.
+function crowd(tips) = log(tips) - 30 / tips^3
 # How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
 distribution thicker(kind, cell) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
@@ -87,14 +87,12 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p)), d = thick * plans.d(p),
-    sway = normal(0, sways(kind)), x = swayed_x(sway, plans.hx(p), plans.hy(p)), y = swayed_y(sway, plans.hx(p), plans.hy(p)), z = plans.hz(p),
-    bx = swayed_x(sway, plans.x(p), plans.y(p)), by = swayed_y(sway, plans.x(p), plans.y(p)), away = ahead / max(1, plans.ahead(p)),
-    ax = away * swayed_x(sway, plans.tx(p), plans.ty(p)), ay = away * swayed_y(sway, plans.tx(p), plans.ty(p)), az = away * plans.tz(p),
-    r = stems(kind, plans.cell(p), log(tips), log(ahead), log(max(0.05, plans.length(p))), x, y, z, log(d)@style),
+    away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
+    r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style),
     sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = ax - bx - scale * stems.tx(r), ey = ay - by - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
+    ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
-  -> [ Kind(kind) At(bx, by, plans.z(p)) Head(x, y, z)
+  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
        Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
@@ -102,10 +100,9 @@ bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
-    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p)) * plans.d(p), sway = normal(0, sways(kind)) }
-  -> [ Kind(kind) At(swayed_x(sway, plans.x(p), plans.y(p)), swayed_y(sway, plans.x(p), plans.y(p)), plans.z(p))
-       Head(swayed_x(sway, plans.hx(p), plans.hy(p)), swayed_y(sway, plans.hx(p), plans.hy(p)), plans.hz(p)) Fibre(d)
-       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * swayed_x(sway, plans.tx(p), plans.ty(p)), away * swayed_y(sway, plans.tx(p), plans.ty(p)), away * plans.tz(p))
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p)) * plans.d(p) }
+  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
+       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 done: Plan(i) ->
 
@@ -121,7 +118,7 @@ on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   { s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
-    r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), log(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
+    r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), crowd(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style),
     q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
@@ -153,9 +150,9 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
     wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - sz * scale * forks.tz(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
-    d = max(thin, nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
+    last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz), 1, sz)
+       part * (wx - gx), part * (wy - gy), part * (wz - gz), last, sz)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -295,7 +292,7 @@ class Writer {
   }
 
   void stems() {
-    put("\n\n# Stems as they were traced; tips, path and diameter are logarithms.\n"
+    put("\n\n# Stems as they were traced; tips as a crowd (below), path and diameter as logarithms.\n"
         "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, "
         "d ~ 0.3{}\n  -> donor, next, ahead, length, tx, ty, tz) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
@@ -303,7 +300,8 @@ class Writer {
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
         row(std::exchange(first, false));
-        put("{} {} {} {} {} ", s.kind, s.cell, logarithm(s.tips), logarithm(s.ahead), logarithm(s.length));
+        put("{} {} {} {} {} ", s.kind, s.cell, rounded(crowd(s.tips), 1e3), logarithm(s.ahead),
+            logarithm(s.length));
         vector(s.heading, 1e3);
         put(" {}", logarithm(s.end_diameter));
         style(c.kinds.at(s.kind).style);
@@ -322,8 +320,9 @@ class Writer {
     widths("near_side", options_.height, [](const Fork& f) { return f.side; });
     widths("near_height", options_.height, [](const Fork& f) { return f.height; });
     widths("near_before", options_.depth, [](const Fork& f) { return f.depth; });
-    put("\n# Forks as they were traced: the branch that ends there (tips, the path to the farthest and the "
-        "diameter are logarithms; heading and\n"
+    put("\n# Forks as they were traced: the branch that ends there (tips as a crowd, the path to the "
+        "farthest and "
+        "the diameter as logarithms; heading and\n"
         "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
         "lengths, paths beyond their ends, and whither the middle of their tips is, and of all.\n"
         "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
@@ -339,7 +338,7 @@ class Writer {
         options_.lean, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
-      put("{} {} {} {} {} {} {} {} ", f.kind, f.cell, f.cell, logarithm(f.tips), logarithm(f.ahead),
+      put("{} {} {} {} {} {} {} {} ", f.kind, f.cell, f.cell, rounded(crowd(f.tips), 1e3), logarithm(f.ahead),
           rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
       put(" {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.side, 10.), rounded(f.height, 10.),
@@ -372,9 +371,8 @@ class Writer {
   void calibres() {
     put("\n\n# The same forks, row by row, asked by how thick they are: the diameters where the branch ends "
         "and its daughters end, µm.\n"
-        "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.25, first ~ 0.15, ahead ~ 0.4, l1 ~ 0.5, "
-        "l2 ~ 0.5, d "
-        "~ 0.14\n"
+        "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.15, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, "
+        "l2 ~ 1, d ~ 0.07\n"
         "  -> d, d1, d2, d3) =");
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
@@ -416,12 +414,6 @@ class Writer {
     for (const auto& [kind, mean] : traced_.means)
       slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
     put("table mean_slope = {}\n", fmt::join(slopes, ", "));
-    put("# By which angle about z stems stray from those of the neuron that they are of: a share of how much "
-        "the ways to the middle of their tips differ in the plane of the slice.\n");
-    std::vector<std::string> bins;
-    for (const auto& [kind, spread] : directions())
-      bins.push_back(fmt::format("{}: {:.3g}", kind, options_.sway * spread));
-    put("table sways = {}\n", fmt::join(bins, ", "));
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
       style += fmt::format(fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
@@ -439,6 +431,8 @@ class Writer {
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
+        "#define fade 20     # µm, over which a branch gives up e times of how much thicker it began than "
+        "where its diameters are of\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
         options_.familiar, options_.jitter);
@@ -460,24 +454,6 @@ class Writer {
     for (const auto& [kind, value] : largest)
       bins.push_back(fmt::format("{}: {}", kind, std::ceil(beyond * value * steps) / steps));
     put("table {} = {}\n", name, fmt::join(bins, ", "));
-  }
-
-  // How much stems of each kind differ in where the middle of their tips lies, in the plane of the slice: the angle from the
-  // mean, in degrees, that two of three stay below, and at most 100, where they lie all around.
-  std::map<int, double> directions() const {
-    std::map<int, std::vector<Vec2>> ways;
-    for (const Cell& c : traced_.cells)
-      for (const Stem& s : c.stems) ways[s.kind].push_back(s.aim.stableNormalized().head<2>());
-    std::map<int, double> spread;
-    for (const auto& [kind, of] : ways) {
-      const Vec2 mean = std::accumulate(of.begin(), of.end(), Vec2(Vec2::Zero()));
-      std::vector<double> angles;
-      for (const Vec2& way : of)
-        angles.push_back(
-            std::abs(std::atan2(double(mean.x() * way.y() - mean.y() * way.x()), double(mean.dot(way)))));
-      spread[kind] = std::min(100., statistics::quantile(angles, .68) * 180. / std::numbers::pi);
-    }
-    return spread;
   }
 
   // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.
@@ -514,6 +490,7 @@ class Writer {
     }
   }
   static double rounded(double value, double steps) { return std::round(value * steps) / steps; }
+  static double crowd(double tips) { return std::log(tips) - 30. / std::pow(tips, 3); }  // as in the grammar
   static double logarithm(double value) { return rounded(std::log(std::max(least_length, value)), 1e3); }
 
   const Traced& traced_;

@@ -39,10 +39,9 @@ struct Resampling {
   // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
   // 10 over the number of neurons, at most 1.2: few show little of what there is.
   std::optional<double> smoothing = {};
-  double sway =
-      .2;  // of a stem's direction, in shares of how much directions differ in the plane of the slice
-  double jitter = .1;   // of the logarithms of a stem's tips and reach
-  std::size_t kin = 4;  // neurons alike, by whose differences it is changed, and none of which is its mate
+  double jitter = .1;  // of the logarithms of a stem's tips and reach
+  std::size_t kin =
+      4;  // neurons alike, by whose differences it is changed, and none of which is its mate or third
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.
