@@ -210,7 +210,7 @@ std::vector<std::string> tasted_features(std::span<const Morphology> neurons, st
 Calibrated calibrated_grammar(std::span<const Morphology> neurons, std::span<const std::uint32_t> slices,
                               const std::string& title, const Resampling& resampling,
                               const Calibration& options, Progress& progress) {
-  Calibrated out{.text = resampling_grammar(neurons, title, resampling)};
+  Calibrated out{.text = resampling_grammar(neurons, title, resampling, progress)};
   const std::vector<std::string> names = tasted_features(neurons, resampling.kinds);
   if (neurons.size() < options.least || options.candidates < 2 || names.empty()) return out;
   statistics::FewFeatures few;

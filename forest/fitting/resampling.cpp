@@ -15,6 +15,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/fitting/evening.h"
 #include "forest/fitting/mixing.h"
 #include "forest/fitting/traced.h"
 #include "forest/statistics/summary.h"
@@ -75,7 +76,7 @@ function crowd(tips) = log(tips) - 30 / tips^3
 distribution thicker(kind, cell) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
-  calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d))
+  calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d), 0)
 
 module Plan(i), Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az)
 module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
@@ -88,7 +89,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p)), d = thick * plans.d(p),
     away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
-    r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style),
+    r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style, 0),
     sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
@@ -120,7 +121,7 @@ fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, 
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
     r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), crowd(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
-      mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style),
+      mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style, 0),
     q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
@@ -164,8 +165,8 @@ constexpr double most_deviation = 1.2;
 
 class Writer {
  public:
-  Writer(const Traced& traced, const std::string& title, const Resampling& options)
-      : traced_(traced), options_(options) {
+  Writer(const Traced& traced, const std::string& title, const Resampling& options, const Seldom& seldom)
+      : traced_(traced), options_(options), seldom_(seldom) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
       kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
                               s == grain                ? .2 * options.style
@@ -294,9 +295,10 @@ class Writer {
   void stems() {
     put("\n\n# Stems as they were traced; tips as a crowd (below), path and diameter as logarithms.\n"
         "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, "
-        "d ~ 0.3{}\n  -> donor, next, ahead, length, tx, ty, tz) =",
+        "d ~ 0.3{}, seldom ~ 1\n  -> donor, next, ahead, length, tx, ty, tz) =",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
+    std::size_t stem = 0;
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
         row(std::exchange(first, false));
@@ -305,7 +307,8 @@ class Writer {
         vector(s.heading, 1e3);
         put(" {}", logarithm(s.end_diameter));
         style(c.kinds.at(s.kind).style);
-        put(" -> {} {} {} {} ", s.cell, s.next, rounded(s.ahead, 10.), rounded(s.length, 1e2));
+        put(" {} -> {} {} {} {} ", rounded(seldom_.stems[stem++], 1e3), s.cell, s.next, rounded(s.ahead, 10.),
+            rounded(s.length, 1e2));
         vector(s.aim - s.place, 10.);
         trace(s.heading, Vec3::Zero(), s.points);
       }
@@ -329,7 +332,7 @@ class Writer {
         "near_order(kind), d ~ near_d(kind),\n"
         "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
         "before ~ "
-        "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}\n"
+        "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}, seldom ~ 1\n"
         "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
         "next2, "
         "next3, "
@@ -346,9 +349,9 @@ class Writer {
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);
-      put(" -> {} {} {} {} {} {} {}", f.cell, rounded(double(f.heading.x()), 1e3),
-          rounded(double(f.heading.y()), 1e3), f.daughters.size(), int(f.turned), f.tips,
-          rounded(f.ahead, 10.));
+      put(" {} -> {} {} {} {} {} {} {}", rounded(seldom_.forks[std::size_t(&f - forks.data())], 1e3), f.cell,
+          rounded(double(f.heading.x()), 1e3), rounded(double(f.heading.y()), 1e3), f.daughters.size(),
+          int(f.turned), f.tips, rounded(f.ahead, 10.));
       const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
           put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);
@@ -372,14 +375,14 @@ class Writer {
     put("\n\n# The same forks, row by row, asked by how thick they are: the diameters where the branch ends "
         "and its daughters end, µm.\n"
         "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.15, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, "
-        "l2 ~ 1, d ~ 0.07\n"
+        "l2 ~ 1, d ~ 0.07, seldom ~ 1\n"
         "  -> d, d1, d2, d3) =");
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
-      put("{} {} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), f.cell, logarithm(f.tips),
+      put("{} {} {} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), f.cell, logarithm(f.tips),
           logarithm(f.daughters[0].tips), logarithm(f.ahead), logarithm(f.daughters[0].length),
           logarithm(f.daughters.size() > 1 ? f.daughters[1].length : 1.), logarithm(f.diameter),
-          rounded(f.diameter, 1e3));
+          rounded(seldom_.calibres[std::size_t(&f - traced_.forks.data())], 1e3), rounded(f.diameter, 1e3));
       for (std::size_t i = 0; i < most_daughters; ++i)
         put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].end_diameter, 1e3) : 0.);
     }
@@ -495,6 +498,7 @@ class Writer {
 
   const Traced& traced_;
   const Resampling& options_;
+  const Seldom& seldom_;
   const std::vector<Mixed> mixed_ = mix(traced_, options_.kin);
   double squares_ = 0., differences_ = 0.;  // of the styles of neurons that are like the same one
   std::string kernels_, text_;
@@ -503,7 +507,7 @@ class Writer {
 }  // namespace
 
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
-                               const Resampling& options) {
+                               const Resampling& options, Progress& progress) {
   const Traced traced = learn(neurons, options.kinds);
   if (traced.cells.size() < 2 || traced.forks.empty())
     throw Error(
@@ -515,7 +519,14 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
                   "none of {} neurons has a fork of these kinds, so there is nothing to learn branching "
                   "from; name others",
                   neurons.size()));
-  return Writer(traced, title, options).text();
+  std::size_t stems = 0;
+  for (const Cell& c : traced.cells) stems += c.stems.size();
+  const std::size_t forks = traced.forks.size();
+  const auto text = [&](const Seldom& seldom) { return Writer(traced, title, options, seldom).text(); };
+  const std::string alike =
+      text({std::vector<double>(stems), std::vector<double>(forks), std::vector<double>(forks)});
+  if (!options.evening.rounds) return alike;
+  return text(evened(lsystem::parse(alike, title), traced.cells.size(), options.evening, progress));
 }
 
 }  // namespace forest::fitting

@@ -15,14 +15,24 @@
 //   the basal ones alone, and the diameters of a third, so that none is like one of them all over.
 #pragma once
 
+#include <cstddef>
 #include <optional>
 #include <span>
 #include <string>
 
+#include "forest/core/progress.h"
 #include "forest/morphology/morphology.h"
 #include "forest/statistics/arbors.h"
 
 namespace forest::fitting {
+
+/// How it is brought about that each stem and fork is drawn about as often as it was met (evening.h).
+struct Evening {
+  std::size_t rounds = 20;  // 0: it is not
+  std::size_t repeats = 2;  // populations grown in each round, …
+  std::size_t most = 2000;  // … of no more neurons than so many together
+  double share = .8;        // of the logarithm of what is amiss, mended in a round
+};
 
 struct Resampling {
   statistics::KindSet kinds = statistics::dendrites;  // of the sections that are modelled
@@ -39,9 +49,9 @@ struct Resampling {
   // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
   // 10 over the number of neurons, at most 1.2: few show little of what there is.
   std::optional<double> smoothing = {};
-  double jitter = .1;  // of the logarithms of a stem's tips and reach
-  std::size_t kin =
-      4;  // neurons alike, by whose differences it is changed, and none of which is its mate or third
+  double jitter = .1;   // of the logarithms of a stem's tips and reach
+  std::size_t kin = 4;  // neurons alike, by whose differences it is changed; none is its mate or third
+  Evening evening = {};
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.
@@ -50,6 +60,6 @@ struct Resampling {
 ///                 stem of its own, which begins where it began.
 /// Throws Error when there are too few.
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
-                               const Resampling& options = {});
+                               const Resampling& options = {}, Progress& progress = Progress::none());
 
 }  // namespace forest::fitting

@@ -140,6 +140,12 @@ void Sample::finish() {
   }
 }
 
+void Sample::ask(std::size_t condition, std::span<const double> of_rows) {
+  for (std::size_t row = 0; row < of_rows.size(); ++row)
+    condition_values_[row * conditions.size() + condition] = float(of_rows[row]);
+  finish();
+}
+
 std::size_t Sample::draw(std::span<const double> wanted, Random& random) const {
   thread_local std::vector<float> key, chances;
   key.clear();

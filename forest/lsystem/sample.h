@@ -102,6 +102,8 @@ class Sample {
   void add(std::span<const double> conditions, std::span<const double> outcomes, std::vector<Trace> branches);
   /// To be called after the last row.
   void finish();
+  /// Changes what all rows say to one condition, after the last.
+  void ask(std::size_t condition, std::span<const double> of_rows);
 
   /// The number of a row. Every row's chance is the product of its kernels; where all are far from what is wanted, the
   /// nearest ones are drawn. Throws Error when no row has the numbers that must be the same.
