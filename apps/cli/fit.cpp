@@ -138,8 +138,8 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   must_be_within(
       *command.add_option("--smoothing", options->resampling.smoothing,
                           "How far a neuron's style may be from that of the traced one whose stems "
-                          "it has; 0: not at all. Without it 10 over the number of neurons, at most "
-                          "1.2"),
+                          "it has; 0: not at all. Without it .4, or with fewer than 25 neurons 10 over "
+                          "their number, at most 1.2"),
       0., 100.);
   CLI::Option* calibrate =
       command.add_flag("--calibrate", options->calibrate,

@@ -253,7 +253,7 @@ class Writer {
           squares_ += std::pow(of.style[s] - found->second.style[s], 2);
   }
   double stray() const {
-    return options_.smoothing.value_or(std::min(1.2, 10. / double(traced_.cells.size())));
+    return options_.smoothing.value_or(std::clamp(10. / double(traced_.cells.size()), .4, 1.2));
   }
   // What keeps styles as different among neurons as they are, when the differences of like ones are added.
   double kept() const {

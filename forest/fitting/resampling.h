@@ -47,7 +47,7 @@ struct Resampling {
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
   double familiar = 1.;  // how often a fork may come from the neuron whose style its branch has
   // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
-  // 10 over the number of neurons, at most 1.2: few show little of what there is.
+  // .4, or with fewer than 25 neurons 10 over their number, at most 1.2: few show little of what there is.
   std::optional<double> smoothing = {};
   double jitter = .1;   // of the logarithms of a stem's tips and reach
   std::size_t kin = 4;  // neurons alike, by whose differences it is changed; none is its mate or third
