@@ -100,7 +100,13 @@ std::string silhouettes(std::span<const Morphology* const> neurons, const statis
 
 Riddle which_is_which(std::span<const Morphology> traced, std::span<const Morphology> grown, std::size_t each,
                       const statistics::KindSet& kinds, std::uint64_t seed) {
-  each = std::min({each, traced.size(), grown.size()});
+  // Those with something to be seen: a soma alone would give itself away.
+  std::vector<const Morphology*> seen[2];
+  for (const bool is_grown : {false, true})
+    for (const Morphology& m : is_grown ? grown : traced)
+      if (std::ranges::any_of(m.sections(), [&](const Section& s) { return kinds.contains(s.kind); }))
+        seen[is_grown].push_back(&m);
+  each = std::min({each, seen[0].size(), seen[1].size()});
   Random random(seed, 0, 0x51de);
   const auto shuffled = [&](auto items) {
     for (std::size_t i = items.size(); i > 1; --i)
@@ -109,9 +115,7 @@ Riddle which_is_which(std::span<const Morphology> traced, std::span<const Morpho
   };
   std::vector<std::pair<const Morphology*, bool>> all;
   for (const bool is_grown : {false, true}) {
-    std::vector<const Morphology*> some;
-    for (const Morphology& m : is_grown ? grown : traced) some.push_back(&m);
-    some = shuffled(std::move(some));
+    const std::vector<const Morphology*> some = shuffled(std::move(seen[is_grown]));
     for (std::size_t i = 0; i < each; ++i) all.emplace_back(some[i], is_grown);
   }
   all = shuffled(std::move(all));
