@@ -2,7 +2,6 @@
 #include "forest/fitting/evening.h"
 
 #include <algorithm>
-#include <array>
 #include <atomic>
 #include <cmath>
 #include <cstdint>

@@ -27,18 +27,20 @@ double degrees(const Vec3& a, const Vec3& b) {
 constexpr int basal_kind = int(SectionKind::basal);
 bool is_basal(const Stem& s) { return s.kind == basal_kind; }
 
-std::set<int> kinds_of_stems(const Cell& c) {
-  std::set<int> kinds;
+using Kinds = std::set<int>;
+
+Kinds kinds_of_stems(const Cell& c) {
+  Kinds kinds;
   for (const Stem& s : c.stems) kinds.insert(s.kind);
   return kinds;
 }
 
-// Which stems a neuron has of its mate: none of a kind that it has not itself, for so often as they were traced.
+// Which stems a neuron has of its mate, by the kinds that both have: none of a kind that it has not itself, so that each kind comes as
+// often as it was traced.
 enum class Lent { nothing, basal_stems, all };
-Lent lent(const Cell& neuron, const Cell& mate) {
-  const std::set<int> kinds = kinds_of_stems(neuron), other = kinds_of_stems(mate);
-  if (kinds.contains(basal_kind) && other.contains(basal_kind)) return Lent::basal_stems;
-  return kinds == other ? Lent::all : Lent::nothing;
+Lent lent(const Kinds& neuron, const Kinds& mate) {
+  if (neuron.contains(basal_kind) && mate.contains(basal_kind)) return Lent::basal_stems;
+  return neuron == mate ? Lent::all : Lent::nothing;
 }
 
 // Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
@@ -148,14 +150,16 @@ std::vector<std::size_t> most_alike(const std::vector<Cell>& cells, std::size_t 
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   const std::vector<Cell>& cells = traced.cells;
   std::vector<std::vector<std::size_t>> like;
-  for (std::size_t i = 0; i < cells.size(); ++i) like.push_back(most_alike(cells, i, kin));
+  std::vector<Kinds> kinds;
+  for (std::size_t i = 0; i < cells.size(); ++i)
+    like.push_back(most_alike(cells, i, kin)), kinds.push_back(kinds_of_stems(cells[i]));
   const auto cost = [&](std::size_t i, std::size_t j) {
     return apart(cells[i], cells[j]) + (std::ranges::count(like[i], j) ? unlikely : 0.) +
-           (kinds_of_stems(cells[i]) == kinds_of_stems(cells[j]) ? 0. : seldom);
+           (kinds[i] == kinds[j] ? 0. : seldom);
   };
   const std::vector<std::size_t> mates = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     return cost(i, j) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
-           (lent(cells[i], cells[j]) == Lent::nothing ? hardly : 0.);
+           (lent(kinds[i], kinds[j]) == Lent::nothing ? hardly : 0.);
   });
   const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     return cost(i, j) + (j == mates[i] ? unlikely : 0.);
@@ -163,7 +167,7 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   std::vector<Mixed> mixed;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell &own = cells[i], &mate = cells[mates[i]];
-    const Lent of_mate = lent(own, mate);
+    const Lent of_mate = lent(kinds[i], kinds[mates[i]]);
     Mixed m{.kin = std::move(like[i]),
             .stems = {},
             .basal_as = of_mate == Lent::nothing ? i : mates[i],

@@ -24,7 +24,8 @@ struct Mixed {
 };
 
 /// Of each neuron. At least two.
-/// @param kin  how many there are of these, as far as there are others; one of them is its mate or third only where there is nobody else
+/// @param kin  how many there are of these, as far as there are others; one of them is its mate or third only where there is
+///             nobody else, and a neuron with kinds of stems that nobody shares is its own mate
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin);
 
 /// How little alike two neurons are: the sum of squares over their styles, but for how steep and kinked they were drawn.

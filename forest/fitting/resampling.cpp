@@ -165,8 +165,9 @@ constexpr double most_deviation = 1.2;
 
 class Writer {
  public:
-  Writer(const Traced& traced, const std::string& title, const Resampling& options, const Seldom& seldom)
-      : traced_(traced), options_(options), seldom_(seldom) {
+  Writer(const Traced& traced, const std::vector<Mixed>& mixed, const std::string& title,
+         const Resampling& options, const Seldom& seldom)
+      : traced_(traced), options_(options), seldom_(seldom), mixed_(mixed) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
       kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
                               s == grain                ? .2 * options.style
@@ -499,7 +500,7 @@ class Writer {
   const Traced& traced_;
   const Resampling& options_;
   const Seldom& seldom_;
-  const std::vector<Mixed> mixed_ = mix(traced_, options_.kin);
+  const std::vector<Mixed>& mixed_;
   double squares_ = 0., differences_ = 0.;  // of the styles of neurons that are like the same one
   std::string kernels_, text_;
 };
@@ -519,10 +520,13 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
                   "none of {} neurons has a fork of these kinds, so there is nothing to learn branching "
                   "from; name others",
                   neurons.size()));
+  const std::vector<Mixed> mixed = mix(traced, options.kin);
   std::size_t stems = 0;
   for (const Cell& c : traced.cells) stems += c.stems.size();
   const std::size_t forks = traced.forks.size();
-  const auto text = [&](const Seldom& seldom) { return Writer(traced, title, options, seldom).text(); };
+  const auto text = [&](const Seldom& seldom) {
+    return Writer(traced, mixed, title, options, seldom).text();
+  };
   const std::string alike =
       text({std::vector<double>(stems), std::vector<double>(forks), std::vector<double>(forks)});
   if (!options.evening.rounds) return alike;
