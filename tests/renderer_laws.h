@@ -85,6 +85,28 @@ TEST_P(RendererLaws, PictureDrawnInPartsIsThatDrawnAtOnce) {
   }
 }
 
+TEST_P(RendererLaws, TwoThatDrawInTurnDrawAsOneAlone) {
+  Fixture thick(GetParam());
+  thick.add({-20, 3, 0}, {15, -8, 0}, 8.f);
+  thick.frame.capsules = thick.items;
+  const frame::Image alone = thick.draw();
+  Fixture thin(GetParam());
+  thin.add({-20, -3, 5}, {15, 9, 5}, 1.f);
+  thin.add({-20, -6, 5}, {15, 2, 5}, 1.f);
+  thin.frame.lines = thin.items;
+  const frame::Image other = thin.draw();
+  for (int i = 0; i < 2; ++i) {
+    thick.renderer->draw(thick.frame);
+    thin.renderer->draw(thin.frame);
+    EXPECT_EQ(thick.renderer->covered(), alone.covered);
+    EXPECT_EQ(thick.renderer->read().pixels, alone.pixels);
+    EXPECT_EQ(thin.renderer->covered(), other.covered);
+    EXPECT_EQ(thin.renderer->read().pixels, other.pixels);
+  }
+  EXPECT_GT(alone.covered, other.covered);
+  EXPECT_GT(other.covered, 0.);
+}
+
 TEST_P(RendererLaws, OverlaysAreSeenWhereverTheOriginIs) {
   for (const float beside : {0.f, 500.f}) {  // the origin in the picture, and far beside it
     Fixture f(GetParam());

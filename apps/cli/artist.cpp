@@ -31,7 +31,7 @@ Artist::Artist(scene::Forest forest, Drawer drawer, circuit::NodeSets sets)
   renderer_->load(forest_.geometry());
 }
 
-Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline) {
+Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t height, Wanted wanted) {
   if (!colouring_ || view.colour_by != coloured_by_ || view.background != coloured_for_ ||
       view.targets != shown_as_) {
     colouring_ = scene::colour(targets_, view);
@@ -40,7 +40,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   Drawn drawn;
   if (playback_) playback_->begin_picture();
   std::vector<frame::Overlay> marks;
-  if (with_outline) marks = outline_;
+  if (wanted.outline) marks = outline_;
   std::optional<frame::Glass> glass;
   if (view.plane) {
     glass = scene::plane_glass(forest_, *view.plane, view.background);
@@ -64,7 +64,8 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
       playback_->colour(cut, from, look, {.window = window_, .states = colouring.states});
     };
   auto start = Clock::now();
-  if (scene::layered(view)) {
+  // A card draws no large pixels: they save work of the processor's kind.
+  if (scene::layered(view) && (view.detail.gaze || !on_card())) {
     Foveated::Dresser dress;
     if (dressing_.wanted(view, colouring))
       dress = [&](frame::Frame& frame, const scene::Cut& near, const scene::Eye& eye) {
@@ -99,7 +100,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   drawn.neurons = chooser_.neurons();
   drawn.draw = timing.draw, drawn.resolve = timing.resolve, drawn.reached = timing.drawn;
   start = Clock::now();
-  drawn.image = renderer_->read();
+  drawn.image = wanted.pixels ? renderer_->read() : frame::Image{width, height, {}, renderer_->covered()};
   drawn.read = milliseconds_since(start);
   if (playback_) drawn.activity = playback_->figures();
   return drawn;
@@ -176,7 +177,7 @@ FilmFigures film(Artist& artist, const scene::CameraPath& path, const FilmPlan& 
       view.activity = activity;
       view.activity->time = plan.from + i * picture_ms;
     }
-    Drawn drawn = artist.draw(view, plan.width, plan.height, plan.outline);
+    Drawn drawn = artist.draw(view, plan.width, plan.height, {.outline = plan.outline});
     segments += drawn.segments;
     figures.covered += drawn.image.covered / count;
     artist.explain(view, plan.marks, drawn.image);

@@ -30,7 +30,13 @@ struct Drawn {
   std::uint32_t neurons = 0;          // in sight and not hidden
   std::uint64_t synapses = 0;         // drawn
   scene::Playback::Figures activity;  // of what was chosen first; zeros when nothing plays
-  frame::Image image;
+  frame::Image image;                 // as it was wanted
+};
+
+/// What a picture is wanted for.
+struct Wanted {
+  bool outline = false;  // the column's, too
+  bool pixels = true;    // else they stay where they were drawn, as for a window, if that can be had
 };
 
 /// What stands in a picture so that it can be read.
@@ -46,8 +52,9 @@ class Artist {
   explicit Artist(scene::Forest forest, Drawer drawer = Drawer::automatic, circuit::NodeSets sets = {});
 
   /// A view with a gaze or with large pixels is drawn in layers (apps/foveated.h).
-  /// @param with_outline  the column's outline too
-  Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, bool with_outline = false);
+  Drawn draw(const scene::View& view, std::uint32_t width, std::uint32_t height, Wanted wanted = {});
+  /// The pixels of the last picture that was not drawn in layers.
+  frame::Image read() { return renderer_->read(); }
   /// Whether something may be seen through (Dressing::sees_through).
   bool sees_through(const scene::View& view) const {
     return dressing_.sees_through(view, scene::colour(targets_, view));
@@ -74,6 +81,8 @@ class Artist {
   const scene::Forest& forest() const { return forest_; }
   const scene::Targets& targets() const { return targets_; }
   std::string renderer() const { return renderer_->name(); }
+  /// Whether pictures can be shown from where they are drawn, on a graphics card.
+  bool on_card() const { return !renderer_->image(); }
 
  private:
   scene::Forest forest_;

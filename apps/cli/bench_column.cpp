@@ -53,7 +53,8 @@ struct Part {
   double per_second() const { return frames / seconds; }
 };
 
-/// Draws `frames` pictures of a moving camera; the acceptable error follows the budget.
+/// Draws `frames` pictures of a moving camera as the studio does, and all but shows them: a card's stay on it. The acceptable error
+/// follows the budget.
 Part measure(Artist& artist, const Options& options, const std::function<scene::View(float)>& view_at,
              const char* name, Console& console) {
   const auto [width, height] = parse_size(options.size);
@@ -71,8 +72,11 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
       view.activity->time = playback->activity().facts().time(i % options.steps);
       touched = playback->activity().touched();
     }
-    const Drawn drawn = artist.draw(view, width, height);
-    frame::soften(drawn.image, budget.softness(), image);
+    Drawn drawn = artist.draw(view, width, height, {.pixels = !artist.on_card()});
+    if (artist.on_card())
+      image = std::move(drawn.image);
+    else
+      frame::soften(drawn.image, budget.softness(), image);
     const double seconds = seconds_since(start);
     if (image.covered < .02)
       throw Error(fmt::format("picture {} covers {:.2f} % of its pixels: nothing was measured", i,
@@ -92,7 +96,8 @@ Part measure(Artist& artist, const Options& options, const std::function<scene::
         part.pixel += double(view.detail.pixel) / options.frames;
     budget.took(1000. * seconds, drawn.segments);
     if (!options.out.empty() && i + 1 == options.frames)
-      io::write_png(options.out / fmt::format("{}.png", name), width, height, image.pixels);
+      io::write_png(options.out / fmt::format("{}.png", name), width, height,
+                    artist.on_card() ? artist.read().pixels : image.pixels);
     console.progress().advance();
   }
   console.progress().end();

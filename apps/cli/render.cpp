@@ -157,7 +157,7 @@ std::function<void()> render(CLI::App& command, Console& console) {
     if (options->outline && scene::outline(forest).empty())
       console.warn("the forest is neither a column nor planted in elements, so it has no outline");
     view.samples = artist.still_samples(view);
-    Drawn drawn = artist.draw(view, width, height, options->outline);
+    Drawn drawn = artist.draw(view, width, height, {.outline = options->outline});
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));
     if (const std::string missing = artist.explain(view, options->marks, drawn.image); !missing.empty())
       console.warn(missing);

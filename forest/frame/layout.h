@@ -103,7 +103,6 @@ struct Constants {
 
 // Constants::flags
 #define FOREST_OVERLAY 1u     // segments lie in the world and name their palette entry
-#define FOREST_COARSE 2u      // tiles of tiles
 #define FOREST_FIRST_BAND 4u  // nothing is hidden yet
 #define FOREST_ENTRIES 8u     // every segment has a palette entry of its own …
 #define FOREST_SINGLE 16u     // … and the list has one an item, not FOREST_CLUSTER_SIZE

@@ -19,6 +19,9 @@ class Renderer {
   virtual frame::Timing draw(const frame::Frame& frame) = 0;
   /// The pixels of the last frame.
   virtual frame::Image read() = 0;
+  /// Share of them that shows something of the forest, without a copy of them where that can be had. Waits until the frame is
+  /// drawn.
+  virtual double covered() { return read().covered; }
   /// The same without a copy, until the next frame is drawn; null where they lie elsewhere. Opacity is the share of a pixel
   /// that is covered.
   virtual const frame::Image* image() const { return nullptr; }

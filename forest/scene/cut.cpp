@@ -527,27 +527,40 @@ std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cut
     choose_some(p * chunk, std::min(count, (p + 1) * chunk), parts.subspan(p * cuts, cuts));
   });
   std::vector<Cut> whole(cuts);
-  parallel_for(cuts, 1, [&](std::size_t c) {
+  parallel_for(4 * cuts, 1, [&](std::size_t n) {
+    const std::size_t c = n / 4;
     const auto take = [&](auto member) {
       join(whole[c].*member, member, std::span<const Cut>(parts), c, cuts);
     };
-    take(&Cut::dots), take(&Cut::lines), take(&Cut::capsules), take(&Cut::left_out);
-    for (std::size_t p = c; p < parts.size(); p += cuts) {
-      whole[c].segments += parts[p].segments;
-      whole[c].far += parts[p].far;
+    switch (n % 4) {
+      case 0:
+        return take(&Cut::dots);
+      case 1:
+        return take(&Cut::lines);
+      case 2:
+        return take(&Cut::capsules);
+      default:
+        take(&Cut::left_out);
     }
   });
+  for (std::size_t p = 0; p < parts.size(); ++p) {
+    whole[p % cuts].segments += parts[p].segments;
+    whole[p % cuts].far += parts[p].far;
+  }
   return whole;
 }
 
-// Sorts a list from near to far, in steps of a 1/64 octave, and returns where each step begins.
-constexpr std::size_t steps = 64 * 24;
+// Sorts a list from near to far, in 64 steps an octave, and returns where each step begins.
+constexpr std::size_t octaves = 24, steps = 64 * octaves;
 using Starts = std::array<std::uint32_t, steps + 1>;
 
-// By the centre: a large sphere around the eye says little of where its branches are.
+// By the centre: a large sphere around the eye says little of where its branches are. Of a float the highest bits are its octave,
+// and the next six a 64th of it.
 std::size_t step_of(const frame::Item& item, const Eye& eye) {
-  const float depth = eye.nearest_depth({{item.x, item.y, item.z}, 0.f});
-  return std::size_t(std::clamp(64.f * std::log2(depth / eye.camera().near), 0.f, float(steps - 1)));
+  const float depth = eye.nearest_depth({{item.x, item.y, item.z}, 0.f}) / eye.camera().near;
+  constexpr std::uint32_t from = std::bit_cast<std::uint32_t>(1.f) >> 17;
+  const std::uint32_t at = std::bit_cast<std::uint32_t>(std::max(depth, 1.f)) >> 17;
+  return std::min<std::size_t>(at - from, steps - 1);
 }
 
 Starts sort_near_to_far(std::vector<frame::Item>& list, const Eye& eye) {
@@ -592,9 +605,10 @@ class KnownCloseness {
 
 // From near to far, in bands.
 void arrange(Cut& cut, const Eye& eye) {
-  const Starts dots = sort_near_to_far(cut.dots, eye), lines = sort_near_to_far(cut.lines, eye),
-               capsules = sort_near_to_far(cut.capsules, eye);
-  cut.bands = bands_of(dots, lines, capsules);
+  std::array<std::vector<frame::Item>*, 3> lists{&cut.dots, &cut.lines, &cut.capsules};
+  std::array<Starts, 3> starts;
+  parallel_for(3, 1, [&](std::size_t i) { starts[i] = sort_near_to_far(*lists[i], eye); });
+  cut.bands = bands_of(starts[0], starts[1], starts[2]);
 }
 
 }  // namespace

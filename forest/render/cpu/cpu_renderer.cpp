@@ -94,6 +94,8 @@ frame::Image CpuRenderer::read() {
   return image;
 }
 
+double CpuRenderer::covered() { return state_->image.covered; }
+
 const frame::Image* CpuRenderer::image() const { return &state_->image; }
 
 const frame::DepthMap& CpuRenderer::seen() const { return state_->seen; }

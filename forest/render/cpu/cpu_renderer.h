@@ -19,6 +19,7 @@ class CpuRenderer final : public Renderer {
   void load(const frame::Geometry& geometry) override;
   frame::Timing draw(const frame::Frame& frame) override;
   frame::Image read() override;
+  double covered() override;
   const frame::Image* image() const override;
   const frame::DepthMap& seen() const override;
   std::span<const std::uint8_t> reached() const override;

@@ -107,4 +107,11 @@ OffscreenContext::OffscreenContext() : handles_(std::make_unique<Handles>()) {
 
 OffscreenContext::~OffscreenContext() { handles_->close(); }
 
+void OffscreenContext::make_current() {
+  if (eglGetCurrentContext() == handles_->context) return;
+  if (!eglMakeCurrent(handles_->display, EGL_NO_SURFACE, EGL_NO_SURFACE, handles_->context))
+    throw Error(
+        fmt::format("the graphics driver does not go on with another picture; start again, {}", otherwise));
+}
+
 }  // namespace forest::render

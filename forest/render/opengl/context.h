@@ -6,11 +6,16 @@
 
 namespace forest::render {
 
-/// Current on the thread that made it, for as long as it lives. Throws Error, with what to install, when there is none.
+/// Current on the thread that made it, until another is. Throws Error, with what to install, when there is none.
 class OffscreenContext {
  public:
   OffscreenContext();
   ~OffscreenContext();
+  OffscreenContext(const OffscreenContext&) = delete;
+  OffscreenContext& operator=(const OffscreenContext&) = delete;
+
+  /// Again, on the same thread.
+  void make_current();
 
  private:
   struct Handles;

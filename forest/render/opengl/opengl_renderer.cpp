@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstring>
 #include <map>
+#include <numeric>
 
 #include <epoxy/gl.h>
 #include <fmt/format.h>
@@ -23,8 +24,9 @@ using frame::Constants;
 using frame::Item;
 using frame::Segment;
 
-// What shaders wrote is read by others as storage or as texels.
-constexpr GLbitfield written_for_readers = GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT;
+// What shaders wrote is read by others, as storage, as texels or as how many of them there are.
+constexpr GLbitfield written_for_shaders =
+    GL_SHADER_STORAGE_BARRIER_BIT | GL_TEXTURE_FETCH_BARRIER_BIT | GL_COMMAND_BARRIER_BIT;
 
 std::string driver() {
   const auto* name =
@@ -66,6 +68,7 @@ class Buffer {
   void reserve(std::size_t bytes) {
     if (bytes <= size_) return;
     size_ = bytes;
+    texel_format_ = 0;
     glNamedBufferData(name_, GLsizeiptr(bytes), nullptr, GL_DYNAMIC_DRAW);
   }
   template <class T>
@@ -84,22 +87,65 @@ class Buffer {
           "a list of {}; take a smaller picture, or --renderer cpu",
           driver(), most * texel_size(format), size_));
     if (!texels_) glCreateTextures(GL_TEXTURE_BUFFER, 1, &texels_);
-    glTextureBuffer(texels_, format, name_);
+    if (texel_format_ != format) glTextureBuffer(texels_, format, name_);
+    texel_format_ = format;
     glBindTextureUnit(unit, texels_);
   }
   GLuint name() const { return name_; }
 
  private:
   GLuint name_ = 0, texels_ = 0;
+  GLenum texel_format_ = 0;
+  std::size_t size_ = 0;
+};
+
+// Memory of the processor that the device copies into. Reading its own buffers makes drivers move them, or wait for more than
+// what is asked for.
+class Returned {
+ public:
+  Returned() = default;
+  ~Returned() { glDeleteBuffers(1, &name_); }
+  Returned(const Returned&) = delete;
+  Returned& operator=(const Returned&) = delete;
+
+  /// The first `count` values of what shaders wrote there, once they have; until it is asked again.
+  template <class T>
+  std::span<const T> read(const Buffer& from, std::size_t count) {
+    const std::size_t bytes = count * sizeof(T);
+    if (!bytes) return {};
+    if (bytes > size_) reserve(bytes);
+    if (!at_) return {};
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
+    glCopyNamedBufferSubData(from.name(), name_, 0, 0, GLsizeiptr(bytes));
+    glMemoryBarrier(GL_CLIENT_MAPPED_BUFFER_BARRIER_BIT);
+    const GLsync done = glFenceSync(GL_SYNC_GPU_COMMANDS_COMPLETE, 0);
+    while (glClientWaitSync(done, GL_SYNC_FLUSH_COMMANDS_BIT, 1'000'000'000) == GL_TIMEOUT_EXPIRED) {
+    }
+    glDeleteSync(done);
+    return {static_cast<const T*>(at_), count};
+  }
+
+ private:
+  void reserve(std::size_t bytes) {
+    constexpr GLbitfield access = GL_MAP_READ_BIT | GL_MAP_PERSISTENT_BIT | GL_MAP_COHERENT_BIT;
+    glDeleteBuffers(1, &name_);
+    glCreateBuffers(1, &name_);
+    glNamedBufferStorage(name_, GLsizeiptr(bytes), nullptr, access | GL_CLIENT_STORAGE_BIT);
+    at_ = glMapNamedBufferRange(name_, 0, GLsizeiptr(bytes), access);
+    size_ = at_ ? bytes : 0;
+  }
+
+  GLuint name_ = 0;
+  const void* at_ = nullptr;
   std::size_t size_ = 0;
 };
 
 class Program {
  public:
-  Program(const char* title, const char* body, const char* before = "", const char* definitions = "") {
+  Program(const char* title, const char* body, const char* before, const std::string& definitions) {
     const GLuint shader = glCreateShader(GL_COMPUTE_SHADER);
-    const char* texts[] = {"#version 450 core\n", definitions, shaders::layout,
-                           shaders::common,       before,      body};
+    const char* texts[] = {
+        "#version 450 core\n", definitions.c_str(), shaders::layout, shaders::common, before, body};
     glShaderSource(shader, 6, texts, nullptr);
     glCompileShader(shader);
     name_ = glCreateProgram();
@@ -125,21 +171,47 @@ class Program {
   GLuint name_ = 0;
 };
 
-// What draws lists.
+enum Kind { capsule_list, dot_list, line_list, list_count };
+
+// What draws lists: by single threads, and by workgroups what those leave to them.
 struct Drawing {
-  explicit Drawing(const char* definitions)
+  explicit Drawing(const std::string& definitions)
       : dots("dots", shaders::dots, "", definitions),
         lines("lines", shaders::lines, "", definitions),
+        long_lines("long_lines", shaders::long_lines, "", definitions),
         capsules("capsules", shaders::capsules, shaders::capsule, definitions),
         close_ups("close_ups", shaders::close_ups, shaders::capsule, definitions) {}
-  Program dots, lines, capsules, close_ups;
+  Program dots, lines, long_lines, capsules, close_ups;
+
+  const std::array<const Program*, list_count> alone{&capsules, &dots, &lines},
+      shared{&close_ups, nullptr, &long_lines};
 };
 
 // What draws surfaces.
 struct Facing {
-  Program triangles{"triangles", shaders::triangles, shaders::triangle},
-      close_ups{"triangle_close_ups", shaders::triangle_close_ups, shaders::triangle};
+  explicit Facing(const std::string& definitions)
+      : triangles("triangles", shaders::triangles, shaders::triangle, definitions),
+        close_ups("triangle_close_ups", shaders::triangle_close_ups, shaders::triangle, definitions) {}
+  Program triangles, close_ups;
 };
+
+// How work is cut for a device. A card's threads are many, and all wait for the slowest; each dispatch costs it some
+// microseconds. Mesa's processor draws the sooner the less is prepared twice and the more is found hidden.
+struct Habits {
+  int alone_steps, alone_area;  // of a segment, and of the rectangle around it: pixels that one thread draws
+  int square;                   // pixels along an edge of what a workgroup draws, at least
+  std::uint32_t segments_a_band;  // at least; bands of fewer are drawn together
+
+  bool ask_together;  // threads of a workgroup, for places in a queue
+
+  std::string definitions() const {
+    return fmt::format(
+        "#define FOREST_ALONE_STEPS {}.0\n#define FOREST_ALONE_AREA {}\n#define FOREST_SQUARE {}\n"
+        "#define FOREST_ASK_TOGETHER {}\n",
+        alone_steps, alone_area, square, int(ask_together));
+  }
+};
+constexpr Habits of_processors{1 << 20, 300, 1 << 15, 0, false}, of_cards{32, 64, 32, 1u << 17, true};
 
 // The parts of a surface that stay.
 struct SurfaceBuffers {
@@ -185,17 +257,24 @@ double milliseconds_since(std::chrono::steady_clock::time_point start) {
 
 struct OpenGLRenderer::Device {
   struct List {
-    Program Drawing::*program;
-    std::uint32_t flags;
-    Buffer items, entries{};
+    Kind kind;
+    std::uint32_t flags = 0;
+    Buffer items{}, entries{};
     std::uint32_t count = 0;
-    std::size_t segments = 0;
+    std::vector<std::uint32_t> segments{};  // before each item, and in all
   };
-  enum { capsule_list, dot_list, line_list, list_count };
   using ListSet = std::array<List, list_count>;
-  static constexpr std::uint32_t large_capacity = 1u << 20;  // segments
+  // What the lists of a kind that are drawn share: which segments are not hidden, and which of them a workgroup draws.
+  struct Work {
+    Buffer queue, large_queue, uniforms;
+  };
+  static constexpr std::uint32_t large_capacity = 1u << 18;  // parts of segments
 
-  Drawing opaque{""};
+  explicit Device(const Habits& of_it) : habits(of_it) {}
+
+  const Habits& habits;
+  const std::string definitions = habits.definitions();
+  Drawing opaque{definitions};
   std::unique_ptr<Drawing> transparent;  // made when something is
   const Drawing* drawing = &opaque;
   std::unique_ptr<Facing> facing;                  // made when there are surfaces
@@ -203,15 +282,16 @@ struct OpenGLRenderer::Device {
   SurfaceBuffers passing;                          // of a surface without one
   Buffer mesh_looks;
   std::vector<std::uint8_t> looks;  // of every vertex: palette entry, presence
-  Program cull{"cull", shaders::cull}, tile{"tiles", shaders::tiles}, resolve{"resolve", shaders::resolve};
+  Program clear{"clear", shaders::clear, "", definitions}, cull{"cull", shaders::cull, "", definitions},
+      tile{"tiles", shaders::tiles, "", definitions}, resolve{"resolve", shaders::resolve, "", definitions},
+      covered{"covered", shaders::covered, "", definitions};
   Buffer segments, instances, owners, states, palette, overlay_segments, ball_segments, uniforms, keys, sums,
-      image, queue, large_queue, tiles;
-  ListSet lists{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}},
-      rest{{{&Drawing::capsules, 0, {}}, {&Drawing::dots, 0, {}}, {&Drawing::lines, 0, {}}}};
-  List overlays{&Drawing::capsules, FOREST_OVERLAY, {}},
-      balls{&Drawing::dots, FOREST_OVERLAY | FOREST_BALLS, {}};
+      image, rows, tiles, depths;
+  std::array<Work, list_count> work;
+  Returned returned;
+  ListSet lists{{{capsule_list}, {dot_list}, {line_list}}}, rest{{{capsule_list}, {dot_list}, {line_list}}};
+  List overlays{capsule_list, FOREST_OVERLAY}, balls{dot_list, FOREST_OVERLAY | FOREST_BALLS};
   frame::DepthMap seen;
-  std::vector<std::uint32_t> farthest;
   frame::Geometry geometry;
   Constants constants{};
   std::uint32_t width = 0, height = 0;
@@ -225,19 +305,15 @@ struct OpenGLRenderer::Device {
     list.flags =
         (list.flags & (FOREST_OVERLAY | FOREST_BALLS)) | (entries.empty() ? 0 : FOREST_ENTRIES | flags);
     list.count = std::uint32_t(items.size());
-    list.segments = 0;
-    for (const Item& item : items) list.segments += std::size_t(std::popcount(item.drawn));
+    list.segments.resize(items.size() + 1);
+    std::transform_inclusive_scan(items.begin(), items.end(), list.segments.begin() + 1, std::plus(),
+                                  [](const Item& item) { return std::uint32_t(std::popcount(item.drawn)); });
   }
 
   void upload(ListSet& to, const frame::Lists& from) {
     set(to[capsule_list], from.capsules, from.entries.capsules);
     set(to[dot_list], from.dots, from.entries.dots, FOREST_SINGLE);
     set(to[line_list], from.lines, from.entries.lines);
-    std::size_t longest = std::max(overlays.segments, balls.segments);
-    for (const List& list : to) longest = std::max(longest, list.segments);
-    queue.reserve(16 + 4 * std::max<std::size_t>(longest, 1));
-    queue.bind_texels(6, GL_R32UI);
-    queue.bind(3);
   }
 
   void upload(const frame::Frame& f) {
@@ -257,7 +333,7 @@ struct OpenGLRenderer::Device {
 
     states.upload(f.states);
     if (frame::transparent(f)) {
-      if (!transparent) transparent = std::make_unique<Drawing>("#define FOREST_DOOR\n");
+      if (!transparent) transparent = std::make_unique<Drawing>("#define FOREST_DOOR\n" + definitions);
       drawing = transparent.get();
     } else {
       drawing = &opaque;
@@ -277,55 +353,93 @@ struct OpenGLRenderer::Device {
     image.reserve(pixels * 4);
     sums.reserve(f.subframes > 1 ? pixels * 16 : 16);
     tiles.reserve((pixels / 32 + width + height + 64) * 4);
-    large_queue.reserve(16 + 4 * std::size_t(large_capacity));
+    depths.reserve((pixels / 32 + width + height + 64) * 4);
     instances.bind_texels(1, GL_RGBA32UI);
     owners.bind_texels(10, GL_RG32UI);
     keys.bind_texels(3, GL_R32UI);
     states.bind_texels(4, GL_RGBA8UI);
     palette.bind_texels(5, GL_RGBA32F);
-    large_queue.bind_texels(7, GL_R32UI);
     tiles.bind_texels(8, GL_R32UI);
     keys.bind(0);
     sums.bind(1);
     image.bind(2);
-    large_queue.bind(4);
     tiles.bind(5);
+    depths.bind(6);
   }
 
-  void set_constants() {
-    uniforms.upload(std::span<const Constants>(&constants, 1));
-    glBindBufferBase(GL_UNIFORM_BUFFER, 0, uniforms.name());
+  void set_constants(Buffer& to) {
+    to.upload(std::span<const Constants>(&constants, 1));
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, to.name());
   }
 
-  // Draws the items [first, last) of a list that earlier bands do not hide.
-  void draw(List& list, std::uint32_t first, std::uint32_t last, bool first_band) {
-    if (first >= last) return;
-    const std::uint32_t nothing[4] = {0, 1, 1, 0};
+  static void empty(Buffer& queue, std::size_t numbers) {
+    constexpr std::uint32_t nothing[4] = {0, 1, 1, 0};
+    queue.reserve(sizeof nothing + 4 * std::max<std::size_t>(numbers, 1));
     glNamedBufferSubData(queue.name(), 0, sizeof nothing, nothing);
-    glNamedBufferSubData(large_queue.name(), 0, sizeof nothing, nothing);
-    constants.first_item = first;
-    constants.item_count = last - first;
-    constants.flags = list.flags | (first_band ? FOREST_FIRST_BAND : 0);
-    set_constants();
+  }
+
+  void bind(List& list) {
+    Work& w = work[list.kind];
+    w.queue.bind(3);
+    w.large_queue.bind(4);
+    w.queue.bind_texels(6, GL_R32UI);
+    w.large_queue.bind_texels(7, GL_R32UI);
     list.items.bind_texels(2, GL_RGBA32UI);
     list.entries.bind_texels(9, GL_R8UI);
     Buffer& in_world = list.flags & FOREST_BALLS ? ball_segments : overlay_segments;
     (list.flags & FOREST_OVERLAY ? in_world : segments).bind_texels(0, GL_RGBA32UI);
-    cull.use();
-    glDispatchCompute((constants.item_count + 63) / 64, 1, 1);
-    run_queue(drawing->*list.program, queue);
-    if (list.program == &Drawing::capsules) run_queue(drawing->close_ups, large_queue);
+    glBindBufferBase(GL_UNIFORM_BUFFER, 0, w.uniforms.name());
   }
 
-  void run_queue(const Program& program, const Buffer& groups) {
-    glMemoryBarrier(GL_COMMAND_BARRIER_BIT | written_for_readers);
+  // Items [first, last) of a list.
+  struct Part {
+    List& list;
+    std::uint32_t first, last;
+  };
+
+  // Draws what earlier bands do not hide of these parts, of a kind each: together, as none waits for another.
+  void draw(std::span<const Part> parts, bool first_band) {
+    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | written_for_shaders);
+    const auto each = [&](auto&& run) {
+      for (const Part& part : parts)
+        if (part.first < part.last) {
+          bind(part.list);
+          run(part);
+        }
+    };
+    for (const Part& part : parts) {
+      if (part.first >= part.last) continue;
+      Work& w = work[part.list.kind];
+      empty(w.queue, part.list.segments[part.last] - part.list.segments[part.first]);
+      empty(w.large_queue, drawing->shared[part.list.kind] ? 2 * std::size_t(large_capacity) : 0);
+      constants.first_item = part.first;
+      constants.item_count = part.last - part.first;
+      constants.flags = part.list.flags | (first_band ? FOREST_FIRST_BAND : 0);
+      set_constants(w.uniforms);
+    }
+    cull.use();
+    each([](const Part& part) { glDispatchCompute((part.last - part.first + 63) / 64, 1, 1); });
+    glMemoryBarrier(written_for_shaders);
+    each([&](const Part& part) { run(*drawing->alone[part.list.kind], work[part.list.kind].queue); });
+    glMemoryBarrier(written_for_shaders);
+    each([&](const Part& part) {
+      if (const Program* shared = drawing->shared[part.list.kind])
+        run(*shared, work[part.list.kind].large_queue);
+    });
+  }
+
+  static void run(const Program& program, const Buffer& groups) {
     program.use();
     glBindBuffer(GL_DISPATCH_INDIRECT_BUFFER, groups.name());
     glDispatchComputeIndirect(0);
   }
 
   void draw_surfaces(const frame::Frame& f) {
-    if (!facing) facing = std::make_unique<Facing>();
+    if (!facing) facing = std::make_unique<Facing>(definitions);
+    Buffer& large_queue = work[capsule_list].large_queue;
+    empty(large_queue, 2 * std::size_t(large_capacity));
+    large_queue.bind(4);
+    large_queue.bind_texels(7, GL_R32UI);
     for (std::size_t k = 0; k < f.surfaces.size(); ++k) {
       const frame::Surface& surface = f.surfaces[k];
       if (surface.triangles.empty() || surface.opacity == 0) continue;
@@ -343,46 +457,52 @@ struct OpenGLRenderer::Device {
         looks[2 * i] = surface.entries[i],
                   looks[2 * i + 1] = surface.presence.empty() ? std::uint8_t(255) : surface.presence[i];
       mesh_looks.upload(std::span<const std::uint8_t>(looks));
-      const std::uint32_t nothing[4] = {0, 1, 1, 0};
-      glNamedBufferSubData(large_queue.name(), 0, sizeof nothing, nothing);
+      glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT | written_for_shaders);
+      empty(large_queue, 0);
       constants.item_count = std::uint32_t(surface.triangles.size());
       constants.instance = surface.instance, constants.opacity = surface.opacity;
       constants.door = frame::forest_surface_key(frame::door_number(f.surfaces, k), surface.instance);
-      set_constants();
+      set_constants(uniforms);
       mesh->vertices.bind_texels(0, GL_RGBA32UI);
       mesh->triangles.bind_texels(2, GL_R32UI);
       mesh_looks.bind_texels(9, GL_RG8UI);
       facing->triangles.use();
       const std::uint32_t groups = (constants.item_count + FOREST_GROUP - 1) / FOREST_GROUP;
       glDispatchCompute(std::min(groups, 32768u), (groups + 32767) / 32768, 1);
-      run_queue(facing->close_ups, large_queue);
+      glMemoryBarrier(written_for_shaders);
+      run(facing->close_ups, large_queue);
     }
   }
 
   void find_tiles() {
-    glMemoryBarrier(written_for_readers);
+    glMemoryBarrier(written_for_shaders);
+    set_constants(uniforms);
     tile.use();
-    std::uint32_t count =
-        ((width + FOREST_TILE - 1) / FOREST_TILE) * ((height + FOREST_TILE - 1) / FOREST_TILE);
-    for (const std::uint32_t flags : {0u, FOREST_COARSE}) {
-      constants.flags = flags;
-      set_constants();
-      glDispatchCompute((count + 63) / 64, 1, 1);
-      glMemoryBarrier(written_for_readers);
-    }
+    constexpr std::uint32_t side = FOREST_TILE * FOREST_TILE;
+    glDispatchCompute((width + side - 1) / side, (height + side - 1) / side, 1);
+    glMemoryBarrier(written_for_shaders);
   }
 
   // @param first_band  nothing is drawn yet
   void draw_bands(ListSet& set, std::span<const frame::Band> bands, bool first_band) {
     const frame::Band whole{set[dot_list].count, set[line_list].count, set[capsule_list].count};
     if (bands.empty()) bands = std::span(&whole, 1);
+    const auto segments_in = [&](Kind kind, std::uint32_t first, std::uint32_t last) {
+      return set[kind].segments[last] - set[kind].segments[first];
+    };
     frame::Band from;
+    bool first = true;
     for (const frame::Band& to : bands) {
-      const bool first = &to == &bands.front();
+      const std::uint32_t count = segments_in(capsule_list, from.capsules, to.capsules) +
+                                  segments_in(dot_list, from.dots, to.dots) +
+                                  segments_in(line_list, from.lines, to.lines);
+      if (count < habits.segments_a_band && &to != &bands.back()) continue;
       if (!first) find_tiles();
-      draw(set[capsule_list], from.capsules, to.capsules, first && first_band);
-      draw(set[dot_list], from.dots, to.dots, first && first_band);
-      draw(set[line_list], from.lines, to.lines, first && first_band);
+      const std::array<Part, list_count> parts{{{set[capsule_list], from.capsules, to.capsules},
+                                                {set[dot_list], from.dots, to.dots},
+                                                {set[line_list], from.lines, to.lines}}};
+      draw(parts, first && first_band);
+      first = false;
       from = to;
     }
   }
@@ -402,21 +522,16 @@ struct OpenGLRenderer::Device {
       upload(rest, more);
       draw_bands(rest, more.bands, false);
     }
-    draw(balls, 0, balls.count, true);
-    draw(overlays, 0, overlays.count, true);
-    glMemoryBarrier(written_for_readers);
+    const std::array<Part, 2> marks{{{balls, 0, balls.count}, {overlays, 0, overlays.count}}};
+    draw(marks, true);
+    glMemoryBarrier(written_for_shaders);
   }
 
   void read_depths() {
     seen.width = (width + FOREST_TILE - 1) / FOREST_TILE,
     seen.height = (height + FOREST_TILE - 1) / FOREST_TILE;
-    farthest.resize(std::size_t(seen.width) * seen.height);
-    glMemoryBarrier(GL_BUFFER_UPDATE_BARRIER_BIT);
-    glGetNamedBufferSubData(tiles.name(), 0, GLsizeiptr(farthest.size() * 4), farthest.data());
-    seen.depths.resize(farthest.size());
-    std::ranges::transform(farthest, seen.depths.begin(), [](std::uint32_t key) {
-      return key == FOREST_KEY_EMPTY ? INFINITY : frame::depth_of_code(key >> 12);
-    });
+    const auto from = returned.read<float>(depths, std::size_t(seen.width) * seen.height);
+    seen.depths.assign(from.begin(), from.end());
   }
 
   void draw_texture() {
@@ -437,13 +552,14 @@ struct OpenGLRenderer::Device {
   }
 };
 
-OpenGLRenderer::OpenGLRenderer() {
+OpenGLRenderer::OpenGLRenderer(Habit habit) {
   if (epoxy_gl_version() < 45)
     throw Error(fmt::format(
         "OpenGL 4.5 is needed for its compute shaders and this driver ({}) has {}.{}; install a newer one "
         "(libgl1-mesa-dri has one for every computer)",
         driver(), epoxy_gl_version() / 10, epoxy_gl_version() % 10));
-  device_ = std::make_unique<Device>();
+  if (habit == Habit::of_driver) habit = on_processor() ? Habit::of_processors : Habit::of_cards;
+  device_ = std::make_unique<Device>(habit == Habit::of_cards ? of_cards : of_processors);
 }
 
 OpenGLRenderer::~OpenGLRenderer() {
@@ -454,9 +570,9 @@ OpenGLRenderer::~OpenGLRenderer() {
 std::string OpenGLRenderer::name() const { return driver(); }
 
 bool OpenGLRenderer::on_processor() const {
-  const std::string driver = name();
+  const std::string name = driver();
   return std::ranges::any_of(std::array{"llvmpipe", "softpipe", "swrast", "SWR"},
-                             [&](const char* word) { return driver.find(word) != driver.npos; });
+                             [&](const char* word) { return name.find(word) != name.npos; });
 }
 
 void OpenGLRenderer::load(const frame::Geometry& geometry) {
@@ -478,13 +594,15 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
   for (std::uint32_t subframe = f.first_subframe; subframe < last; ++subframe) {
     auto start = std::chrono::steady_clock::now();
     d.constants = frame::constants_of(f, subframe);
-    const std::uint32_t empty = FOREST_KEY_EMPTY;
-    glClearNamedBufferSubData(d.keys.name(), GL_R32UI, 0, GLsizeiptr(std::size_t(f.width) * f.height * 4),
-                              GL_RED_INTEGER, GL_UNSIGNED_INT, &empty);
+    d.set_constants(d.uniforms);
+    d.clear.use();
+    glDispatchCompute((f.width + 63) / 64, f.height, 1);
+    glMemoryBarrier(written_for_shaders);
     d.draw_subframe(f);
     glFinish();
     timing.draw += milliseconds_since(start);
     start = std::chrono::steady_clock::now();
+    d.set_constants(d.uniforms);
     d.resolve.use();
     glDispatchCompute((f.width + 63) / 64, f.height, 1);
     glMemoryBarrier(GL_SHADER_STORAGE_BARRIER_BIT | GL_BUFFER_UPDATE_BARRIER_BIT);
@@ -497,17 +615,27 @@ frame::Timing OpenGLRenderer::draw(const frame::Frame& f) {
 }
 
 frame::Image OpenGLRenderer::read() {
-  const Device& d = *device_;
-  frame::Image image{d.width, d.height, std::vector<std::uint8_t>(std::size_t(d.width) * d.height * 4)};
-  glGetNamedBufferSubData(d.image.name(), 0, GLsizeiptr(image.pixels.size()), image.pixels.data());
+  Device& d = *device_;
+  frame::Image image{d.width, d.height, {}, covered()};
+  const auto pixels = d.returned.read<std::uint8_t>(d.image, std::size_t(d.width) * d.height * 4);
+  image.pixels.assign(pixels.begin(), pixels.end());
   check_driver();
-  double covered = 0.;
-  for (std::size_t i = 3; i < image.pixels.size(); i += 4) {
-    covered += image.pixels[i];
-    image.pixels[i] = 255;
-  }
-  image.covered = covered / 255. / double(std::max<std::size_t>(1, image.pixels.size() / 4));
+  for (std::size_t i = 3; i < image.pixels.size(); i += 4) image.pixels[i] = 255;
   return image;
+}
+
+double OpenGLRenderer::covered() {
+  Device& d = *device_;
+  d.rows.reserve(std::max<std::size_t>(16, d.height * std::size_t(4)));
+  d.rows.bind(1);
+  d.image.bind(2);
+  d.set_constants(d.uniforms);
+  d.covered.use();
+  glDispatchCompute(d.height, 1, 1);
+  const auto rows = d.returned.read<std::uint32_t>(d.rows, d.height);
+  check_driver();
+  return std::accumulate(rows.begin(), rows.end(), 0.) / 255. /
+         double(std::max(1u, d.width) * std::size_t(std::max(1u, d.height)));
 }
 
 const frame::DepthMap& OpenGLRenderer::seen() const { return device_->seen; }

@@ -1,10 +1,21 @@
-// Large segments: one workgroup each, its 64 threads share the scan lines.
+// Large parts of near runs, which the 64 threads of a workgroup share.
 
 layout(local_size_x = 64) in;
 
 void main() {
   Capsule c;
-  if (group_index() >= min(large_queued, uint(large.length()))) return;
-  uint entry = texelFetch(large_seen, int(4u + group_index())).x;
-  if (fetch(entry / 64u, entry % 64u, c)) draw_capsule(c, int(gl_LocalInvocationID.x), 64);
+  uint part;
+  if (!fetch_shared(c, part)) return;
+  int lane = int(gl_LocalInvocationID.x);
+  uint manner = manner_of(c);
+  if (manner == as_line)
+    draw_line(c, lane, 64);
+  else if (manner == as_tube)
+    draw_tube(c, lane, 64);
+  else
+#if FOREST_SQUARE < FOREST_WHOLE
+    draw_square(c, part, lane);
+#else
+    draw_capsule(c, lane, 64);
+#endif
 }

@@ -18,10 +18,12 @@ layout(std430, binding = 0) buffer Keys { uint keys[]; };
 // Segments of this band's items that are not hidden, one thread each (item * 64 + index), and the workgroups that draw
 // them (as glDispatchComputeIndirect reads them).
 layout(std430, binding = 3) buffer Queue { uint groups_x, groups_y, groups_z, queued; uint queue[]; };
-// Segments so large that a workgroup shares each: item * 64 + index.
+// What workgroups share, two numbers each: item * 64 + index, and which part of it.
 layout(std430, binding = 4) buffer LargeQueue { uint large_x, large_y, large_z, large_queued; uint large[]; };
 layout(std430, binding = 5) writeonly buffer Tiles { uint tiles[]; };  // farthest key of each tile; coarse ones after the fine
 
+#define FOREST_WHOLE 32768  // pixels: wider than any picture
+const uint FOREST_NOBODY = 0xffffffffu;
 const float golden = 0.61803399;
 
 // The capsule of one thread in camera coordinates: x right, y up, z depth.
@@ -53,6 +55,8 @@ vec2 to_pixel(vec3 p) {
 }
 
 float depth_code(float z) { return clamp((log2(z) + FOREST_DEPTH_BASE) * FOREST_DEPTH_STEPS, 0.0, FOREST_DEPTH_MAX); }
+
+float depth_of(uint key) { return exp2(float(key >> 12) / FOREST_DEPTH_STEPS - FOREST_DEPTH_BASE); }
 
 uint key_of(float code, uint payload) { return (uint(code) << 12) | payload; }
 
@@ -165,6 +169,84 @@ bool fetch_queued(out Capsule c) {
   return at < queued && fetch(entry / 64u, entry % 64u, c);
 }
 
+// Of the queue for workgroups so many places in a row, and the first of them: every thread of a workgroup must ask, also for
+// none. A card is asked once for all of them, since it counts one after the other.
+#if FOREST_ASK_TOGETHER
+shared uint places_wanted, first_place;
+#endif
+uint places_for(uint parts) {
+#if FOREST_ASK_TOGETHER
+  if (gl_LocalInvocationIndex == 0u) places_wanted = 0u;
+  barrier();
+  uint mine = parts == 0u ? 0u : atomicAdd(places_wanted, parts);
+  barrier();
+  if (gl_LocalInvocationIndex == 0u && places_wanted > 0u) first_place = atomicAdd(large_queued, places_wanted);
+  barrier();
+  uint at = first_place + mine, end = first_place + places_wanted;
+  bool asked = gl_LocalInvocationIndex == 0u && places_wanted > 0u;
+#else
+  uint at = parts == 0u ? 0u : atomicAdd(large_queued, parts), end = at + parts;
+  bool asked = parts > 0u;
+#endif
+  if (asked) {
+    end = min(end, uint(large.length()) / 2u);
+    atomicMax(large_x, min(end, 32768u));
+    atomicMax(large_y, (end + 32767u) / 32768u);
+  }
+  return at;
+}
+
+// Leaves to workgroups, in so many parts, what is too much for one thread. False when it is for one, or there is no room: then it
+// is slower alone, and still right.
+bool shared_by_groups(uint code, uint parts, uint at) {
+  if (parts == 0u) return false;
+  uint room = uint(large.length()) / 2u, end = min(at + parts, room);
+  bool all = at + parts <= room;
+  for (uint i = at; i < end; ++i) {
+    large[2u * i] = all ? code : FOREST_NOBODY;
+    large[2u * i + 1u] = i - at;
+  }
+  return all;
+}
+
+// What this workgroup shares, and which part of it; false where there is nothing.
+bool shared_code(out uint code, out uint part) {
+  uint at = group_index();
+  if (at >= min(large_queued, uint(large.length()) / 2u)) return false;
+  code = texelFetch(large_seen, int(4u + 2u * at)).x;
+  part = texelFetch(large_seen, int(5u + 2u * at)).x;
+  return code != FOREST_NOBODY;
+}
+bool fetch_shared(out Capsule c, out uint part) {
+  uint code;
+  return shared_code(code, part) && fetch(code / 64u, code % 64u, c);
+}
+
+// What it is called in the queues.
+uint queued_code() { return texelFetch(queue_seen, int(4u + thread_index())).x; }
+
+// Pixels [low, high), and the squares, in rows, by which workgroups share them.
+struct Squares {
+  ivec2 low, high, count;
+  int edge;
+};
+
+Squares squares_of(ivec2 low, ivec2 high) {
+  Squares s = Squares(low, high, ivec2(0), FOREST_SQUARE / 2);
+  do {
+    s.edge *= 2;
+    s.count = (s.high - s.low + s.edge - 1) / s.edge;
+  } while (s.count.x * s.count.y > 256);
+  return s;
+}
+
+ivec2 low_of(Squares s, uint which) { return s.low + s.edge * ivec2(int(which) % s.count.x, int(which) / s.count.x); }
+// In how many parts workgroups draw them; 0: one thread does.
+uint parts_of(Squares s) {
+  ivec2 size = s.high - s.low;
+  return size.x * size.y < FOREST_ALONE_AREA ? 0u : uint(s.count.x * s.count.y);
+}
+
 // Whether all that lies in a rectangle of pixels, at this depth or behind, is hidden by earlier bands. Looks at no more
 // than `most` tiles; a rectangle that needs more is not hidden.
 bool hidden(vec2 low, vec2 high, float nearest, uint most) {
@@ -193,6 +275,13 @@ bool hidden(vec2 low, vec2 high, float nearest, uint most) {
   return !seen;
 }
 
+// The same of a segment, by the steps that it takes along its major axis within the picture.
+uint parts_of(Capsule c) {
+  vec2 edge = vec2(view.width, view.height);
+  vec2 d = abs(clamp(to_pixel(c.a), vec2(0.0), edge) - clamp(to_pixel(c.b), vec2(0.0), edge));
+  return max(d.x, d.y) > FOREST_ALONE_STEPS ? 1u : 0u;
+}
+
 float width_in_pixels(Capsule c) { return view.focal * (c.ra / lens(c.a.z) + c.rb / lens(c.b.z)); }
 
 // What stands right before the eye reaches far beyond the picture.
@@ -201,7 +290,8 @@ int clipped(float x, int limit) { return int(clamp(ceil(x), 0.0, float(limit)));
 // A line across its major axis, every column (or row) between the ends once, ends half open, so that joined segments neither
 // overlap nor gap. With several subframes a pixel is drawn where its centre lies within the line: the mean is its true
 // coverage. A single one draws lines of whole pixels, by rank: the area drawn is, on the mean over ranks, the true area.
-void draw_line(Capsule c) {
+// This thread draws the steps lane, lane + lanes, …
+void draw_line(Capsule c, int lane, int lanes) {
   vec2 p = to_pixel(c.a), q = to_pixel(c.b);
   vec2 d = q - p;
   float thinnest = c.straw ? FOREST_STRAW_WIDTH * view.thinnest : view.thinnest, shortest = FOREST_STRAW_LENGTH * view.thinnest;
@@ -237,6 +327,7 @@ void draw_line(Capsule c) {
   if (p.x > q.x) { vec2 swap = p; p = q; q = swap; float z = za; za = zb; zb = z; }
   int limit_x = int(steep ? view.height : view.width), limit_y = int(steep ? view.width : view.height);
   int first = max(int(ceil(p.x - 0.5)), 0), last = min(int(ceil(q.x - 0.5)), limit_x);
+  first += lane;
   if (first >= last) return;
 
   // The mean light of the half cylinder one sees, of (0.5 + 0.5 n·l)² as resolve.glsl has it: with the front's share b and
@@ -255,6 +346,8 @@ void draw_line(Capsule c) {
   float slope = (q.y - p.y) / (q.x - p.x), rise = (zb - za) / (q.x - p.x);
   float y = p.y + (float(first) + 0.5 - p.x) * slope - 0.5, half_width = 0.5 * width;
   float z = za + (float(first) + 0.5 - p.x) * rise;
+  slope *= float(lanes);
+  rise *= float(lanes);
   // One loop over the pixels of all scan lines, tested at its end (see hidden).
   int x = first, across = clipped(y - half_width, limit_y), end = clipped(y + half_width, limit_y);
   do {
@@ -266,7 +359,7 @@ void draw_line(Capsule c) {
       put(steep ? across : x, steep ? x : across, z, payload);
     }
     if (++across >= end) {
-      ++x;
+      x += lanes;
       y += slope;
       z += rise;
       across = clipped(y - half_width, limit_y);

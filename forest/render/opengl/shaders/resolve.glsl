@@ -56,7 +56,7 @@ void main() {
     colour = mix(base * (0.16 + 1.05 * shade * shade) * exp(-1.1 * rim), vec3(view.fog_red, view.fog_green, view.fog_blue), fog);
   }
   if (view.glass_opacity > 0.0) {
-    float z = key == FOREST_KEY_EMPTY ? 1e29 : exp2(float(key >> 12) / FOREST_DEPTH_STEPS - FOREST_DEPTH_BASE);
+    float z = key == FOREST_KEY_EMPTY ? 1e29 : depth_of(key);
     if (glass_depth(vec2(x, y) + 0.5) < z) colour = mix(colour, vec3(view.glass_red, view.glass_green, view.glass_blue), view.glass_opacity);
   }
   vec4 sum = vec4(colour, covered);

@@ -63,18 +63,18 @@ Facet fetch_facet(uint index) {
 
 dvec3 homogeneous(vec3 p) { return dvec3(p.xy, view.converge * p.z + view.parallel); }
 
-// The rows lane, lane + lanes, … of it.
-void draw_facet(Facet f, int lane, int lanes) {
+// Its pixels within [low, high), by the threads of a square of so many by so many.
+void draw_facet(Facet f, ivec2 low, ivec2 high, int lane, int edge) {
   dvec3 h0 = homogeneous(f.p.at), h1 = homogeneous(f.q.at), h2 = homogeneous(f.r.at);
   dvec3 n0 = cross(h1, h2), n1 = cross(h2, h0), n2 = cross(h0, h1);
   double volume = dot(h0, n0);
   if (volume == 0.0) return;
   bool front = volume > 0.0;
   if (!front) { n0 = -n0; n1 = -n1; n2 = -n2; }
-  for (int y = f.low.y + lane; y < f.high.y; y += lanes) {
+  for (int y = low.y + lane / edge; y < high.y; y += edge) {
     double up = (double(view.centre_y) - double(y) - 0.5) / double(view.focal);
     dvec3 row = dvec3(n0.y * up + n0.z, n1.y * up + n1.z, n2.y * up + n2.z);
-    for (int x = f.low.x; x < f.high.x; ++x) {
+    for (int x = low.x + lane % edge; x < high.x; x += edge) {
       double right = (double(x) + 0.5 - double(view.centre_x)) / double(view.focal);
       dvec3 inside = dvec3(n0.x, n1.x, n2.x) * right + row;
       double sum = inside.x + inside.y + inside.z;
