@@ -200,7 +200,7 @@ struct Facing {
 struct Habits {
   int alone_steps, alone_area;  // of a segment, and of the rectangle around it: pixels that one thread draws
   int square;                   // pixels along an edge of what a workgroup draws, at least
-  std::uint32_t segments_a_band;  // at least; bands of fewer are drawn together
+  std::uint32_t first_band;       // segments, at least: bands of fewer are drawn together, and each holds twice the last
 
   bool ask_together;  // threads of a workgroup, for places in a queue
 
@@ -211,7 +211,7 @@ struct Habits {
         alone_steps, alone_area, square, int(ask_together));
   }
 };
-constexpr Habits of_processors{1 << 20, 300, 1 << 15, 0, false}, of_cards{32, 64, 32, 1u << 17, true};
+constexpr Habits of_processors{1 << 20, 300, 1 << 15, 0, false}, of_cards{32, 64, 32, 1u << 15, true};
 
 // The parts of a surface that stay.
 struct SurfaceBuffers {
@@ -492,17 +492,19 @@ struct OpenGLRenderer::Device {
     };
     frame::Band from;
     bool first = true;
+    std::uint32_t enough = first_band ? habits.first_band : 4 * habits.first_band;
     for (const frame::Band& to : bands) {
       const std::uint32_t count = segments_in(capsule_list, from.capsules, to.capsules) +
                                   segments_in(dot_list, from.dots, to.dots) +
                                   segments_in(line_list, from.lines, to.lines);
-      if (count < habits.segments_a_band && &to != &bands.back()) continue;
+      if (count < enough && &to != &bands.back()) continue;
       if (!first) find_tiles();
       const std::array<Part, list_count> parts{{{set[capsule_list], from.capsules, to.capsules},
                                                 {set[dot_list], from.dots, to.dots},
                                                 {set[line_list], from.lines, to.lines}}};
       draw(parts, first && first_band);
       first = false;
+      enough *= 2;
       from = to;
     }
   }

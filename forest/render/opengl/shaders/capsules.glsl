@@ -15,7 +15,13 @@ void main() {
   if (drawn) {
     manner = manner_of(c);
     drawn = manner == as_line || !hidden(c);
-    if (drawn) parts = manner == as_solid ? parts_of(squares_of(c)) : parts_of(c);
+    if (drawn && manner == as_solid) {
+      Squares s = squares_of(c);
+      drawn = all(lessThan(s.low, s.high));  // else beside the picture, and still along all of it
+      parts = parts_of(s);
+    } else if (drawn) {
+      parts = parts_of(c);
+    }
   }
   uint at = places_for(parts);
   if (!drawn || shared_by_groups(queued_code(), parts, at)) return;
