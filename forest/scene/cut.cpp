@@ -518,14 +518,11 @@ std::span<Cut> emptied(std::vector<Cut>& cuts, std::size_t count) {
   return std::span(cuts).first(count);
 }
 
-// What `choose_some(begin, end, cuts)` adds to each of so many cuts for those below `count`, in this order; `chunk` of them at
-// a time.
-std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cuts, auto&& choose_some) {
+// What `choose_some(p, cuts)` adds to each of so many cuts for every p below `count`, in this order.
+std::vector<Cut> in_parts(std::size_t count, std::size_t cuts, auto&& choose_some) {
   Lent<std::vector<Cut>> lent;
-  const std::span<Cut> parts = emptied(*lent, (count + chunk - 1) / chunk * cuts);
-  parallel_for(parts.size() / cuts, 1, [&](std::size_t p) {
-    choose_some(p * chunk, std::min(count, (p + 1) * chunk), parts.subspan(p * cuts, cuts));
-  });
+  const std::span<Cut> parts = emptied(*lent, count * cuts);
+  parallel_for(count, 1, [&](std::size_t p) { choose_some(p, parts.subspan(p * cuts, cuts)); });
   std::vector<Cut> whole(cuts);
   parallel_for(4 * cuts, 1, [&](std::size_t n) {
     const std::size_t c = n / 4;
@@ -548,6 +545,22 @@ std::vector<Cut> in_chunks(std::size_t count, std::size_t chunk, std::size_t cut
     whole[p % cuts].far += parts[p].far;
   }
   return whole;
+}
+
+// Where each of so many portions begins that may take about as long as one another, and where the last one ends.
+std::vector<std::size_t> portions(const Forest& forest, std::span<const LeftOut> left_out) {
+  std::vector<std::size_t> bounds{0};
+  std::size_t weight = 0;
+  for (std::size_t i = 0; i < left_out.size(); ++i) {
+    const LeftOut& l = left_out[i];
+    const std::size_t more = l.what == LeftOut::grove ? 8 * std::size_t(forest.groves().nodes()[l.number].count)
+                             : l.what == LeftOut::brick && !l.groups ? 64
+                                                                     : 1;
+    if (weight > 0 && weight + more > left_out_at_once) bounds.push_back(i), weight = 0;
+    weight += more;
+  }
+  if (!left_out.empty()) bounds.push_back(left_out.size());
+  return bounds;
 }
 
 // Sorts a list from near to far, in 64 steps an octave, and returns where each step begins.
@@ -647,13 +660,13 @@ std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, con
   KnownCloseness known(forest, sights.front().eye, closeness);
   const Look look{forest, sights, true, shown, *known, turn};
   const auto groves = forest.groves().parts(neurons_at_once), bricks = parts_of(forest.bricks());
-  std::vector<Cut> cuts = in_chunks(groves.size() + bricks.size(), 1, sights.size(),
-                                    [&](std::size_t i, std::size_t, std::span<Cut> parts) {
-                                      if (i < groves.size())
-                                        choose_grove(look, {groves[i], look.all()}, parts);
-                                      else
-                                        choose_bricks(look, {bricks[i - groves.size()], look.all()}, parts);
-                                    });
+  std::vector<Cut> cuts =
+      in_parts(groves.size() + bricks.size(), sights.size(), [&](std::size_t i, std::span<Cut> parts) {
+        if (i < groves.size())
+          choose_grove(look, {groves[i], look.all()}, parts);
+        else
+          choose_bricks(look, {bricks[i - groves.size()], look.all()}, parts);
+      });
   parallel_for(cuts.size(), 1, [&](std::size_t s) { arrange(cuts[s], sights[s].eye); });
   return cuts;
 }
@@ -667,9 +680,11 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
              Closeness* closeness) {
   KnownCloseness known(forest, now.eye, closeness);
   const Look look{forest, std::span(&now, 1), false, shown, *known};
-  const auto reveal = [&](std::size_t begin, std::size_t end, std::span<Cut> cuts) {
+  const std::vector<std::size_t> bounds = portions(forest, left_out);
+  const auto reveal = [&](std::size_t portion, std::span<Cut> cuts) {
     Descent descent(look, cuts);
-    for (const LeftOut& l : left_out.subspan(begin, end - begin)) {
+    for (const LeftOut& l :
+         left_out.subspan(bounds[portion], bounds[portion + 1] - bounds[portion])) {
       // Most are asked no more than this: the camera is that of the cut.
       if (l.seen.nearest > now.horizon) cuts.front().left_out.push_back(l);
       if (l.seen.nearest > now.horizon || (now.before && now.before->hide(l.seen))) continue;
@@ -697,7 +712,7 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
     }
     descent.run();
   };
-  Cut cut = std::move(in_chunks(left_out.size(), left_out_at_once, 1, reveal).front());
+  Cut cut = std::move(in_parts(bounds.size() - 1, 1, reveal).front());
   arrange(cut, now.eye);
   return cut;
 }
