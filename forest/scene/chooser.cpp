@@ -14,9 +14,11 @@ Chooser::Horizons Chooser::horizons_of(const frame::DepthMap& seen) {
   constexpr std::array<float, 3> shares{.6f, .85f, .98f};
   constexpr float least = 100.f;  // µm: an eye within a bush is told little of where it is going
   Horizons horizons{INFINITY, INFINITY, INFINITY};
+  // Some thousand say how they are spread.
+  const std::size_t every = std::max<std::size_t>(1, seen.depths.size() / 8192);
   std::vector<float> depths;
-  for (const float depth : seen.depths)
-    if (std::isfinite(depth)) depths.push_back(depth);
+  for (std::size_t i = 0; i < seen.depths.size(); i += every)
+    if (std::isfinite(seen.depths[i])) depths.push_back(seen.depths[i]);
   for (std::size_t i = 0; i < shares.size() && !depths.empty(); ++i) {
     const auto nth = depths.begin() + std::ptrdiff_t(shares[i] * float(depths.size() - 1));
     std::nth_element(depths.begin(), nth, depths.end());

@@ -5,12 +5,15 @@
 #include <bit>
 #include <cmath>
 
+#include "forest/core/parallel.h"
+
 namespace forest::scene {
 namespace {
 
 constexpr float margin = 2.f;          // pixels that a line may be wider than what it shows, and jitter
 constexpr float depth_step = 1.0001f;  // more than a step of a pixel's key
 constexpr float tile = float(FOREST_TILE);
+constexpr std::size_t rows_at_once = 32;
 
 }  // namespace
 
@@ -25,19 +28,15 @@ Occluders::Occluders(const frame::DepthMap& map, const frame::Camera& camera, co
   squares_.push_back(map.depths);
   for (std::uint32_t side = 1; 2 * side <= std::min(width_, height_); side *= 2) {
     const std::vector<float>& small = squares_.back();
-    std::vector<float> large(small.size()), wide(small.size());
-    for (std::uint32_t y = 0; y < height_; ++y) {
-      const float* row = &small[std::size_t(y) * width_];
-      float* to = &wide[std::size_t(y) * width_];
-      for (std::uint32_t x = 0; x < width_ - side; ++x) to[x] = std::max(row[x], row[x + side]);
-      std::copy(row + (width_ - side), row + width_, to + (width_ - side));
-    }
-    for (std::uint32_t y = 0; y < height_; ++y) {
-      const float* row = &wide[std::size_t(y) * width_];
-      const float* below = &wide[std::size_t(std::min(y + side, height_ - 1)) * width_];
-      for (std::uint32_t x = 0; x < width_; ++x)
-        large[std::size_t(y) * width_ + x] = std::max(row[x], y + side < height_ ? below[x] : row[x]);
-    }
+    std::vector<float> large(small.size());
+    parallel_for(height_, rows_at_once, [&](std::size_t y) {
+      const float* row = &small[y * width_];
+      const float* below = y + side < height_ ? row + std::size_t(side) * width_ : row;
+      float* to = &large[y * width_];
+      for (std::uint32_t x = 0; x < width_ - side; ++x)
+        to[x] = std::max(std::max(row[x], row[x + side]), std::max(below[x], below[x + side]));
+      for (std::uint32_t x = width_ - side; x < width_; ++x) to[x] = std::max(row[x], below[x]);
+    });
     squares_.push_back(std::move(large));
   }
 }
