@@ -117,17 +117,22 @@ bool transparent(const Frame& frame) {
 }
 
 void check(const Lists& lists, const Geometry& geometry) {
+  // Of all of them: there may be a million.
+  std::uint64_t last = 0;
+  std::uint32_t classes = 0;
+  bool known = true, finite = true;
   for (const auto list : {lists.dots, lists.lines, lists.capsules})
     for (const Item& item : list) {
-      require(geometry.straw(item) ? item.first_segment >= geometry.segments.size() - geometry.owners.size()
-                                   : item.instance < geometry.instances.size(),
-              "an item names an instance that is not there");
-      require(unpacked(item.state).colour_class < 16, "a colour class must be below 16");
-      require(item.first_segment + std::size_t(std::bit_width(item.drawn)) <= geometry.segments.size(),
-              "an item names segments that are not there");
-      require(item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius),
-              "an item's sphere must be finite");
+      known &= geometry.straw(item) ? item.first_segment >= geometry.segments.size() - geometry.owners.size()
+                                    : item.instance < geometry.instances.size();
+      classes |= unpacked(item.state).colour_class;
+      last = std::max(last, item.first_segment + std::uint64_t(std::bit_width(item.drawn)));
+      finite &= item.radius >= 0.f && std::isfinite(item.x + item.y + item.z + item.radius);
     }
+  require(known, "an item names an instance that is not there");
+  require(classes < 16, "a colour class must be below 16");
+  require(last <= geometry.segments.size(), "an item names segments that are not there");
+  require(finite, "an item's sphere must be finite");
   const auto check_entries = [](std::span<const std::uint8_t> entries, std::size_t wanted) {
     require(entries.empty() || entries.size() == wanted,
             "a list has colours for all of its segments, or for none");
