@@ -553,7 +553,8 @@ std::vector<std::size_t> portions(const Forest& forest, std::span<const LeftOut>
   std::size_t weight = 0;
   for (std::size_t i = 0; i < left_out.size(); ++i) {
     const LeftOut& l = left_out[i];
-    const std::size_t more = l.what == LeftOut::grove ? 8 * std::size_t(forest.groves().nodes()[l.number].count)
+    const std::size_t more = l.what == LeftOut::grove
+                                 ? 8 * std::size_t(forest.groves().nodes()[l.number].count)
                              : l.what == LeftOut::brick && !l.groups ? 64
                                                                      : 1;
     if (weight > 0 && weight + more > left_out_at_once) bounds.push_back(i), weight = 0;
@@ -683,8 +684,7 @@ Cut revealed(const Forest& forest, const Sight& now, std::span<const LeftOut> le
   const std::vector<std::size_t> bounds = portions(forest, left_out);
   const auto reveal = [&](std::size_t portion, std::span<Cut> cuts) {
     Descent descent(look, cuts);
-    for (const LeftOut& l :
-         left_out.subspan(bounds[portion], bounds[portion + 1] - bounds[portion])) {
+    for (const LeftOut& l : left_out.subspan(bounds[portion], bounds[portion + 1] - bounds[portion])) {
       // Most are asked no more than this: the camera is that of the cut.
       if (l.seen.nearest > now.horizon) cuts.front().left_out.push_back(l);
       if (l.seen.nearest > now.horizon || (now.before && now.before->hide(l.seen))) continue;

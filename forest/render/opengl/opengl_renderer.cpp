@@ -200,7 +200,8 @@ struct Facing {
 struct Habits {
   int alone_steps, alone_area;  // of a segment, and of the rectangle around it: pixels that one thread draws
   int square;                   // pixels along an edge of what a workgroup draws, at least
-  std::uint32_t first_band;       // segments, at least: bands of fewer are drawn together, and each holds twice the last
+  std::uint32_t
+      first_band;  // segments, at least: bands of fewer are drawn together, and each holds twice the last
 
   bool ask_together;  // threads of a workgroup, for places in a queue
 
