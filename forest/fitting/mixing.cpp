@@ -126,7 +126,7 @@ double apart(const Cell& one, const Cell& other) {
   for (const auto& [kind, of] : one.kinds) {
     const auto found = other.kinds.find(kind);
     for (std::size_t s = 0; s < styles; ++s)
-      if (s != slope && s != kink)
+      if (s < slope || s > kinks)
         sum += std::pow(of.style[s] - (found == other.kinds.end() ? 0. : found->second.style[s]), 2);
   }
   return sum;

@@ -27,7 +27,13 @@ namespace {
 using Out = std::back_insert_iterator<std::string>;
 
 // What is a tracer's habit rather than a neuron's.
-constexpr bool habit(std::size_t style) { return style == grain || style == slope || style == kink; }
+constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
+
+// How narrowly forks are chosen by what sets tracers apart beside the mean: of few neurons, hardly, since none are alike in all of
+// it.
+double habits_of_many(double width, std::size_t neurons) {
+  return width * std::pow(std::max(1., 100. / double(neurons)), 3.);
+}
 
 double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
 
@@ -169,10 +175,12 @@ class Writer {
          const Resampling& options, const Seldom& seldom)
       : traced_(traced), options_(options), seldom_(seldom), mixed_(mixed) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
-      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
-                              s == grain                ? .2 * options.style
-                              : s == slope || s == kink ? options.tracer
-                                                        : options.style);
+      kernels_ +=
+          fmt::format(", {} ~ {:.2g}", style_names[s],
+                      s == grain                  ? .2 * options.style
+                      : s == stairs || s == kinks ? habits_of_many(options.tracer, traced.cells.size())
+                      : habit(s)                  ? options.tracer
+                                                  : options.style);
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
         traced.cells.size(), traced.forks.size(), title);
     cells();

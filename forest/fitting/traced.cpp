@@ -41,15 +41,27 @@ double slope_of(std::span<const Point> points) {
   return length > 0. ? along / length : 0.;
 }
 
-// By which angle it turns from one segment to the next, in the mean.
-double kink_of(std::span<const Point> points) {
-  double sum = 0.;
+// By which angle it turns from one segment to the next.
+void add_turns(std::span<const Point> points, std::vector<double>& to) {
   for (std::size_t i = 2; i < points.size(); ++i) {
     const Vec3 before = points[i - 1].position() - points[i - 2].position(),
                after = points[i].position() - points[i - 1].position();
-    sum += std::atan2(double(before.cross(after).norm()), double(before.dot(after)));
+    to.push_back(std::atan2(double(before.cross(after).norm()), double(before.dot(after))));
   }
-  return sum / double(points.size() - 2);
+}
+double kink_of(std::span<const Point> points) {  // in the mean
+  std::vector<double> turns;
+  add_turns(points, turns);
+  return statistics::mean(turns);
+}
+
+// The angle of each segment to the plane of the slice.
+void add_elevations(std::span<const Point> points, std::vector<double>& to) {
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    const Vec3 step = points[i].position() - points[i - 1].position();
+    if (!step.isZero(0.f))
+      to.push_back(std::atan2(std::abs(double(step.z())), std::hypot(double(step.x()), double(step.y()))));
+  }
 }
 
 // Unit; zero for a branch without length.
@@ -198,6 +210,8 @@ struct Learner {
     }
     std::map<int, Manner> manners;
     for (auto& [kind, of] : by_kind) {
+      for (const std::size_t s : {stairs, kinks})  // not their mean: how much they differ
+        of.values[s] = {of.values[s].size() > 1 ? statistics::summarize(of.values[s]).sd : 0.};
       of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
       Manner& manner = manners[kind];
       for (std::size_t s = 0; s < styles; ++s)
@@ -219,6 +233,8 @@ struct Learner {
     values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
     values[slope].push_back(slope_of(points(i)));
     if (points(i).size() > 2) values[kink].push_back(kink_of(points(i)));
+    add_elevations(points(i), values[stairs]);
+    add_turns(points(i), values[kinks]);
     values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
     if (above(i) < 0) return;
     const auto before = points(std::uint32_t(above(i)));

@@ -19,9 +19,25 @@
 namespace forest::fitting {
 
 // What sets the branches of one neuron apart from those of another, and the names that the grammar gives it.
-enum { reach, wander, girth, grain, slope, kink, depth, spread, thinning, extent, number, styles };
-inline constexpr std::array<const char*, styles> style_names{
-    "reach", "wander", "girth", "grain", "slope", "kink", "depth", "spread", "thinning", "extent", "forks"};
+enum {
+  reach,
+  wander,
+  girth,
+  grain,
+  slope,
+  kink,
+  stairs,
+  kinks,
+  depth,
+  spread,
+  thinning,
+  extent,
+  number,
+  styles
+};
+inline constexpr std::array<const char*, styles> style_names{"reach",    "wander", "girth", "grain", "slope",
+                                                             "kink",     "stairs", "kinks", "depth", "spread",
+                                                             "thinning", "extent", "forks"};
 using Style = std::array<double, styles>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured

@@ -2,8 +2,10 @@
 #include "forest/lsystem/sample.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <map>
+#include <numeric>
 #include <span>
 #include <vector>
 
@@ -24,19 +26,18 @@ void add_kernel(const float* column, float wanted, std::size_t count, float* sum
   }
 }
 
-// Where it never changes, it does so evenly.
-std::vector<float> changes_of(std::span<const Trace::Stop> stops) {
-  std::vector<float> changes(stops.size(), 0.f);
-  for (std::size_t i = 1; i < stops.size(); ++i) {
-    const float before = stops[i - 1].diameter, after = stops[i].diameter;
-    changes[i] = changes[i - 1] + (before > 0.f && after > 0.f ? std::abs(std::log(after / before)) : 0.f);
+// Where a diameter never changes, it does so evenly.
+void share_changes(std::vector<Calibre>& places) {
+  for (std::size_t i = 1; i < places.size(); ++i) {
+    const float before = places[i - 1].diameter, after = places[i].diameter;
+    places[i].change =
+        places[i - 1].change + (before > 0.f && after > 0.f ? std::abs(std::log(after / before)) : 0.f);
   }
-  const float all = changes.back();
-  for (std::size_t i = 0; i < changes.size(); ++i)
-    changes[i] =
-        all > 0.f ? changes[i] / all : float(i) / float(std::max<std::size_t>(1, changes.size() - 1));
-  changes.back() = 1.f;
-  return changes;
+  const float all = places.back().change;
+  for (std::size_t i = 0; i < places.size(); ++i)
+    places[i].change =
+        all > 0.f ? places[i].change / all : float(i) / float(std::max<std::size_t>(1, places.size() - 1));
+  places.back().change = 1.f;
 }
 
 }  // namespace
@@ -88,15 +89,91 @@ Course::Course(const Trace& t, float scale) {
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = times * places[i] + rest * lengths[i];
 }
 
-std::size_t Calibre::next(float part, bool long_step) {
-  const auto& lengths = of_.lengths;
-  const float wanted = part * of_.length();
-  const std::size_t end = lengths.size() - 1;
-  auto at = std::min(end, std::size_t(std::ranges::lower_bound(lengths, wanted) - lengths.begin()));
-  if (at > 0 && wanted - lengths[at - 1] < lengths[at] - wanted) --at;
-  if (last_ == none && part < 1.f) at = 0;
-  if (at == last_ && at < end && long_step) ++at;
-  return last_ = at;
+namespace {
+
+// The places of a traced branch for one of so many: some that follow one another are left out, or come twice, where the step from
+// what is before to what comes after is most like one that was there; rather in the middle.
+std::vector<std::size_t> places_for(const Trace& of, std::size_t wanted) {
+  std::vector<std::size_t> places(of.stops.size());
+  std::iota(places.begin(), places.end(), 0);
+  while (places.size() != wanted) {
+    const std::size_t count = places.size();
+    if (wanted < 3 || count < 3) {  // nothing to choose from
+      const std::size_t last = places.back();
+      places.resize(wanted, last);
+      places.back() = last;
+      break;
+    }
+    const bool fewer = wanted < count;
+    const std::size_t skip = std::min(fewer ? count - wanted : wanted - count, count - 2);
+    const auto diameter = [&](std::size_t i) { return of.stops[places[i]].diameter; };
+    std::size_t best = 1;
+    float least = INFINITY;
+    for (std::size_t first = 1; first + skip < count; ++first) {
+      // What came before the place that comes next, and what does now.
+      const float was = diameter(fewer ? first + skip - 1 : first - 1),
+                  is = diameter(fewer ? first - 1 : first + skip - 1);
+      const float off = was + is > 0.f ? std::abs(was - is) / (was + is) : 0.f;
+      const float aside = std::abs(float(2 * first + skip) / float(count) - 1.f);
+      if (const float cost = off + .02f * aside; cost < least) least = cost, best = first;
+    }
+    const auto from = places.begin() + std::ptrdiff_t(best), to = from + std::ptrdiff_t(skip);
+    if (fewer) {
+      places.erase(from, to);
+    } else {
+      const std::vector<std::size_t> twice(from, to);
+      places.insert(from, twice.begin(), twice.end());
+    }
+  }
+  return places;
+}
+
+// Short steps change less: of so many changes that follow one another each goes where the step is about as long as its own, as long
+// as no diameter leaves the range that they had. What comes after them stays.
+constexpr std::size_t window = 4;
+void match_lengths(std::span<float, window + 1> diameters, std::span<const float, window> own,
+                   std::span<const float, window> here) {
+  const auto [low, high] = std::ranges::minmax(diameters);
+  constexpr float rounding = 1e-4f;
+  std::array<float, window> changes{};
+  std::array<std::size_t, window> order{}, best{};
+  for (std::size_t k = 0; k < window; ++k)
+    changes[k] = diameters[k + 1] - diameters[k], order[k] = best[k] = k;
+  float most = -INFINITY;
+  do {
+    float fit = 0.f, at = diameters[0];
+    bool within = true;
+    for (std::size_t k = 0; k < window; ++k) {
+      at += changes[order[k]];
+      within &= at >= low - rounding && at <= high + rounding;
+      fit += own[order[k]] * here[k];
+    }
+    if (within && fit > most + rounding) most = fit, best = order;
+  } while (std::ranges::next_permutation(order).found);
+  for (std::size_t k = 0; k + 1 < window; ++k) diameters[k + 1] = diameters[k] + changes[best[k]];
+}
+
+}  // namespace
+
+std::vector<Calibre> calibres(const Trace& of, std::span<const float> along) {
+  const std::vector<std::size_t> places = places_for(of, along.size());
+  const auto size = [](std::span<const float> lengths, std::size_t i) {
+    return std::log(std::max(lengths[i] - (i ? lengths[i - 1] : 0.f), 1e-3f));
+  };
+  std::vector<float> diameters, own, here;
+  for (std::size_t n = 0; n < places.size(); ++n) {
+    diameters.push_back(of.stops[places[n]].diameter);
+    own.push_back(size(of.lengths, places[n]));
+    here.push_back(size(along, n));
+  }
+  for (std::size_t n = 1; n + window <= places.size(); n += window)
+    match_lengths(std::span<float, window + 1>(&diameters[n - 1], window + 1),
+                  std::span<const float, window>(&own[n], window),
+                  std::span<const float, window>(&here[n], window));
+  std::vector<Calibre> told;
+  for (const float diameter : diameters) told.push_back({diameter, 0.f});
+  share_changes(told);
+  return told;
 }
 
 void Sample::add(std::span<const double> condition_row, std::span<const double> outcome_row,
@@ -109,7 +186,12 @@ void Sample::add(std::span<const double> condition_row, std::span<const double> 
     Vec3 last = Vec3::Zero();
     for (const Trace::Stop& stop : t.stops)
       t.lengths.push_back(length += (stop.at - last).norm()), last = stop.at;
-    t.changes = changes_of(t.stops);
+    float before = t.diameter, way = 0.f;
+    for (std::size_t i = 0; i < t.stops.size(); ++i) {
+      const float step = t.lengths[i] - way;
+      if (step > 0.f) t.steepest = std::max(t.steepest, std::abs(t.stops[i].diameter - before) / step);
+      before = t.stops[i].diameter, way = t.lengths[i];
+    }
   }
   branches_.push_back(std::move(branches));
 }

@@ -33,7 +33,8 @@ struct Trace {
   // Worked out by Sample::add().
   Vec3 ahead = Vec3::Zero();        // where it heads at its end
   std::vector<float> lengths = {};  // from its beginning to each place, µm
-  std::vector<float> changes = {};  // of how its diameter changes after the first place, the share up to each
+
+  float steepest = 0.f;  // how fast its diameter changes at most, µm a µm
 
   const Vec3& end() const { return stops.back().at; }
   float length() const { return lengths.back(); }
@@ -50,21 +51,17 @@ struct Course {
   float length() const { return lengths.back(); }
 };
 
-/// Tells the diameters of one traced branch along another, place by place. A tracer sets them in steps, rather in long ones:
-/// each is that of the nearest place, but a long step does not end with the diameter that it begins with when the branch goes on.
-/// The first place has the first diameter: by how much that differs from what the branch leaves belongs to the fork.
-class Calibre {
- public:
-  explicit Calibre(const Trace& of) : of_(of) {}
-  /// The number of the place whose diameter it is.
-  /// @param part  share of the way, not less than the last time
-  std::size_t next(float part, bool long_step);
-
- private:
-  const Trace& of_;
-  static constexpr std::size_t none = std::size_t(-1);
-  std::size_t last_ = none;
+/// At a place of a branch.
+struct Calibre {
+  float diameter;  // µm
+  float change;    // of how the diameter changes after the first place, the share up to here
 };
+
+/// The diameters of one traced branch for another, place by place. They are not drawn out: how often a tracer sets another, and how
+/// they waver, is his habit. Where there are more places or fewer, some that follow one another come twice or are left out. The first
+/// place has the first diameter, since by how much that differs from what the branch leaves belongs to the fork; the last the last.
+/// @param along  from the beginning to each place, µm; at least one
+std::vector<Calibre> calibres(const Trace& of, std::span<const float> along);
 
 /// Where a path heads that ends with these places: the unit vector over its last `reach` µm, or over all of it when it is
 /// shorter; zero when it has no length. A path through `from`, then through the stops.

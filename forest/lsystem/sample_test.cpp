@@ -186,20 +186,58 @@ Trace traced(std::vector<Trace::Stop> stops) {
   return sample.branches(0)[0];
 }
 
-TEST(Calibre, IsThatOfTheNearestPlaceAndLongStepsGoOn) {
-  const Trace t = traced({{{1, 0, 0}, 4}, {{2, 0, 0}, 3}, {{3, 0, 0}, 2}, {{4, 0, 0}, 1}});
-  Calibre calibre(t);
-  EXPECT_EQ(calibre.next(.2f, true), 0u);
-  EXPECT_EQ(calibre.next(.3f, false), 0u);
-  EXPECT_EQ(calibre.next(.35f, true), 1u);  // though the first is nearer
-  EXPECT_EQ(calibre.next(.7f, true), 2u);
-  EXPECT_EQ(calibre.next(1.f, true), 3u);
-  EXPECT_EQ(calibre.next(1.f, true), 3u);
-  EXPECT_EQ(Calibre(t).next(.9f, true), 0u);  // the first place, however far away
-  EXPECT_EQ(Calibre(t).next(1.f, true), 3u);  // … but for the only one
+std::vector<float> diameters_for(const Trace& t, std::vector<float> along) {
+  const std::vector<Calibre> told = calibres(t, along);
+  EXPECT_EQ(told.front().change, along.size() > 1 ? 0.f : 1.f);
+  EXPECT_EQ(told.back().change, 1.f);
+  std::vector<float> diameters;
+  for (const Calibre& c : told) diameters.push_back(c.diameter);
+  return diameters;
 }
 
-// Twice as thick where it begins, as thick where it ends, and in between as the diameter itself changes: at once, here.
+TEST(Calibres, AreThoseThatWereTracedWhereStepsAreThoseThatWere) {
+  const Trace t = traced({{{1, 0, 0}, 4}, {{2, 0, 0}, 3}, {{4, 0, 0}, 3}, {{5, 0, 0}, 1}, {{9, 0, 0}, 2}});
+  EXPECT_EQ(diameters_for(t, t.lengths), (std::vector<float>{4, 3, 3, 1, 2}));
+  EXPECT_EQ(diameters_for(t, {7}), std::vector<float>{2});
+  EXPECT_EQ(diameters_for(t, {7, 8}), (std::vector<float>{4, 2}));
+  EXPECT_EQ(diameters_for(traced({{{1, 0, 0}, 4}}), {1, 2, 3}), (std::vector<float>{4, 4, 4}));
+}
+
+TEST(Calibres, WaverAsOftenAsTheyDidHoweverManyPlacesThereAre) {
+  std::vector<Trace::Stop> stops;
+  for (int i = 0; i < 10; ++i) stops.push_back({Vec3(float(i + 1), 0, 0), i % 2 ? 2.f : 1.f});
+  const Trace t = traced(stops);
+  for (const std::size_t places : {4u, 8u, 10u, 12u, 18u, 40u, 200u}) {
+    std::vector<float> along;
+    for (std::size_t i = 0; i < places; ++i) along.push_back(float(i + 1));
+    const std::vector<float> told = diameters_for(t, along);
+    ASSERT_EQ(told.size(), places);
+    for (std::size_t i = 0; i < places; ++i) EXPECT_EQ(told[i], i % 2 ? 2.f : 1.f) << places;
+  }
+}
+
+TEST(Calibres, ChangeInStepsAboutAsLongAsThoseThatTheyChangedIn) {
+  const Trace t =
+      traced({{{1, 0, 0}, 1}, {{5, 0, 0}, 2}, {{6, 0, 0}, 2}, {{10, 0, 0}, 1.5f}, {{11, 0, 0}, 1.5f}});
+  EXPECT_EQ(diameters_for(t, {1, 2, 6, 7, 11}), (std::vector<float>{1, 1, 2, 2, 1.5f}));
+}
+
+// A branch whose diameter changed by 2 µm a µm at most, told along shorter steps.
+TEST(Trace, DiametersChangeNoFasterThanTheyDid) {
+  const Grammar g = parse(R"(sample twigs() = | 1 0 0 1: 1 0 0 1, 1.1 0 0 1, 1.2 0 0 1, 5 0 0 1;
+  | 1 0 0 1: 1 0 0 1, 2 0 0 3, 3 0 0 1, 4 0 0 1
+axiom: Soma(10) Trace(twigs, 0, 0, 1, 0, 1, 1, 1)
+nothing: z -> z
+)",
+                          "g");
+  const Morphology m = interpret(derive(g, 0, 0, 0), g);
+  ASSERT_EQ(m.points().size(), 5u);
+  const std::array<float, 5> radii{.5f, .5f, .6f, .5f, .5f};
+  for (std::size_t i = 0; i < radii.size(); ++i) EXPECT_NEAR(m.points()[i].radius, radii[i], 1e-5f) << i;
+}
+
+// Twice as thick where it begins, as thick where it ends, and in between as the diameter itself changes: here at once, but by no
+// more than 2 µm a µm until the end.
 TEST(Trace, WhatIsAsThickAsWhatWasBeforeItRemainsSo) {
   const Grammar g = parse(R"(sample twigs() = | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 2, 4 0 0 2;
   | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 4
@@ -210,7 +248,7 @@ none: A ->
   std::vector<float> radii;
   const Morphology m = interpret(derive(g, 0, 0, 0), g);
   for (const Point& p : m.points()) radii.push_back(p.radius);
-  EXPECT_EQ(radii, (std::vector<float>{4, 4, 4, 1, 1, 2, 1, .5f}));  // one that never changes does so evenly
+  EXPECT_EQ(radii, (std::vector<float>{4, 4, 4, 3, 1, 2, 1, .5f}));  // one that never changes does so evenly
 }
 
 // What multiplying a diameter and dividing it again leaves of it is not another diameter.

@@ -449,16 +449,17 @@ class Turtle {
       if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       const Course course(t, float(scale));
-      const float whole = course.length(), mean_step = whole / float(course.places.size());
-      const bool own = &calibre == &t && course.places.size() == t.stops.size();
-      Calibre diameters(calibre);
-      auto start = float(0.5 * thick(calibre.diameter, 0.f));
+      const float whole = course.length();
+      const std::vector<Calibre> diameters = calibres(calibre, course.lengths);
       float way = 0.f;
+      auto start = float(0.5 * thick(calibre.diameter, 0.f));
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
-        const bool long_step = course.lengths[i] - std::exchange(way, course.lengths[i]) >= mean_step;
-        const std::size_t like = own ? i : diameters.next(part, long_step);
-        state_.diameter = thick(calibre.stops[like].diameter, calibre.changes[like]);
+        const float step_length = float(scale) * (course.lengths[i] - std::exchange(way, course.lengths[i]));
+        const double most = double(calibre.steepest) * double(step_length);
+        state_.diameter = thick(diameters[i].diameter, diameters[i].change);
+        if (calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size())
+          state_.diameter = std::clamp(state_.diameter, 2. * double(start) - most, 2. * double(start) + most);
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
