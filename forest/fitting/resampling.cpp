@@ -221,10 +221,13 @@ class Writer {
 
   void styles_of_cells() {
     put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and "
-        "coarsely traced branches are,\n"
-        "# how deep in the slice, how wide their forks, how much thinner daughters, how far they reach and "
-        "how often they fork; the\n"
-        "# thinnest diameter (µm), and the mean logarithm of path by chord.\n"
+        "coarsely traced "
+        "branches are,\n"
+        "# how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide "
+        "their forks, how much\n"
+        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter (µm), and "
+        "the mean logarithm of path "
+        "by chord.\n"
         "sample styles(cell =, kind = -> {}, thinnest, winding) =",
         fmt::join(style_names, ", "));
     bool first = true;

@@ -18,7 +18,8 @@
 
 namespace forest::fitting {
 
-// What sets the branches of one neuron apart from those of another, and the names that the grammar gives it.
+// What sets the branches of one neuron apart from those of another, and the names that the grammar gives it. Stairs and kinks are how
+// much its segments differ in how steep they are, and the angles between them.
 enum {
   reach,
   wander,
