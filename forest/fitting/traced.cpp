@@ -49,11 +49,6 @@ void add_turns(std::span<const Point> points, std::vector<double>& to) {
     to.push_back(std::atan2(double(before.cross(after).norm()), double(before.dot(after))));
   }
 }
-double kink_of(std::span<const Point> points) {  // in the mean
-  std::vector<double> turns;
-  add_turns(points, turns);
-  return statistics::mean(turns);
-}
 
 // The angle of each segment to the plane of the slice.
 void add_elevations(std::span<const Point> points, std::vector<double>& to) {
@@ -232,9 +227,11 @@ struct Learner {
     values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
     values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
     values[slope].push_back(slope_of(points(i)));
-    if (points(i).size() > 2) values[kink].push_back(kink_of(points(i)));
     add_elevations(points(i), values[stairs]);
+    const std::size_t known = values[kinks].size();
     add_turns(points(i), values[kinks]);
+    if (const auto turns = std::span(values[kinks]).subspan(known); !turns.empty())
+      values[kink].push_back(statistics::mean(turns));
     values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
     if (above(i) < 0) return;
     const auto before = points(std::uint32_t(above(i)));
