@@ -35,6 +35,9 @@ double habits_of_many(double width, std::size_t neurons) {
   return width * std::pow(std::max(1., 100. / double(neurons)), 3.);
 }
 
+// … and how much of that difference a branch makes up for.
+double habits_kept(std::size_t neurons) { return std::pow(std::min(1., double(neurons) / 75.), 3.); }
+
 double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
 
 // What a neuron begins with, in `growth` and when there are some without a soma.
@@ -61,6 +64,11 @@ function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
 # How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
 distribution steeper(kind, donor) = max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
+# How much more unevenly steep it is drawn, how many times as large the angles between its steps are, and how much more they differ,
+# as this neuron's tracer would have done.
+distribution stepped(kind, donor) = max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
+distribution turned(kind, donor) = max(0.6, min(1.6, (styles.angle(styles(me, kind)) / styles.angle(donor))^habits))
+distribution kinky(kind, donor) = max(0.5, min(2, (styles.kinky(styles(me, kind)) / styles.kinky(donor))^(1.6 * habits)))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
 # together take the whole.
@@ -100,7 +108,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), habits)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
@@ -159,7 +167,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz), last, sz)
+       part * (wx - gx), part * (wy - gy), part * (wz - gz), last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -225,10 +233,12 @@ class Writer {
         "branches are,\n"
         "# how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide "
         "their forks, how much\n"
-        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter (µm), and "
-        "the mean logarithm of path "
-        "by chord.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, winding) =",
+        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter (µm), the "
+        "mean "
+        "logarithm of path by chord,\n"
+        "# the mean angle between segments, and how much they differ in how steep they are, and those "
+        "angles, in shares of the means.\n"
+        "sample styles(cell =, kind = -> {}, thinnest, winding, angle, stepped, kinky) =",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -238,7 +248,8 @@ class Writer {
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4));
+        put(" {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4), rounded(of.turn, 1e4),
+            rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
       }
   }
 
@@ -443,6 +454,7 @@ class Writer {
         "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
         "#define steep 1     # how much of the difference between its slope and its donor's a branch makes "
         "up for\n"
+        "#define habits {:.4g}  # … of how unevenly steep and how kinked it was drawn\n"
         "#define most 0.5    # … in shares of their length, at most\n"
         "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
@@ -450,7 +462,7 @@ class Writer {
         "where its diameters are of\n"
         "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
-        options_.familiar, options_.jitter);
+        habits_kept(traced_.cells.size()), options_.familiar, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);

@@ -205,14 +205,21 @@ struct Learner {
     }
     std::map<int, Manner> manners;
     for (auto& [kind, of] : by_kind) {
+      Manner& manner = manners[kind];
+      const auto mean_of = [&](std::size_t s) {
+        return of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
+      };
+      constexpr double flat = .02;  // radians
+      const double climb = std::max(flat, mean_of(stairs)), turn = std::max(manner.turn, mean_of(kinks));
       for (const std::size_t s : {stairs, kinks})  // not their mean: how much they differ
         of.values[s] = {of.values[s].size() > 1 ? statistics::summarize(of.values[s]).sd : 0.};
       of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
-      Manner& manner = manners[kind];
-      for (std::size_t s = 0; s < styles; ++s)
-        manner.style[s] = of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
+      for (std::size_t s = 0; s < styles; ++s) manner.style[s] = mean_of(s);
       manner.thinnest = of.widest > 0. ? of.thinnest : 0.;  // without diameters: none
       manner.winding = std::max(.01, manner.style[wander]);
+      manner.turn = turn;
+      manner.stairs = std::max(manner.stairs, manner.style[stairs] / climb);
+      manner.kinks = std::max(manner.kinks, manner.style[kinks] / turn);
     }
     return manners;
   }

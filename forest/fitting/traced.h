@@ -92,6 +92,9 @@ struct Manner {
   Style style{};
   double thinnest = least_diameter;  // diameter, µm
   double winding = .01;              // mean of the logarithm of path / chord
+  double turn = .02;                 // mean angle from one segment to the next
+  // How much its segments differ in how steep they are, and those angles: standard deviations in shares of the mean.
+  double stairs = .1, kinks = .1;
 };
 
 struct Cell {

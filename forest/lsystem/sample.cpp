@@ -7,6 +7,7 @@
 #include <map>
 #include <numeric>
 #include <span>
+#include <utility>
 #include <vector>
 
 #include <fmt/format.h>
@@ -87,6 +88,48 @@ Course::Course(const Trace& t, float scale) {
   const float times = t.length() / length();
   const Vec3 rest = (t.end() - times * places.back()) / length();
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = times * places[i] + rest * lengths[i];
+}
+
+void Course::stairs(float power) {
+  std::vector<float> climbs;
+  std::array<float, 2> was{}, is{};  // in all, down and up
+  Vec3 before = Vec3::Zero();
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const float climb = places[i].z() - std::exchange(before, places[i]).z(),
+                length = lengths[i] - (i ? lengths[i - 1] : 0.f),
+                steep = length > 0.f ? std::min(1.f, std::abs(climb) / length) : 0.f;
+    climbs.push_back(std::copysign(length * std::pow(steep, power), climb));
+    was[climb > 0.f] += std::abs(climb), is[climb > 0.f] += std::abs(climbs.back());
+  }
+  float at = 0.f;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const bool up = climbs[i] > 0.f;
+    if (is[up] > 0.f) at += climbs[i] * (was[up] / is[up]);
+    places[i].z() = at;
+  }
+}
+
+void Course::kinks(float times, float power) {
+  const std::vector<Vec3> was = places;
+  const auto before = [&](std::size_t i) { return i ? was[i - 1] : Vec3(Vec3::Zero()); };
+  std::vector<float> turns, wanted;
+  float sum = 0.f, sum_wanted = 0.f;
+  for (std::size_t i = 0; i + 1 < was.size(); ++i) {
+    const Vec3 step = was[i] - before(i), next = was[i + 1] - was[i];
+    turns.push_back(std::atan2(step.cross(next).norm(), step.dot(next)));
+    wanted.push_back(turns[i] > 0.f ? std::pow(turns[i], power) : 0.f);
+    sum += turns[i], sum_wanted += wanted[i];
+  }
+  for (std::size_t i = 0; i < turns.size(); ++i) {
+    const float here = lengths[i] - (i ? lengths[i - 1] : 0.f), beside = lengths[i + 1] - lengths[i];
+    if (!(turns[i] > 0.f && here + beside > 0.f)) continue;
+    // Places beside it move too: moved by all of what is wanted, angles of traced dendrites change by .6 of it.
+    constexpr float share = 1.f / .6f, least = -.8f, most = 1.5f;
+    const float more = times * wanted[i] * (sum / sum_wanted) / turns[i] - 1.f;
+    Vec3 off = was[i] - (before(i) + (was[i + 1] - before(i)) * (here / (here + beside)));
+    off.z() = 0.f;
+    places[i] += std::clamp(share * more, least, most) * off;
+  }
 }
 
 namespace {

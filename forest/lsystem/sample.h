@@ -45,9 +45,16 @@ struct Trace {
 /// made twice, where the end then lies nearest to where it should; what is still missing all of them take up.
 struct Course {
   std::vector<Vec3> places;
-  std::vector<float> lengths;  // from its beginning to each place, µm
+  std::vector<float> lengths;  // from its beginning to each place, µm, as it was traced
 
   Course(const Trace& t, float scale);
+
+  /// How much steps differ in how steep they are: up and down each go as far as before, but shares of a step that go along z are taken
+  /// to this power, so that above 1 flat ones become flatter and steep ones steeper. Flat ones remain so.
+  void stairs(float power);
+  /// How kinked it is: angles between steps become about so many times as large, and their differences as by this power, by moving
+  /// places in the plane of the slice to or from the line between those beside them. Its end, and all z, stay.
+  void kinks(float times, float power);
   float length() const { return lengths.back(); }
 };
 

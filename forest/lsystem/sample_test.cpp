@@ -169,14 +169,22 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
   EXPECT_FLOAT_EQ(m.points().back().radius, 1.75f);
 }
 
-TEST(Trace, IsDrawnAsideInProportionToTheWay) {
-  const Morphology m = drawn("Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, -16)");
-  expect_near(m.points()[1].position(), {3, 3, -6});  // after 3 of 8 µm
-  expect_near(m.points()[2].position(), {8, 6, -12});
+TEST(Trace, IsDrawnAsideInProportionToTheWayAndToItsClimbs) {
+  const std::string along = "Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, ",
+                    climbing = ", 1, 1, 1, 1, 1, 1)";
+  const Morphology even = drawn(along + "-16)");
+  expect_near(even.points()[1].position(), {3, 3, -6});  // after 3 of 8 µm
+  expect_near(even.points()[2].position(), {8, 6, -12});
+  const Morphology m = drawn(along + "-1.6" + climbing);
+  expect_near(m.points()[1].position(), {3, 3, 0});  // no climb yet
+  expect_near(m.points()[2].position(), {8, 6, 2.4f});
+  // By what is more than two fifths of all climbs in proportion to the way.
+  const Morphology far = drawn(along + "-16" + climbing);
+  expect_near(far.points()[1].position(), {3, 3, -5.4f});
+  expect_near(far.points()[2].position(), {8, 6, -12});
   // It heads where it has been drawn.
-  const std::string course = "Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, -16)";
   const Vec3 straight = end_of("Trace(twigs, 0, 0) F(1)") - end_of("Trace(twigs, 0, 0)"),
-             aside = end_of(course + " F(1)") - end_of(course);
+             aside = end_of(along + "-16) F(1)") - end_of(along + "-16)");
   expect_near(aside, (straight + Vec3(1, 0, -2)).normalized());
 }
 
@@ -294,6 +302,90 @@ TEST(Course, IsLongerOrShorterByWholeStepsAndEndsWhereItShould) {
   EXPECT_EQ(few.places.size(), 2u);
   const Course still(traced(std::vector<Trace::Stop>(6, {{0, 0, 0}, 1})), .5f);
   EXPECT_EQ(still.places.size(), 6u);
+}
+
+// A branch that wanders, climbs in leaps both up and down, and is flat between them.
+Trace wandering() {
+  std::vector<Trace::Stop> stops;
+  Vec3 at = Vec3::Zero();
+  for (int i = 0; i < 60; ++i) {
+    const float climb = i % 3 ? 0.f : (i % 2 ? -.4f : .9f) * (1.f + .5f * std::sin(float(i)));
+    at += Vec3(1.f, .4f * std::cos(float(5 * i)), climb);
+    stops.push_back({at, 1.f});
+  }
+  return traced(stops);
+}
+struct Turned {
+  double mean, sd;
+};
+Turned turns_of(const Course& course) {
+  std::vector<double> turns;
+  Vec3 before = Vec3::Zero(), step = Vec3::Zero();
+  for (const Vec3& place : course.places) {
+    const Vec3 next = place - std::exchange(before, place);
+    if (!step.isZero(0.f))
+      turns.push_back(std::atan2(double(step.cross(next).norm()), double(step.dot(next))));
+    step = next;
+  }
+  double sum = 0., squares = 0.;
+  for (const double t : turns) sum += t, squares += t * t;
+  const double mean = sum / double(turns.size());
+  return {mean, std::sqrt(squares / double(turns.size()) - mean * mean)};
+}
+
+TEST(Course, ClimbsAsFarInStepsThatDifferMoreOrLess) {
+  const Course was(wandering(), 1.f);
+  const auto climbs_of = [](const Course& course) {
+    std::vector<float> climbs;
+    float z = 0.f;
+    for (const Vec3& p : course.places) climbs.push_back(p.z() - std::exchange(z, p.z()));
+    return climbs;
+  };
+  const std::vector<float> before = climbs_of(was);
+  const auto squares = [](const std::vector<float>& climbs) {
+    double sum = 0.;
+    for (const float c : climbs) sum += double(c) * double(c);
+    return sum;
+  };
+  for (const float power : {.5f, 1.f, 2.f}) {
+    SCOPED_TRACE(power);
+    Course is = was;
+    is.stairs(power);
+    const std::vector<float> after = climbs_of(is);
+    double up = 0., down = 0.;
+    for (std::size_t i = 0; i < after.size(); ++i) {
+      EXPECT_EQ(is.places[i].head<2>(), was.places[i].head<2>());
+      EXPECT_GE(after[i] * before[i], -1e-6f);
+      if (std::abs(before[i]) < 1e-6f) {
+        EXPECT_LT(std::abs(after[i]), 1e-5f);
+      }
+      (before[i] > 0.f ? up : down) += double(after[i] - before[i]);
+    }
+    EXPECT_NEAR(up, 0., 1e-4);
+    EXPECT_NEAR(down, 0., 1e-4);
+    if (power != 1.f) {
+      EXPECT_EQ(squares(after) > squares(before), power > 1.f);
+    }
+  }
+}
+
+TEST(Course, IsAsManyTimesAsKinkedAndAsUnevenlyAsItIsAsked) {
+  const Course was(wandering(), 1.f);
+  const Turned before = turns_of(was);
+  for (const float times : {.7f, 1.f, 1.4f}) {
+    Course is = was;
+    is.kinks(times, 1.f);
+    EXPECT_NEAR(turns_of(is).mean / before.mean, double(times), .2) << times;  // what z does to them stays
+    EXPECT_EQ(is.places.back(), was.places.back());
+    for (std::size_t i = 0; i < is.places.size(); ++i) EXPECT_EQ(is.places[i].z(), was.places[i].z());
+  }
+  Course even = was, uneven = was;
+  even.kinks(1.f, .6f), uneven.kinks(1.f, 1.6f);
+  EXPECT_LT(turns_of(even).sd, .95 * before.sd);
+  EXPECT_GT(turns_of(uneven).sd, 1.05 * before.sd);
+  Course still(traced(std::vector<Trace::Stop>(6, {{0, 0, 0}, 1})), 1.f);
+  still.stairs(2.f), still.kinks(1.5f, 2.f);  // nothing to change
+  for (const Vec3& place : still.places) EXPECT_EQ(place, Vec3(Vec3::Zero()));
 }
 
 TEST(Trace, TurnsTheEndOfTheBranchBeforeAsItsForkWas) {

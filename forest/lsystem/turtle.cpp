@@ -47,15 +47,19 @@ constexpr TurtleSymbol symbol_table[] = {
     {"At", "x, y, z", "stand at a place, counted from the soma, without drawing", Action::place, 3, 3},
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
     {"Trace",
-     "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep",
+     "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep, "
+     "stairs, kinked, kinks, climbing",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
      "branch of row `like`, "
      "times `thickness`, at its end `last`, and no thinner than `thinnest`; its end drawn aside by (x, y, "
      "z), all of it in "
-     "proportion; `steep` times as far along z",
-     Action::trace, 3, 15},
+     "proportion; `steep` times as far along z; how steep its "
+     "steps are to the power of "
+     "`stairs`; angles between them `kinked` times as large, and to the power of `kinks`; of "
+     "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it",
+     Action::trace, 3, 19},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -448,10 +452,25 @@ class Turtle {
     } else {
       if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
-      const Course course(t, float(scale));
+      Course course(t, float(scale));
+      if (value(15, 1.) != 1.) course.stairs(float(value(15, 1.)));
+      if (value(16, 1.) != 1. || value(17, 1.) != 1.)
+        course.kinks(float(value(16, 1.)), float(value(17, 1.)));
       const float whole = course.length();
       const std::vector<Calibre> diameters = calibres(calibre, course.lengths);
       float way = 0.f;
+      // What is drawn aside along z can take as much of every climb, so that flat steps stay flat; but for what would change climbs by
+      // more than two fifths.
+      constexpr double most_of_climbs = .4;
+      double climbs = 0., climbed = 0.;
+      for (float z = 0.f; const Vec3& p : course.places)
+        climbs += std::abs(double(p.z() - std::exchange(z, p.z())));
+      const double by_climbs =
+          aside.z() == 0. || climbs == 0.
+              ? 0.
+              : value(18, 0.) *
+                    std::min(1., most_of_climbs * climbs * scale * std::abs(sides.z()) / std::abs(aside.z()));
+      float z = 0.f;
       auto start = float(0.5 * thick(calibre.diameter, 0.f));
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
@@ -461,8 +480,10 @@ class Turtle {
         if (calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size())
           state_.diameter = std::clamp(state_.diameter, 2. * double(start) - most, 2. * double(start) + most);
         const Vec3 on_chord = t.end() * part;
+        climbed += std::abs(double(course.places[i].z() - std::exchange(z, course.places[i].z())));
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
+        if (by_climbs > 0.) next.z() += by_climbs * (climbed / climbs - double(part)) * aside.z();
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
