@@ -27,6 +27,11 @@ void add_kernel(const float* column, float wanted, std::size_t count, float* sum
   }
 }
 
+// How long the step is that ends at a place, when these are the ways to all of them.
+float step_to(std::span<const float> lengths, std::size_t i) {
+  return lengths[i] - (i ? lengths[i - 1] : 0.f);
+}
+
 // Where a diameter never changes, it does so evenly.
 void share_changes(std::vector<Calibre>& places) {
   for (std::size_t i = 1; i < places.size(); ++i) {
@@ -95,8 +100,7 @@ void Course::stairs(float power) {
   std::array<float, 2> was{}, is{};  // in all, down and up
   Vec3 before = Vec3::Zero();
   for (std::size_t i = 0; i < places.size(); ++i) {
-    const float climb = places[i].z() - std::exchange(before, places[i]).z(),
-                length = lengths[i] - (i ? lengths[i - 1] : 0.f),
+    const float climb = places[i].z() - std::exchange(before, places[i]).z(), length = step_to(lengths, i),
                 steep = length > 0.f ? std::min(1.f, std::abs(climb) / length) : 0.f;
     climbs.push_back(std::copysign(length * std::pow(steep, power), climb));
     was[climb > 0.f] += std::abs(climb), is[climb > 0.f] += std::abs(climbs.back());
@@ -121,7 +125,7 @@ void Course::kinks(float times, float power) {
     sum += turns[i], sum_wanted += wanted[i];
   }
   for (std::size_t i = 0; i < turns.size(); ++i) {
-    const float here = lengths[i] - (i ? lengths[i - 1] : 0.f), beside = lengths[i + 1] - lengths[i];
+    const float here = step_to(lengths, i), beside = step_to(lengths, i + 1);
     if (!(turns[i] > 0.f && here + beside > 0.f)) continue;
     // Places beside it move too: moved by all of what is wanted, angles of traced dendrites change by .6 of it.
     constexpr float share = 1.f / .6f, least = -.8f, most = 1.5f;
@@ -201,7 +205,7 @@ void match_lengths(std::span<float, window + 1> diameters, std::span<const float
 std::vector<Calibre> calibres(const Trace& of, std::span<const float> along) {
   const std::vector<std::size_t> places = places_for(of, along.size());
   const auto size = [](std::span<const float> lengths, std::size_t i) {
-    return std::log(std::max(lengths[i] - (i ? lengths[i - 1] : 0.f), 1e-3f));
+    return std::log(std::max(step_to(lengths, i), 1e-3f));
   };
   std::vector<float> diameters, own, here;
   for (std::size_t n = 0; n < places.size(); ++n) {
@@ -229,11 +233,11 @@ void Sample::add(std::span<const double> condition_row, std::span<const double> 
     Vec3 last = Vec3::Zero();
     for (const Trace::Stop& stop : t.stops)
       t.lengths.push_back(length += (stop.at - last).norm()), last = stop.at;
-    float before = t.diameter, way = 0.f;
+    float before = t.diameter;
     for (std::size_t i = 0; i < t.stops.size(); ++i) {
-      const float step = t.lengths[i] - way;
+      const float step = step_to(t.lengths, i);
       if (step > 0.f) t.steepest = std::max(t.steepest, std::abs(t.stops[i].diameter - before) / step);
-      before = t.stops[i].diameter, way = t.lengths[i];
+      before = t.stops[i].diameter;
     }
   }
   branches_.push_back(std::move(branches));
