@@ -17,6 +17,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/evening.h"
 #include "forest/fitting/mixing.h"
+#include "forest/fitting/ring.h"
 #include "forest/fitting/traced.h"
 #include "forest/statistics/summary.h"
 #include "forest/statistics/two_samples.h"
@@ -216,14 +217,18 @@ class Writer {
         "(else -1), between which depths "
         "they lie, how many stems one like this has, and the neurons in whose style its basal dendrites are, "
         "in "
-        "whose all others, and whose diameters it has.\n"
-        "sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as) =");
+        "whose all others, and whose diameters it has; and, of as many places of a ring in which like ones "
+        "lie "
+        "side by "
+        "side, the neuron there.\n"
+        "sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring) =");
+    const std::vector<std::size_t> around = ring(traced_, mixed_);
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
       const Cell& c = traced_.cells[i];
       const Mixed& m = mixed_[i];
       row(!i);
-      put("{} {} {} {} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), rounded(c.low, 10.),
-          rounded(c.high, 10.), m.stems.size(), m.basal_as, m.others_as, m.thin_as);
+      put("{} {} {} {} {} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), rounded(c.low, 10.),
+          rounded(c.high, 10.), m.stems.size(), m.basal_as, m.others_as, m.thin_as, around[i]);
     }
   }
 
@@ -414,7 +419,8 @@ class Writer {
   void productions() {
     put("\n\n# This neuron is made of three traced ones, and its style strays as two neurons alike to it "
         "differ.\n"
-        "cell me = dealt({})\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, kin))))\n"
+        "cell me = cells.ring(dealt({}))\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, "
+        "kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell planned = cells.stems(me)\ncell basal_as = cells.basal_as(me)\ncell others_as = "
         "cells.others_as(me)\ncell thin_as = "

@@ -134,6 +134,30 @@ TEST(Expression, CardsAreDealt) {
     EXPECT_THROW(value_of(none), Error) << none;
 }
 
+// The first neurons of a block, however many, take cards evenly from all around the ring. Were they drawn at random, how many of n / 2
+// lie in half of the ring would have a variance of about n / 16.
+TEST(Expression, CardsAreDealtEvenlyAroundTheRing) {
+  for (const int cards : {16, 37, 100, 1000}) {
+    const Grammar g = parse(fmt::format("axiom: A\ng: A -> B(dealt({}))\n", cards), "test");
+    Deriver deriver(g);
+    double squares = 0.;
+    int arcs = 0;
+    for (std::uint64_t block = 0; block < 4; ++block)
+      for (const int neurons : {cards / 3, cards / 2}) {
+        std::vector<int> taken(std::size_t(cards), 0);
+        for (int place = 0; place < neurons; ++place)
+          ++taken[std::size_t(
+              deriver.derive(5, block * std::uint64_t(cards) + std::uint64_t(place), 1).parameters[0])];
+        for (int first = 0; first < cards; ++first, ++arcs) {
+          int here = 0;
+          for (int i = 0; i < cards / 2; ++i) here += taken[std::size_t((first + i) % cards)];
+          squares += std::pow(here - neurons * double(cards / 2) / cards, 2);
+        }
+      }
+    EXPECT_LT(squares / arcs, .6 + .1 * std::log2(cards)) << cards;
+  }
+}
+
 TEST(Grammar, BindingsUseADrawTwice) {
   const Grammar g =
       parse("axiom: A(10)\ng: A(d) { r = uniform(0, 1), s = r * d } -> B(r, s) [C(d - s)]\n", "test");

@@ -42,7 +42,9 @@ constexpr Function function_table[] = {
     {"poisson", 1, Op::poisson, true, "mean"},
     {"chance", 1, Op::chance, true, "1 with probability p, else 0"},
     {"dealt", 1, Op::dealt, true,
-     "the neuron's card of n: 0 to n - 1, each once among neurons 0 to n - 1, n to 2 n - 1, …"},
+     "the neuron's card of n: 0 to n - 1, each once among neurons 0 to n - 1, n to 2 n - 1, …; the first of "
+     "these are "
+     "spread evenly over all"},
 };
 
 constexpr double nonsense =
@@ -86,21 +88,35 @@ double poisson(Random& random, double mean) {
   return count;
 }
 
-// The neuron's number in its block of `cards` neurons, after the block was shuffled by Fisher & Yates.
+// The cards lie in a ring, and a block of as many neurons takes one each, so that those of the first neurons, however many, are spread
+// evenly around it: the halves of the ring take turns, in each of which chance says which is first, and so do the halves of these. When
+// they are not as large as each other, chance says which is larger, and in which turn it is alone.
 double dealt(const Random& random, double cards) {
   constexpr double most = 1e6;
   if (!(cards >= 1. && cards <= most && cards == std::floor(cards))) return nonsense;
   const auto count = std::uint32_t(cards);
-  Random shuffle(random.seed(), random.item() / count, 0xdea1);
+  const std::uint64_t block = random.item() / count;
   auto place = std::uint32_t(random.item() % count);
-  for (std::uint32_t i = count; i-- > 1;) {  // one card is followed, to where it comes to lie
-    const std::uint32_t other = shuffle.below(i + 1);
-    if (place == i)
-      place = other;
-    else if (place == other)
-      return i;
+  std::uint32_t first = Random(random.seed(), block, 0xdea1).below(count);
+  constexpr std::uint32_t of_parts = 0x80000000;
+  for (std::uint32_t size = count, part = 1; size > 1;) {
+    Random draw(random.seed(), block, of_parts | part);
+    const bool odd = size % 2, right_is_larger = odd && draw.below(2);
+    const std::uint32_t turns = (size + 1) / 2, left = right_is_larger ? size - turns : turns,
+                        alone = odd ? draw.below(turns) : turns;
+    if (place > 2 * alone) ++place;  // as though both halves took that turn
+    const std::uint32_t turn = place / 2;
+    bool to_right = right_is_larger;
+    if (turn != alone) {
+      for (std::uint32_t i = 0; i < turn; ++i) draw.below(2);
+      to_right = (place % 2 == 1) != (draw.below(2) == 1);
+    }
+    place = turn > alone && to_right != right_is_larger ? turn - 1 : turn;
+    if (to_right) first += left;
+    size = to_right ? size - left : left;
+    part = 2 * part + to_right;
   }
-  return place;
+  return first % count;
 }
 
 double modulo(double x, double y) { return x - y * std::floor(x / y); }
