@@ -87,8 +87,9 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 # Tips as forks and stems are asked by them: as far apart as their logarithms but for few. A fork of two cannot bear three, as a daughter
 # that ended where it was traced has no way to go on.
 function crowd(tips) = log(tips) - 30 / tips^3
-# How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
-distribution thicker(kind, cell) = exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind))))
+# How many times thicker a stem that was so thick at its end is than where it was traced, as the neuron is whose diameters it has.
+distribution thicker(kind, cell, d) = min(max(1, most_thick(kind) / max(0.001, d)),
+  exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind)))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d), 0)
@@ -102,7 +103,7 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
-    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p)), d = thick * plans.d(p),
+    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p), plans.d(p)), d = thick * plans.d(p),
     away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
     r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style, 0),
     sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
@@ -116,7 +117,7 @@ bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
-    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p)) * plans.d(p) }
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p), plans.d(p)) * plans.d(p) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
@@ -439,9 +440,10 @@ class Writer {
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
     put("# No stem has more tips, or reaches farther, than half as much again as the largest that was "
-        "traced.\n");
-    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
-    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
+        "traced, and none is thicker at its end.\n");
+    most("most_tips", 1.5, 1., [](const Stem& stem) { return stem.tips; });
+    most("most_ahead", 1.5, 10., [](const Stem& stem) { return stem.ahead; });
+    most("most_thick", 1., 1e3, [](const Stem& stem) { return stem.end_diameter; });
     std::vector<std::string> slopes;
     for (const auto& [kind, mean] : traced_.means)
       slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
@@ -478,14 +480,14 @@ class Writer {
     text_ += rest;
   }
 
-  void most(const char* name, double steps, auto&& of) {
-    constexpr double beyond = 1.5;
+  // @param times  … so many times the largest that was traced
+  void most(const char* name, double times, double steps, auto&& of) {
     std::map<int, double> largest;
     for (const Cell& c : traced_.cells)
       for (const Stem& stem : c.stems) largest[stem.kind] = std::max(largest[stem.kind], double(of(stem)));
     std::vector<std::string> bins;
     for (const auto& [kind, value] : largest)
-      bins.push_back(fmt::format("{}: {}", kind, std::ceil(beyond * value * steps) / steps));
+      bins.push_back(fmt::format("{}: {}", kind, std::ceil(times * value * steps) / steps));
     put("table {} = {}\n", name, fmt::join(bins, ", "));
   }
 
