@@ -120,7 +120,7 @@ constexpr double least_tolerance = 1e-4;  // mm
 
 // Which options said something of an input.
 struct Used {
-  bool threshold = false, pixel = false, unit = false;
+  bool axis = false, spacing = false, threshold = false, pixel = false, unit = false;
 };
 
 struct Options {
@@ -231,7 +231,7 @@ void tell_edges(const cortex::ContourStack& stack, const cortex::Volume& volume,
 
 cortex::ContourStack of_volume(const cortex::Volume& volume, const fs::path& path, const std::string& name,
                                const Options& options, bool pictures, Console& console) {
-  if (std::isnan(options.threshold))
+  if (!options.command->count("--threshold"))
     throw Error(path.string() + ": what is inside is a question of grey; give --threshold");
   check_threshold(volume, path, options.threshold, console);
   const cortex::Axis axis = axis_of(options.axis);
@@ -292,7 +292,11 @@ void refuse_unused(const Options& options, const Used& used) {
     bool used;
   };
   for (const auto& [option, of, is_used] :
-       {Row{"--threshold", "of volumes and pictures", used.threshold},
+       {Row{"--axis", "of surfaces, volumes and pictures", used.axis},
+        {"--spacing", "of surfaces, volumes and pictures", used.spacing},
+        {"--offset", "of surfaces, volumes and pictures", used.spacing},
+        {"--name", "of boundaries of surfaces, volumes and pictures", used.axis},
+        {"--threshold", "of volumes and pictures", used.threshold},
         {"--pixel", "of pictures", used.pixel},
         {"--unit", "of an .slc file", used.unit},
         {"--tolerance", "of curves, without --straight", !options.straight}})
@@ -316,7 +320,7 @@ cortex::ContourStack cut(const Mesh& surface, const std::string& name, const fs:
 void run(const Options& options, Console& console) {
   must_take_contours(options.out, options.force);
   if (options.names.size() > options.inputs.size())
-    throw Error(fmt::format("{} are named for {}; name each once",
+    throw Error(fmt::format("{} are named for {}, each of which has one; name each once",
                             counted(options.names.size(), "boundary", "boundaries"),
                             counted(options.inputs.size(), "file")));
   std::vector<cortex::ContourStack> stacks;
@@ -341,7 +345,7 @@ void run(const Options& options, Console& console) {
       if (drawn && !files_in(path, ".png").empty())
         console.warn(path.string() + ": has drawings (.svg) and pictures (.png); the drawings are taken");
       if (!drawn) {
-        used.threshold = used.pixel = true;
+        used.axis = used.spacing = used.threshold = used.pixel = true;
         stacks.push_back(of_volume(read_pictures(path, options, console), path, must_be_new(name), options,
                                    true, console));
         continue;
@@ -356,13 +360,14 @@ void run(const Options& options, Console& console) {
     const MappedFile file(path);
     const std::string lower = path.string();
     if (io::may_be_nifti(file.text()) && (lower.ends_with(".nii") || lower.ends_with(".nii.gz"))) {
-      used.threshold = true;
+      used.axis = used.spacing = used.threshold = true;
       const io::NiftiVolume read = io::read_nifti(file.text(), path.string());
       for (const std::string& oddity : read.oddities) console.warn(path.string() + ": " + oddity);
       stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false, console));
       continue;
     }
     if (lower.ends_with(".png")) throw Error(lower + ": is one section; give the folder of all");
+    used.axis = used.spacing = true;
     surfaces.push_back(io::read_surface(file.text(), path.string()));
     surface_files.push_back(path);
     surface_names.push_back(must_be_new(name));
@@ -386,8 +391,8 @@ void run(const Options& options, Console& console) {
   for (const cortex::Section& section : stack.sections)
     for (const cortex::Contour& contour : section.contours) ++loops, along += length(contour.curve);
   if (loops == 0)
-    throw Error(fmt::format("no section of {} has a contour; check --axis, --spacing and --offset",
-                            options.inputs.front().string()));
+    throw Error(fmt::format("no section of {} has a contour; {}", options.inputs.front().string(),
+                            used.axis ? "check --axis, --spacing and --offset" : "draw some, as paths"));
   if (stack.sections.size() < 3 && !surfaces.empty())
     console.warn(
         fmt::format("{} reaches over {:.3g} mm, so there {}; a smaller --spacing gives more, if it is in mm",
@@ -463,6 +468,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
   struct Compare {
     fs::path file, svg;
     std::string object;
+    double unit = 1.;
     bool force = false;
   };
   const auto o = std::make_shared<Compare>();
@@ -472,10 +478,17 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
   command.add_option("--object", o->object, "Compare only this boundary")->type_name("NAME");
   command.add_option("--svg", o->svg, "A folder for drawings, each section over the one before it")
       ->type_name("FOLDER");
+  must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
+                 1e3);
   add_force(command, o->force);
-  return [o, &console] {
+  return [o, &command, &console] {
     if (!o->svg.empty()) must_take_contours(o->svg, o->force);
-    const cortex::ContourStack stack = read_contour_files(o->file, 1e3, console);
+    if (command.count("--unit") && o->file.extension() != ".slc")
+      throw Error("--unit is of an .slc file, and none is given; leave it out");
+    const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
+    if (stack.sections.size() < 2)
+      throw Error(fmt::format("{}: has {}; two are compared", o->file.string(),
+                              counted(stack.sections.size(), "section")));
     if (!o->object.empty() && std::ranges::find(stack.objects, o->object) == stack.objects.end())
       throw Error(fmt::format("{}: has no object '{}'; it has {}", o->file.string(), o->object,
                               fmt::join(stack.objects, ", ")));

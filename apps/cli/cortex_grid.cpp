@@ -31,6 +31,7 @@ namespace forest::cli {
 namespace {
 
 struct Options {
+  CLI::App* command = nullptr;
   std::string domain, generator = "best";
   std::filesystem::path elements;
   std::size_t element = 0;
@@ -143,10 +144,30 @@ void check_out(const Options& options) {
   must_have_folder(options.out);
 }
 
+// What says nothing of the block that was given was meant for another.
+void refuse_unused(const Options& options, bool one, bool in_space) {
+  struct Row {
+    const char *option, *of;
+    bool used;
+  };
+  const bool drawn = options.out.extension() == ".svg";
+  for (const auto& [option, of, used] :
+       {Row{"--dimensions", "of all blocks together, and one is given", !one},
+        {"--generator", "of one block, and none is given", one},
+        {"--up", "of drawings (.svg) of blocks in space", drawn && in_space},
+        {"--closed", "of drawings (.svg) of blocks in space", drawn && in_space}})
+    if (!used && options.command->count(option))
+      throw Error(fmt::format("{} is {}; leave it out", option, of));
+}
+
 void run(const Options& options, Console& console) {
   check_out(options);
-  if (options.domain.empty() && options.elements.empty()) return compare(options, console);
+  if (options.domain.empty() && options.elements.empty()) {
+    refuse_unused(options, false, options.dimensions != 2);
+    return compare(options, console);
+  }
   const auto [name, boundary] = block(options);
+  refuse_unused(options, true, boundary.dimensions() == 3);
   const Filled filled = fill(options.generator, boundary);
   const cortex::Validity validity = cortex::validity(filled.grid);
   if (!options.out.empty()) {
@@ -178,6 +199,7 @@ void run(const Options& options, Console& console) {
 
 std::function<void()> cortex_grid(CLI::App& command, Console& console) {
   const auto options = std::make_shared<Options>();
+  options->command = &command;
   std::string domains;
   std::vector<std::string> generators{"best"};
   for (const cortex::Domain& row : cortex::domains())

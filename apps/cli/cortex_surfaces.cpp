@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest cortex surfaces: contours of sections become the outer and the inner surface.
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -63,13 +64,25 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
   must_be_within(*command.add_option("--unit", o->unit, "Of an .slc file, mm")->capture_default_str(), 1e-6,
                  1e3);
   add_force(command, o->force);
-  return [o, &console] {
+  return [o, &command, &console] {
     must_take_surfaces(o->out, o->force);
     if (o->outer == o->inner)
       throw Error(fmt::format(
           "'{}' is to be both boundaries; name the outer one by --outer, the inner one by --inner",
           o->outer));
+    if (command.count("--unit") && o->file.extension() != ".slc")
+      throw Error("--unit is of an .slc file, and none is given; leave it out");
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
+    // Coarser than the sections are apart, what they show is lost.
+    if (const std::size_t sections = stack.sections.size(); sections > 1) {
+      const double apart =
+          std::abs(stack.sections.back().at - stack.sections.front().at) / double(sections - 1) / 1e3;
+      if (o->voxel > 1.001 * apart)
+        throw Error(
+            fmt::format("--voxel {:g} mm is coarser than the sections, which are {:.3g} mm apart; give no "
+                        "more than that, or leave it out",
+                        o->voxel, apart));
+    }
     const cortex::Surfaces made = cortex::surfaces_from(stack,
                                                         {.voxel = 1e3 * o->voxel,
                                                          .between = int(o->between),

@@ -10,6 +10,7 @@
 #include "forest/io/sonata.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/planting.h"
 #include "apps/cli/planting_elements.h"
@@ -73,6 +74,8 @@ std::string sentence_of(const Bending& b) {
 }
 
 void run(const Options& options, Console& console) {
+  must_have_folder(options.out);
+  io::must_take_sonata(options.out);
   const circuit::Recipe recipe = find_recipe(options.recipe);
   const bool curved = !options.elements.file.empty();
   PlantedElements all;

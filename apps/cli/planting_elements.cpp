@@ -81,11 +81,15 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
     for (std::size_t i = 0; i < count; ++i) chosen.push_back(order[i].second);
     return chosen;
   }
+  if (!options.sphere.empty() && !(options.sphere[3] > 0.))
+    throw Error(fmt::format("--sphere has a radius of {:g} µm; give one above 0", options.sphere[3]));
   const auto within = [&](const Place& p) {
     if (!options.sphere.empty())
       return (p - Place(options.sphere[0], options.sphere[1], options.sphere[2])).norm() <= options.sphere[3];
     for (Eigen::Index a = 0; a < 3; ++a)
-      if (!(p[a] >= options.box[std::size_t(a)] && p[a] <= options.box[std::size_t(a) + 3])) return false;
+      if (const auto [low, high] = std::minmax(options.box[std::size_t(a)], options.box[std::size_t(a) + 3]);
+          !(p[a] >= low && p[a] <= high))
+        return false;
     return true;
   };
   Place low = Place::Constant(INFINITY), high = -low;
@@ -424,7 +428,7 @@ CLI::Option* add_elements(CLI::App& command, ElementOptions& o) {
                       ->expected(4)
                       ->type_name("X Y Z R"));
   CLI::Option* const box =
-      one_of_them(command.add_option("--box", o.box, "… or in a box, µm: its two corners")
+      one_of_them(command.add_option("--box", o.box, "… or in a box, µm: two opposite corners")
                       ->expected(6)
                       ->type_name("X Y Z X Y Z"));
   for (CLI::Option* a : {element, near, sphere, box})

@@ -6,7 +6,6 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/progress.h"
-#include "forest/cortex/surfaces.h"
 #include "forest/geometry/triangle_tree.h"
 
 namespace forest::cortex {
@@ -60,17 +59,48 @@ void measure(const std::vector<std::vector<Place>>& from, const TriangleTree& to
     }
 }
 
-double overlap_of(const Section& one, const Section& other, std::uint32_t object, const Extent& extent) {
-  const double step = std::max(std::min(100., extent.size() / 200.), extent.size() / 2000.);
-  const auto count = [&](double length) { return std::size_t(length / step) + 2; };
+// Where lines across the longer extent, as many as there are lists, cross the polygons: rising, in each list.
+std::vector<std::vector<double>> crossings_of(const std::vector<std::vector<Place>>& polygons, int along,
+                                              double low, double step, std::size_t lines) {
+  std::vector<std::vector<double>> at(lines);
+  for (const auto& polygon : polygons)
+    for (std::size_t i = 0; i < polygon.size(); ++i) {
+      Place a = polygon[i], b = polygon[(i + 1) % polygon.size()];
+      if (a[along] > b[along]) std::swap(a, b);
+      const auto line = [&](double place) {  // the first at it or beyond
+        return std::size_t(std::clamp(std::ceil((place - low) / step - .5), 0., double(lines)));
+      };
+      for (std::size_t k = line(a[along]); k < line(b[along]); ++k)
+        at[k].push_back(std::lerp(a[1 - along], b[1 - along],
+                                  (low + (double(k) + .5) * step - a[along]) / (b[along] - a[along])));
+    }
+  for (auto& list : at) std::ranges::sort(list);
+  return at;
+}
+
+// What lies within both of what lies within either, line by line; exact along the lines.
+double overlap_of(const std::vector<std::vector<Place>>& one, const std::vector<std::vector<Place>>& other,
+                  const Extent& extent) {
+  constexpr std::size_t lines = 2000;
   const Place reach = extent.high - extent.low;
-  const std::size_t width = count(reach.x()), height = count(reach.y());
-  const auto a = signed_distances(one, object, extent.low, step, width, height, step),
-             b = signed_distances(other, object, extent.low, step, width, height, step);
-  std::size_t both = 0, either = 0;
-  for (std::size_t i = 0; i < a.size(); ++i)
-    both += a[i] < 0.f && b[i] < 0.f, either += a[i] < 0.f || b[i] < 0.f;
-  return either ? double(both) / double(either) : 1.;
+  const int along = reach.x() >= reach.y() ? 0 : 1;
+  const double step = reach[along] / double(lines);
+  if (!(step > 0.)) return 1.;
+  const auto a = crossings_of(one, along, extent.low[along], step, lines),
+             b = crossings_of(other, along, extent.low[along], step, lines);
+  double both = 0., either = 0.;
+  for (std::size_t k = 0; k < lines; ++k) {
+    double before = 0.;
+    for (std::size_t i = 0, j = 0; i < a[k].size() || j < b[k].size();) {
+      const bool of_one = j == b[k].size() || (i < a[k].size() && a[k][i] <= b[k][j]);
+      const double here = of_one ? a[k][i] : b[k][j];
+      if (i % 2 && j % 2) both += here - before;
+      if (i % 2 || j % 2) either += here - before;
+      before = here;
+      ++(of_one ? i : j);
+    }
+  }
+  return either > 0. ? both / either : 1.;
 }
 
 }  // namespace
@@ -101,7 +131,7 @@ std::vector<SectionChange> changes(const ContourStack& stack, Progress& progress
         std::ranges::sort(distances);
         change.p95 = distances[std::size_t(.95 * double(distances.size() - 1))];
         change.greatest = distances.back();
-        change.overlap = overlap_of(one, other, object, extent);
+        change.overlap = overlap_of(a, b, extent);
       }
       each[i].push_back(change);
     }

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/cortex/compare.h"
 
+#include <algorithm>
 #include <cmath>
 
 #include <gtest/gtest.h>
@@ -44,6 +45,29 @@ TEST(Changes, AreTheSameOfWhatIsAThousandTimesSmaller) {
   EXPECT_NEAR(small[0].mean, large[0].mean / 1e3, .005);
   EXPECT_NEAR(small[0].greatest, large[0].greatest / 1e3, .001);
   EXPECT_NEAR(small[0].overlap, large[0].overlap, .01);
+}
+
+// Half of a blade 200 µm thick and 100 mm long; which way around contours are drawn says nothing.
+TEST(Changes, OfThinShapesAreAsExactAsOfLargeOnes) {
+  const auto blade = [](double thick, bool upright) {
+    std::vector<Place> points{{0., 0.}, {1e5, 0.}, {1e5, thick}, {0., thick}};
+    if (upright)
+      for (Place& p : points) p = {p.y(), p.x()};
+    return points;
+  };
+  for (const bool upright : {false, true}) {
+    const auto thin = changes(pair(blade(200., upright), blade(100., upright)), Progress::none());
+    EXPECT_NEAR(thin[0].overlap, .5, 1e-3) << upright;
+  }
+  const auto turned = changes(pair(blade(200., false), blade(200., true)), Progress::none());
+  EXPECT_NEAR(turned[0].overlap, 200. * 200. / (2. * 200. * 1e5 - 200. * 200.), 1e-4);
+  std::vector<Place> around = square(5000., 0.);
+  std::ranges::reverse(around);
+  EXPECT_EQ(changes(pair(square(5000., 0.), around), Progress::none())[0].overlap, 1.);
+  // A hole of a quarter.
+  ContourStack hole = pair(square(5000., 0.), square(5000., 0.));
+  hole.sections[1].contours.push_back({1, straight_loop(square(2500., 1000.))});
+  EXPECT_NEAR(changes(hole, Progress::none())[0].overlap, .75, 1e-3);
 }
 
 TEST(Changes, SeeWhatOnlyOneSectionHas) {

@@ -82,6 +82,8 @@ class JsonReader {
       json_ = json::parse(text);
     } catch (const json::parse_error& error) {
       throw no_json(text, error.byte, name, "get the whole file, or write it again");
+    } catch (const json::exception&) {
+      throw InputError(name, 0, "holds a number too large for any place; correct it");
     }
   }
 
@@ -272,7 +274,7 @@ ReadContours read_slc(std::string_view text, const std::string& name, double uni
         fail("is no stack of slices; begin with 'slice Z'");
     } else if (tracing) {
       const auto blank = line.find_first_of(" \t");
-      if (blank == line.npos) fail("a point needs x and y");
+      if (blank == line.npos) fail("a point needs x and y; get the whole file");
       points.push_back({unit * real(line.substr(0, blank)), unit * real(trimmed(line.substr(blank)))});
     } else {
       fail(fmt::format("'{}' stands outside any contour; write 'contour closed' before points", shown(line)));

@@ -26,8 +26,9 @@ namespace fs = std::filesystem;
 using circuit::Circuit;
 using circuit::Instance;
 
-/// Throws unless the folder is missing, empty, or holds a circuit of ours and nothing more.
-void refuse_foreign_folder(const fs::path& folder) {
+}  // namespace
+
+void must_take_sonata(const fs::path& folder) {
   const auto refuse = [&](const std::string& why) {
     throw Error(fmt::format("{}: {}, so it is not replaced; choose another folder or remove it",
                             folder.string(), why));
@@ -49,6 +50,8 @@ void refuse_foreign_folder(const fs::path& folder) {
       refuse(fmt::format("holds {}, which is no part of the circuit", name.string()));
   }
 }
+
+namespace {
 
 void check_file_name(const std::string& name) {
   const bool good =
@@ -201,7 +204,7 @@ void write_sonata(const fs::path& folder, const Circuit& circuit, std::span<cons
     throw Error(fmt::format("a circuit of {} morphologies was given {} of them; give one for each name",
                             circuit.morphologies.size(), morphologies.size()));
   for (const std::string& name : circuit.morphologies) check_file_name(name);
-  refuse_foreign_folder(folder);
+  must_take_sonata(folder);
 
   NewFolder files(folder);
   fs::create_directory(files.path() / sonata_morphologies_name);

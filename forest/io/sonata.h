@@ -26,6 +26,8 @@ namespace forest::io {
 void write_sonata(const std::filesystem::path& folder, const circuit::Circuit& circuit,
                   std::span<const Morphology> morphologies, Progress& progress = Progress::none(),
                   std::span<const circuit::Projection> projections = {});
+/// Throws Error unless the folder is missing, empty, or holds a circuit of ours and nothing more.
+void must_take_sonata(const std::filesystem::path& folder);
 /// What it calls the neurons of a circuit: the name of their population.
 std::string sonata_population(const circuit::Circuit& circuit);
 

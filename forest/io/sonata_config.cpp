@@ -21,6 +21,8 @@ SonataConfig::SonataConfig(const std::filesystem::path& place)
     throw InputError(
         file_.string(), std::size_t(std::ranges::count(before, '\n')) + 1,
         "this is not JSON; correct what stands here or before, or name the folder of a SONATA circuit");
+  } catch (const Json::exception&) {
+    throw InputError(file_.string(), 0, "holds a number too large to be read; correct it");
   }
   if (!find(json_, "networks"))
     refuse("has no \"networks\"; name the configuration file of a SONATA circuit, or its folder");

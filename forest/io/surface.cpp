@@ -73,6 +73,7 @@ bool may_be_surface(std::string_view bytes) {
 Mesh read_surface(std::string_view bytes, const std::string& name) {
   std::string place;
   const std::string_view content = unpacked(bytes, place, name);
+  if (content.empty()) throw InputError(name, 0, "is empty; get the file again");
   if (is_freesurfer_surface(content)) return read_freesurfer_surface(content, name);
   if (is_gifti(content)) return read_gifti_surface(content, name);
   if (is_ply(content)) return read_ply_surface(content, name);

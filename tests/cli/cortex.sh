@@ -169,7 +169,23 @@ mkdir -p same_number && touch same_number/s1.png same_number/s01.png
 refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
 refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
+# Options of other input, which would say nothing.
+for option in '--axis x' '--spacing 3' '--offset 1' '--name a' '--unit 2'; do
+  refuses "${option% *} is of .*, and none is given; leave it out" $BRAINFOREST cortex contours s.contours $option -o no.contours
+done
+refuses 'unit is of an .slc file' $BRAINFOREST cortex surfaces s.contours --unit 2 -o no.gii no2.gii
+refuses 'coarser than the sections, which are 1 mm apart' $BRAINFOREST cortex surfaces s.contours --voxel 3 -o no.gii no2.gii
+sed '3s/"at": [-0-9.]*,/"at": 1e400,/' s.contours >large.contours
+refuses 'large.contours: holds a number too large' $BRAINFOREST cortex compare large.contours
+echo '{"brainforest_contours": 1, "axis": "y", "objects": ["a"], "sections": []}' >none.contours
+refuses 'two are compared' $BRAINFOREST cortex compare none.contours
+: >empty.nii
+refuses 'empty.nii: is empty' $BRAINFOREST cortex contours empty.nii --threshold 1 -o no.contours
 refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
+refuses 'dimensions is of all blocks together' $BRAINFOREST cortex grid swan --dimensions 3
+refuses 'up is of drawings' $BRAINFOREST cortex grid swan --up x -o no.svg
+refuses 'closed is of drawings' $BRAINFOREST cortex grid crown --steps 3 --closed -o no.obj
+[ ! -e no.svg ] && [ ! -e no.obj ]
 [ ! -e nowhere ] && [ ! -e no.gii ] && [ ! -e no2.gii ] && [ ! -e no.contours ]
 
 # Successive sections over one another, as drawings; contours that cross are told with a place.

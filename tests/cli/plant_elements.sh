@@ -140,6 +140,10 @@ fails_with 2 'layers-on' plant --element 1 --layers layer1.txt --out no
 fails_with 1 'e.h5 has elements 0 to' plant --element 1000000 --out no
 fails_with 1 'is no list of elements' plant --element 1,x --out no
 fails_with 1 'no element of e.h5 has its middle in that sphere' plant --sphere 0 0 0 10 --out no
+fails_with 1 'sphere has a radius of -5 µm' plant --sphere 0 0 0 -5 --out no
+fails_with 1 'has its middle in that box' plant --box 10 10 10 0 0 0 --out no
+fails_with 1 'its folder is not there' plant --element 1 --out nowhere/no
+fails_with 1 'holds something other than a circuit' plant --element 1 --out "$FOREST_SOURCE_DIR/docs"
 fails_with 1 'say which elements' plant --out no
 fails_with 1 'do not fit into layer' plant --element 1 --density 20000000 --out no
 fails_with 1 'outer' $BRAINFOREST plant --elements outer --element 1 --recipe human-frontal --repo cells.db --out no
