@@ -195,7 +195,8 @@ void write_unless_there(const std::vector<std::pair<fs::path, std::string>>& fil
 void must_have_folder(const fs::path& place) {
   if (is_stream(place)) return;
   std::error_code none;
-  const fs::path folder = place.has_parent_path() ? place.parent_path() : fs::path(".");
+  const fs::path named = place.has_filename() ? place : place.parent_path();  // a folder may end in a slash
+  const fs::path folder = named.has_parent_path() ? named.parent_path() : fs::path(".");
   const std::string name = repository::escaped(place.string());
   if (!fs::is_directory(folder, none))
     throw Error(fmt::format("{}: its folder is not there; make it first", name));

@@ -167,9 +167,10 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
     wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - sz * scale * forks.tz(r)))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
+    off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)), back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx), part * (wy - gy), part * (wz - gz), last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits)
+       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -239,12 +240,13 @@ class Writer {
         "branches are,\n"
         "# how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide "
         "their forks, how much\n"
-        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter (µm), the "
+        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter and how far "
+        "from the soma the farthest branch ends (µm), the "
         "mean "
         "logarithm of path by chord,\n"
         "# the mean angle between segments, and how much they differ in how steep they are, and those "
         "angles, in shares of the means.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, winding, angle, stepped, kinky) =",
+        "sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, stepped, kinky) =",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -254,8 +256,8 @@ class Writer {
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.winding, 1e4), rounded(of.turn, 1e4),
-            rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
+        put(" {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
+            rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
       }
   }
 

@@ -216,6 +216,7 @@ struct Learner {
       of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
       for (std::size_t s = 0; s < styles; ++s) manner.style[s] = mean_of(s);
       manner.thinnest = of.widest > 0. ? of.thinnest : 0.;  // without diameters: none
+      manner.farthest = of.farthest;
       manner.winding = std::max(.01, manner.style[wander]);
       manner.turn = turn;
       manner.stairs = std::max(manner.stairs, manner.style[stairs] / climb);

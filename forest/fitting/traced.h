@@ -91,6 +91,7 @@ struct Fork {
 struct Manner {
   Style style{};
   double thinnest = least_diameter;  // diameter, µm
+  double farthest = 0.;              // end of a branch from the soma, µm
   double winding = .01;              // mean of the logarithm of path / chord
   double turn = .02;                 // mean angle from one segment to the next
   // How much its segments differ in how steep they are, and those angles: standard deviations in shares of the mean.

@@ -170,15 +170,19 @@ refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours s
 refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 # Options of other input, which would say nothing.
-for option in '--axis x' '--spacing 3' '--offset 1' '--name a' '--unit 2'; do
-  refuses "${option% *} is of .*, and none is given; leave it out" $BRAINFOREST cortex contours s.contours $option -o no.contours
+for option in 'axis x' 'spacing 3' 'offset 1' 'name a' 'unit 2'; do
+  refuses "${option% *} is of " $BRAINFOREST cortex contours s.contours --$option -o no.contours
 done
 refuses 'unit is of an .slc file' $BRAINFOREST cortex surfaces s.contours --unit 2 -o no.gii no2.gii
 refuses 'coarser than the sections, which are 1 mm apart' $BRAINFOREST cortex surfaces s.contours --voxel 3 -o no.gii no2.gii
 sed '3s/"at": [-0-9.]*,/"at": 1e400,/' s.contours >large.contours
 refuses 'large.contours: holds a number too large' $BRAINFOREST cortex compare large.contours
-echo '{"brainforest_contours": 1, "axis": "y", "objects": ["a"], "sections": []}' >none.contours
-refuses 'two are compared' $BRAINFOREST cortex compare none.contours
+/usr/bin/python3 - <<'PY'
+import json
+d = json.load(open("s.contours"))
+json.dump({**d, "sections": d["sections"][:1]}, open("one.contours", "w"))
+PY
+refuses 'has 1 section; two are compared' $BRAINFOREST cortex compare one.contours
 : >empty.nii
 refuses 'empty.nii: is empty' $BRAINFOREST cortex contours empty.nii --threshold 1 -o no.contours
 refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
