@@ -27,9 +27,6 @@ namespace {
 
 using Out = std::back_insert_iterator<std::string>;
 
-// What is a tracer's habit rather than a neuron's.
-constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
-
 // How narrowly forks are chosen by what sets tracers apart beside the mean: of few neurons, hardly, since none are alike in all of
 // it.
 double habits_of_many(double width, std::size_t neurons) {

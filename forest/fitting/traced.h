@@ -39,6 +39,8 @@ enum {
 inline constexpr std::array<const char*, styles> style_names{"reach",    "wander", "girth", "grain", "slope",
                                                              "kink",     "stairs", "kinks", "depth", "spread",
                                                              "thinning", "extent", "forks"};
+// What is a tracer's habit rather than a neuron's.
+constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
 using Style = std::array<double, styles>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured
