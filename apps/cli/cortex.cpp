@@ -31,6 +31,12 @@
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
+
+void must_be_used(const CLI::App& command, std::initializer_list<OptionUse> options) {
+  for (const auto& [option, of, used] : options)
+    if (!used && command.count(option)) throw Error(fmt::format("{} is {}; leave it out", option, of));
+}
+
 namespace {
 
 namespace fs = std::filesystem;

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <functional>
+#include <initializer_list>
 
 namespace CLI {
 class App;
@@ -11,6 +12,14 @@ class App;
 namespace forest::cli {
 
 class Console;
+
+/// An option, what it says something of, and whether there is such a thing.
+struct OptionUse {
+  const char *option, *of;
+  bool used;
+};
+/// Throws Error for one that was given and says nothing: it was meant for other input.
+void must_be_used(const CLI::App& command, std::initializer_list<OptionUse> options);
 
 std::function<void()> cortex_compare(CLI::App& command, Console& console);
 std::function<void()> cortex_contours(CLI::App& command, Console& console);

@@ -287,21 +287,15 @@ std::string name_of(const Options& options, std::size_t i) {
 
 // An option that says nothing of any input was meant for another.
 void refuse_unused(const Options& options, const Used& used) {
-  struct Row {
-    const char *option, *of;
-    bool used;
-  };
-  for (const auto& [option, of, is_used] :
-       {Row{"--axis", "of surfaces, volumes and pictures", used.axis},
-        {"--spacing", "of surfaces, volumes and pictures", used.spacing},
-        {"--offset", "of surfaces, volumes and pictures", used.spacing},
-        {"--name", "of boundaries of surfaces, volumes and pictures", used.axis},
-        {"--threshold", "of volumes and pictures", used.threshold},
-        {"--pixel", "of pictures", used.pixel},
-        {"--unit", "of an .slc file", used.unit},
-        {"--tolerance", "of curves, without --straight", !options.straight}})
-    if (!is_used && options.command->count(option))
-      throw Error(fmt::format("{} is {}, and none is given; leave it out", option, of));
+  must_be_used(*options.command,
+               {{"--axis", "of surfaces, volumes and pictures, and none is given", used.axis},
+                {"--spacing", "of surfaces, volumes and pictures, and none is given", used.spacing},
+                {"--offset", "of surfaces, volumes and pictures, and none is given", used.spacing},
+                {"--name", "of boundaries of surfaces, volumes and pictures, and none is given", used.axis},
+                {"--threshold", "of volumes and pictures, and none is given", used.threshold},
+                {"--pixel", "of pictures, and none is given", used.pixel},
+                {"--unit", "of an .slc file, and none is given", used.unit},
+                {"--tolerance", "of curves, without --straight, and none is given", !options.straight}});
 }
 
 // The sections of a surface; what is wrong with it is said with the name of its file.
@@ -483,8 +477,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
   add_force(command, o->force);
   return [o, &command, &console] {
     if (!o->svg.empty()) must_take_contours(o->svg, o->force);
-    if (command.count("--unit") && o->file.extension() != ".slc")
-      throw Error("--unit is of an .slc file, and none is given; leave it out");
+    must_be_used(command, {{"--unit", "of an .slc file, and none is given", o->file.extension() == ".slc"}});
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     if (stack.sections.size() < 2)
       throw Error(fmt::format("{}: has {}; two are compared", o->file.string(),

@@ -146,18 +146,11 @@ void check_out(const Options& options) {
 
 // What says nothing of the block that was given was meant for another.
 void refuse_unused(const Options& options, bool one, bool in_space) {
-  struct Row {
-    const char *option, *of;
-    bool used;
-  };
   const bool drawn = options.out.extension() == ".svg";
-  for (const auto& [option, of, used] :
-       {Row{"--dimensions", "of all blocks together, and one is given", !one},
-        {"--generator", "of one block, and none is given", one},
-        {"--up", "of drawings (.svg) of blocks in space", drawn && in_space},
-        {"--closed", "of drawings (.svg) of blocks in space", drawn && in_space}})
-    if (!used && options.command->count(option))
-      throw Error(fmt::format("{} is {}; leave it out", option, of));
+  must_be_used(*options.command, {{"--dimensions", "of all blocks together, and one is given", !one},
+                                  {"--generator", "of one block, and none is given", one},
+                                  {"--up", "of drawings (.svg) of blocks in space", drawn && in_space},
+                                  {"--closed", "of drawings (.svg) of blocks in space", drawn && in_space}});
 }
 
 void run(const Options& options, Console& console) {

@@ -70,8 +70,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
       throw Error(fmt::format(
           "'{}' is to be both boundaries; name the outer one by --outer, the inner one by --inner",
           o->outer));
-    if (command.count("--unit") && o->file.extension() != ".slc")
-      throw Error("--unit is of an .slc file, and none is given; leave it out");
+    must_be_used(command, {{"--unit", "of an .slc file, and none is given", o->file.extension() == ".slc"}});
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     // Coarser than the sections are apart, what they show is lost.
     if (const std::size_t sections = stack.sections.size(); sections > 1) {
