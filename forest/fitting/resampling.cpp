@@ -84,9 +84,8 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 # Tips as forks and stems are asked by them: as far apart as their logarithms but for few. A fork of two cannot bear three, as a daughter
 # that ended where it was traced has no way to go on.
 function crowd(tips) = log(tips) - 30 / tips^3
-# How many times thicker a stem that was so thick at its end is than where it was traced, as the neuron is whose diameters it has.
-distribution thicker(kind, cell, d) = min(max(1, most_thick(kind) / max(0.001, d)),
-  exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(cell, kind)))))
+# How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
+distribution thicker(kind, p) = min(plans.most(p), exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(plans.cell(p), kind)))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d), 0)
@@ -100,7 +99,7 @@ axiom: Soma(cells.soma(me)) Plan(0)
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
-    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, plans.cell(p), plans.d(p)), d = thick * plans.d(p),
+    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, p), d = thick * plans.d(p),
     away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
     r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style, 0),
     sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
@@ -114,7 +113,7 @@ bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
     ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
-    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, plans.cell(p), plans.d(p)) * plans.d(p) }
+    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, p) * plans.d(p) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
@@ -290,8 +289,24 @@ class Writer {
 
   void plans() {
     put("\n\n# Their stems, in the order of the sample of stems: tips, where they leave the soma's centre "
-        "(µm) and head, their diameter where they end, and the path to the farthest tip.\n"
-        "sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz) =");
+        "(µm) and head, their diameter where they end, the path to the farthest tip, their length, where the "
+        "middle of their "
+        "tips is, and how many times thicker they may be,\n# so that none ends or is thicker than the "
+        "thickest that was traced.\n"
+        "sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz, most) =");
+    const auto thickest = [&](auto&& of) {
+      std::map<int, double> result;
+      for (const Cell& c : traced_.cells)
+        for (const Stem& s : c.stems) result[s.kind] = std::max(result[s.kind], of(s));
+      return result;
+    };
+    const auto end = [](const Stem& s) { return std::max(least_diameter, s.end_diameter); };
+    const auto widest = [&](const Stem& s) {
+      float radius = 0;
+      for (const Point& p : s.points) radius = std::max(radius, p.radius);
+      return std::max(end(s), 2. * double(radius));
+    };
+    std::map<int, double> thickest_end = thickest(end), thickest_anywhere = thickest(widest);
     bool first = true;
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
@@ -303,6 +318,7 @@ class Writer {
         put(" {} {} {}", rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.), rounded(s.length, 1e2));
         put(" ");
         vector(s.aim, 10.);
+        put(" {:.4g}", std::min(thickest_end[s.kind] / end(s), thickest_anywhere[s.kind] / widest(s)));
       }
   }
 
@@ -439,10 +455,9 @@ class Writer {
       put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
     }
     put("# No stem has more tips, or reaches farther, than half as much again as the largest that was "
-        "traced, and none is thicker at its end.\n");
+        "traced.\n");
     most("most_tips", 1.5, 1., [](const Stem& stem) { return stem.tips; });
     most("most_ahead", 1.5, 10., [](const Stem& stem) { return stem.ahead; });
-    most("most_thick", 1., 1e3, [](const Stem& stem) { return stem.end_diameter; });
     std::vector<std::string> slopes;
     for (const auto& [kind, mean] : traced_.means)
       slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));

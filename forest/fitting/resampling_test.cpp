@@ -386,6 +386,39 @@ TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
   EXPECT_NEAR(differ(lsystem::grow_population(grammar, 100, 1)), differ(models), .1 * differ(models));
 }
 
+// Thin neurons whose stems begin as thick as those of thick ones: a cone that is drawn by a thick neuron is no thicker than any was.
+TEST(Resampling, NoStemIsThickerThanTheThickest) {
+  std::vector<Morphology> models;
+  const auto thickest = [](const Morphology& n) {
+    float radius = 0;
+    for (const Point& p : n.points()) radius = std::max(radius, p.radius);
+    return radius;
+  };
+  float most = 0;
+  for (std::uint64_t i = 0; i < 12; ++i) {
+    Random random(6, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const double thick = i % 2 ? 2. : .3;
+    for (int stem = 0; stem < 3; ++stem) {
+      const double angle = 2. * stem + .1 * random.normal();
+      const auto at = [&](double way, double turn, double radius) {
+        return away(way, angle + turn, radius, random);
+      };
+      const Point fork = at(40. + 5. * random.normal(), 0., thick);
+      const SectionId root =
+          builder.add_section({}, SectionKind::basal, std::array{at(5., 0., 2.5), at(20., .1, thick), fork});
+      for (const double side : {-.3, .4})
+        builder.add_section(root, SectionKind::basal,
+                            std::array{fork, at(90. + 5. * random.normal(), side, thick)});
+    }
+    models.push_back(builder.build());
+    most = std::max(most, thickest(models.back()));
+  }
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  for (const Morphology& n : lsystem::grow_population(grammar, 100, 1)) EXPECT_LE(thickest(n), 1.01f * most);
+}
+
 // Two arbors that fork in their first point, where they leave the soma, and one that does not.
 TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
   std::vector<Morphology> models;
