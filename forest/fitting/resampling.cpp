@@ -19,6 +19,7 @@
 #include "forest/fitting/mixing.h"
 #include "forest/fitting/ring.h"
 #include "forest/fitting/traced.h"
+#include "forest/fitting/tuning.h"
 #include "forest/statistics/summary.h"
 #include "forest/statistics/two_samples.h"
 
@@ -57,15 +58,15 @@ distribution plan(i) = arbors.plan(arbors(me, i))
 # How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
-function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter * sqrt(
+function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter(kind) * sqrt(
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 # How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
-distribution steeper(kind, donor) = max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
+distribution steeper(kind, donor) = climb(kind) * max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
 # How much more unevenly steep it is drawn, how many times as large the angles between its steps are, and how much more they differ,
 # as this neuron's tracer would have done.
-distribution stepped(kind, donor) = max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
-distribution turned(kind, donor) = max(0.6, min(1.6, (styles.angle(styles(me, kind)) / styles.angle(donor))^habits))
+distribution stepped(kind, donor) = rugged(kind) * max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
+distribution turned(kind, donor) = kinked(kind) * max(0.6, min(1.6, (styles.angle(styles(me, kind)) / styles.angle(donor))^habits))
 distribution kinky(kind, donor) = max(0.5, min(2, (styles.kinky(styles(me, kind)) / styles.kinky(donor))^(1.6 * habits)))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
@@ -75,9 +76,15 @@ function borne(r, i) = forks.tips(r) * nth(i, forks.n1(r), forks.n2(r), rest(r))
 # The cosine of the angle between a direction and that to the middle of the tips where a fork was traced.
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
 function along(r, x, y, z) = cosine(x, y, z, forks.tx(r), forks.ty(r), forks.tz(r))
-# By which angle about z a fork is turned, of that between the headings where it was traced and here (Trace turns as much).
-function spin(m, r, x, y) = turn * sqrt((forks.ux(r)^2 + forks.uy(r)^2) * (x^2 + y^2)) *
+# The angle about z from one direction to another, less where either leaves the plane of the slice.
+function about(ux, uy, uz, vx, vy, vz) = sqrt((ux^2 + uy^2) / max(0.001, ux^2 + uy^2 + uz^2) * (vx^2 + vy^2) / max(0.001, vx^2 + vy^2 + vz^2)) *
+  atan2(ux * vy - uy * vx, ux * vx + uy * vy)
+# By which angle about z a fork is turned: of that between the headings where it was traced and here, and of that by which the middle of
+# its tips then lies beside the heading.
+function with_it(m, r, x, y, z) = turn * sqrt(forks.ux(r)^2 + forks.uy(r)^2) * sqrt(x^2 + y^2) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
+function back_by(a, tx, ty, tz, x, y, z) = about(cos(a) * tx - sin(a) * ty, sin(a) * tx + cos(a) * ty, tz, x, y, z)
+function spin(kind, m, r, x, y, z) = with_it(m, r, x, y, z) + (1 - wide(kind)) * back_by(with_it(m, r, x, y, z), m * forks.tx(r), forks.ty(r), forks.tz(r), x, y, z)
 # The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
 function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
   min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
@@ -125,7 +132,7 @@ end: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, a
 on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   : next >= 0 & run < longest & forks.tips(max(0, next)) == tips
     & along(max(0, next), if(mirror, px - ax, ax - px), ay - py, az - pz) > agreed
-  { q = calibre(kind, next, tips, ahead, d), phi = spin(if(mirror, -1, 1), next, x, y) }
+  { q = calibre(kind, next, tips, ahead, d), phi = spin(kind, if(mirror, -1, 1), next, x, y, z) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
@@ -134,7 +141,7 @@ fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, 
     r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), crowd(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style, 0),
-    q = calibre(kind, r, tips, ahead, d), phi = spin(mx, r, x, y) }
+    q = calibre(kind, r, tips, ahead, d), phi = spin(kind, mx, r, x, y, z) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
 one: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 1
@@ -161,12 +168,12 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
-    wz = max(cells.low(me), min(cells.high(me), gz + bears * (az - pz - sz * scale * forks.tz(r)))),
+    wz = max(cells.low(me), min(cells.high(me), deep(kind) * (gz + bears * (az - pz - sz * scale * forks.tz(r))))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
     off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)), back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
-  -> Trace(forks, r, i, scale, mirror, turn, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits)
+  -> Trace(forks, r, i, scale, mirror, 0, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
+       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits, phi)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -179,8 +186,8 @@ constexpr double most_deviation = 1.2;
 class Writer {
  public:
   Writer(const Traced& traced, const std::vector<Mixed>& mixed, const std::string& title,
-         const Resampling& options, const Seldom& seldom)
-      : traced_(traced), options_(options), seldom_(seldom), mixed_(mixed) {
+         const Resampling& options, const Seldom& seldom, const Tuning& tuning)
+      : traced_(traced), options_(options), seldom_(seldom), tuning_(tuning), mixed_(mixed) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
       kernels_ +=
           fmt::format(", {} ~ {:.2g}", style_names[s],
@@ -458,6 +465,12 @@ class Writer {
         "traced.\n");
     most("most_tips", 1.5, 1., [](const Stem& stem) { return stem.tips; });
     most("most_ahead", 1.5, 10., [](const Stem& stem) { return stem.ahead; });
+    put("# Tuned: how many times as much as traced branches those of each kind are told to do.\n");
+    for (std::size_t k = 0; k < knobs.size(); ++k) {
+      std::vector<std::string> bins;
+      for (const auto& [kind, values] : tuning_) bins.push_back(fmt::format("{}: {:.4g}", kind, values[k]));
+      put("table {} = {}  # {}\n", knobs[k].name, fmt::join(bins, ", "), knobs[k].says);
+    }
     std::vector<std::string> slopes;
     for (const auto& [kind, mean] : traced_.means)
       slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
@@ -473,7 +486,6 @@ class Writer {
         "#define longest 3   # branches from one neuron in a row, at most\n"
         "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
         "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
-        "#define straighter 0.95  # how much less they bend themselves, as this bends them too\n"
         "#define steep 1     # how much of the difference between its slope and its donor's a branch makes "
         "up for\n"
         "#define habits {:.4g}  # … of how unevenly steep and how kinked it was drawn\n"
@@ -545,6 +557,7 @@ class Writer {
   const Traced& traced_;
   const Resampling& options_;
   const Seldom& seldom_;
+  const Tuning& tuning_;
   const std::vector<Mixed>& mixed_;
   double squares_ = 0., differences_ = 0.;  // of the styles of neurons that are like the same one
   std::string kernels_, text_;
@@ -569,13 +582,15 @@ std::string resampling_grammar(std::span<const Morphology> neurons, const std::s
   std::size_t stems = 0;
   for (const Cell& c : traced.cells) stems += c.stems.size();
   const std::size_t forks = traced.forks.size();
-  const auto text = [&](const Seldom& seldom) {
-    return Writer(traced, mixed, title, options, seldom).text();
+  const auto text = [&](const Seldom& seldom, const Tuning& tuning) {
+    return Writer(traced, mixed, title, options, seldom, tuning).text();
   };
-  const std::string alike =
-      text({std::vector<double>(stems), std::vector<double>(forks), std::vector<double>(forks)});
-  if (!options.evening.rounds) return alike;
-  return text(evened(lsystem::parse(alike, title), traced.cells.size(), options.evening, progress));
+  Seldom seldom{std::vector<double>(stems), std::vector<double>(forks), std::vector<double>(forks)};
+  Tuning tuning = untuned(traced);
+  const auto grammar = [&] { return lsystem::parse(text(seldom, tuning), title); };
+  if (options.evening.rounds) seldom = evened(grammar(), traced.cells.size(), options.evening, progress);
+  if (options.tuning.rounds) tuning = tuned(grammar(), traced, options, progress);
+  return text(seldom, tuning);
 }
 
 }  // namespace forest::fitting

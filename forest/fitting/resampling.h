@@ -34,6 +34,12 @@ struct Evening {
   double share = .8;        // of the logarithm of what is amiss, mended in a round
 };
 
+/// How a model is tuned after that, until its branches are in the mean as traced ones are.
+struct TuningOptions {
+  std::size_t rounds = 10;  // 0: it is not
+  std::size_t most = 300;   // neurons in a round
+};
+
 struct Resampling {
   statistics::KindSet kinds = statistics::dendrites;  // of the sections that are modelled
   // Widths of the kernels by which forks are drawn.
@@ -52,6 +58,7 @@ struct Resampling {
   double jitter = .1;   // of the logarithms of a stem's tips and reach
   std::size_t kin = 4;  // neurons alike, by whose differences it is changed; none is its mate or third
   Evening evening = {};
+  TuningOptions tuning = {};
 };
 
 /// The text of a grammar (docs/lsystem/notation.md) with all that it draws from.

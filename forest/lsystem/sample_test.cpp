@@ -158,6 +158,9 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
   expect_near(end_of("Trace(twigs, 0, 0, 2, 2, 1, 1, 0, 1, 0, 0, 0, 0, 1, 0.5)"), {0, 12, -4});
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});  // about z, as the slice lies
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0)"), {0, 6, 4});
+  expect_near(
+      end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0.5, 1, 0, 1, 0, 0, 0, 0, 1, 1, 1, 1, 1, 0, 45)"),
+      {0, 6, 4});
   // Twice as far from its chord, with the same end; three times as thick as a branch of another row, which is 1 everywhere, but in
   // the end no thinner than 3.5.
   const Morphology m =

@@ -48,7 +48,7 @@ constexpr TurtleSymbol symbol_table[] = {
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
     {"Trace",
      "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep, "
-     "stairs, kinked, kinks, climbing",
+     "stairs, kinked, kinks, climbing, about",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
@@ -58,8 +58,10 @@ constexpr TurtleSymbol symbol_table[] = {
      "proportion; `steep` times as far along z; how steep its "
      "steps are to the power of "
      "`stairs`; angles between them `kinked` times as large, and to the power of `kinks`; of "
-     "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it",
-     Action::trace, 3, 19},
+     "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it; and "
+     "turned about z by `about` degrees "
+     "beside",
+     Action::trace, 3, 20},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -432,8 +434,9 @@ class Turtle {
                  along = before.x() * heading.x() + before.y() * heading.y();
     // Two that head nearly along z hardly have an angle about it.
     const double level = before.head<2>().norm() * heading.head<2>().norm();
-    const Eigen::Quaterniond turn(
-        Eigen::AngleAxisd(level * turn_share * std::atan2(across, along), Eigen::Vector3d::UnitZ()));
+    const Eigen::Quaterniond turn(Eigen::AngleAxisd(
+        level * turn_share * std::atan2(across, along) + value(19, 0.) * (std::numbers::pi / 180.),
+        Eigen::Vector3d::UnitZ()));
     const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const double thickness_end = value(13, thickness);

@@ -1,0 +1,46 @@
+// SPDX-License-Identifier: Apache-2.0
+// What a model is told to do, and what comes of it, differ: a branch that is drawn to where its tips should be leaves its fork more
+// widely and bends more than where it was traced, whatever it is drawn from. So a model is heard, and tuned: as many neurons as were
+// traced are grown, what their branches are like in the mean is compared with what traced ones are like, knobs are turned by it, and
+// so on. Private to this room.
+#pragma once
+
+#include <array>
+#include <cstddef>
+#include <map>
+
+#include "forest/core/progress.h"
+#include "forest/fitting/resampling.h"
+#include "forest/fitting/traced.h"
+#include "forest/lsystem/grammar.h"
+
+namespace forest::fitting {
+
+/// A factor that the model asks for, of each kind of section, as a table of this name.
+struct Knob {
+  const char* name;
+  std::size_t style;   // what it turns up
+  double first, gain;  // gain: of its logarithm, for each standard deviation of that style among neurons
+  const char* says;
+};
+inline constexpr std::array knobs{
+    Knob{"wide", spread, 1., .35, "how wide the angle is in which they leave a fork"},
+    Knob{"straighter", wander, .95, .15, "how far they bend from their chord"},
+    Knob{"kinked", kink, 1., .2, "how large the angles between steps are"},
+    Knob{"rugged", stairs, 1., .4, "how unevenly steep steps are"},
+    Knob{"climb", slope, 1., .3, "how steep they are"},
+    Knob{"deep", depth, 1., .4, "how far along z from the soma the middle of their tips is sought"},
+};
+
+/// By kind, in the order of `knobs`.
+using Tuning = std::map<int, std::array<double, knobs.size()>>;
+
+Tuning untuned(const Traced& traced);
+
+/// The same at any number of threads.
+/// @param grammar  as resampling_grammar writes it, with a table for each knob
+/// @param traced   of what it was made
+Tuning tuned(lsystem::Grammar grammar, const Traced& traced, const Resampling& options,
+             Progress& progress = Progress::none());
+
+}  // namespace forest::fitting
