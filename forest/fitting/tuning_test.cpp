@@ -38,9 +38,8 @@ double amiss(const std::vector<Morphology>& models, const Resampling& options) {
   double sum = 0.;
   for (const auto& [kind, mean] : traced.means)
     for (const Knob& knob : knobs)
-      sum += std::pow((grown.means.at(kind)[knob.style] - mean[knob.style]) /
-                          traced.deviations.at(kind)[knob.style],
-                      2);
+      sum += std::pow(
+          (grown.means.at(kind)[knob.style] - mean[knob.style]) / traced.deviations.at(kind)[knob.style], 2);
   return std::sqrt(sum);
 }
 
