@@ -76,15 +76,14 @@ function borne(r, i) = forks.tips(r) * nth(i, forks.n1(r), forks.n2(r), rest(r))
 # The cosine of the angle between a direction and that to the middle of the tips where a fork was traced.
 function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 + y^2 + z^2) * (u^2 + v^2 + w^2)))
 function along(r, x, y, z) = cosine(x, y, z, forks.tx(r), forks.ty(r), forks.tz(r))
-# The angle about z from one direction to another, less where either leaves the plane of the slice.
-function about(ux, uy, uz, vx, vy, vz) = sqrt((ux^2 + uy^2) / max(0.001, ux^2 + uy^2 + uz^2) * (vx^2 + vy^2) / max(0.001, vx^2 + vy^2 + vz^2)) *
-  atan2(ux * vy - uy * vx, ux * vx + uy * vy)
-# By which angle about z a fork is turned: of that between the headings where it was traced and here, and of that by which the middle of
-# its tips then lies beside the heading.
-function with_it(m, r, x, y, z) = turn * sqrt(forks.ux(r)^2 + forks.uy(r)^2) * sqrt(x^2 + y^2) *
+# By which angle about z a fork is turned, of that between the headings where it was traced and here, and of that by which the middle of
+# its tips then lies beside the heading; less where either leaves the plane of the slice.
+function swing(m, r, x, y) = turn * sqrt(forks.ux(r)^2 + forks.uy(r)^2) * sqrt(x^2 + y^2) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
-function back_by(a, tx, ty, tz, x, y, z) = about(cos(a) * tx - sin(a) * ty, sin(a) * tx + cos(a) * ty, tz, x, y, z)
-function spin(kind, m, r, x, y, z) = with_it(m, r, x, y, z) + (1 - wide(kind)) * back_by(with_it(m, r, x, y, z), m * forks.tx(r), forks.ty(r), forks.tz(r), x, y, z)
+function beside(tx, ty, tz, x, y) = sqrt((tx^2 + ty^2) / max(0.001, tx^2 + ty^2 + tz^2)) * sqrt(x^2 + y^2) *
+  atan2(tx * y - ty * x, tx * x + ty * y)
+function spin(kind, a, m, r, x, y) = a + (1 - wide(kind)) *
+  beside(cos(a) * m * forks.tx(r) - sin(a) * forks.ty(r), sin(a) * m * forks.tx(r) + cos(a) * forks.ty(r), forks.tz(r), x, y)
 # The share of a way aside that the branch takes which is `length` of the path to the farthest tip; not more than it can bend.
 function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
   min(1, most * (length + beyond) / max(1, sqrt(x^2 + y^2 + z^2)))
@@ -132,7 +131,7 @@ end: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, a
 on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   : next >= 0 & run < longest & forks.tips(max(0, next)) == tips
     & along(max(0, next), if(mirror, px - ax, ax - px), ay - py, az - pz) > agreed
-  { q = calibre(kind, next, tips, ahead, d), phi = spin(kind, if(mirror, -1, 1), next, x, y, z) }
+  { q = calibre(kind, next, tips, ahead, d), a = swing(if(mirror, -1, 1), next, x, y), phi = spin(kind, a, if(mirror, -1, 1), next, x, y) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
@@ -141,7 +140,7 @@ fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, 
     r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), crowd(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
       mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
       mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style, 0),
-    q = calibre(kind, r, tips, ahead, d), phi = spin(kind, mx, r, x, y, z) }
+    q = calibre(kind, r, tips, ahead, d), a = swing(mx, r, x, y), phi = spin(kind, a, mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
 one: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 1
@@ -313,7 +312,7 @@ class Writer {
       for (const Point& p : s.points) radius = std::max(radius, p.radius);
       return std::max(end(s), 2. * double(radius));
     };
-    std::map<int, double> thickest_end = thickest(end), thickest_anywhere = thickest(widest);
+    const std::map<int, double> ends = thickest(end), anywhere = thickest(widest);
     bool first = true;
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
@@ -325,7 +324,7 @@ class Writer {
         put(" {} {} {}", rounded(s.end_diameter, 1e3), rounded(s.ahead, 10.), rounded(s.length, 1e2));
         put(" ");
         vector(s.aim, 10.);
-        put(" {:.4g}", std::min(thickest_end[s.kind] / end(s), thickest_anywhere[s.kind] / widest(s)));
+        put(" {:.4g}", std::min(ends.at(s.kind) / end(s), anywhere.at(s.kind) / widest(s)));
       }
   }
 
@@ -465,7 +464,7 @@ class Writer {
         "traced.\n");
     most("most_tips", 1.5, 1., [](const Stem& stem) { return stem.tips; });
     most("most_ahead", 1.5, 10., [](const Stem& stem) { return stem.ahead; });
-    put("# Tuned: how many times as much as traced branches those of each kind are told to do.\n");
+    put("# Tuned by growing: how many times as much as traced branches those of each kind are told to do.\n");
     for (std::size_t k = 0; k < knobs.size(); ++k) {
       std::vector<std::string> bins;
       for (const auto& [kind, values] : tuning_) bins.push_back(fmt::format("{}: {:.4g}", kind, values[k]));

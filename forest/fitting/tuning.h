@@ -1,8 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // What a model is told to do, and what comes of it, differ: a branch that is drawn to where its tips should be leaves its fork more
 // widely and bends more than where it was traced, whatever it is drawn from. So a model is heard, and tuned: as many neurons as were
-// traced are grown, what their branches are like in the mean is compared with what traced ones are like, knobs are turned by it, and
-// so on. Private to this room.
+// traced are grown, their branches are compared in the mean with those of the traced ones, knobs are turned by the difference, and
+// they are grown again. Private to this room.
 #pragma once
 
 #include <array>
@@ -24,7 +24,7 @@ struct Knob {
   const char* says;
 };
 inline constexpr std::array knobs{
-    Knob{"wide", spread, 1., .35, "how wide the angle is in which they leave a fork"},
+    Knob{"wide", spread, 1., .35, "how far the middle of a fork's tips stands beside the branch before"},
     Knob{"straighter", wander, .95, .15, "how far they bend from their chord"},
     Knob{"kinked", kink, 1., .2, "how large the angles between steps are"},
     Knob{"rugged", stairs, 1., .4, "how unevenly steep steps are"},
@@ -35,6 +35,7 @@ inline constexpr std::array knobs{
 /// By kind, in the order of `knobs`.
 using Tuning = std::map<int, std::array<double, knobs.size()>>;
 
+/// As the knobs are at first, for each kind that was traced.
 Tuning untuned(const Traced& traced);
 
 /// The same at any number of threads.
