@@ -118,6 +118,9 @@ MappedFile& MappedFile::operator=(MappedFile&& other) noexcept {
 }
 
 NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(followed(wanted)) {
+  if (wanted == "-")
+    throw Error(
+        "'-' is no place to write to; name /dev/stdout for standard output, or ./- for a file of that name");
   if (place_.parent_path() == "/dev/fd") place_ = "/proc/self/fd" / place_.filename();
   struct stat status {};
   const bool there = ::stat(place_.c_str(), &status) == 0;

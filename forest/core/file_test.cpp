@@ -143,6 +143,13 @@ TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
   EXPECT_EQ(entries(folder_), 1);
 }
 
+// Who writes "-" means standard output, and would find a file of that name instead.
+TEST_F(FileInAFolder, ADashIsNoPlace) {
+  EXPECT_NE(refused([] { NewFile("-"); }).find("/dev/stdout"), std::string::npos);
+  NewFile(folder_ / "-").commit();
+  EXPECT_TRUE(std::filesystem::exists(folder_ / "-"));
+}
+
 TEST_F(FileInAFolder, AScratchFileHasNoNameAndGivesBackWhatWasWritten) {
   const NewFile file(folder_ / "x");
   ScratchFile scratch(file);
