@@ -300,19 +300,13 @@ class Writer {
         "tips is, and how many times thicker they may be,\n# so that none ends or is thicker than the "
         "thickest that was traced.\n"
         "sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz, most) =");
-    const auto thickest = [&](auto&& of) {
-      std::map<int, double> result;
-      for (const Cell& c : traced_.cells)
-        for (const Stem& s : c.stems) result[s.kind] = std::max(result[s.kind], of(s));
-      return result;
-    };
     const auto end = [](const Stem& s) { return std::max(least_diameter, s.end_diameter); };
     const auto widest = [&](const Stem& s) {
       float radius = 0;
       for (const Point& p : s.points) radius = std::max(radius, p.radius);
       return std::max(end(s), 2. * double(radius));
     };
-    const std::map<int, double> ends = thickest(end), anywhere = thickest(widest);
+    const std::map<int, double> ends = largest(end), anywhere = largest(widest);
     bool first = true;
     for (const Cell& c : traced_.cells)
       for (const Stem& s : c.stems) {
@@ -455,25 +449,19 @@ class Writer {
                                       {"wander", wander},
                                       {"girth", girth},
                                       {"slope", slope}}) {
-      std::vector<std::string> bins;
-      for (const auto& [kind, sd] : traced_.deviations)
-        bins.push_back(fmt::format("{}: {:.4g}", kind, std::min(sd[style], most_deviation)));
-      put("table sd_{} = {}\n", name, fmt::join(bins, ", "));
+      const std::size_t of = style;
+      table(fmt::format("sd_{}", name), traced_.deviations,
+            [&](const Style& sd) { return std::min(sd[of], most_deviation); });
     }
     put("# No stem has more tips, or reaches farther, than half as much again as the largest that was "
         "traced.\n");
-    most("most_tips", 1.5, 1., [](const Stem& stem) { return stem.tips; });
-    most("most_ahead", 1.5, 10., [](const Stem& stem) { return stem.ahead; });
+    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
+    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
     put("# Tuned by growing: how many times as much as traced branches those of each kind are told to do.\n");
-    for (std::size_t k = 0; k < knobs.size(); ++k) {
-      std::vector<std::string> bins;
-      for (const auto& [kind, values] : tuning_) bins.push_back(fmt::format("{}: {:.4g}", kind, values[k]));
-      put("table {} = {}  # {}\n", knobs[k].name, fmt::join(bins, ", "), knobs[k].says);
-    }
-    std::vector<std::string> slopes;
-    for (const auto& [kind, mean] : traced_.means)
-      slopes.push_back(fmt::format("{}: {:.4g}", kind, mean[slope]));
-    put("table mean_slope = {}\n", fmt::join(slopes, ", "));
+    for (std::size_t k = 0; k < knobs.size(); ++k)
+      table(
+          knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
+    table("mean_slope", traced_.means, [](const Style& mean) { return mean[slope]; });
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
       style += fmt::format(fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
@@ -505,28 +493,37 @@ class Writer {
     text_ += rest;
   }
 
-  // @param times  … so many times the largest that was traced
-  void most(const char* name, double times, double steps, auto&& of) {
-    std::map<int, double> largest;
-    for (const Cell& c : traced_.cells)
-      for (const Stem& stem : c.stems) largest[stem.kind] = std::max(largest[stem.kind], double(of(stem)));
+  // A table by kind.
+  void table(std::string_view name, const auto& by_kind, auto&& value, std::string_view says = "",
+             int digits = 4) {
     std::vector<std::string> bins;
-    for (const auto& [kind, value] : largest)
-      bins.push_back(fmt::format("{}: {}", kind, std::ceil(times * value * steps) / steps));
-    put("table {} = {}\n", name, fmt::join(bins, ", "));
+    for (const auto& [kind, of] : by_kind)
+      bins.push_back(fmt::format("{}: {:.{}g}", kind, value(of), digits));
+    put("table {} = {}{}{}\n", name, fmt::join(bins, ", "), says.empty() ? "" : "  # ", says);
+  }
+
+  // Of the stems of each kind.
+  std::map<int, double> largest(auto&& of) const {
+    std::map<int, double> result;
+    for (const Cell& c : traced_.cells)
+      for (const Stem& stem : c.stems) result[stem.kind] = std::max(result[stem.kind], of(stem));
+    return result;
+  }
+  // Half as much again as the largest, rounded up.
+  void most(std::string_view name, double steps, auto&& of) {
+    table(
+        name, largest(of), [&](double value) { return std::ceil(1.5 * value * steps) / steps; }, "", 9);
   }
 
   // A table of the widths of a kernel: a share of the standard deviation among the forks of each kind.
   void widths(const char* name, double share, auto&& what) {
     std::map<int, std::vector<double>> values;
     for (const Fork& f : traced_.forks) values[f.kind].push_back(what(f));
-    std::vector<std::string> bins;
-    for (const auto& [kind, of] : values) {
+    table(name, values, [&](const std::vector<double>& of) {
       const double sd = deviation(of);
       constexpr double same = 1e-6;  // but for what rounding makes of it
-      bins.push_back(fmt::format("{}: {:.4g}", kind, sd > same ? share * sd : 1.));
-    }
-    put("table {} = {}\n", name, fmt::join(bins, ", "));
+      return sd > same ? share * sd : 1.;
+    });
   }
 
   void vector(const Vec3& v, double steps) {
