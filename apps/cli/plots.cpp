@@ -112,7 +112,12 @@ std::string interval_plot(std::span<const IntervalRow> rows, const IntervalAxis&
   Svg svg;
   constexpr double row_height = 24.;
   double top = axis.left.empty() && axis.right.empty() ? 14. : 34.;
-  const Scale x{axis.low, axis.high, 330., 780.};
+  double notes = width - 794.;  // what is written behind the rows needs
+  for (const IntervalRow& r : rows)
+    notes = std::max(notes, 4. + 6.6 * double(std::ranges::count_if(r.note, [](char c) {
+                                   return (c & 0xc0) != 0x80;
+                                 })));  // characters
+  const Scale x{axis.low, axis.high, 330., width - notes - 14.};
   const double bottom = top + row_height * double(rows.size());
   if (!axis.left.empty()) svg.text(x.from, 18., "◂ " + axis.left, "start", 12., .75);
   if (!axis.right.empty()) svg.text(x.to, 18., axis.right + " ▸", "end", 12., .75);
@@ -136,7 +141,7 @@ std::string interval_plot(std::span<const IntervalRow> rows, const IntervalAxis&
       svg.add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="5" fill="{}" fill-opacity="{:.2f}"/>)", inside(r.value),
               y, colour_of(r.colour), opacity);
     }
-    svg.text(794., y + 4., r.note, "start", 11., .75);
+    svg.text(width - notes, y + 4., r.note, "start", 11., .75);
   }
   svg.text(.5 * (x.from + x.to), bottom + 38., axis.title, "middle", 12., .85);
   return svg.done(bottom + 48., axis.title);
