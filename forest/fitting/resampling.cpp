@@ -112,7 +112,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), habits)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), 1)
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
@@ -172,7 +172,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)), back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, 0, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), habits, phi)
+       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), 1, phi)
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";

@@ -101,6 +101,33 @@ grow: Tip(n) : n < 8 -> ^(uniform(-climb, climb)) F(8) Tip(n + 1)
   EXPECT_LT(spread(grown(evened)), .95 * spread(grown(text)));
 }
 
+// Half of them were traced by somebody who changes the plane of focus at one step of three, half by somebody who does at each.
+TEST(Resampling, KeepsThePlanesOfFocusOfWhoTracedThem) {
+  const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(
+steps: 60
+module Tip(n), Stems(n)
+cell seldom = chance(0.5)
+axiom: Soma(14) Basal Stems(0)
+stem: Stems(n) : n < 4 -> [ -(90 * n + uniform(-20, 20)) f(7) !(1) F(8) Tip(0) ] Stems(n + 1)
+fork: Tip(n) : n > 1 & n < 7 -> [ +(30) Tip(n + 1) ] -(30) Tip(n + 1) : 0.2
+far: Tip(n) : n < 8 & seldom { a = uniform(-40, 40) } -> ^(a) F(2) &(a) F(4) F(3) Tip(n + 1)
+near: Tip(n) : n < 8 & !seldom { a = uniform(-20, 20) } -> ^(a) F(3) &(a) Tip(n + 1)
+)",
+                                                                                 "planes"),
+                                                                  60, 4);
+  const auto shares = [](std::span<const Morphology> neurons) {
+    std::vector<double> of_each;
+    for (const Morphology& n : neurons)
+      of_each.push_back(statistics::find_metric("level_segment_fraction")->values(Arbors(n))[0]);
+    return of_each;
+  };
+  const std::vector<double> were = shares(models),
+                            are = shares(lsystem::grow_population(
+                                lsystem::parse(resampling_grammar(models, "planes"), "fitted"), 120, 1));
+  EXPECT_NEAR(statistics::mean(are), statistics::mean(were), .1 * statistics::mean(were));
+  EXPECT_GT(statistics::summarize(are).sd, .7 * statistics::summarize(were).sd);
+}
+
 // All branches that fork are 5 µm long, and all that end 45 µm: a fork of two that bore three would have a short tip.
 TEST(Resampling, WhatForksAndWhatEndsAreAsLongAsTheyWere) {
   const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(

@@ -235,7 +235,11 @@ struct Learner {
     values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
     values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
     values[slope].push_back(slope_of(points(i)));
+    const std::size_t steps = values[stairs].size();
     add_elevations(points(i), values[stairs]);
+    constexpr double as_level = 1e-4;  // radians
+    for (const double elevation : std::span(values[stairs]).subspan(steps))
+      values[levels].push_back(double(elevation < as_level));
     const std::size_t known = values[kinks].size();
     add_turns(points(i), values[kinks]);
     if (const auto turns = std::span(values[kinks]).subspan(known); !turns.empty())

@@ -19,7 +19,7 @@
 namespace forest::fitting {
 
 // What sets the branches of one neuron apart from those of another, and the names that the grammar gives it. Stairs and kinks are how
-// much its segments differ in how steep they are, and the angles between them.
+// much its segments differ in how steep they are, and the angles between them; levels, how many of them are level.
 enum {
   reach,
   wander,
@@ -29,6 +29,7 @@ enum {
   kink,
   stairs,
   kinks,
+  levels,
   depth,
   spread,
   thinning,
@@ -37,10 +38,10 @@ enum {
   styles
 };
 inline constexpr std::array<const char*, styles> style_names{"reach",    "wander", "girth", "grain", "slope",
-                                                             "kink",     "stairs", "kinks", "depth", "spread",
-                                                             "thinning", "extent", "forks"};
+                                                             "kink",     "stairs", "kinks", "levels", "depth",
+                                                             "spread",   "thinning", "extent", "forks"};
 // What is a tracer's habit rather than a neuron's.
-constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
+constexpr bool habit(std::size_t style) { return style >= grain && style <= levels; }
 using Style = std::array<double, styles>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured

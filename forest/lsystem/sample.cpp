@@ -27,6 +27,8 @@ void add_kernel(const float* column, float wanted, std::size_t count, float* sum
   }
 }
 
+constexpr float as_high = 1e-4f;  // µm: by no more a level step leaves its height, which is rounding
+
 // How long the step is that ends at a place, when these are the ways to all of them.
 float step_to(std::span<const float> lengths, std::size_t i) {
   return lengths[i] - (i ? lengths[i - 1] : 0.f);
@@ -91,8 +93,34 @@ Course::Course(const Trace& t, float scale) {
     places.push_back(place(i) + aside), lengths.push_back(way(i) + longer);
   if (!skip) return;
   const float times = t.length() / length();
-  const Vec3 rest = (t.end() - times * places.back()) / length();
+  Vec3 rest = (t.end() - times * places.back()) / length();
+  const float higher = std::exchange(rest.z(), 0.f) * length();
   for (std::size_t i = 0; i < places.size(); ++i) places[i] = times * places[i] + rest * lengths[i];
+  climb(higher);
+}
+
+void Course::climb(float by) {
+  if (by == 0.f) return;
+  std::vector<float> climbs, sloping;  // of each step: how far along z, and its length unless it is level
+  float before = 0.f;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    climbs.push_back(std::abs(places[i].z() - std::exchange(before, places[i].z())));
+    sloping.push_back(climbs[i] > as_high ? step_to(lengths, i) : 0.f);
+  }
+  const float climbed = std::reduce(climbs.begin(), climbs.end());
+  float along = std::reduce(sloping.begin(), sloping.end());
+  if (!(along > 0.f)) {
+    for (std::size_t i = 0; i < places.size(); ++i) sloping[i] = step_to(lengths, i);
+    along = length();
+  }
+  constexpr float most = .4f;  // of how far it goes along z
+  const float share = std::min(1.f, most * climbed / std::abs(by));
+  float more = 0.f;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (climbed > 0.f) more += by * share * climbs[i] / climbed;
+    if (along > 0.f) more += by * (1.f - share) * sloping[i] / along;
+    places[i].z() += more;
+  }
 }
 
 void Course::stairs(float power) {
@@ -232,7 +260,8 @@ void Sample::add(std::span<const double> condition_row, std::span<const double> 
     float length = 0.f;
     Vec3 last = Vec3::Zero();
     for (const Trace::Stop& stop : t.stops)
-      t.lengths.push_back(length += (stop.at - last).norm()), last = stop.at;
+      t.lengths.push_back(length += (stop.at - last).norm()), t.level &= std::abs(stop.at.z()) <= as_high,
+          last = stop.at;
     float before = t.diameter;
     for (std::size_t i = 0; i < t.stops.size(); ++i) {
       const float step = step_to(t.lengths, i);

@@ -35,6 +35,7 @@ struct Trace {
   std::vector<float> lengths = {};  // from its beginning to each place, µm
 
   float steepest = 0.f;  // how fast its diameter changes at most, µm a µm
+  bool level = true;     // all along
 
   const Vec3& end() const { return stops.back().at; }
   float length() const { return lengths.back(); }
@@ -50,11 +51,14 @@ struct Course {
   Course(const Trace& t, float scale);
 
   /// How much steps differ in how steep they are: up and down each go as far as before, but shares of a step that go along z are taken
-  /// to this power, so that above 1 flat ones become flatter and steep ones steeper. Flat ones remain so.
+  /// to this power, so that above 1 flat ones become flatter and steep ones steeper. Level ones remain so.
   void stairs(float power);
   /// How kinked it is: angles between steps become about so many times as large, and their differences as by this power, by moving
   /// places in the plane of the slice to or from the line between those beside them. Its end, and all z, stay.
   void kinks(float times, float power);
+  /// Its end so many µm farther along z: each step in proportion to how far it goes along z, but for what would change them by more
+  /// than two fifths, which those that are not level take evenly. Level ones remain so, unless all are.
+  void climb(float by);
   float length() const { return lengths.back(); }
 };
 

@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/lsystem/sample.h"
 
+#include <algorithm>
 #include <cmath>
+#include <ranges>
 
 #include <gtest/gtest.h>
 
@@ -181,9 +183,9 @@ TEST(Trace, IsDrawnAsideInProportionToTheWayAndToItsClimbs) {
   const Morphology m = drawn(along + "-1.6" + climbing);
   expect_near(m.points()[1].position(), {3, 3, 0});  // no climb yet
   expect_near(m.points()[2].position(), {8, 6, 2.4f});
-  // By what is more than two fifths of all climbs in proportion to the way.
+  // However far: the first step stays level.
   const Morphology far = drawn(along + "-16" + climbing);
-  expect_near(far.points()[1].position(), {3, 3, -5.4f});
+  expect_near(far.points()[1].position(), {3, 3, 0});
   expect_near(far.points()[2].position(), {8, 6, -12});
   // It heads where it has been drawn.
   const Vec3 straight = end_of("Trace(twigs, 0, 0) F(1)") - end_of("Trace(twigs, 0, 0)"),
@@ -372,6 +374,33 @@ TEST(Course, ClimbsAsFarInStepsThatDifferMoreOrLess) {
   }
 }
 
+TEST(Course, EndsHigherOrLowerAndLevelStepsStayLevel) {
+  const Course was(wandering(), 1.f);
+  const auto level = [](const Course& course, std::size_t i) {
+    return std::abs(course.places[i].z() - (i ? course.places[i - 1].z() : 0.f)) < 1e-5f;
+  };
+  for (const float by : {-40.f, -2.f, .5f, 30.f}) {
+    SCOPED_TRACE(by);
+    Course is = was;
+    is.climb(by);
+    EXPECT_NEAR(is.places.back().z(), was.places.back().z() + by, 1e-3f);
+    for (std::size_t i = 0; i < is.places.size(); ++i) {
+      EXPECT_EQ(is.places[i].head<2>(), was.places[i].head<2>());
+      if (level(was, i)) {
+        EXPECT_TRUE(level(is, i)) << i;
+      }
+    }
+  }
+  for (const float scale : {.6f, 1.4f})  // by steps that are left out or come twice, too
+    EXPECT_GT(std::ranges::count_if(std::views::iota(std::size_t(0), Course(wandering(), scale).places.size()),
+                                    [&](std::size_t i) { return level(Course(wandering(), scale), i); }),
+              std::lround(.6f * 60.f * scale));
+  Course all(traced({{{3, 0, 0}, 1}, {{4, 0, 0}, 1}}), 1.f);
+  all.climb(2.f);
+  EXPECT_NEAR(all.places[0].z(), 1.5f, 1e-6f);
+  EXPECT_NEAR(all.places[1].z(), 2.f, 1e-6f);
+}
+
 TEST(Course, IsAsManyTimesAsKinkedAndAsUnevenlyAsItIsAsked) {
   const Course was(wandering(), 1.f);
   const Turned before = turns_of(was);
@@ -408,6 +437,38 @@ nothing: z -> z
   EXPECT_EQ(stem[1].position(), Vec3(0, 5, 0));  // how it leaves the soma is its own
   EXPECT_EQ(stem[2].position(), Vec3(0, 8, 0));  // farther than the turn reaches
   EXPECT_EQ(m.points(SectionId(1))[1].position(), end + Vec3(5, 0, 0));
+}
+
+// The fork stood on a step that climbed; the branch ends as high as it did, and what was level of it stays so.
+TEST(Trace, TurnsAnEndUpwardsByStepsThatAreNotLevel) {
+  const auto stem_before = [](const std::string& last_step) {
+    const Grammar g = parse("steps: 1\nsample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 22 0 1, 0 25 0 1, 0 27 2 1, 0 28 2 1, 0 30 2 1\n"
+                            "sample forks(-> x) = 0 | 0 1 0 1, " + last_step + ": 5 0 0 1 | 0 1 0 1, " + last_step +
+                                ": -5 0 0 1\naxiom: Soma(1) Trace(stems, 0, 0) [ Trace(forks, 0, 0) ] [ Trace(forks, 0, 1) ]\n"
+                                "nothing: z -> z\n",
+                            "fork");
+    const Morphology m = interpret(derive(g, 0, 0, 0), g);
+    const auto points = m.points(SectionId(0));
+    std::vector<Vec3> places;
+    for (const Point& p : points) places.push_back(p.position());
+    return places;
+  };
+  const std::vector<Vec3> up = stem_before("0 0.8 0.6"), level = stem_before("0.6 0.8 0");
+  expect_near(up.back(), {0, 30, 2});
+  expect_near((up[6] - up[5]).normalized(), Vec3(0, .8f, .6f));
+  EXPECT_NEAR(up[5].z(), up[4].z(), 1e-5f);  // levels, and what bears it
+  EXPECT_NEAR(up[4].z(), .8f, 1e-5f);
+  EXPECT_NEAR(up[3].z(), 0.f, 1e-5f);
+  expect_near((level[6] - level[5]).normalized(), Vec3(.6f, .8f, 0));
+  for (const std::size_t i : {1u, 2u, 3u}) EXPECT_NEAR(level[i].z(), 0.f, 1e-6f);
+  for (const std::size_t i : {4u, 5u, 6u}) EXPECT_NEAR(level[i].z(), 2.f, 1e-6f);
+}
+
+TEST(Trace, WhatIsLevelAllAlongIsNotDrawnAsideAlongZ) {
+  const std::string aside = "Trace(twigs, 1, 0, 1, 0, 1, 1, 1, 1, 0, 4, 0, 6";
+  EXPECT_NEAR(end_of(aside + ")").z(), 6.f, 1e-5f);
+  EXPECT_NEAR(end_of(aside + ", 1, 1, 1, 1, 1, 1)").z(), 0.f, 1e-5f);
+  expect_near(end_of(aside + ", 1, 1, 1, 1, 1, 0.5)"), end_of(aside + ")") - Vec3(0, 0, 3));
 }
 
 TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -437,7 +438,10 @@ class Turtle {
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(
         level * turn_share * std::atan2(across, along) + value(19, 0.) * (std::numbers::pi / 180.),
         Eigen::Vector3d::UnitZ()));
-    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), value(12, 0.));
+    // A branch that is level all along is not drawn aside along z, nor one with steps that are level by changing these.
+    const double climbing = value(18, 0.);
+    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.),
+                                (t.level ? 1. - climbing : 1.) * value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const double thickness_end = value(13, thickness);
     // How many times as thick: from the first to the last as the diameter itself changes, so that what is as thick as what was
@@ -462,18 +466,9 @@ class Turtle {
       const float whole = course.length();
       const std::vector<Calibre> diameters = calibres(calibre, course.lengths);
       float way = 0.f;
-      // What is drawn aside along z can take as much of every climb, so that flat steps stay flat; but for what would change climbs by
-      // more than two fifths.
-      constexpr double most_of_climbs = .4;
-      double climbs = 0., climbed = 0.;
-      for (float z = 0.f; const Vec3& p : course.places)
-        climbs += std::abs(double(p.z() - std::exchange(z, p.z())));
-      const double by_climbs =
-          aside.z() == 0. || climbs == 0.
-              ? 0.
-              : value(18, 0.) *
-                    std::min(1., most_of_climbs * climbs * scale * std::abs(sides.z()) / std::abs(aside.z()));
-      float z = 0.f;
+      Course climbed = course;
+      const double along_z = scale * sides.z();
+      if (climbing > 0. && along_z != 0.) climbed.climb(float(aside.z() / along_z));
       auto start = float(0.5 * thick(calibre.diameter, 0.f));
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
@@ -483,10 +478,9 @@ class Turtle {
         if (calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size())
           state_.diameter = std::clamp(state_.diameter, 2. * double(start) - most, 2. * double(start) + most);
         const Vec3 on_chord = t.end() * part;
-        climbed += std::abs(double(course.places[i].z() - std::exchange(z, course.places[i].z())));
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
-        if (by_climbs > 0.) next.z() += by_climbs * (climbed / climbs - double(part)) * aside.z();
+        next.z() += climbing * (from.z() + along_z * double(climbed.places[i].z()) - next.z());
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));
@@ -509,6 +503,7 @@ class Turtle {
   /// before it belongs to the fork. The turn fades over the steps before; what lies farther away stays.
   void approach(const Eigen::Vector3d& direction) {
     constexpr double reach = 10.;  // µm
+    constexpr double as_high = 1e-4;
     if (state_.node == none || state_.begun == none) return;
     const Eigen::Vector3d end = drawn_[state_.node].position;
     std::uint32_t node = drawn_[state_.node].parent;
@@ -517,17 +512,33 @@ class Turtle {
     if (node == none || first(node)) return;
     const Eigen::Vector3d step = end - drawn_[node].position;
     if (step.isZero(0.)) return;
-    const Eigen::AngleAxisd whole(Eigen::Quaterniond::FromTwoVectors(step, direction));
-    Eigen::Vector3d after = end;
-    for (double way = -step.norm(); node != none && !first(node) && drawn_[node].children == 1;
-         node = drawn_[node].parent) {
-      const Eigen::Vector3d place = drawn_[node].position;
-      way += (place - after).norm();
-      if (way >= reach) break;
-      drawn_[node].position =
-          end +
-          Eigen::AngleAxisd(whole.angle() * (1. - std::max(0., way) / reach), whole.axis()) * (place - end);
-      after = place;
+    // Turned about z; as steep as it should be then, as far as steps before it that are not level can make up for that.
+    std::vector<std::uint32_t> nodes;
+    std::vector<double> ways, sloping;  // back to each, and how long the step to it is unless that is level
+    const double length = step.norm();
+    for (double way = 0.; !first(node) && drawn_[node].children == 1 && way < reach;) {
+      nodes.push_back(node), ways.push_back(way);
+      const Eigen::Vector3d back = drawn_[node].position - drawn_[drawn_[node].parent].position;
+      sloping.push_back(std::abs(back.z()) > as_high ? back.norm() : 0.);
+      way += back.norm(), node = drawn_[node].parent;
+    }
+    const double along = std::reduce(sloping.begin(), sloping.end()), level = direction.head<2>().norm(),
+                 was = step.head<2>().norm();
+    const double angle = level > 0. && was > 0. ? std::atan2(step.x() * direction.y() - step.y() * direction.x(),
+                                                             step.head<2>().dot(direction.head<2>()))
+                                                : 0.;
+    const double lower = std::clamp(step.z() - length * direction.z(), -along / 2., along / 2.);
+    const double wide = std::sqrt(std::max(0., length * length - std::pow(step.z() - lower, 2)));
+    const Eigen::Vector2d out = level > 0. ? Eigen::Vector2d((was - wide) / level * direction.head<2>())
+                                           : Eigen::Vector2d::Zero();
+    double left = lower;
+    for (std::size_t i = 0; i < nodes.size(); ++i) {
+      Eigen::Vector3d& place = drawn_[nodes[i]].position;
+      const double share = 1. - ways[i] / reach;
+      place.head<2>() = (end + Eigen::AngleAxisd(share * angle, Eigen::Vector3d::UnitZ()) * (place - end)).head<2>() +
+                        share * out;
+      place.z() += left;
+      if (along > 0.) left -= lower * sloping[i] / along;
     }
   }
 

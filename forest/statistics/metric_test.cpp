@@ -191,6 +191,7 @@ TEST(Metrics, AreInvariantUnderRotationAndTranslation) {
                             "depth",
                             "length_fraction_above_soma",
                             "length_fraction_along_z",
+                            "level_segment_fraction",
                             "length_along_z_by_x",
                             "section_length_fractions_along_z",
                             "segment_elevations",
@@ -260,6 +261,7 @@ TEST(Metrics, SayWhetherTheyDependOnDiameters) {
 
 TEST(Metrics, DoNotDependOnHowDenselyABranchWasTraced) {
   const Names local{"number_of_segments",
+                    "level_segment_fraction",
                     "width",
                     "height",
                     "depth",

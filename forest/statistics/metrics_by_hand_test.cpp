@@ -73,6 +73,7 @@ TEST(ByHand, TheNeuron) {
                   {"total_height", {26.}},
                   {"total_depth", {10.}},
                   {"length_fraction_along_z", {10. / 50.}},
+                  {"level_segment_fraction", {7. / 8.}},
                   {"length_along_z_by_x", {10. / 20.}},
                   {"hull_volume", {2000. / 3.}},
                   {"circularity", {4. * pi * 200. / (front * front)}},

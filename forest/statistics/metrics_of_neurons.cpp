@@ -97,6 +97,17 @@ double fraction_above_soma(const Arbors& a) {
 double length_fraction_along_z(const Arbors& a) {
   return ratio(sum<length_along<&Columns::z>>(a), sum<length>(a));
 }
+double level_segment_fraction(const Arbors& a) {
+  constexpr double as_high = 1e-3;  // µm
+  const Columns& c = a.columns();
+  double level = 0., all = 0.;
+  for (const Branch& b : a.sections())
+    for (std::size_t row = b.first_row + 1; row <= b.last_row(); ++row) {
+      const double is_one = c.length[row] > 0.;
+      all += is_one, level += is_one * double(std::abs(c.z[row] - c.z[row - 1]) < as_high);
+    }
+  return ratio(level, all);
+}
 double depth_by_width(const Arbors& a) {
   return ratio(sum<length_along<&Columns::z>>(a), sum<length_along<&Columns::x>>(a));
 }
@@ -246,6 +257,8 @@ constexpr auto table = std::to_array<Metric>({
      "Part of the path length that lies on the pia's side (larger y) of the centre of the soma.", "", ""},
     {"length_fraction_along_z", "", neuron, axes_only, per_neuron<length_fraction_along_z>,
      "Way along z, forth or back, over path length: Σ abs(Δz) / Σ l. It sees a wrong depth of a slice, or a wrong step between its pictures.", "", ""},
+    {"level_segment_fraction", "", neuron, axes_only, per_neuron<level_segment_fraction>,
+     "Part of the segments with a length that do not change z, by .001 µm or more. Somebody at a microscope follows a branch in one plane of focus, and goes on to the next; who turns or bends a neuron leaves no such segments.", "", ""},
     {"length_along_z_by_x", "", neuron, axes_only, per_neuron<depth_by_width>,
      "Way along z over way along x: Σ abs(Δz) / Σ abs(Δx).", "", ""},
     {"hull_volume", "µm³", neuron, axes_only, per_neuron<hull_volume>,
