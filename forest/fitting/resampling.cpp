@@ -40,8 +40,9 @@ double habits_kept(std::size_t neurons) { return std::pow(std::min(1., double(ne
 double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
 
 // What a neuron begins with, in `growth` and when there are some without a soma.
-constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)\n", with_fibre = R"(module Begin
-axiom: Begin Plan(0)
+constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Gauge(gauges, thin_as) Plan(0)\n",
+                           with_fibre = R"(module Begin
+axiom: Begin Gauge(gauges, thin_as) Plan(0)
 body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
 fibre: Begin -> Kind(plans.kind(plan(0))) Fibre(cells.fibre(me))
 )";
@@ -68,6 +69,10 @@ distribution steeper(kind, donor) = climb(kind) * max(0.6, min(1.6, (slope(kind,
 distribution stepped(kind, donor) = rugged(kind) * max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
 distribution turned(kind, donor) = kinked(kind) * max(0.6, min(1.6, (styles.angle(styles(me, kind)) / styles.angle(donor))^habits))
 distribution kinky(kind, donor) = max(0.5, min(2, (styles.kinky(styles(me, kind)) / styles.kinky(donor))^(1.6 * habits)))
+# Of steps that climbed, the share that stays level now, as this neuron's tracer kept more of them in one plane of focus; below 0, of
+# level ones the share that climbs.
+function more(mine, theirs) = (mine - theirs) / max(0.01, if(mine > theirs, 1 - theirs, theirs))
+distribution levelled(kind, donor) = more(styles.level(styles(me, kind)), styles.level(donor))
 function nth(i, a, b, c) = if(i == 0, a, if(i == 1, b, c))
 # The share of a way aside, of all the tips of a fork, that those of a daughter take: the more the more there are, so that all
 # together take the whole.
@@ -99,7 +104,7 @@ distribution calibre(kind, r, tips, ahead, d) =
 module Plan(i), Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az)
 module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
 module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
-axiom: Soma(cells.soma(me)) Plan(0)
+axiom: Soma(cells.soma(me)) Gauge(gauges, thin_as) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
@@ -112,7 +117,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), 1)
+       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), 1, 0, levelled(kind, styles(stems.donor(r), kind)))
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
@@ -172,7 +177,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)), back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
   -> Trace(forks, r, i, scale, mirror, 0, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), 1, phi)
+       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), 1, phi, levelled(kind, styles(donor, kind)))
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -197,6 +202,7 @@ class Writer {
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
         traced.cells.size(), traced.forks.size(), title);
     cells();
+    gauges();
     styles_of_cells();
     alike();
     plans();
@@ -236,6 +242,17 @@ class Writer {
     }
   }
 
+  void gauges() {
+    put("\n\n# The diameters that each neuron's points have, µm: a tracer has so many to choose from.\n"
+        "sample gauges(-> cell) =");
+    for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
+      row(!i);
+      const auto& diameters = traced_.cells[i].diameters;
+      put("{} | 0 1 0 {}:", i, diameters.front());
+      for (std::size_t k = 0; k < diameters.size(); ++k) put("{} 0 0 0 {}", k ? "," : "", diameters[k]);
+    }
+  }
+
   void styles_of_cells() {
     put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and "
         "coarsely traced "
@@ -246,9 +263,9 @@ class Writer {
         "from the soma the farthest branch ends (µm), the "
         "mean "
         "logarithm of path by chord,\n"
-        "# the mean angle between segments, and how much they differ in how steep they are, and those "
-        "angles, in shares of the means.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, stepped, kinky) =",
+        "# the mean angle between segments, which share of them is level, and how much the others differ in how "
+        "steep they are, and those angles, in shares of the means.\n"
+        "sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky) =",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -258,8 +275,8 @@ class Writer {
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
-            rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
+        put(" {} {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
+            rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.level, 1e3), rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
       }
   }
 

@@ -133,7 +133,10 @@ struct Learner {
       for (const Point& p : points(i)) {
         cell.low = std::min(cell.low, double(p.z - soma.z()));
         cell.high = std::max(cell.high, double(p.z - soma.z()));
+        cell.diameters.push_back(std::round(2e3 * double(p.radius)) / 1e3);
       }
+    std::ranges::sort(cell.diameters);
+    cell.diameters.erase(std::ranges::unique(cell.diameters).begin(), cell.diameters.end());
     for (std::uint32_t i = 0; i < all.size(); ++i)
       if (above(i) < 0 && (drawn(i) || bud(i))) cell.stems.push_back(stem(i));
     if (cell.stems.empty()) return;
@@ -209,8 +212,16 @@ struct Learner {
       const auto mean_of = [&](std::size_t s) {
         return of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
       };
-      constexpr double flat = .02;  // radians
-      const double climb = std::max(flat, mean_of(stairs)), turn = std::max(manner.turn, mean_of(kinks));
+      std::vector<double> elevations = of.values[stairs];
+      constexpr double as_level = 1e-4, flat = .02;  // radians
+      const auto level = std::ranges::remove_if(elevations, [](double e) { return e < as_level; });
+      if (!elevations.empty()) manner.level = double(level.size()) / double(elevations.size());
+      elevations.erase(level.begin(), level.end());
+      if (elevations.size() > 1) {
+        const statistics::Summary climbs = statistics::summarize(elevations);
+        manner.stairs = std::max(manner.stairs, climbs.sd / std::max(flat, climbs.mean));
+      }
+      const double turn = std::max(manner.turn, mean_of(kinks));
       for (const std::size_t s : {stairs, kinks})  // not their mean: how much they differ
         of.values[s] = {of.values[s].size() > 1 ? statistics::summarize(of.values[s]).sd : 0.};
       of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
@@ -219,7 +230,6 @@ struct Learner {
       manner.farthest = of.farthest;
       manner.winding = std::max(.01, manner.style[wander]);
       manner.turn = turn;
-      manner.stairs = std::max(manner.stairs, manner.style[stairs] / climb);
       manner.kinks = std::max(manner.kinks, manner.style[kinks] / turn);
     }
     return manners;
@@ -235,11 +245,7 @@ struct Learner {
     values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
     values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
     values[slope].push_back(slope_of(points(i)));
-    const std::size_t steps = values[stairs].size();
     add_elevations(points(i), values[stairs]);
-    constexpr double as_level = 1e-4;  // radians
-    for (const double elevation : std::span(values[stairs]).subspan(steps))
-      values[levels].push_back(double(elevation < as_level));
     const std::size_t known = values[kinks].size();
     add_turns(points(i), values[kinks]);
     if (const auto turns = std::span(values[kinks]).subspan(known); !turns.empty())

@@ -19,7 +19,7 @@
 namespace forest::fitting {
 
 // What sets the branches of one neuron apart from those of another, and the names that the grammar gives it. Stairs and kinks are how
-// much its segments differ in how steep they are, and the angles between them; levels, how many of them are level.
+// much its segments differ in how steep they are, and the angles between them.
 enum {
   reach,
   wander,
@@ -29,7 +29,6 @@ enum {
   kink,
   stairs,
   kinks,
-  levels,
   depth,
   spread,
   thinning,
@@ -38,10 +37,10 @@ enum {
   styles
 };
 inline constexpr std::array<const char*, styles> style_names{"reach",    "wander", "girth", "grain", "slope",
-                                                             "kink",     "stairs", "kinks", "levels", "depth",
-                                                             "spread",   "thinning", "extent", "forks"};
+                                                             "kink",     "stairs", "kinks", "depth", "spread",
+                                                             "thinning", "extent", "forks"};
 // What is a tracer's habit rather than a neuron's.
-constexpr bool habit(std::size_t style) { return style >= grain && style <= levels; }
+constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
 using Style = std::array<double, styles>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured
@@ -97,7 +96,8 @@ struct Manner {
   double farthest = 0.;              // end of a branch from the soma, µm
   double winding = .01;              // mean of the logarithm of path / chord
   double turn = .02;                 // mean angle from one segment to the next
-  // How much its segments differ in how steep they are, and those angles: standard deviations in shares of the mean.
+  double level = 0.;                 // share of its segments that stay as high as they begin
+  // How much the others differ in how steep they are, and those angles: standard deviations in shares of the mean.
   double stairs = .1, kinks = .1;
 };
 
@@ -105,6 +105,7 @@ struct Cell {
   double soma = 0.;    // diameter, µm
   double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
   double low = 0., high = 0.;  // of its points, along z from the soma, µm
+  std::vector<double> diameters = {};  // that its points have, each once, from the thinnest on, µm
   std::map<int, Manner> kinds;
   std::vector<Stem> stems;
 };

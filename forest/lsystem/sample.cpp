@@ -123,6 +123,50 @@ void Course::climb(float by) {
   }
 }
 
+void Course::levels(float share) {
+  if (share == 0.f) return;
+  std::vector<float> climbs;
+  std::vector<std::size_t> to_change;  // if all of them were to
+  float before = 0.f;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    climbs.push_back(places[i].z() - std::exchange(before, places[i].z()));
+    if ((std::abs(climbs[i]) > as_high) == (share > 0.f)) to_change.push_back(i);
+  }
+  const auto rounded = [&](std::size_t count) { return std::size_t(std::abs(share) * float(count) + .5f); };
+  std::vector<bool> changes(places.size());
+  if (share > 0.f) {
+    if (to_change.empty()) return;
+    std::ranges::stable_sort(to_change, {}, [&](std::size_t i) { return std::abs(climbs[i]); });
+    to_change.resize(std::min(rounded(to_change.size()), to_change.size() - 1));  // one has to climb
+    for (const std::size_t i : to_change) changes[i] = true;
+  } else {
+    if (to_change.size() == places.size()) return;
+    for (std::size_t k = 0; k < to_change.size(); ++k)
+      changes[to_change[k]] = rounded(k + 1) > rounded(k);
+  }
+  // What changes, with the step that climbs next, or at the end with the last that does.
+  std::vector<std::size_t> together;
+  const auto share_out = [&](std::size_t climber) {
+    together.push_back(climber);
+    float climb = 0.f, length = 0.f;
+    for (const std::size_t i : together) climb += climbs[i], length += step_to(lengths, i);
+    const bool evenly = share < 0.f && length > 0.f;
+    for (const std::size_t i : together) climbs[i] = evenly ? climb * step_to(lengths, i) / length : 0.f;
+    if (!evenly) climbs[climber] = climb;
+    together.clear();
+  };
+  std::size_t last = 0;
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    if (changes[i])
+      together.push_back(i);
+    else if (std::abs(climbs[i]) > as_high)
+      share_out(last = i);
+  }
+  if (!together.empty()) share_out(last);
+  float at = 0.f;
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].z() = at += climbs[i];
+}
+
 void Course::stairs(float power) {
   std::vector<float> climbs;
   std::array<float, 2> was{}, is{};  // in all, down and up

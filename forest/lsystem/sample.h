@@ -50,6 +50,9 @@ struct Course {
 
   Course(const Trace& t, float scale);
 
+  /// How many steps are level. Of those that are not so large a share becomes so, those first that go least along z, and the next that
+  /// is not goes their way along z, too; below 0, of those that are so large a share climbs with the next that does.
+  void levels(float share);
   /// How much steps differ in how steep they are: up and down each go as far as before, but shares of a step that go along z are taken
   /// to this power, so that above 1 flat ones become flatter and steep ones steeper. Level ones remain so.
   void stairs(float power);

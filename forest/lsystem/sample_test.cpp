@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <ranges>
 
 #include <gtest/gtest.h>
 
@@ -374,11 +373,49 @@ TEST(Course, ClimbsAsFarInStepsThatDifferMoreOrLess) {
   }
 }
 
+bool level(const Course& course, std::size_t i) {
+  return std::abs(course.places[i].z() - (i ? course.places[i - 1].z() : 0.f)) < 1e-5f;
+}
+int levels_of(const Course& course) {
+  int count = 0;
+  for (std::size_t i = 0; i < course.places.size(); ++i) count += level(course, i);
+  return count;
+}
+
+TEST(Course, HasAsManyLevelStepsAsItIsAskedAndEndsAsHighAsItDid) {
+  const Course was(wandering(), 1.f);  // 40 steps of 60 are level
+  ASSERT_EQ(levels_of(was), 40);
+  for (const auto& [share, levels] : {std::pair{-1.f, 0}, {-.5f, 20}, {0.f, 40}, {.5f, 50}, {1.f, 59}}) {
+    SCOPED_TRACE(share);
+    Course is = was;
+    is.levels(share);
+    EXPECT_EQ(levels_of(is), levels);
+    EXPECT_NEAR(is.places.back().z(), was.places.back().z(), 1e-4f);
+    for (std::size_t i = 0; i < is.places.size(); ++i) {
+      EXPECT_EQ(is.places[i].head<2>(), was.places[i].head<2>());
+      if (share > 0.f && level(was, i)) {
+        EXPECT_TRUE(level(is, i)) << i;
+      }
+      if (share < 0.f && !level(was, i)) {
+        EXPECT_FALSE(level(is, i)) << i;
+      }
+    }
+  }
+  const Trace flat = traced({{{3, 0, 0}, 1}, {{4, 0, 0}, 1}});
+  EXPECT_TRUE(flat.level);
+  EXPECT_FALSE(wandering().level);
+  for (const float share : {-1.f, 1.f}) {  // nothing climbs
+    Course all(flat, 1.f);
+    all.levels(share);
+    EXPECT_EQ(levels_of(all), 2);
+    Course one(traced({{{3, 0, 1}, 1}}), 1.f);  // and what has to
+    one.levels(share);
+    EXPECT_EQ(one.places[0].z(), 1.f);
+  }
+}
+
 TEST(Course, EndsHigherOrLowerAndLevelStepsStayLevel) {
   const Course was(wandering(), 1.f);
-  const auto level = [](const Course& course, std::size_t i) {
-    return std::abs(course.places[i].z() - (i ? course.places[i - 1].z() : 0.f)) < 1e-5f;
-  };
   for (const float by : {-40.f, -2.f, .5f, 30.f}) {
     SCOPED_TRACE(by);
     Course is = was;
@@ -392,9 +429,7 @@ TEST(Course, EndsHigherOrLowerAndLevelStepsStayLevel) {
     }
   }
   for (const float scale : {.6f, 1.4f})  // by steps that are left out or come twice, too
-    EXPECT_GT(std::ranges::count_if(std::views::iota(std::size_t(0), Course(wandering(), scale).places.size()),
-                                    [&](std::size_t i) { return level(Course(wandering(), scale), i); }),
-              std::lround(.6f * 60.f * scale));
+    EXPECT_GT(levels_of(Course(wandering(), scale)), std::lround(.6f * 60.f * scale));
   Course all(traced({{{3, 0, 0}, 1}, {{4, 0, 0}, 1}}), 1.f);
   all.climb(2.f);
   EXPECT_NEAR(all.places[0].z(), 1.5f, 1e-6f);
@@ -469,6 +504,31 @@ TEST(Trace, WhatIsLevelAllAlongIsNotDrawnAsideAlongZ) {
   EXPECT_NEAR(end_of(aside + ")").z(), 6.f, 1e-5f);
   EXPECT_NEAR(end_of(aside + ", 1, 1, 1, 1, 1, 1)").z(), 0.f, 1e-5f);
   expect_near(end_of(aside + ", 1, 1, 1, 1, 1, 0.5)"), end_of(aside + ")") - Vec3(0, 0, 3));
+  // Unless its tracer kept no level.
+  expect_near(end_of(aside + ", 1, 1, 1, 1, 1, 1, 0, -1)"), end_of(aside + ")"));
+}
+
+// Of 2, 1.5 and 1 µm, scaled: those that a gauge of .5, 1.2 and 3 µm has.
+TEST(Gauge, DiametersAreTheNearestOfThoseThatItHas) {
+  const auto diameters = [](const std::string& before, const std::string& thickness) {
+    const Grammar g = grammar("sample gauges(-> cell) = 0 | 0 1 0 0.5: 0 0 0 0.5, 0 0 0 1.2, 0 0 0 3; 1 | 0 1 0 3: 0 0 0 3, 0 0 0 2\naxiom: Soma(1) Basal " + before +
+                              " Trace(twigs, 0, 0, 1, 0, 1, 1, 0, " + thickness + ")\nnothing: z -> z\n");
+    const Morphology m = interpret(derive(g, 0, 0, 0), g);
+    std::vector<float> found;
+    for (const Point& p : m.points(SectionId(0))) found.push_back(2.f * p.radius);
+    return found;
+  };
+  EXPECT_EQ(diameters("", "1"), (std::vector<float>{2, 1, 1.5f}));
+  EXPECT_EQ(diameters("Gauge(gauges, 0)", "1"), (std::vector<float>{1.2f, 1.2f, 1.2f}));
+  EXPECT_EQ(diameters("Gauge(gauges, 0)", "1.5"), (std::vector<float>{3, 1.2f, 3}));
+  EXPECT_EQ(diameters("Gauge(gauges, 0)", "0.5"), (std::vector<float>{1.2f, .5f, .5f}));
+  // Beyond the thickest as far apart as two of them are at least: .7 µm.
+  const std::vector<float> thick = diameters("Gauge(gauges, 0)", "9"), expected{17.7f, 9.3f, 13.5f};
+  ASSERT_EQ(thick.size(), expected.size());
+  for (std::size_t i = 0; i < thick.size(); ++i) EXPECT_NEAR(thick[i], expected[i], 1e-5f);
+  EXPECT_EQ(diameters("[ Gauge(gauges, 0) ]", "1"), diameters("", "1"));
+  EXPECT_THROW((void)diameters("Gauge(gauges, 1)", "1"), Error);  // which fall
+  EXPECT_THROW((void)diameters("Gauge(gauges, 2)", "1"), Error);  // there is none
 }
 
 TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {

@@ -49,7 +49,7 @@ constexpr TurtleSymbol symbol_table[] = {
     {"Head", "x, y, z", "turn the shortest way to head into a direction", Action::head, 3, 3},
     {"Trace",
      "sample, row, branch, scale, mirror, turn, bent, like, thickness, thinnest, x, y, z, last, steep, "
-     "stairs, kinked, kinks, climbing, about",
+     "stairs, kinked, kinks, climbing, about, levelled",
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
@@ -59,10 +59,14 @@ constexpr TurtleSymbol symbol_table[] = {
      "proportion; `steep` times as far along z; how steep its "
      "steps are to the power of "
      "`stairs`; angles between them `kinked` times as large, and to the power of `kinks`; of "
-     "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it; and "
-     "turned about z by `about` degrees "
-     "beside",
-     Action::trace, 3, 20},
+     "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it; "
+     "turned about z by `about` degrees beside; and of its steps that are not level the share `levelled` becomes "
+     "so, or below 0 of those that are as large a share climbs",
+     Action::trace, 3, 21},
+    {"Gauge", "sample, row",
+     "from here on every diameter of `Trace` is the nearest of those that the first branch of the row has, "
+     "which must rise",
+     Action::gauge, 2, 2},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -120,6 +124,8 @@ struct State {
   std::uint32_t begun = none;                          // … and that where the traced branch to it began
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
+  std::span<const lsystem::Trace::Stop> gauge;  // whose diameters traced ones have; empty: any
+  double gap = 0.;                              // the least between two of these
 };
 
 class Turtle {
@@ -271,6 +277,13 @@ class Turtle {
         return head(direction(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.)));
       case Action::trace:
         return trace(m);
+      case Action::gauge:
+        state_.gauge = gauge(parameter(0, 0.), parameter(1, 0.));
+        state_.gap = INFINITY;
+        for (std::size_t i = 1; i < state_.gauge.size(); ++i)
+          state_.gap = std::min(state_.gap, double(state_.gauge[i].diameter) - double(state_.gauge[i - 1].diameter));
+        if (state_.gauge.size() < 2) state_.gap = 0.;
+        return;
       case Action::avoid:
         state_.avoid = parameter(0, 0.);
         return;
@@ -403,17 +416,36 @@ class Turtle {
     state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
-  const lsystem::Trace& branch(double sample, double row, double which) const {
+  const lsystem::Trace& branch(double sample, double row, double which, std::string_view by = "Trace") const {
     const auto& samples = grammar_.lookups.samples;
-    if (!(sample >= 0. && sample < double(samples.size()))) fail("Trace names no sample");
+    if (!(sample >= 0. && sample < double(samples.size()))) fail(fmt::format("{} names no sample", by));
     const Sample& s = samples[std::size_t(sample)];
     if (!(row >= 0. && row < double(s.rows())))
-      fail(fmt::format("Trace asks for row {} of sample {}, which has {}", row, s.name, s.rows()));
+      fail(fmt::format("{} asks for row {} of sample {}, which has {}", by, row, s.name, s.rows()));
     const auto branches = s.branches(std::size_t(row));
     if (!(which >= 0. && which < double(branches.size())))
-      fail(fmt::format("Trace asks for branch {} of row {} of sample {}, which has {}", which, row, s.name,
+      fail(fmt::format("{} asks for branch {} of row {} of sample {}, which has {}", by, which, row, s.name,
                        branches.size()));
     return branches[std::size_t(which)];
+  }
+
+  std::span<const lsystem::Trace::Stop> gauge(double sample, double row) const {
+    const auto& stops = branch(sample, row, 0., "Gauge").stops;
+    if (!std::ranges::is_sorted(stops, {}, &lsystem::Trace::Stop::diameter))
+      fail("the diameters of a gauge do not rise");
+    return stops;
+  }
+  // Beyond the thickest, as far apart as the nearest two of them are.
+  double gauged(double diameter) const {
+    if (state_.gauge.empty()) return diameter;
+    const double thickest = double(state_.gauge.back().diameter);
+    if (diameter >= thickest)
+      return state_.gap > 0. ? thickest + std::round((diameter - thickest) / state_.gap) * state_.gap : thickest;
+    const auto above = std::ranges::upper_bound(state_.gauge, float(diameter), {}, &lsystem::Trace::Stop::diameter);
+    const double more = above == state_.gauge.end() ? thickest : double(above->diameter);
+    if (above == state_.gauge.begin()) return more;
+    const double less = double(std::prev(above)->diameter);
+    return more - diameter < diameter - less ? more : less;
   }
 
   void trace(const Module& m) {
@@ -439,9 +471,8 @@ class Turtle {
         level * turn_share * std::atan2(across, along) + value(19, 0.) * (std::numbers::pi / 180.),
         Eigen::Vector3d::UnitZ()));
     // A branch that is level all along is not drawn aside along z, nor one with steps that are level by changing these.
-    const double climbing = value(18, 0.);
-    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.),
-                                (t.level ? 1. - climbing : 1.) * value(12, 0.));
+    const double climbing = value(18, 0.), kept = climbing * (1. + std::clamp(value(20, 0.), -1., 0.));
+    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), (t.level ? 1. - kept : 1.) * value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const double thickness_end = value(13, thickness);
     // How many times as thick: from the first to the last as the diameter itself changes, so that what is as thick as what was
@@ -460,6 +491,7 @@ class Turtle {
       if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       Course course(t, float(scale));
+      course.levels(float(value(20, 0.)));
       if (value(15, 1.) != 1.) course.stairs(float(value(15, 1.)));
       if (value(16, 1.) != 1. || value(17, 1.) != 1.)
         course.kinks(float(value(16, 1.)), float(value(17, 1.)));
@@ -469,14 +501,18 @@ class Turtle {
       Course climbed = course;
       const double along_z = scale * sides.z();
       if (climbing > 0. && along_z != 0.) climbed.climb(float(aside.z() / along_z));
-      auto start = float(0.5 * thick(calibre.diameter, 0.f));
+      double thickness_before = thick(calibre.diameter, 0.f), drawn_before = gauged(thickness_before);
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
         const float step_length = float(scale) * (course.lengths[i] - std::exchange(way, course.lengths[i]));
         const double most = double(calibre.steepest) * double(step_length);
-        state_.diameter = thick(diameters[i].diameter, diameters[i].change);
-        if (calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size())
-          state_.diameter = std::clamp(state_.diameter, 2. * double(start) - most, 2. * double(start) + most);
+        double thickness_here = thick(diameters[i].diameter, diameters[i].change);
+        const bool inner = calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size();
+        if (inner)
+          thickness_here = std::clamp(thickness_here, thickness_before - most, thickness_before + most);
+        const auto start = float(0.5 * drawn_before);
+        state_.diameter = gauged(thickness_here);
+        if (inner && std::abs(state_.diameter - drawn_before) > most) state_.diameter = drawn_before;
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
@@ -489,11 +525,11 @@ class Turtle {
           if (step.isZero(0.)) continue;
         }
         line_to(next, start);
-        start = float(0.5 * state_.diameter);
+        thickness_before = thickness_here, drawn_before = state_.diameter;
       }
       state_.begun = begun;
     }
-    state_.diameter = thick(calibre.stops.back().diameter, 1.f);
+    state_.diameter = gauged(thick(calibre.stops.back().diameter, 1.f));
     const double length = scale * double(t.length());
     if (!t.ahead.isZero(0.f) && length > 0.)
       head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
