@@ -263,7 +263,8 @@ class Writer {
         "from the soma the farthest branch ends (µm), the "
         "mean "
         "logarithm of path by chord,\n"
-        "# the mean angle between segments, which share of them is level, and how much the others differ in how "
+        "# the mean angle between segments, which share of them is level, and how much the others differ in "
+        "how "
         "steep they are, and those angles, in shares of the means.\n"
         "sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky) =",
         fmt::join(style_names, ", "));
@@ -276,7 +277,8 @@ class Writer {
         put("{} {} ->", i, kind);
         style(of.style);
         put(" {} {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
-            rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.level, 1e3), rounded(of.stairs, 1e4), rounded(of.kinks, 1e4));
+            rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.level, 1e3), rounded(of.stairs, 1e4),
+            rounded(of.kinks, 1e4));
       }
   }
 

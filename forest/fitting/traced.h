@@ -104,7 +104,7 @@ struct Manner {
 struct Cell {
   double soma = 0.;    // diameter, µm
   double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
-  double low = 0., high = 0.;  // of its points, along z from the soma, µm
+  double low = 0., high = 0.;          // of its points, along z from the soma, µm
   std::vector<double> diameters = {};  // that its points have, each once, from the thinnest on, µm
   std::map<int, Manner> kinds;
   std::vector<Stem> stems;

@@ -141,8 +141,7 @@ void Course::levels(float share) {
     for (const std::size_t i : to_change) changes[i] = true;
   } else {
     if (to_change.size() == places.size()) return;
-    for (std::size_t k = 0; k < to_change.size(); ++k)
-      changes[to_change[k]] = rounded(k + 1) > rounded(k);
+    for (std::size_t k = 0; k < to_change.size(); ++k) changes[to_change[k]] = rounded(k + 1) > rounded(k);
   }
   // What changes, with the step that climbs next, or at the end with the last that does.
   std::vector<std::size_t> together;

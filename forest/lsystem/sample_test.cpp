@@ -249,7 +249,7 @@ nothing: z -> z
 }
 
 // Twice as thick where it begins, as thick where it ends, and in between as the diameter itself changes: here at once, but by no
-// more than 2 µm a µm until the end.
+// more than 2 µm a µm, so that it has to begin a step earlier.
 TEST(Trace, WhatIsAsThickAsWhatWasBeforeItRemainsSo) {
   const Grammar g = parse(R"(sample twigs() = | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 2, 4 0 0 2;
   | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 4
@@ -260,7 +260,7 @@ none: A ->
   std::vector<float> radii;
   const Morphology m = interpret(derive(g, 0, 0, 0), g);
   for (const Point& p : m.points()) radii.push_back(p.radius);
-  EXPECT_EQ(radii, (std::vector<float>{4, 4, 4, 3, 1, 2, 1, .5f}));  // one that never changes does so evenly
+  EXPECT_EQ(radii, (std::vector<float>{4, 4, 3, 2, 1, 2, 1, .5f}));  // one that never changes does so evenly
 }
 
 // What multiplying a diameter and dividing it again leaves of it is not another diameter.
@@ -477,11 +477,14 @@ nothing: z -> z
 // The fork stood on a step that climbed; the branch ends as high as it did, and what was level of it stays so.
 TEST(Trace, TurnsAnEndUpwardsByStepsThatAreNotLevel) {
   const auto stem_before = [](const std::string& last_step) {
-    const Grammar g = parse("steps: 1\nsample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 22 0 1, 0 25 0 1, 0 27 2 1, 0 28 2 1, 0 30 2 1\n"
-                            "sample forks(-> x) = 0 | 0 1 0 1, " + last_step + ": 5 0 0 1 | 0 1 0 1, " + last_step +
-                                ": -5 0 0 1\naxiom: Soma(1) Trace(stems, 0, 0) [ Trace(forks, 0, 0) ] [ Trace(forks, 0, 1) ]\n"
-                                "nothing: z -> z\n",
-                            "fork");
+    const Grammar g = parse(
+        "steps: 1\nsample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 22 0 1, 0 25 0 1, 0 27 2 1, 0 28 2 1, 0 30 2 "
+        "1\n"
+        "sample forks(-> x) = 0 | 0 1 0 1, " +
+            last_step + ": 5 0 0 1 | 0 1 0 1, " + last_step +
+            ": -5 0 0 1\naxiom: Soma(1) Trace(stems, 0, 0) [ Trace(forks, 0, 0) ] [ Trace(forks, 0, 1) ]\n"
+            "nothing: z -> z\n",
+        "fork");
     const Morphology m = interpret(derive(g, 0, 0, 0), g);
     const auto points = m.points(SectionId(0));
     std::vector<Vec3> places;
@@ -511,8 +514,10 @@ TEST(Trace, WhatIsLevelAllAlongIsNotDrawnAsideAlongZ) {
 // Of 2, 1.5 and 1 µm, scaled: those that a gauge of .5, 1.2 and 3 µm has.
 TEST(Gauge, DiametersAreTheNearestOfThoseThatItHas) {
   const auto diameters = [](const std::string& before, const std::string& thickness) {
-    const Grammar g = grammar("sample gauges(-> cell) = 0 | 0 1 0 0.5: 0 0 0 0.5, 0 0 0 1.2, 0 0 0 3; 1 | 0 1 0 3: 0 0 0 3, 0 0 0 2\naxiom: Soma(1) Basal " + before +
-                              " Trace(twigs, 0, 0, 1, 0, 1, 1, 0, " + thickness + ")\nnothing: z -> z\n");
+    const Grammar g = grammar(
+        "sample gauges(-> cell) = 0 | 0 1 0 0.5: 0 0 0 0.5, 0 0 0 1.2, 0 0 0 3; 1 | 0 1 0 3: 0 0 0 3, 0 0 0 "
+        "2\naxiom: Soma(1) Basal " +
+        before + " Trace(twigs, 0, 0, 1, 0, 1, 1, 0, " + thickness + ")\nnothing: z -> z\n");
     const Morphology m = interpret(derive(g, 0, 0, 0), g);
     std::vector<float> found;
     for (const Point& p : m.points(SectionId(0))) found.push_back(2.f * p.radius);

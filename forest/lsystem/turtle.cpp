@@ -60,7 +60,8 @@ constexpr TurtleSymbol symbol_table[] = {
      "steps are to the power of "
      "`stairs`; angles between them `kinked` times as large, and to the power of `kinks`; of "
      "what is drawn aside along z the share `climbing` in proportion to how far each step goes along it; "
-     "turned about z by `about` degrees beside; and of its steps that are not level the share `levelled` becomes "
+     "turned about z by `about` degrees beside; and of its steps that are not level the share `levelled` "
+     "becomes "
      "so, or below 0 of those that are as large a share climbs",
      Action::trace, 3, 21},
     {"Gauge", "sample, row",
@@ -281,7 +282,8 @@ class Turtle {
         state_.gauge = gauge(parameter(0, 0.), parameter(1, 0.));
         state_.gap = INFINITY;
         for (std::size_t i = 1; i < state_.gauge.size(); ++i)
-          state_.gap = std::min(state_.gap, double(state_.gauge[i].diameter) - double(state_.gauge[i - 1].diameter));
+          state_.gap =
+              std::min(state_.gap, double(state_.gauge[i].diameter) - double(state_.gauge[i - 1].diameter));
         if (state_.gauge.size() < 2) state_.gap = 0.;
         return;
       case Action::avoid:
@@ -440,8 +442,10 @@ class Turtle {
     if (state_.gauge.empty()) return diameter;
     const double thickest = double(state_.gauge.back().diameter);
     if (diameter >= thickest)
-      return state_.gap > 0. ? thickest + std::round((diameter - thickest) / state_.gap) * state_.gap : thickest;
-    const auto above = std::ranges::upper_bound(state_.gauge, float(diameter), {}, &lsystem::Trace::Stop::diameter);
+      return state_.gap > 0. ? thickest + std::round((diameter - thickest) / state_.gap) * state_.gap
+                             : thickest;
+    const auto above =
+        std::ranges::upper_bound(state_.gauge, float(diameter), {}, &lsystem::Trace::Stop::diameter);
     const double more = above == state_.gauge.end() ? thickest : double(above->diameter);
     if (above == state_.gauge.begin()) return more;
     const double less = double(std::prev(above)->diameter);
@@ -501,6 +505,7 @@ class Turtle {
       Course climbed = course;
       const double along_z = scale * sides.z();
       if (climbing > 0. && along_z != 0.) climbed.climb(float(aside.z() / along_z));
+      const double thickness_last = thick(diameters.back().diameter, diameters.back().change);
       double thickness_before = thick(calibre.diameter, 0.f), drawn_before = gauged(thickness_before);
       for (std::size_t i = 0; i < course.places.size(); ++i) {
         const float part = whole > 0.f ? course.lengths[i] / whole : 1.f;
@@ -508,11 +513,17 @@ class Turtle {
         const double most = double(calibre.steepest) * double(step_length);
         double thickness_here = thick(diameters[i].diameter, diameters[i].change);
         const bool inner = calibre.steepest > 0.f && i > 0 && i + 1 < course.places.size();
-        if (inner)
+        // As fast as it may change, it has to come to its end.
+        const double left = double(calibre.steepest) * scale * double(whole - course.lengths[i]);
+        if (inner) {
           thickness_here = std::clamp(thickness_here, thickness_before - most, thickness_before + most);
+          thickness_here = std::clamp(thickness_here, thickness_last - left, thickness_last + left);
+        }
         const auto start = float(0.5 * drawn_before);
         state_.diameter = gauged(thickness_here);
-        if (inner && std::abs(state_.diameter - drawn_before) > most) state_.diameter = drawn_before;
+        if (inner && std::abs(state_.diameter - drawn_before) > most &&
+            std::abs(drawn_before - thickness_last) <= left)
+          state_.diameter = drawn_before;
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
             place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
@@ -560,19 +571,21 @@ class Turtle {
     }
     const double along = std::reduce(sloping.begin(), sloping.end()), level = direction.head<2>().norm(),
                  was = step.head<2>().norm();
-    const double angle = level > 0. && was > 0. ? std::atan2(step.x() * direction.y() - step.y() * direction.x(),
-                                                             step.head<2>().dot(direction.head<2>()))
-                                                : 0.;
+    const double angle = level > 0. && was > 0.
+                             ? std::atan2(step.x() * direction.y() - step.y() * direction.x(),
+                                          step.head<2>().dot(direction.head<2>()))
+                             : 0.;
     const double lower = std::clamp(step.z() - length * direction.z(), -along / 2., along / 2.);
     const double wide = std::sqrt(std::max(0., length * length - std::pow(step.z() - lower, 2)));
-    const Eigen::Vector2d out = level > 0. ? Eigen::Vector2d((was - wide) / level * direction.head<2>())
-                                           : Eigen::Vector2d::Zero();
+    const Eigen::Vector2d out =
+        level > 0. ? Eigen::Vector2d((was - wide) / level * direction.head<2>()) : Eigen::Vector2d::Zero();
     double left = lower;
     for (std::size_t i = 0; i < nodes.size(); ++i) {
       Eigen::Vector3d& place = drawn_[nodes[i]].position;
       const double share = 1. - ways[i] / reach;
-      place.head<2>() = (end + Eigen::AngleAxisd(share * angle, Eigen::Vector3d::UnitZ()) * (place - end)).head<2>() +
-                        share * out;
+      place.head<2>() =
+          (end + Eigen::AngleAxisd(share * angle, Eigen::Vector3d::UnitZ()) * (place - end)).head<2>() +
+          share * out;
       place.z() += left;
       if (along > 0.) left -= lower * sloping[i] / along;
     }
