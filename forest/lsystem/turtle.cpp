@@ -495,7 +495,7 @@ class Turtle {
       if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       Course course(t, float(scale));
-      course.levels(float(value(20, 0.)));
+      course.levels(float(std::clamp(value(20, 0.), -1., 1.)));
       if (value(15, 1.) != 1.) course.stairs(float(value(15, 1.)));
       if (value(16, 1.) != 1. || value(17, 1.) != 1.)
         course.kinks(float(value(16, 1.)), float(value(17, 1.)));
