@@ -27,8 +27,6 @@ void add_kernel(const float* column, float wanted, std::size_t count, float* sum
   }
 }
 
-constexpr float as_high = 1e-4f;  // µm: by no more a level step leaves its height, which is rounding
-
 // How long the step is that ends at a place, when these are the ways to all of them.
 float step_to(std::span<const float> lengths, std::size_t i) {
   return lengths[i] - (i ? lengths[i - 1] : 0.f);

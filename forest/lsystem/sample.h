@@ -20,6 +20,8 @@
 
 namespace forest::lsystem {
 
+inline constexpr float as_high = 1e-4f;  // µm: by no more a level step leaves its height, which is rounding
+
 /// A branch as it was traced, from its beginning at the origin.
 struct Trace {
   struct Stop {

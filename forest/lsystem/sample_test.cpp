@@ -502,6 +502,19 @@ TEST(Trace, TurnsAnEndUpwardsByStepsThatAreNotLevel) {
   for (const std::size_t i : {4u, 5u, 6u}) EXPECT_NEAR(level[i].z(), 2.f, 1e-6f);
 }
 
+TEST(Trace, TurnsNoEndBeyondWhereATurtleBeganAnew) {
+  const Grammar g = parse(R"(steps: 1
+sample stems(-> x) = 0 | 0 1 0 1: 0 5 0 1, 0 8 0 1
+sample forks(-> x) = 0 | 0 1 0 1, 0.6 0.8 0: 5 0 0 1
+axiom: Soma(1) Trace(stems, 0, 0) f(50) F(2) F(2) Trace(forks, 0, 0)
+nothing: z -> z
+)",
+                          "anew");
+  const Morphology m = interpret(derive(g, 0, 0, 0), g);
+  expect_near(m.points(SectionId(1)).front().position(), {0, 58, 0});
+  expect_near(m.points(SectionId(1)).back().position(), {5, 62, 0});
+}
+
 TEST(Trace, WhatIsLevelAllAlongIsNotDrawnAsideAlongZ) {
   const std::string aside = "Trace(twigs, 1, 0, 1, 0, 1, 1, 1, 1, 0, 4, 0, 6";
   EXPECT_NEAR(end_of(aside + ")").z(), 6.f, 1e-5f);

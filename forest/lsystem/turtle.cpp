@@ -475,7 +475,8 @@ class Turtle {
         level * turn_share * std::atan2(across, along) + value(19, 0.) * (std::numbers::pi / 180.),
         Eigen::Vector3d::UnitZ()));
     // A branch that is level all along is not drawn aside along z, nor one with steps that are level by changing these.
-    const double climbing = value(18, 0.), kept = climbing * (1. + std::clamp(value(20, 0.), -1., 0.));
+    const double climbing = value(18, 0.), levelled = std::clamp(value(20, 0.), -1., 1.),
+                 kept = climbing * (1. + std::min(levelled, 0.));
     const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), (t.level ? 1. - kept : 1.) * value(12, 0.));
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
     const double thickness_end = value(13, thickness);
@@ -495,7 +496,7 @@ class Turtle {
       if (free && !t.last_step.isZero(0.f)) approach((turn * mirrored(t.last_step)).stableNormalized());
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       Course course(t, float(scale));
-      course.levels(float(std::clamp(value(20, 0.), -1., 1.)));
+      course.levels(float(levelled));
       if (value(15, 1.) != 1.) course.stairs(float(value(15, 1.)));
       if (value(16, 1.) != 1. || value(17, 1.) != 1.)
         course.kinks(float(value(16, 1.)), float(value(17, 1.)));
@@ -550,7 +551,6 @@ class Turtle {
   /// before it belongs to the fork. The turn fades over the steps before; what lies farther away stays.
   void approach(const Eigen::Vector3d& direction) {
     constexpr double reach = 10.;  // µm
-    constexpr double as_high = 1e-4;
     if (state_.node == none || state_.begun == none) return;
     const Eigen::Vector3d end = drawn_[state_.node].position;
     std::uint32_t node = drawn_[state_.node].parent;
@@ -563,7 +563,8 @@ class Turtle {
     std::vector<std::uint32_t> nodes;
     std::vector<double> ways, sloping;  // back to each, and how long the step to it is unless that is level
     const double length = step.norm();
-    for (double way = 0.; !first(node) && drawn_[node].children == 1 && way < reach;) {
+    for (double way = 0.;
+         !first(node) && drawn_[node].parent != none && drawn_[node].children == 1 && way < reach;) {
       nodes.push_back(node), ways.push_back(way);
       const Eigen::Vector3d back = drawn_[node].position - drawn_[drawn_[node].parent].position;
       sloping.push_back(std::abs(back.z()) > as_high ? back.norm() : 0.);
