@@ -63,7 +63,8 @@ function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter(kind) * sqrt
   max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
 # How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
-distribution steeper(kind, donor) = climb(kind) * max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
+distribution steeper(kind, donor) = climb(kind) *
+  max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
 # How much more unevenly steep it is drawn, how many times as large the angles between its steps are, and how much more they differ,
 # as this neuron's tracer would have done.
 distribution stepped(kind, donor) = rugged(kind) * max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
@@ -96,10 +97,17 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 # that ended where it was traced has no way to go on.
 function crowd(tips) = log(tips) - 30 / tips^3
 # How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
-distribution thicker(kind, p) = min(plans.most(p), exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(plans.cell(p), kind)))))
+distribution thicker(kind, p) = min(plans.most(p),
+  exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(plans.cell(p), kind)))))
+# How many tips a stem has, and how far the farthest is: by the styles of whom it is of, and of the two by which it strays.
+distribution tips_of(p, kind, s, u, v, least) = max(least, min(most_tips(kind), round(plans.tips(p) *
+  exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))))
+distribution ahead_of(p, kind, s, u, v) = min(most_ahead(kind), plans.ahead(p) *
+  exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
-  calibres(kind, forks.daughters(r), thin_as, log(tips), log(forks.n1(r)), log(max(ahead, 1)), log(forks.l1(r)), log(max(forks.l2(r), 1)), log(d), 0)
+  calibres(kind, daughters = forks.daughters(r), cell = thin_as, tips = log(tips), first = log(forks.n1(r)), ahead = log(max(ahead, 1)),
+    l1 = log(forks.l1(r)), l2 = log(max(forks.l2(r), 1)), d = log(d), seldom = 0)
 
 module Plan(i), Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az)
 module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
@@ -109,21 +117,22 @@ axiom: Soma(cells.soma(me)) Gauge(gauges, thin_as) Plan(0)
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
-    tips = max(1, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
-    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))), thick = thicker(kind, p), d = thick * plans.d(p),
+    tips = tips_of(p, kind, s, u, v, 1), ahead = ahead_of(p, kind, s, u, v), thick = thicker(kind, p), d = thick * plans.d(p),
     away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
-    r = stems(kind, plans.cell(p), crowd(tips), log(ahead), log(max(0.05, plans.length(p))), plans.hx(p), plans.hy(p), plans.hz(p), log(d)@style, 0),
-    sz = steeper(kind, styles(stems.donor(r), kind)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
+    r = stems(kind, cell = plans.cell(p), tips = crowd(tips), ahead = log(ahead), length = log(max(0.05, plans.length(p))),
+      hx = plans.hx(p), hy = plans.hy(p), hz = plans.hz(p), d = log(d), @style, seldom = 0),
+    from = styles(stems.donor(r), kind), sz = steeper(kind, from), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
-       Trace(stems, r, 0, scale, 0, 0, bending(kind, s, u, v, styles(stems.donor(r), kind)), p, thick, 0, part * ex, part * ey, part * ez, thick, sz, stepped(kind, styles(stems.donor(r), kind)), turned(kind, styles(stems.donor(r), kind)), kinky(kind, styles(stems.donor(r), kind)), 1, 0, levelled(kind, styles(stems.donor(r), kind)))
+       Trace(stems, r, 0, scale, turn = 0, bent = bending(kind, s, u, v, from), like = p, thickness = thick,
+         x = part * ex, y = part * ey, z = part * ez, steep = sz, stairs = stepped(kind, from), kinked = turned(kind, from),
+         kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
-    tips = max(2, min(most_tips(kind), round(plans.tips(p) * exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s)))))),
-    ahead = min(most_ahead(kind), plans.ahead(p) * exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s)))),
+    tips = tips_of(p, kind, s, u, v, 2), ahead = ahead_of(p, kind, s, u, v),
     away = ahead / max(1, plans.ahead(p)), d = thicker(kind, p) * plans.d(p) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
@@ -142,9 +151,10 @@ on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   { s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
-    r = forks(kind, donor, if(chance(familiar), -1, whose(kind)), crowd(tips), log(max(ahead, 1)), path, order, log(d), x * mx, y, z,
-      mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), px * mx, py, pz,
-      mx * (ax - px) / far, (ay - py) / far, (az - pz) / far@style, 0),
+    r = forks(kind, cell = donor, other = if(chance(familiar), -1, whose(kind)), tips = crowd(tips), ahead = log(max(ahead, 1)),
+      path = path, order = order, d = log(d), hx = x * mx, hy = y, hz = z,
+      lean = mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), side = px * mx, height = py, before = pz,
+      gx = mx * (ax - px) / far, gy = (ay - py) / far, gz = (az - pz) / far, @style, seldom = 0),
     q = calibre(kind, r, tips, ahead, d), a = swing(mx, r, x, y), phi = spin(kind, a, mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
@@ -164,20 +174,24 @@ three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az
      [ Limb(kind, r, q, run, 1, m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
      [ Limb(kind, r, q, run, 2, tips - n - m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
 limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
-  { s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), thin = styles.thinnest(styles(thin_as, kind)),
+  { s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), from = styles(donor, kind),
+    thin = styles.thinnest(styles(thin_as, kind)),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
-    sz = steeper(kind, styles(donor, kind)), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
+    sz = steeper(kind, from), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
     mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
     wz = max(cells.low(me), min(cells.high(me), deep(kind) * (gz + bears * (az - pz - sz * scale * forks.tz(r))))),
     part = steer * drawn(length, beyond, wx - gx, wy - gy, wz - gz),
-    off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)), back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
+    off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)),
+    back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
-  -> Trace(forks, r, i, scale, mirror, 0, bending(kind, s, u, v, styles(donor, kind)), q, thick, thin,
-       part * (wx - gx) - back * gx, part * (wy - gy) - back * gy, part * (wz - gz) - back * gz, last, sz, stepped(kind, styles(donor, kind)), turned(kind, styles(donor, kind)), kinky(kind, styles(donor, kind)), 1, phi, levelled(kind, styles(donor, kind)))
+  -> Trace(forks, r, i, scale, mirror, turn = 0, about = phi, bent = bending(kind, s, u, v, from),
+       like = q, thickness = thick, last = last, thinnest = thin,
+       x = part * (wx - gx) - back * gx, y = part * (wy - gy) - back * gy, z = part * (wz - gz) - back * gz, steep = sz,
+       stairs = stepped(kind, from), kinked = turned(kind, from), kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
 )";
@@ -483,10 +497,14 @@ class Writer {
     table("mean_slope", traced_.means, [](const Style& mean) { return mean[slope]; });
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
-      style += fmt::format(fmt::runtime(i == girth || i == thinning ? ", styles.{0}(u)"
-                                        : habit(i)                  ? ", styles.{0}(t)"
-                                                   : ", own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
-                           style_names[i]);
+      style +=
+          fmt::format(fmt::runtime(i == girth || i == thinning ? "{1}{0} = styles.{0}(u)"
+                                   : habit(i)                  ? "{1}{0} = styles.{0}(t)"
+                                              : "{1}{0} = own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
+                      style_names[i],
+                      !i      ? ""
+                      : i % 3 ? ", "
+                              : ",\n      ");
     put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
         "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
         "#define longest 3   # branches from one neuron in a row, at most\n"

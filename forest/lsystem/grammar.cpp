@@ -28,14 +28,22 @@ constexpr double most_candidates = 64;                                  // of on
 // What a name in an expression stands for.
 struct Meaning {
   enum { constant, cell, total, table, sample, function } kind = constant;
-  double value = 0.;                       // of a constant
-  std::int32_t index = 0;                  // of a cell value, a total, a table or a sample
-  std::vector<std::string> outcomes = {};  // of a sample
-  Program body = {};                       // of a function: finds its arguments in slots 0 to parameters - 1
-  std::int32_t parameters = 0, slots = 0;
+  double value = 0.;                         // of a constant
+  std::int32_t index = 0;                    // of a cell value, a total, a table or a sample
+  std::vector<std::string> outcomes = {};    // of a sample
+  std::vector<std::string> parameters = {};  // their names
+  Program body = {};                         // of a function: finds its arguments in the first slots
+  std::int32_t slots = 0;
   bool draws = false, sums = false;
 };
 using Meanings = std::map<std::string, Meaning, std::less<>>;
+
+// How a module, function or sample is called.
+struct Signature {
+  std::string_view name;
+  std::span<const std::string> parameters = {};
+  std::span<const double> defaults = {};  // of the last of them
+};
 
 struct Binary {
   std::string_view token;
@@ -78,6 +86,48 @@ class Compiler {
   }
 
   void expression(Program& out) { binary(out, 0); }
+
+  /// Arguments and the parenthesis behind them: in order, then by name, `reach = 5`, with the default of what is left out
+  /// before the last.
+  /// @return how many there are
+  int arguments(Program& out, const Signature& of) {
+    if (text_.takes(")")) return 0;
+    std::size_t count = 0;
+    std::map<std::size_t, Program> named;
+    do {
+      const std::size_t place = (text_.more(), text_.at());
+      const std::string name = argument_name();
+      if (name.empty()) {
+        if (!named.empty()) text_.fail_at(place, "an argument in order stands before those by name");
+        expression(out);
+        ++count;
+        continue;
+      }
+      const auto parameter = std::size_t(std::ranges::find(of.parameters, name) - of.parameters.begin());
+      if (parameter == of.parameters.size())
+        text_.fail_at(
+            place, of.parameters.empty()
+                       ? fmt::format("{} has no parameters with names; give its arguments in order", of.name)
+                       : fmt::format("{} has no parameter '{}'; it has {}", of.name, name,
+                                     fmt::join(of.parameters, ", ")));
+      if (parameter < count || named.contains(parameter))
+        text_.fail_at(place, fmt::format("the parameter '{}' of {} is given twice", name, of.name));
+      named[parameter] = apart();
+    } while (text_.takes(","));
+    text_.expect(")", "after the arguments");
+    const std::size_t needed = of.parameters.size() - of.defaults.size();
+    for (; !named.empty(); ++count) {
+      if (const auto given = named.extract(count)) {
+        out.insert(out.end(), given.mapped().begin(), given.mapped().end());
+        barrier_ = out.size();
+      } else if (count >= needed) {
+        out.push_back({Op::constant, 0, of.defaults[count - needed]});
+      } else {
+        text_.fail(fmt::format("the parameter '{}' of {} is missing", of.parameters[count], of.name));
+      }
+    }
+    return int(count);
+  }
 
   /// `name = expression` as a store.
   void binding(Program& out) {
@@ -152,13 +202,37 @@ class Compiler {
     const Meaning& m = found->second;
     if (m.kind == Meaning::constant) return out.push_back({Op::constant, 0, m.value});
     sums_ |= m.kind == Meaning::total;
-    if (m.kind == Meaning::cell || (m.kind == Meaning::total && m.parameters == 0))
+    if (m.kind == Meaning::cell || (m.kind == Meaning::total && m.parameters.empty()))
       return out.push_back({Op::cell, m.index, 0.});
     text_.fail_at(place, fmt::format("'{}' wants its arguments; write {}(…)", name, name));
   }
 
+  // The name before a single =, else nothing.
+  std::string argument_name() {
+    const std::string_view rest = text_.rest();
+    const auto length = std::size_t(std::ranges::find_if_not(rest, is_name) - rest.begin());
+    if (!length || is_digit(rest[0])) return {};
+    std::string_view after = rest.substr(length);
+    after.remove_prefix(
+        std::min(after.size(), std::size_t(std::ranges::find_if_not(after, is_space) - after.begin())));
+    if (!after.starts_with('=') || after.starts_with("==")) return {};
+    std::string name = text_.name("of an argument");
+    text_.takes("=");
+    return name;
+  }
+
+  // An expression whose place in a program is not yet known.
+  Program apart() {
+    Program out;
+    const std::size_t barrier = std::exchange(barrier_, 0);
+    expression(out);
+    barrier_ = barrier;
+    return out;
+  }
+
   void call(Program& out, const std::string& name, std::size_t place) {
-    const auto close = [&](int taken, int wanted) {
+    const auto close = [&](int taken, std::size_t count) {
+      const int wanted = int(count);
       if (taken != wanted)
         text_.fail_at(place, fmt::format("{} takes {} argument{}, {} given", name, wanted,
                                          wanted == 1 ? "" : "s", taken));
@@ -169,9 +243,8 @@ class Compiler {
       const Meaning& f = found->second;
       const std::int32_t base = slots_;
       slots_ += f.slots;
-      const int taken = arguments(out);
-      close(taken, f.parameters);
-      for (int i = f.parameters; i-- > 0;) out.push_back({Op::store, base + i, 0.});
+      close(arguments(out, {name, f.parameters}), f.parameters.size());
+      for (auto i = std::int32_t(f.parameters.size()); i-- > 0;) out.push_back({Op::store, base + i, 0.});
       for (Instruction i : f.body) {
         if (i.op == Op::slot || i.op == Op::store) i.index += base;
         out.push_back(i);
@@ -179,17 +252,19 @@ class Compiler {
       barrier_ = out.size();
       draws_ |= f.draws, sums_ |= f.sums;
     } else if (found != meanings_.end() && found->second.kind == Meaning::total) {
-      close(arguments(out), found->second.parameters);
-      out.push_back({found->second.parameters ? Op::cell_at : Op::cell, found->second.index, 0.});
+      const auto& parameters = found->second.parameters;
+      close(arguments(out, {name, parameters}), parameters.size());
+      out.push_back({parameters.empty() ? Op::cell : Op::cell_at, found->second.index, 0.});
       barrier_ = out.size();
       sums_ = true;
     } else if (found != meanings_.end() && found->second.kind == Meaning::table) {
-      close(arguments(out), 1);
+      close(arguments(out, {name}), 1);
       out.push_back({Op::table, found->second.index, 0.});
       barrier_ = out.size();
     } else if (found != meanings_.end() && found->second.kind == Meaning::sample) {
-      close(arguments(out), found->second.parameters);
-      out.push_back({Op::row, found->second.index, double(found->second.parameters)});
+      const auto& parameters = found->second.parameters;
+      close(arguments(out, {name, parameters}), parameters.size());
+      out.push_back({Op::row, found->second.index, double(parameters.size())});
       barrier_ = out.size();
       draws_ = true;
     } else {
@@ -199,7 +274,7 @@ class Compiler {
             place,
             fmt::format("there is no function '{}'; declare it as function, distribution or table above",
                         name));
-      close(arguments(out), row->parameters);
+      close(arguments(out, {name}), std::size_t(row->parameters));
       draws_ |= row->draws;
       emit(out, {row->op, 0, 0.}, row->draws ? 0 : row->parameters);
     }
@@ -219,17 +294,6 @@ class Compiler {
     text_.expect(")", "after the row of an outcome");
     out.push_back({Op::outcome, sample.index, double(found - sample.outcomes.begin())});
     barrier_ = out.size();
-  }
-
-  int arguments(Program& out) {
-    int count = 0;
-    if (text_.takes(")")) return 0;
-    do {
-      expression(out);
-      ++count;
-    } while (text_.takes(","));
-    text_.expect(")", "after the arguments");
-    return count;
   }
 
   // if(condition, then, otherwise): only one of the two is evaluated.
@@ -304,7 +368,7 @@ class Parser {
     grammar_.text = text;
     for (const TurtleSymbol& s : turtle_symbols()) {
       grammar_.symbols.emplace_back(s.symbol);
-      arities_.push_back({s.least, s.most});
+      arities_.push_back({s.least, s.most, names_in(s.parameters), s.defaults});
     }
     for (const auto& [name, number] :
          {std::pair{"pi", 3.141592653589793}, {"axon", 2.}, {"basal", 3.}, {"apical", 4.}, {"glia", 7.}})
@@ -359,7 +423,19 @@ class Parser {
  private:
   struct Arity {
     int least = 0, most = int(most_parameters);
+    std::vector<std::string> names = {};    // of the parameters, when they have some
+    std::span<const double> defaults = {};  // of the last of them
   };
+
+  // "x, y" as two.
+  static std::vector<std::string> names_in(std::string_view list) {
+    std::vector<std::string> names;
+    for (std::size_t at = 0, stop; at < list.size(); at = stop + 2) {
+      stop = std::min(list.find(", ", at), list.size());
+      names.emplace_back(list.substr(at, stop - at));
+    }
+    return names;
+  }
 
   /// What it uses is found by its names; a parameter of the same name makes it one too many, which does no harm.
   void keep_declaration(std::size_t begin, std::size_t end) {
@@ -484,11 +560,10 @@ class Parser {
     Compiler compiler(text_, meanings_);
     Meaning meaning{.kind = Meaning::function};
     if (text_.takes("(") && !text_.takes(")")) {
-      do compiler.add_slot(text_.name("of a parameter"));
+      do compiler.add_slot(meaning.parameters.emplace_back(text_.name("of a parameter")));
       while (text_.takes(","));
       text_.expect(")", "after the parameters");
     }
-    meaning.parameters = compiler.slots();
     text_.expect("=", "between a function and its expression");
     compiler.expression(meaning.body);
     meaning.slots = compiler.slots();
@@ -573,10 +648,11 @@ class Parser {
     } while (text_.takes(";"));
     if (!sample.rows()) text_.fail("the sample has no row");
     sample.finish();
-    meanings_[name] = {.kind = Meaning::sample,
-                       .index = std::int32_t(grammar_.lookups.samples.size()),
-                       .outcomes = sample.outcomes,
-                       .parameters = std::int32_t(sample.conditions.size())};
+    Meaning meaning{.kind = Meaning::sample,
+                    .index = std::int32_t(grammar_.lookups.samples.size()),
+                    .outcomes = sample.outcomes};
+    for (const Sample::Condition& c : sample.conditions) meaning.parameters.push_back(c.name);
+    meanings_[name] = std::move(meaning);
     draws_ = true;
     grammar_.lookups.samples.push_back(std::move(sample));
   }
@@ -625,8 +701,9 @@ class Parser {
     if (compiler.draws() || compiler.sums())
       text_.fail_at(place, "a total neither draws nor uses totals; sum what the module's parameters say");
     note(total.value, compiler);
-    meanings_[name] = {
-        .kind = Meaning::total, .index = std::int32_t(total.place), .parameters = !key.empty()};
+    Meaning meaning{.kind = Meaning::total, .index = std::int32_t(total.place)};
+    if (!key.empty()) meaning.parameters = {key};
+    meanings_[name] = std::move(meaning);
     grammar_.cell_values += key.empty() ? 1 : std::size_t(total_keys);
     grammar_.totals.push_back(std::move(total));
   }
@@ -663,13 +740,14 @@ class Parser {
       const std::string name = text_.name("of a module");
       if (std::ranges::find(grammar_.symbols, name) != grammar_.symbols.end())
         text_.fail_at(place, fmt::format("module {} is there already", name));
-      int count = 0;
+      Arity arity{0, 0};
       if (text_.takes("(") && !text_.takes(")")) {
-        do text_.name("of a parameter"), ++count;
+        do arity.names.push_back(text_.name("of a parameter"));
         while (text_.takes(","));
         text_.expect(")", "after the parameters");
       }
-      add_symbol(name, {count, count});
+      arity.least = arity.most = int(arity.names.size());
+      add_symbol(name, std::move(arity));
     } while (text_.takes(","));
   }
 
@@ -737,7 +815,7 @@ class Parser {
         while (text_.takes(","));
         text_.expect(")", "after the parameters");
       }
-      check_arity(s, place);
+      check_count(s.symbol, s.count, place);
       shapes.push_back(s);
     }
     return shapes;
@@ -749,12 +827,15 @@ class Parser {
     while (text_.more() && !text_.sees(":")) {
       const std::size_t place = text_.at();
       Shape s{symbol(), 0};
-      if (text_.takes("(") && !text_.takes(")")) {
-        do compiler.expression(values), ++s.count;
-        while (text_.takes(",") && s.count < most_parameters);
-        text_.expect(")", "after the parameters");
+      if (text_.takes("(")) {
+        const Arity& arity = arities_[s.symbol];
+        const int count =
+            compiler.arguments(values, {grammar_.symbols[s.symbol], arity.names, arity.defaults});
+        check_count(s.symbol, count, place);
+        s.count = std::uint16_t(count);
+      } else {
+        check_count(s.symbol, 0, place);
       }
-      check_arity(s, place);
       shapes.push_back(s);
     }
     check_brackets(shapes);
@@ -773,13 +854,13 @@ class Parser {
       text_.fail(open > 0 ? "a [ is not closed; write ] where the branch ends"
                           : "a ] closes nothing; write [ where the branch begins");
   }
-  void check_arity(const Shape& s, std::size_t place) const {
-    const Arity a = arities_[s.symbol];
-    if (s.count >= a.least && s.count <= a.most) return;
+  void check_count(Symbol symbol, int count, std::size_t place) const {
+    const Arity& a = arities_[symbol];
+    if (count >= a.least && count <= a.most) return;
     const std::string wanted =
         a.least == a.most ? fmt::format("{}", a.least) : fmt::format("{} to {}", a.least, a.most);
-    text_.fail_at(place, fmt::format("module {} has {} parameter{}, {} given", grammar_.symbols[s.symbol],
-                                     wanted, wanted == "1" ? "" : "s", s.count));
+    text_.fail_at(place, fmt::format("module {} has {} parameter{}, {} given", grammar_.symbols[symbol],
+                                     wanted, wanted == "1" ? "" : "s", count));
   }
 
   Symbol add_symbol(const std::string& name, Arity arity) {
@@ -787,7 +868,7 @@ class Parser {
     if (grammar_.symbols.size() >= 4096)
       text_.fail("there are more than 4096 modules; use parameters to tell them apart");
     grammar_.symbols.push_back(name);
-    arities_.push_back(arity);
+    arities_.push_back(std::move(arity));
     return Symbol(grammar_.symbols.size() - 1);
   }
 

@@ -62,6 +62,57 @@ TEST(Expression, CallsFunctionsTablesAndConstants) {
   EXPECT_EQ(value_of("steps_of(99)", declarations), 20.);
 }
 
+// What is called by names, beside the same in order; behind it declarations, before it the word that it grows.
+TEST(Expression, ArgumentsHaveNames) {
+  const std::string declarations =
+      "function less(a, b) = a - b\n"
+      "sample twigs(kind =, reach ~ 1 -> part) = 3 10 -> 0.25 | 0 1 0 1: 0 6 0 2, 0 9 1 2; 4 20 -> 0.5 | 0 1 "
+      "0 1: 0 2 0 "
+      "1\n"
+      "module Tip(length, order)\n"
+      "total tips(order) = Tip(length, order) : length\n";
+  const auto grown = [&](const std::string& word) {
+    const Grammar g = parse(declarations + "axiom: A(1)\ng: A(x) -> " + word + "\n", "test");
+    return to_string(derive(g, 0, 0, 1), g);
+  };
+  const auto message = [&](const std::string& word) -> std::string {
+    try {
+      return grown(word);
+    } catch (const InputError& error) {
+      return error.what();
+    }
+  };
+  const std::pair<std::string, std::string> alike[] = {
+      {"A(less(b = 2, a = x * 7))", "A(less(7, 2))"},
+      {"A(less(9, b = if(x == 1, 2, 3)))", "A(7)"},  // and == compares
+      {"A(twigs.part(twigs(reach = 20, kind = 4)))", "A(0.5)"},
+      {"A(tips(order = 2))", "A(tips(2))"},
+      {"Tip(order = 3, length = 4)", "Tip(4, 3)"},
+      {"F(2, diameter = 1) T(strength = 1)", "F(2, 1) T(1)"},
+      {"Trace(twigs, 0, 0)", "Trace(branch = 0, row = 0, sample = twigs)"},
+      {"Trace(twigs, 0, 0, bent = 3)", "Trace(twigs, 0, 0, 1, 0, 1, 3)"},
+      {"Trace(twigs, 0, 0, x = 2, mirror = 1)", "Trace(twigs, 0, 0, 1, 1, 1, 1, -1, 1, 0, 2)"},
+  };
+  for (const auto& [named, ordered] : alike) EXPECT_EQ(grown(named), grown(ordered)) << named;
+  const std::pair<std::string, std::string> refused[] = {
+      {"Trace(twigs, 0, 0, length = 3)",
+       "Trace has no parameter 'length'; it has sample, row, branch, scale"},
+      {"Trace(twigs, 0, 0, sample = 3)", "column 31: the parameter 'sample' of Trace is given twice"},
+      {"Trace(twigs, 0, 0, x = 1, x = 2)", "the parameter 'x' of Trace is given twice"},
+      {"Trace(sample = twigs, 0, 0)", "an argument in order stands before those by name"},
+      {"Trace(twigs, 0, x = 1)", "the parameter 'branch' of Trace is missing"},
+      {"T(strength = 1, z = 1)", "the parameter 'x' of T is missing"},
+      {"Tip(order = 1)", "the parameter 'length' of Tip is missing"},
+      {"Tip(length = 1)", "module Tip has 2 parameters, 1 given"},
+      {"A(less(a = 1))", "less takes 2 arguments, 1 given"},
+      {"A(sin(angle = 1))", "sin has no parameters with names; give its arguments in order"},
+      {"A(angle = 1)", "A has no parameters with names"},
+      {"F(length = )", "a number, a name or a parenthesis is missing here"},
+  };
+  for (const auto& [word, says] : refused)
+    EXPECT_NE(message(word).find(says), std::string::npos) << message(word);
+}
+
 TEST(Expression, DrawsAreRepeatedByTheSameSeedOnly) {
   const Grammar g =
       parse("distribution size = gamma(2, 3)\naxiom: A\ng: A -> B(size(), size(), normal(0, 1))\n", "test");

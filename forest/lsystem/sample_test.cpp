@@ -152,20 +152,19 @@ TEST(Trace, IsDrawnAsItWasTraced) {
 }
 
 TEST(Trace, IsScaledMirroredTurnedAndBent) {
-  expect_near(end_of("Trace(twigs, 0, 0, 2)"), {0, 12, 8});
-  expect_near(end_of("Trace(twigs, 0, 0, 1, 2)"), {0, 6, -4});
-  expect_near(end_of("Trace(twigs, 1, 1, 1, 1)"), {1, 0, 0});
-  expect_near(end_of("Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 0, 0, 0, 1, 2)"), {0, 6, 8});
-  expect_near(end_of("Trace(twigs, 0, 0, 2, 2, 1, 1, 0, 1, 0, 0, 0, 0, 1, 0.5)"), {0, 12, -4});
+  expect_near(end_of("Trace(twigs, 0, 0, scale = 2)"), {0, 12, 8});
+  expect_near(end_of("Trace(twigs, 0, 0, mirror = 2)"), {0, 6, -4});
+  expect_near(end_of("Trace(twigs, 1, 1, mirror = 1)"), {1, 0, 0});
+  expect_near(end_of("Trace(twigs, 0, 0, steep = 2)"), {0, 6, 8});
+  expect_near(end_of("Trace(twigs, 0, 0, scale = 2, mirror = 2, steep = 0.5)"), {0, 12, -4});
   expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0)"), {6, 0, 4});  // about z, as the slice lies
-  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0)"), {0, 6, 4});
-  expect_near(
-      end_of("Head(1, 0, 0) Trace(twigs, 0, 0, 1, 0, 0.5, 1, 0, 1, 0, 0, 0, 0, 1, 1, 1, 1, 1, 0, 45)"),
-      {0, 6, 4});
+  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, turn = 0)"), {0, 6, 4});
+  expect_near(end_of("Head(1, 0, 0) Trace(twigs, 0, 0, turn = 0.5, about = 45)"), {0, 6, 4});
   // Twice as far from its chord, with the same end; three times as thick as a branch of another row, which is 1 everywhere, but in
   // the end no thinner than 3.5.
-  const Morphology m =
-      drawn("Trace(twigs, 0, 0, 1, 0, 1, 2, 1, 3) Trace(twigs, 0, 0, 1, 0, 1, 1, 1, 3, 3.5)");
+  const Morphology m = drawn(
+      "Trace(twigs, 0, 0, bent = 2, like = 1, thickness = 3) Trace(twigs, 0, 0, like = 1, thickness = 3, "
+      "thinnest = 3.5)");
   const Vec3 on_chord = Vec3(0, 6, 4) * (3.f / 8.f);
   expect_near(m.points()[1].position(), on_chord + 2.f * (Vec3(0, 3, 0) - on_chord));
   expect_near(m.points()[2].position(), {0, 6, 4});
@@ -174,8 +173,7 @@ TEST(Trace, IsScaledMirroredTurnedAndBent) {
 }
 
 TEST(Trace, IsDrawnAsideInProportionToTheWayAndToItsClimbs) {
-  const std::string along = "Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 1, 0, 8, 0, ",
-                    climbing = ", 1, 1, 1, 1, 1, 1)";
+  const std::string along = "Trace(twigs, 0, 0, x = 8, z = ", climbing = ", climbing = 1)";
   const Morphology even = drawn(along + "-16)");
   expect_near(even.points()[1].position(), {3, 3, -6});  // after 3 of 8 µm
   expect_near(even.points()[2].position(), {8, 6, -12});
@@ -238,7 +236,7 @@ TEST(Calibres, ChangeInStepsAboutAsLongAsThoseThatTheyChangedIn) {
 TEST(Trace, DiametersChangeNoFasterThanTheyDid) {
   const Grammar g = parse(R"(sample twigs() = | 1 0 0 1: 1 0 0 1, 1.1 0 0 1, 1.2 0 0 1, 5 0 0 1;
   | 1 0 0 1: 1 0 0 1, 2 0 0 3, 3 0 0 1, 4 0 0 1
-axiom: Soma(10) Trace(twigs, 0, 0, 1, 0, 1, 1, 1)
+axiom: Soma(10) Trace(twigs, 0, 0, like = 1)
 nothing: z -> z
 )",
                           "g");
@@ -253,7 +251,7 @@ nothing: z -> z
 TEST(Trace, WhatIsAsThickAsWhatWasBeforeItRemainsSo) {
   const Grammar g = parse(R"(sample twigs() = | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 2, 4 0 0 2;
   | 1 0 0 4: 1 0 0 4, 2 0 0 4, 3 0 0 4
-axiom: Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 2, 0, 0, 0, 0, 1) Trace(twigs, 1, 0, 1, 0, 1, 1, 1, 1, 0, 0, 0, 0, 0.25)
+axiom: Trace(twigs, 0, 0, thickness = 2, last = 1) Trace(twigs, 1, 0, last = 0.25)
 none: A ->
 )",
                           "t");
@@ -266,7 +264,7 @@ none: A ->
 // What multiplying a diameter and dividing it again leaves of it is not another diameter.
 TEST(Trace, DaughtersBeginWithThePointOfTheForkInAFileOfPoints) {
   const Grammar g = parse(R"(sample twigs() = | 1 0 0 0.7: 1 0 0 0.7
-axiom: Soma(1) Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 0.37 / 0.7) [ Trace(twigs, 0, 0, 1, 0, 1, 1, 0, 0.37000001 / 0.7) ] [ Head(0, 1, 0) Trace(twigs, 0, 0) ]
+axiom: Soma(1) Trace(twigs, 0, 0, thickness = 0.37 / 0.7) [ Trace(twigs, 0, 0, thickness = 0.37000001 / 0.7) ] [ Head(0, 1, 0) Trace(twigs, 0, 0) ]
 none: A ->
 )",
                           "t");
@@ -516,12 +514,12 @@ nothing: z -> z
 }
 
 TEST(Trace, WhatIsLevelAllAlongIsNotDrawnAsideAlongZ) {
-  const std::string aside = "Trace(twigs, 1, 0, 1, 0, 1, 1, 1, 1, 0, 4, 0, 6";
+  const std::string aside = "Trace(twigs, 1, 0, x = 4, z = 6";
   EXPECT_NEAR(end_of(aside + ")").z(), 6.f, 1e-5f);
-  EXPECT_NEAR(end_of(aside + ", 1, 1, 1, 1, 1, 1)").z(), 0.f, 1e-5f);
-  expect_near(end_of(aside + ", 1, 1, 1, 1, 1, 0.5)"), end_of(aside + ")") - Vec3(0, 0, 3));
+  EXPECT_NEAR(end_of(aside + ", climbing = 1)").z(), 0.f, 1e-5f);
+  expect_near(end_of(aside + ", climbing = 0.5)"), end_of(aside + ")") - Vec3(0, 0, 3));
   // Unless its tracer kept no level.
-  expect_near(end_of(aside + ", 1, 1, 1, 1, 1, 1, 0, -1)"), end_of(aside + ")"));
+  expect_near(end_of(aside + ", climbing = 1, levelled = -1)"), end_of(aside + ")"));
 }
 
 // Of 2, 1.5 and 1 µm, scaled: those that a gauge of .5, 1.2 and 3 µm has.
@@ -530,7 +528,7 @@ TEST(Gauge, DiametersAreTheNearestOfThoseThatItHas) {
     const Grammar g = grammar(
         "sample gauges(-> cell) = 0 | 0 1 0 0.5: 0 0 0 0.5, 0 0 0 1.2, 0 0 0 3; 1 | 0 1 0 3: 0 0 0 3, 0 0 0 "
         "2\naxiom: Soma(1) Basal " +
-        before + " Trace(twigs, 0, 0, 1, 0, 1, 1, 0, " + thickness + ")\nnothing: z -> z\n");
+        before + " Trace(twigs, 0, 0, thickness = " + thickness + ")\nnothing: z -> z\n");
     const Morphology m = interpret(derive(g, 0, 0, 0), g);
     std::vector<float> found;
     for (const Point& p : m.points(SectionId(0))) found.push_back(2.f * p.radius);

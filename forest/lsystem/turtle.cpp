@@ -2,6 +2,8 @@
 #include "forest/lsystem/turtle.h"
 
 #include <algorithm>
+#include <array>
+#include <bit>
 #include <cmath>
 #include <limits>
 #include <numbers>
@@ -16,6 +18,15 @@
 
 namespace forest::lsystem {
 namespace {
+
+// What Trace is told, in the order of its parameters. The first three are needed.
+struct Tracing {
+  double sample = 0., row = 0., branch = 0., scale = 1., mirror = 0., turn = 1., bent = 1., like = -1.,
+         thickness = 1., thinnest = 0., x = 0., y = 0., z = 0., last = -1., steep = 1., stairs = 1.,
+         kinked = 1., kinks = 1., climbing = 0., about = 0., levelled = 0.;
+};
+constexpr std::size_t tracing_needs = 3, tracing_takes = sizeof(Tracing) / sizeof(double);
+constexpr auto tracing_values = std::bit_cast<std::array<double, tracing_takes>>(Tracing{});
 
 constexpr TurtleSymbol symbol_table[] = {
     {"F", "length, diameter", "draw a segment; it tapers to the diameter, when given", Action::draw, 0, 2},
@@ -53,8 +64,9 @@ constexpr TurtleSymbol symbol_table[] = {
      "draw a branch of a sample's row as it was traced, times `scale`; mirror 1: x, 2: z, 3: both; turned "
      "about z by the share `turn` of "
      "the angle from what it left there to the heading; `bent` times as far from its chord; as thick as the "
-     "branch of row `like`, "
-     "times `thickness`, at its end `last`, and no thinner than `thinnest`; its end drawn aside by (x, y, "
+     "branch of row `like` (below 0: its own), "
+     "times `thickness`, at its end `last` (below 0: the same), and no thinner than `thinnest`; its end "
+     "drawn aside by (x, y, "
      "z), all of it in "
      "proportion; `steep` times as far along z; how steep its "
      "steps are to the power of "
@@ -63,7 +75,7 @@ constexpr TurtleSymbol symbol_table[] = {
      "turned about z by `about` degrees beside; and of its steps that are not level the share `levelled` "
      "becomes "
      "so, or below 0 of those that are as large a share climbs",
-     Action::trace, 3, 21},
+     Action::trace, int(tracing_needs), int(tracing_takes), std::span(tracing_values).subspan(tracing_needs)},
     {"Gauge", "sample, row",
      "from here on every diameter of `Trace` is the nearest of those that the first branch of the row has, "
      "which must rise",
@@ -453,16 +465,14 @@ class Turtle {
   }
 
   void trace(const Module& m) {
-    const std::span<const double> values = word_.of(m);
-    const auto value = [&](std::size_t i, double otherwise) {
-      return i < values.size() ? values[i] : otherwise;
-    };
-    const lsystem::Trace& t = branch(values[0], values[1], values[2]);
-    const lsystem::Trace& calibre = branch(values[0], value(7, values[1]), values[2]);
-    const double scale = value(3, 1.), turn_share = value(5, 1.), bent = value(6, 1.),
-                 thickness = value(8, 1.), thinnest = value(9, 0.);
-    const auto mirror = int(value(4, 0.));
-    const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., (mirror & 2 ? -1. : 1.) * value(14, 1.));
+    auto values = tracing_values;
+    std::ranges::copy(word_.of(m), values.begin());
+    const auto told = std::bit_cast<Tracing>(values);
+    const lsystem::Trace& t = branch(told.sample, told.row, told.branch);
+    const lsystem::Trace& calibre = branch(told.sample, told.like < 0. ? told.row : told.like, told.branch);
+    const double scale = told.scale;
+    const auto mirror = int(told.mirror);
+    const Eigen::Vector3d sides(mirror & 1 ? -1. : 1., 1., (mirror & 2 ? -1. : 1.) * told.steep);
     const auto mirrored = [&](const Vec3& v) {
       return Eigen::Vector3d(sides.cwiseProduct(v.cast<double>()));
     };
@@ -472,21 +482,21 @@ class Turtle {
     // Two that head nearly along z hardly have an angle about it.
     const double level = before.head<2>().norm() * heading.head<2>().norm();
     const Eigen::Quaterniond turn(Eigen::AngleAxisd(
-        level * turn_share * std::atan2(across, along) + value(19, 0.) * (std::numbers::pi / 180.),
+        level * told.turn * std::atan2(across, along) + told.about * (std::numbers::pi / 180.),
         Eigen::Vector3d::UnitZ()));
     // A branch that is level all along is not drawn aside along z, nor one with steps that are level by changing these.
-    const double climbing = value(18, 0.), levelled = std::clamp(value(20, 0.), -1., 1.),
+    const double climbing = told.climbing, levelled = std::clamp(told.levelled, -1., 1.),
                  kept = climbing * (1. + std::min(levelled, 0.));
-    const Eigen::Vector3d aside(value(10, 0.), value(11, 0.), (t.level ? 1. - kept : 1.) * value(12, 0.));
+    const Eigen::Vector3d aside(told.x, told.y, (t.level ? 1. - kept : 1.) * told.z);
     const auto place = [&](const Vec3& at) { return Eigen::Vector3d(from + turn * (scale * mirrored(at))); };
-    const double thickness_end = value(13, thickness);
+    const double thickness = told.thickness, thickness_end = told.last < 0. ? thickness : told.last;
     // How many times as thick: from the first to the last as the diameter itself changes, so that what is as thick as what was
     // before it remains so.
     const auto thick = [&](float diameter, float part) {
       const double times = thickness_end == thickness || !(thickness > 0.)
                                ? thickness
                                : thickness * std::pow(thickness_end / thickness, double(part));
-      return std::max(thinnest, times * double(diameter));
+      return std::max(told.thinnest, times * double(diameter));
     };
     const bool free = state_.avoid < 0.;
     Eigen::Vector3d slip = Eigen::Vector3d::Zero();  // by what it avoided
@@ -497,9 +507,8 @@ class Turtle {
       const std::uint32_t begun = state_.node == none ? std::uint32_t(drawn_.size()) : state_.node;
       Course course(t, float(scale));
       course.levels(float(levelled));
-      if (value(15, 1.) != 1.) course.stairs(float(value(15, 1.)));
-      if (value(16, 1.) != 1. || value(17, 1.) != 1.)
-        course.kinks(float(value(16, 1.)), float(value(17, 1.)));
+      if (told.stairs != 1.) course.stairs(float(told.stairs));
+      if (told.kinked != 1. || told.kinks != 1.) course.kinks(float(told.kinked), float(told.kinks));
       const float whole = course.length();
       const std::vector<Calibre> diameters = calibres(calibre, course.lengths);
       float way = 0.f;
@@ -527,7 +536,7 @@ class Turtle {
           state_.diameter = drawn_before;
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
-            place(on_chord + float(bent) * (course.places[i] - on_chord)) + double(part) * aside;
+            place(on_chord + float(told.bent) * (course.places[i] - on_chord)) + double(part) * aside;
         next.z() += climbing * (from.z() + along_z * double(climbed.places[i].z()) - next.z());
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,

@@ -27,7 +27,8 @@ enum class Action : std::uint8_t {
 struct TurtleSymbol {
   std::string_view symbol, parameters, meaning;
   Action action;
-  int least, most;  // parameters
+  int least, most;                        // parameters
+  std::span<const double> defaults = {};  // of those above the least, when each has one by itself
 };
 std::span<const TurtleSymbol> turtle_symbols();
 
