@@ -120,7 +120,8 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     tips = tips_of(p, kind, s, u, v, 1), ahead = ahead_of(p, kind, s, u, v), thick = thicker(kind, p), d = thick * plans.d(p),
     away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
     r = stems(kind, cell = plans.cell(p), tips = crowd(tips), ahead = log(ahead), length = log(max(0.05, plans.length(p))),
-      hx = plans.hx(p), hy = plans.hy(p), hz = plans.hz(p), d = log(d), @style, seldom = 0),
+      hx = plans.hx(p), hy = plans.hy(p), hz = plans.hz(p), d = log(d),
+      @style, seldom = 0),
     from = styles(stems.donor(r), kind), sz = steeper(kind, from), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
@@ -129,14 +130,14 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
          x = part * ex, y = part * ey, z = part * ez, steep = sz, stairs = stepped(kind, from), kinked = turned(kind, from),
          kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
-       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
+       ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = tips_of(p, kind, s, u, v, 2), ahead = ahead_of(p, kind, s, u, v),
     away = ahead / max(1, plans.ahead(p)), d = thicker(kind, p) * plans.d(p) }
   -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
-       ?P(0, 0, 0) ?H(0, 0, 0) ] Plan(i + 1)
+       ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0) ] Plan(i + 1)
 done: Plan(i) ->
 
 # A branch with one tip to come ends; another forks, or goes on as another section. Left and right are alike; a
@@ -148,13 +149,15 @@ on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az
   { q = calibre(kind, next, tips, ahead, d), a = swing(if(mirror, -1, 1), next, x, y), phi = spin(kind, a, if(mirror, -1, 1), next, x, y) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
-fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
+fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z) ?S(sx, sy, sz)
   { s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind), mx = if(chance(0.5), 1, -1),
     far = max(1, sqrt((ax - px)^2 + (ay - py)^2 + (az - pz)^2)),
     r = forks(kind, cell = donor, other = if(chance(familiar), -1, whose(kind)), tips = crowd(tips), ahead = log(max(ahead, 1)),
       path = path, order = order, d = log(d), hx = x * mx, hy = y, hz = z,
-      lean = mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), side = px * mx, height = py, before = pz,
-      gx = mx * (ax - px) / far, gy = (ay - py) / far, gz = (az - pz) / far, @style, seldom = 0),
+      lean = mx * (px * y - py * x) / max(1, sqrt(px^2 + py^2 + pz^2)), swerve = mx * atan2(x * sy - y * sx, x * sx + y * sy),
+      side = px * mx, height = py, before = pz,
+      gx = mx * (ax - px) / far, gy = (ay - py) / far, gz = (az - pz) / far,
+      @style, seldom = 0),
     q = calibre(kind, r, tips, ahead, d), a = swing(mx, r, x, y), phi = spin(kind, a, mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
@@ -193,7 +196,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
        x = part * (wx - gx) - back * gx, y = part * (wy - gy) - back * gy, z = part * (wz - gz) - back * gz, steep = sz,
        stairs = stepped(kind, from), kinked = turned(kind, from), kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
      Twig(kind, donor, nth(i, forks.next1(r), forks.next2(r), forks.next3(r)), run, mirror, tips, beyond, path + length, order, d,
-       wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0)
+       wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0)
 )";
 
 /// Writes the grammar, part by part.
@@ -407,7 +410,8 @@ class Writer {
         "lengths, paths beyond their ends, and whither the middle of their tips is, and of all.\n"
         "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
         "near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, side ~ near_side(kind), height ~ near_height(kind), "
+        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, swerve ~ {}, side ~ near_side(kind), height ~ "
+        "near_height(kind), "
         "before ~ "
         "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}, seldom ~ 1\n"
         "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
@@ -415,14 +419,14 @@ class Writer {
         "next3, "
         "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
-        options_.lean, options_.aim, options_.aim, options_.aim_across, kernels_);
+        options_.lean, options_.swerve, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
       row(&f == forks.data());
       put("{} {} {} {} {} {} {} {} ", f.kind, f.cell, f.cell, rounded(crowd(f.tips), 1e3), logarithm(f.ahead),
           rounded(f.path, 10.), f.order, logarithm(f.diameter));
       vector(f.heading, 1e3);
-      put(" {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.side, 10.), rounded(f.height, 10.),
-          rounded(f.depth, 10.));
+      put(" {} {} {} {} {}", rounded(f.lean(), 1e3), rounded(f.swerve(), 10.), rounded(f.side, 10.),
+          rounded(f.height, 10.), rounded(f.depth, 10.));
       put(" ");
       vector(f.aim, 1e3);
       style(traced_.cells[f.cell].kinds.at(f.kind).style);

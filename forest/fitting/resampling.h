@@ -49,6 +49,7 @@ struct Resampling {
   double heading = .15, heading_across = .1;  // of a unit vector: in the plane of the slice, and across it
   double aim = .25, aim_across = .15;         // of the unit vector to the middle of the tips: likewise
   double lean = .12;                          // of how far aside of the way out it heads
+  double swerve = 20.;                        // of how far its last step turns aside, degrees
   double style = .45;                         // in standard deviations among the neurons
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
   double familiar = 1.;  // how often a fork may come from the neuron whose style its branch has

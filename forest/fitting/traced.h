@@ -8,6 +8,7 @@
 #include <cmath>
 #include <cstddef>
 #include <map>
+#include <numbers>
 #include <span>
 #include <vector>
 
@@ -71,6 +72,12 @@ struct Fork {
   double lean() const {
     return (side * double(heading.y()) - height * double(heading.x())) /
            std::max(1., std::hypot(side, height, depth));
+  }
+  // By which angle about z its last step leaves its heading, degrees.
+  double swerve() const {
+    return std::atan2(double(heading.x() * last_step.y() - heading.y() * last_step.x()),
+                      double(heading.x() * last_step.x() + heading.y() * last_step.y())) *
+           180. / std::numbers::pi;
   }
   struct Daughter {
     double tips, ahead, length, end_diameter;

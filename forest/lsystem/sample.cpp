@@ -207,6 +207,14 @@ void Course::kinks(float times, float power) {
 
 namespace {
 
+// Unit; zero when all is one place.
+Vec3 last_step_at_end(std::span<const Trace::Stop> stops) {
+  for (std::size_t i = stops.size(); i-- > 0;)
+    if (const Vec3 step = stops[i].at - (i ? stops[i - 1].at : Vec3(Vec3::Zero())); !step.isZero(0.f))
+      return step.stableNormalized();
+  return Vec3::Zero();
+}
+
 // The places of a traced branch for one of so many: some that follow one another are left out, or come twice, where the step from
 // what is before to what comes after is most like one that was there; rather in the middle.
 std::vector<std::size_t> places_for(const Trace& of, std::size_t wanted) {
@@ -298,6 +306,7 @@ void Sample::add(std::span<const double> condition_row, std::span<const double> 
   outcome_values_.insert(outcome_values_.end(), outcome_row.begin(), outcome_row.end());
   for (Trace& t : branches) {
     t.ahead = heading_at_end(Vec3::Zero(), t.stops);
+    t.own_last = last_step_at_end(t.stops);
     float length = 0.f;
     Vec3 last = Vec3::Zero();
     for (const Trace::Stop& stop : t.stops)

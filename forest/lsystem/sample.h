@@ -34,6 +34,7 @@ struct Trace {
   std::vector<Stop> stops;        // at least one
   // Worked out by Sample::add().
   Vec3 ahead = Vec3::Zero();        // where it heads at its end
+  Vec3 own_last = Vec3::Zero();     // unit: its own last step
   std::vector<float> lengths = {};  // from its beginning to each place, µm
 
   float steepest = 0.f;  // how fast its diameter changes at most, µm a µm

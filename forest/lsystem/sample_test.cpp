@@ -570,5 +570,25 @@ TEST(Questions, AreAnsweredAfterEveryStep) {
   expect_near(m.points().back().position(), {36, 36, 0});
 }
 
+// Whither the last step went is not where the turtle heads: it has turned since, or heads where the last 20 µm led.
+TEST(Questions, TellTheLastStep) {
+  const auto told = [](const std::string& before) {
+    const Grammar g = grammar("axiom: " + before + " Q ?S(9, 9, 9)\nasked: Q > ?S(x, y, z) -> B(x, y, z)\n");
+    const Word word = derive(g);
+    for (const Module& m : word.modules)
+      if (g.symbols[m.symbol] == "B") {
+        const auto values = word.of(m);
+        return Vec3(float(values[0]), float(values[1]), float(values[2]));
+      }
+    return Vec3(Vec3::Constant(9.f));
+  };
+  expect_near(told("Soma(10)"), {0, 0, 0});
+  expect_near(told("-(90) F(3) +(90)"), {1, 0, 0});
+  expect_near(told("[ -(90) F(3) ] F(3)"), {0, 1, 0});
+  expect_near(told("Trace(twigs, 0, 0)"), {0, .6f, .8f});
+  expect_near(told("Trace(twigs, 0, 0, mirror = 2)"), {0, .6f, -.8f});
+  expect_near(told("Trace(twigs, 0, 0, about = -90)"), {.6f, 0, .8f});
+}
+
 }  // namespace
 }  // namespace forest::lsystem

@@ -97,6 +97,8 @@ constexpr TurtleSymbol symbol_table[] = {
     {"?P", "x, y, z", "after every step, where the turtle is here, counted from the soma", Action::ask_place,
      3, 3},
     {"?H", "x, y, z", "… and where it heads: a unit vector", Action::ask_heading, 3, 3},
+    {"?S", "x, y, z", "… and the direction of the last step: a unit vector, 0 when nothing was drawn",
+     Action::ask_step, 3, 3},
     {"?D", "depth, layer, above, below",
      "… how deep below the pia it is, in which layer, and how far from the upper and lower border of that",
      Action::ask_depth, 1, 4},
@@ -127,7 +129,8 @@ struct Drawn {
 
 struct State {
   Eigen::Vector3d position = Eigen::Vector3d::Zero();
-  Eigen::Matrix3d frame;  // columns: heading, left, up
+  Eigen::Matrix3d frame;                           // columns: heading, left, up
+  Eigen::Vector3d step = Eigen::Vector3d::Zero();  // the direction of the last one
   double diameter = 1., tropism = 0., outward = 0., flat = 0., seek = 0., shun = 0.;
   double shun_reach = 10.;
   double avoid = -1.;                                  // µm kept free; below 0: it goes through everything
@@ -312,6 +315,8 @@ class Turtle {
         return tell(m, Eigen::Vector3d(state_.position - soma_place_));
       case Action::ask_heading:
         return tell(m, Eigen::Vector3d(state_.frame.col(0)));
+      case Action::ask_step:
+        return tell(m, state_.step);
       case Action::ask_depth: {
         const auto stratum = environment_.stratum(here());
         return tell(m,
@@ -366,6 +371,7 @@ class Turtle {
                           step = clear(wanted, std::max(double(start), 0.5 * diameter));
     if (step.isZero(0.)) return;  // there is no room
     line_to(state_.position + step, start);
+    state_.step = step.stableNormalized();
     if (step != wanted) head(step / std::copysign(step.norm(), length));
     if (state_.seek != 0.)
       if (const auto field = environment_.field(here()); field.density != 0.)
@@ -552,8 +558,9 @@ class Turtle {
     }
     state_.diameter = gauged(thick(calibre.stops.back().diameter, 1.f));
     const double length = scale * double(t.length());
-    if (!t.ahead.isZero(0.f) && length > 0.)
-      head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
+    if (t.ahead.isZero(0.f) || !(length > 0.)) return;
+    head((turn * mirrored(t.ahead) + aside / length).stableNormalized());
+    state_.step = (turn * mirrored(t.own_last) + aside / length).stableNormalized();
   }
 
   /// Turns the end of the traced branch that leads here so that its last step has this direction: how a fork stands on the step

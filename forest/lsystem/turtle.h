@@ -20,7 +20,7 @@ enum class Action : std::uint8_t {
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
   push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
   place, head, trace, gauge, fibre, avoid, seek, shun,
-  ask_place, ask_heading, ask_depth, ask_near, ask_attraction,  // questions are the last
+  ask_place, ask_heading, ask_step, ask_depth, ask_near, ask_attraction,  // questions are the last
   // clang-format on
 };
 
