@@ -120,7 +120,7 @@ constexpr double least_tolerance = 1e-4;  // mm
 
 // Which options said something of an input.
 struct Used {
-  bool axis = false, spacing = false, threshold = false, pixel = false, unit = false;
+  bool axis = false, spacing = false, threshold = false, pixel = false, unit = false, straight = false;
 };
 
 struct Options {
@@ -295,7 +295,8 @@ void refuse_unused(const Options& options, const Used& used) {
                 {"--threshold", "of volumes and pictures, and none is given", used.threshold},
                 {"--pixel", "of pictures, and none is given", used.pixel},
                 {"--unit", "of an .slc file, and none is given", used.unit},
-                {"--tolerance", "of curves, without --straight, and none is given", !options.straight}});
+                {"--tolerance", "of curves fitted to straight contours, and none is to be fitted",
+                 !options.straight && used.straight}});
 }
 
 // The sections of a surface; what is wrong with it is said with the name of its file.
@@ -368,6 +369,10 @@ void run(const Options& options, Console& console) {
     for (const Vec3& p : surfaces.back().positions)
       low = std::min(low, double(p[int(axis)])), high = std::max(high, double(p[int(axis)]));
   }
+  used.straight = !surfaces.empty();
+  for (const cortex::ContourStack& stack : stacks)
+    for (const cortex::Section& section : stack.sections)
+      for (const cortex::Contour& contour : section.contours) used.straight |= contour.curve.polygon();
   refuse_unused(options, used);
   // All surfaces by the same planes.
   const auto planes =

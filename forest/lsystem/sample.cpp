@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <map>
 #include <numeric>
 #include <span>
@@ -12,19 +13,51 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/clones.h"
 #include "forest/core/error.h"
 
 namespace forest::lsystem {
 namespace {
 
-constexpr float far = -1e30f;  // the logarithm of no chance at all
+constexpr float far = -1e30f;    // the logarithm of no chance at all
+constexpr float hardly = -20.f;  // … of what has none beside the best
 
-// sums[i] -= ½ (column[i] - wanted)².
-void add_kernel(const float* column, float wanted, std::size_t count, float* sums) {
-  for (std::size_t i = 0; i < count; ++i) {
-    const float off = column[i] - wanted;
-    sums[i] -= .5f * off * off;
+// The logarithm of a kernel.
+float kernel(float value, float wanted) {
+  const float off = value - wanted;
+  return -(.5f * off * off);
+}
+FOREST_CLONES void add_kernel(const float* column, float wanted, std::size_t count, float* sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] += kernel(column[i], wanted);
+}
+FOREST_CLONES void forbid(const float* column, float value, std::size_t count, float* sums) {
+  for (std::size_t i = 0; i < count; ++i) sums[i] += column[i] == value ? far : 0.f;
+}
+// Those above a limit, in their order.
+FOREST_CLONES void find_above(const float* values, std::size_t count, float limit,
+                              std::vector<std::uint32_t>& found) {
+  constexpr std::size_t lanes = 16;
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes) {
+    int any = 0;
+    for (std::size_t k = 0; k < lanes; ++k) any |= int(values[i + k] > limit);
+    if (!any) continue;
+    for (std::size_t k = 0; k < lanes; ++k)
+      if (values[i + k] > limit) found.push_back(std::uint32_t(i + k));
   }
+  for (; i < count; ++i)
+    if (values[i] > limit) found.push_back(std::uint32_t(i));
+}
+FOREST_CLONES std::size_t largest(const float* values, std::size_t count) {
+  constexpr std::size_t lanes = 16;
+  float best[lanes];
+  std::fill_n(best, lanes, values[0]);
+  std::size_t i = 0;
+  for (; i + lanes <= count; i += lanes)
+    for (std::size_t k = 0; k < lanes; ++k) best[k] = values[i + k] > best[k] ? values[i + k] : best[k];
+  const float most = std::max(*std::max_element(best, best + lanes),
+                              *std::max_element(values + std::min(i, count - 1), values + count));
+  return std::size_t(std::find(values, values + count, most) - values);
 }
 
 // How long the step is that ends at a place, when these are the ways to all of them.
@@ -99,26 +132,35 @@ Course::Course(const Trace& t, float scale) {
 
 void Course::climb(float by) {
   if (by == 0.f) return;
+  const std::vector<float> heights = climbed(by);
+  for (std::size_t i = 0; i < places.size(); ++i) places[i].z() = heights[i];
+}
+
+std::vector<float> Course::climbed(float by) const {
+  std::vector<float> heights(places.size());
+  for (std::size_t i = 0; i < places.size(); ++i) heights[i] = places[i].z();
+  if (by == 0.f) return heights;
   std::vector<float> climbs, sloping;  // of each step: how far along z, and its length unless it is level
   float before = 0.f;
   for (std::size_t i = 0; i < places.size(); ++i) {
     climbs.push_back(std::abs(places[i].z() - std::exchange(before, places[i].z())));
     sloping.push_back(climbs[i] > as_high ? step_to(lengths, i) : 0.f);
   }
-  const float climbed = std::reduce(climbs.begin(), climbs.end());
+  const float whole = std::reduce(climbs.begin(), climbs.end());
   float along = std::reduce(sloping.begin(), sloping.end());
   if (!(along > 0.f)) {
     for (std::size_t i = 0; i < places.size(); ++i) sloping[i] = step_to(lengths, i);
     along = length();
   }
   constexpr float most = .4f;  // of how far it goes along z
-  const float share = std::min(1.f, most * climbed / std::abs(by));
+  const float share = std::min(1.f, most * whole / std::abs(by));
   float more = 0.f;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    if (climbed > 0.f) more += by * share * climbs[i] / climbed;
+    if (whole > 0.f) more += by * share * climbs[i] / whole;
     if (along > 0.f) more += by * (1.f - share) * sloping[i] / along;
-    places[i].z() += more;
+    heights[i] += more;
   }
+  return heights;
 }
 
 void Course::levels(float share) {
@@ -334,16 +376,32 @@ void Sample::finish() {
   }
   groups_.clear();
   for (auto& [key, members] : by_key) {
-    Group group{key, std::move(members), {}, {}};
+    Group group;
+    group.key = key, group.rows = std::move(members);
+    const std::size_t count = group.rows.size();
+    std::vector<double> differ;  // by condition: the variance, in units of the width
     for (std::size_t c = 0; c < wide; ++c) {
       const Condition& condition = conditions[c];
-      if (condition.match == Match::same) continue;
-      const double width = condition.widths.values.empty()
-                               ? condition.width
-                               : condition.widths.lookup(double(value(group.rows[0], condition.by)));
-      group.widths.push_back(condition.match == Match::like ? float(width) : 1.f);
-      for (const std::uint32_t row : group.rows) group.columns.push_back(value(row, c) / group.widths.back());
+      double width = condition.width, sum = 0., squares = 0.;
+      if (!condition.widths.values.empty())
+        width = condition.widths.lookup(double(value(group.rows[0], condition.by)));
+      for (const std::uint32_t row : group.rows) {
+        const double x = double(value(row, c)) / width;
+        sum += x, squares += x * x;
+      }
+      differ.push_back(squares - sum * sum / double(count));
+      if (condition.match == Match::like) group.like.push_back({c, float(width)});
+      if (condition.match == Match::another) group.another.push_back({c, 1.f});
     }
+    std::ranges::stable_sort(group.like, std::ranges::greater{},
+                             [&](const Group::Column& c) { return differ[c.condition]; });
+    for (const Group::Column& c : group.another)
+      for (const std::uint32_t row : group.rows) group.forbidden.push_back(value(row, c.condition));
+    for (const Group::Column& c : group.like)
+      for (const std::uint32_t row : group.rows) group.columns.push_back(value(row, c.condition) / c.width);
+    for (std::size_t i = 0; i < count; ++i)
+      for (std::size_t k = 0; k < group.like.size(); ++k)
+        group.by_row.push_back(group.columns[k * count + i]);
     groups_.push_back(std::move(group));
   }
 }
@@ -355,7 +413,8 @@ void Sample::ask(std::size_t condition, std::span<const double> of_rows) {
 }
 
 std::size_t Sample::draw(std::span<const double> wanted, Random& random) const {
-  thread_local std::vector<float> key, chances;
+  thread_local std::vector<float> key, asked, chances;
+  thread_local std::vector<std::uint32_t> near;
   key.clear();
   for (std::size_t c = 0; c < conditions.size(); ++c)
     if (conditions[c].match == Match::same) key.push_back(float(wanted[c]));
@@ -363,26 +422,40 @@ std::size_t Sample::draw(std::span<const double> wanted, Random& random) const {
   if (group == groups_.end() || group->key != key)
     throw Error(fmt::format("sample {} has no row for {}; add one or ask for what there is", name,
                             fmt::join(key, ", ")));
-  const std::size_t count = group->rows.size();
+  const auto chance = float(random.uniform());
+  const std::size_t count = group->rows.size(), wide = group->like.size();
+  if (count == 1) return group->rows[0];
   chances.assign(count, 0.f);
-  const float *column = group->columns.data(), *width = group->widths.data();
-  for (std::size_t c = 0; c < conditions.size(); ++c) {
-    if (conditions[c].match == Match::same) continue;
-    if (conditions[c].match == Match::like) {
-      add_kernel(column, float(wanted[c]) / *width, count, chances.data());
-    } else {
-      const float other = float(wanted[c]);
-      if (std::any_of(column, column + count, [&](float x) { return x != other; }))
-        for (std::size_t i = 0; i < count; ++i) chances[i] += column[i] == other ? far : 0.f;
-    }
-    column += count, ++width;
+  const float* column = group->forbidden.data();
+  for (const Group::Column& c : group->another) {
+    const auto other = float(wanted[c.condition]);
+    if (std::any_of(column, column + count, [&](float x) { return x != other; }))
+      forbid(column, other, count, chances.data());
+    column += count;
   }
-  const float best = *std::ranges::max_element(chances);
-  float total = 0.f;
-  for (float& chance : chances) total += chance = chance > best - 20.f ? std::exp(chance - best) : 0.f;
-  float left = float(random.uniform()) * total;
-  std::size_t last = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  asked.clear();
+  for (const Group::Column& c : group->like) asked.push_back(float(wanted[c.condition]) / c.width);
+  // By the first kernels most rows are out of the question.
+  const std::size_t first = std::min<std::size_t>(6, wide);
+  for (std::size_t k = 0; k < first; ++k)
+    add_kernel(group->columns.data() + k * count, asked[k], count, chances.data());
+  const auto whole = [&](std::size_t i) {
+    const float* row = group->by_row.data() + i * wide;
+    float sum = chances[i];
+    for (std::size_t k = first; k < wide; ++k) sum += kernel(row[k], asked[k]);
+    return sum;
+  };
+  // Sums only fall, so the best is no less than any whole one; what is far below that has no chance.
+  const std::size_t lead = largest(chances.data(), count);
+  near.clear();
+  find_above(chances.data(), count, whole(lead) + hardly, near);
+  float best = -INFINITY, total = 0.f;
+  for (const std::uint32_t i : near) best = std::max(best, chances[i] = whole(i));
+  for (const std::uint32_t i : near)
+    total += chances[i] = chances[i] > best + hardly ? std::exp(chances[i] - best) : 0.f;
+  float left = chance * total;
+  std::size_t last = lead;  // also where all are so far that nothing is added to what is missing
+  for (const std::uint32_t i : near) {
     if (chances[i] == 0.f) continue;
     last = i;
     if ((left -= chances[i]) < 0.f) break;

@@ -65,6 +65,8 @@ struct Course {
   /// Its end so many µm farther along z: each step in proportion to how far it goes along z, but for what would change them by more
   /// than two fifths, which those that are not level take evenly. Level ones remain so, unless all are.
   void climb(float by);
+  /// How high its places would lie then.
+  std::vector<float> climbed(float by) const;
   float length() const { return lengths.back(); }
 };
 
@@ -132,8 +134,14 @@ class Sample {
   struct Group {  // of rows that are the same where they must be
     std::vector<float> key;
     std::vector<std::uint32_t> rows;
-    std::vector<float> widths;   // of the other conditions
-    std::vector<float> columns;  // they themselves, one after the other, in units of their widths
+    struct Column {
+      std::size_t condition;
+      float width;
+    };
+    std::vector<Column> another, like;  // of the other conditions; kernels first by which rows differ most
+    std::vector<float> forbidden;       // of what must be another, one column after the other
+    std::vector<float> columns;         // of kernels, in units of their widths, likewise
+    std::vector<float> by_row;          // the same, row by row
   };
   std::vector<float> condition_values_;  // row by row
   std::vector<double> outcome_values_;

@@ -518,9 +518,9 @@ class Turtle {
       const float whole = course.length();
       const std::vector<Calibre> diameters = calibres(calibre, course.lengths);
       float way = 0.f;
-      Course climbed = course;
       const double along_z = scale * sides.z();
-      if (climbing > 0. && along_z != 0.) climbed.climb(float(aside.z() / along_z));
+      const std::vector<float> heights =
+          course.climbed(climbing > 0. && along_z != 0. ? float(aside.z() / along_z) : 0.f);
       const double thickness_last = thick(diameters.back().diameter, diameters.back().change);
       double thickness_before = thick(calibre.diameter, 0.f), drawn_before = gauged(thickness_before);
       for (std::size_t i = 0; i < course.places.size(); ++i) {
@@ -543,7 +543,7 @@ class Turtle {
         const Vec3 on_chord = t.end() * part;
         Eigen::Vector3d next =
             place(on_chord + float(told.bent) * (course.places[i] - on_chord)) + double(part) * aside;
-        next.z() += climbing * (from.z() + along_z * double(climbed.places[i].z()) - next.z());
+        next.z() += climbing * (from.z() + along_z * double(heights[i]) - next.z());
         if (!free) {
           const Eigen::Vector3d wanted = next + slip - state_.position,
                                 step = clear(wanted, std::max(double(start), 0.5 * state_.diameter));

@@ -177,6 +177,7 @@ Forest Forest::check(std::shared_ptr<Data> data, std::span<const std::byte> byte
 
 void Forest::Data::find_parts(std::span<const std::byte> whole, const Refuse& refuse) {
   Header header{};
+  refuse.unless(!whole.empty(), "is empty; get the file again");
   refuse.unless(whole.size() >= sizeof header, "is too short to be a forest file");
   std::memcpy(&header, whole.data(), sizeof header);
   if (header.magic != magic)

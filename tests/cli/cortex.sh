@@ -170,7 +170,7 @@ refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours s
 refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 # Options of other input, which would say nothing.
-for option in 'axis x' 'spacing 3' 'offset 1' 'name a' 'unit 2'; do
+for option in 'axis x' 'spacing 3' 'offset 1' 'name a' 'unit 2' 'tolerance .01'; do
   refuses "${option% *} is of " $BRAINFOREST cortex contours s.contours --$option -o no.contours
 done
 refuses 'unit is of an .slc file' $BRAINFOREST cortex surfaces s.contours --unit 2 -o no.gii no2.gii

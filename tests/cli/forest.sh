@@ -43,6 +43,8 @@ refuses "'big' is no size" env -u DISPLAY -u WAYLAND_DISPLAY "$program" view a.f
 [[ $(head -c 8 walk.mp4 | tail -c 4) == ftyp ]] || fail "walk.mp4 is no MP4 file"
 
 refuses "forest file" "$program" render view.json -o x.png
+: >empty.obj
+refuses "empty.obj: is empty; get the file again" "$program" render empty.obj -o x.png
 head -c 100000 a.forest >short.forest
 refuses "cut short" "$program" render short.forest -o x.png
 refuses "brainforest: --view:1: is no JSON from column 15 on" "$program" render a.forest --view '{"eye":[1,2,3]' -o x.png
