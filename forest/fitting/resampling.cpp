@@ -522,7 +522,7 @@ class Writer {
         "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
         "#define fade 20     # µm, over which a branch gives up e times of how much thicker it began than "
         "where its diameters are of\n"
-        "#define turn 0.4    # share of the angle between headings where a fork was traced and where it is "
+        "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
         "drawn\n",
         habits_kept(traced_.cells.size()), options_.familiar, options_.jitter);
     std::string rules(growth);
