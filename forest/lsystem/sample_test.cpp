@@ -2,8 +2,11 @@
 #include "forest/lsystem/sample.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <numeric>
 
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -55,6 +58,50 @@ TEST(Sample, DrawsByItsKernels) {
   const double share = 1. / (1. + std::exp(-.5)), expected = draws * share;
   const double chi = (counts[0] - expected) * (counts[0] - expected) / (expected * (1. - share));
   EXPECT_LT(chi, 10.8);  // of one degree of freedom, one time in a thousand more
+}
+
+// Of many rows and conditions most are out of the question by the first of these: chances are those of all nevertheless.
+TEST(Sample, OfManyRowsEachHasItsChance) {
+  constexpr std::size_t many = 300, wide = 10;
+  Random random(3);
+  Sample sample;
+  for (std::size_t c = 0; c < wide; ++c)
+    sample.conditions.push_back({fmt::format("c{}", c), Sample::Match::like, .5 + double(c % 4)});
+  std::vector<std::array<double, wide>> values(many);
+  for (auto& row : values) {
+    for (double& x : row) x = random.uniform();
+    sample.add(row, {}, {});
+  }
+  sample.finish();
+  const auto logarithm = [&](std::size_t row, const std::array<double, wide>& wanted) {
+    double sum = 0.;
+    for (std::size_t c = 0; c < wide; ++c)
+      sum -= .5 * std::pow((values[row][c] - wanted[c]) / sample.conditions[c].width, 2);
+    return sum;
+  };
+  std::array<double, wide> near, far;
+  near.fill(.8), far.fill(3.);
+  for (const auto& wanted : {near, far}) {
+    std::vector<double> chances(many);
+    for (std::size_t row = 0; row < many; ++row) chances[row] = std::exp(logarithm(row, wanted));
+    const double all = std::accumulate(chances.begin(), chances.end(), 0.);
+    constexpr int draws = 30000;
+    std::vector<int> counts(many);
+    for (int i = 0; i < draws; ++i) ++counts[sample.draw(wanted, random)];
+    double chi = 0., degrees = -1., rest = draws, rest_drawn = draws;
+    for (std::size_t row = 0; row < many; ++row) {
+      const double expected = draws * chances[row] / all;
+      if (expected < 5.) continue;
+      chi += std::pow(counts[row] - expected, 2) / expected, ++degrees;
+      rest -= expected, rest_drawn -= counts[row];
+    }
+    if (rest > 1.) chi += std::pow(rest_drawn - rest, 2) / rest, ++degrees;
+    EXPECT_GT(degrees, 20.);
+    EXPECT_LT(chi, degrees + 4. * std::sqrt(2. * degrees));  // one time in some ten thousand more
+  }
+  // So far that nothing can be told by the last digits: one of the nearest by the first conditions, never a failure.
+  near.fill(1e9);
+  EXPECT_LT(sample.draw(near, random), many);
 }
 
 TEST(Sample, TakesAnotherAndTheNearest) {
