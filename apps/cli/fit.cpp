@@ -9,6 +9,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/calibration.h"
 #include "forest/lsystem/grammar.h"
+#include "forest/morphology/validate.h"
 #include "forest/repository/names.h"
 #include "forest/statistics/dealing.h"
 
@@ -38,8 +39,35 @@ std::vector<std::uint32_t> slices_of(const Sample& sample, const std::string& ex
   return statistics::numbered(names.slices);
 }
 
+// What is so far from all else that a model of it would grow it again: a slip of a tracer or of a file.
+void look_for_slips(const Sample& sample, statistics::KindSet kinds, Console& console) {
+  constexpr float farthest = 1e7f;  // µm: no neurite of any animal is longer
+  std::size_t with = 0;
+  std::string first;
+  for (std::size_t i = 0; i < sample.neurons.size(); ++i) {
+    const Morphology& neuron = sample.neurons[i];
+    for (const Point& p : neuron.points())
+      if (!(p.position().cwiseAbs().maxCoeff() <= farthest))
+        throw Error(fmt::format(
+            "{} has a point at {:g} {:g} {:g} µm, farther away than any neuron reaches; mend it, or "
+            "leave this neuron out",
+            repository::escaped(sample.cells[i]), p.x, p.y, p.z));
+    const auto findings = validate(neuron);
+    const auto slip = std::ranges::find_if(findings, [&](const Finding& f) {
+      return f.code == "jump" && f.section.valid() && kinds.contains(neuron.section(f.section).kind);
+    });
+    if (slip == findings.end()) continue;
+    if (!with++) first = fmt::format("{}: {}", repository::escaped(sample.cells[i]), slip->sentence);
+  }
+  if (with)
+    console.warn(fmt::format(
+        "{} of {} {} what may be a slip, which will be grown again, first {}; 'brainforest check' "
+        "tells all",
+        with, counted(sample.neurons.size(), "neuron"), with == 1 ? "has" : "have", first));
+}
+
 void run(const Options& options, Console& console) {
-  must_take_files({options.out}, true);
+  must_take_files({options.out}, options.force);
   const bool files = !options.files.empty();
   const Sample sample = read_sample(files ? options.files : std::vector{options.population},
                                     files ? "" : options.repo, console);
@@ -50,6 +78,7 @@ void run(const Options& options, Console& console) {
   resampling.kinds = {};
   for (const std::string& word : options.kinds)
     resampling.kinds = resampling.kinds | statistics::kind_set(word);
+  look_for_slips(sample, resampling.kinds, console);
   fitting::Calibration calibration = options.calibration;
   if (!options.calibrate) calibration.candidates = 1;
   const auto without = std::ranges::count_if(neurons, [&](const Morphology& m) {

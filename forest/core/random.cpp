@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numbers>
 
 #include <Random123/philox.h>
@@ -46,8 +47,14 @@ double Random::normal(double mean, double sd) {
 
 double Random::truncated_normal(double mean, double sd, double low, double high) {
   if (!(sd > 0.)) return std::clamp(mean, low, high);
+  if (low > mean) return -truncated_normal(-mean, sd, -high, -low);  // near 1 a share says too little
   const auto phi = [&](double x) { return 0.5 * std::erfc(-(x - mean) / (sd * std::numbers::sqrt2)); };
-  const double p = uniform(phi(low), phi(high));
+  const double u = uniform(), from = phi(low), to = phi(high), p = from + (to - from) * u;
+  if (high < mean && !(to > std::numeric_limits<double>::min())) {
+    // Some 38 deviations away, where it falls as an exponential one does.
+    const double steep = (mean - high) / (sd * sd);
+    return std::max(low, high + std::log1p(-u * -std::expm1(steep * (low - high))) / steep);
+  }
   if (p <= 0. || p >= 1.) return std::clamp(mean, low, high);
   return std::clamp(mean - sd * std::numbers::sqrt2 * boost::math::erfc_inv(2. * p), low, high);
 }

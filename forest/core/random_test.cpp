@@ -94,6 +94,25 @@ TEST(Random, TruncatedNormalFollowsItsDistributionAndKeepsItsLimits) {
             1e-4);
 }
 
+// The mean of a tail is known: sd times the density where it begins over what lies beyond, by Mills' ratio 1/a - 1/a³ + 3/a⁵ - ….
+TEST(Random, TruncatedNormalIsRightFarFromItsMean) {
+  for (const double a : {8., 20., 37., 50., 300.})
+    for (const double side : {-1., 1.}) {
+      Random random(12);
+      double sum = 0.;
+      constexpr int count = 20000;
+      for (int i = 0; i < count; ++i) {
+        const double x = side > 0. ? random.truncated_normal(3., 2., 3. + 2. * a, 3. + 2. * (a + 5.))
+                                   : random.truncated_normal(3., 2., 3. - 2. * (a + 5.), 3. - 2. * a);
+        ASSERT_GE(side * (x - 3.) / 2., a * (1. - 1e-12));
+        ASSERT_LE(side * (x - 3.) / 2., a + 5.);
+        sum += side * (x - 3.) / 2. - a;
+      }
+      const double beyond = 1. / a - 2. / std::pow(a, 3) + 10. / std::pow(a, 5);
+      EXPECT_NEAR(sum / count, beyond, 5. * beyond / std::sqrt(count)) << a << ' ' << side;
+    }
+}
+
 TEST(Random, GammaHasItsMeanAndVariance) {
   for (double shape : {0.4, 1., 5.}) {
     Random random(11);

@@ -199,11 +199,11 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
        wx, wy, wz) ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0)
 )";
 
-/// Writes the grammar, part by part.
 // Neurons stray from one another by no more than this, in logarithms of how often they fork and how far they reach: axons of one
 // tip beside those of hundreds would make it twice as much, and what is grown then nine times as large as what was traced.
 constexpr double most_deviation = 1.2;
 
+/// Writes the grammar, part by part: first what a person may want to change, then what was traced, then how it grows.
 class Writer {
  public:
   Writer(const Traced& traced, const std::vector<Mixed>& mixed, const std::string& title,
@@ -216,8 +216,6 @@ class Writer {
                       : s == stairs || s == kinks ? habits_of_many(options.tracer, traced.cells.size())
                       : habit(s)                  ? options.tracer
                                                   : options.style);
-    put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
-        traced.cells.size(), traced.forks.size(), title);
     cells();
     gauges();
     styles_of_cells();
@@ -228,6 +226,11 @@ class Writer {
     forks();
     calibres();
     productions();
+    const std::string body = std::exchange(text_, {});
+    put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
+        traced.cells.size(), traced.forks.size(), title);
+    settings();
+    text_ += body;
   }
   std::string text() && { return std::move(text_); }
 
@@ -241,13 +244,12 @@ class Writer {
 
   void cells() {
     put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
-        "(else -1), between which depths "
-        "they lie, how many stems one like this has, and the neurons in whose style its basal dendrites are, "
-        "in "
-        "whose all others, and whose diameters it has; and, of as many places of a ring in which like ones "
-        "lie "
-        "side by "
-        "side, the neuron there.\n"
+        "(else -1),\n"
+        "# between which depths they lie, how many stems one like this has, and the neurons in whose style "
+        "its basal\n"
+        "# dendrites are, in whose all others, and whose diameters it has; and, of as many places of a ring "
+        "in which\n"
+        "# like ones lie side by side, the neuron there.\n"
         "sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring) =");
     const std::vector<std::size_t> around = ring(traced_, mixed_);
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
@@ -472,15 +474,14 @@ class Writer {
   void productions() {
     put("\n\n# This neuron is made of three traced ones, and its style strays as two neurons alike to it "
         "differ.\n"
-        "cell me = cells.ring(dealt({}))\n#define kin {}\ncell one = alike.cell(alike(me, floor(uniform(0, "
+        "cell me = cells.ring(dealt({}))\ncell one = alike.cell(alike(me, floor(uniform(0, "
         "kin))))\n"
         "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
         "cell planned = cells.stems(me)\ncell basal_as = cells.basal_as(me)\ncell others_as = "
         "cells.others_as(me)\ncell thin_as = "
-        "cells.thin_as(me)\n#define stray {:.4g}\n"
-        "#define kept {:.4g}  # so that neurons differ as much as traced ones\n"
+        "cells.thin_as(me)\n"
         "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
-        traced_.cells.size(), kin(), stray(), kept());
+        traced_.cells.size());
     for (const auto& [name, style] : {std::pair{"forks", number},
                                       {"extent", extent},
                                       {"wander", wander},
@@ -490,14 +491,6 @@ class Writer {
       table(fmt::format("sd_{}", name), traced_.deviations,
             [&](const Style& sd) { return std::min(sd[of], most_deviation); });
     }
-    put("# No stem has more tips, or reaches farther, than half as much again as the largest that was "
-        "traced.\n");
-    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
-    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
-    put("# Tuned by growing: how many times as much as traced branches those of each kind are told to do.\n");
-    for (std::size_t k = 0; k < knobs.size(); ++k)
-      table(
-          knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
     table("mean_slope", traced_.means, [](const Style& mean) { return mean[slope]; });
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
@@ -509,22 +502,6 @@ class Writer {
                       !i      ? ""
                       : i % 3 ? ", "
                               : ",\n      ");
-    put("#define agreed 0.85  # the least cosine between the ways to the middle of their tips, for that\n"
-        "#define follow 0.95  # how often a branch goes on as in the neuron it comes from\n"
-        "#define longest 3   # branches from one neuron in a row, at most\n"
-        "#define bold 0.5    # how much of that difference goes into how far stems reach\n"
-        "#define steer 0.35  # how far branches are drawn to where the middle of their tips should be\n"
-        "#define steep 1     # how much of the difference between its slope and its donor's a branch makes "
-        "up for\n"
-        "#define habits {:.4g}  # … of how unevenly steep and how kinked it was drawn\n"
-        "#define most 0.5    # … in shares of their length, at most\n"
-        "#define familiar {:.4g}  # how often a fork may come from the neuron that has the same stems\n"
-        "#define jitter {:.4g}  # of the logarithms of a stem's tips and of the path to its farthest\n"
-        "#define fade 20     # µm, over which a branch gives up e times of how much thicker it began than "
-        "where its diameters are of\n"
-        "#define turn 0.7    # share of the angle between headings where a fork was traced and where it is "
-        "drawn\n",
-        habits_kept(traced_.cells.size()), options_.familiar, options_.jitter);
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
@@ -532,6 +509,38 @@ class Writer {
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);
     text_ += rest;
+  }
+
+  // What a person may want to change.
+  void settings() {
+    put(R"(
+# How much neurons differ from those that were traced.
+#define stray {:.4g}  # how far their styles stray, in differences of two neurons alike to them: 0 or more
+#define kin {}  # of how many most alike these two are drawn: 1 to {}
+#define kept {:.4g}  # times which styles are taken, so that grown neurons differ as much as traced ones
+#define bold 0.5  # how much of what extents stray goes into how far stems reach: 0 to 1
+#define jitter {:.4g}  # how much a stem's tips and reach are changed: standard deviation of their logarithms
+#define familiar {:.4g}  # how often a fork may come from the neuron whose stems these are: 0 to 1
+#define follow 0.95  # how often a branch goes on as in the neuron that it comes from, where it can: 0 to 1
+#define agreed 0.85  # … which it can when the cosine between the ways to its tips, there and here, is above this
+#define longest 3  # branches in a row that come from one neuron, at most
+# How branches are drawn.
+#define steer 0.35  # how much of the way to where the middle of their tips should be they are drawn aside: 0 to 1
+#define most 0.5  # how far they are drawn aside at most, in shares of their length
+#define turn 0.7  # by how much of the angle between headings, where it was traced and here, a fork is turned: 0 to 1
+#define steep 1  # how much of the difference in slope between their neuron and its donor they make up for: 0 to 1
+#define habits {:.4g}  # the same of how unevenly steep and how kinked their steps are: 0 to 1
+#define fade 20  # µm, along which they give up e times of how much thicker they are than what lends its diameters: above 0
+# Tuned by growing: how many times as much as traced branches those of each kind are told to do.
+)",
+        stray(), kin(), kin(), kept(), options_.jitter, options_.familiar, habits_kept(traced_.cells.size()));
+    for (std::size_t k = 0; k < knobs.size(); ++k)
+      table(
+          knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
+    put("# No stem has more tips, or reaches farther (µm), than half as much again as the largest that was "
+        "traced.\n");
+    most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
+    most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
   }
 
   // A table by kind.

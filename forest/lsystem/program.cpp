@@ -317,10 +317,10 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         unary([](double a) { return double(a > 0.) - double(a < 0.); });
         break;
       case Op::min:
-        binary([](double a, double b) { return std::min(a, b); });
+        binary([](double a, double b) { return b < a || std::isnan(b) ? b : a; });
         break;
       case Op::max:
-        binary([](double a, double b) { return std::max(a, b); });
+        binary([](double a, double b) { return b > a || std::isnan(b) ? b : a; });
         break;
       case Op::uniform:
         binary([&](double a, double b) { return random.uniform(a, b); });
