@@ -43,6 +43,10 @@ lsystem::Grammar find_grammar(const std::string& name_or_path) {
   return grammar;
 }
 
+void tell_doubts(const lsystem::Grammar& grammar, Console& console) {
+  for (const std::string& doubt : grammar.doubts) console.warn(doubt);
+}
+
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
   constexpr std::size_t most = 100'000'000;
   repository::TextsByName distributions;

@@ -10,11 +10,16 @@
 
 namespace forest::cli {
 
+class Console;
+
 /// The names of the built-in grammars, in alphabetical order.
 std::vector<std::string> built_in_grammars();
 
 /// A built-in grammar by its name, any other by the path of its file. Throws InputError when there is none.
 lsystem::Grammar find_grammar(const std::string& name_or_path);
+
+/// Warns of what is read otherwise than it looks.
+void tell_doubts(const lsystem::Grammar& grammar, Console& console);
 
 /// The distributions that a grammar names, each as a text that stands alone. Throws InputError when they are too large.
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar);

@@ -92,6 +92,12 @@ class IntoRepository final : public Destination {
     if (std::filesystem::exists(options.repo)) open();
   }
 
+  ~IntoRepository() override {
+    if (!made_ || kept_) return;
+    transaction_.reset(), repository_.reset();  // nothing was stored: no repository without a neuron is left
+    std::error_code none;
+    std::filesystem::remove(options_.repo, none);
+  }
   void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
     if (!repository_) open();
     if (!transaction_) transaction_.emplace(repository_->begin());
@@ -104,7 +110,7 @@ class IntoRepository final : public Destination {
     if (++count_ % stored == 0) finish();
   }
   void finish() override {
-    if (transaction_) transaction_->commit();
+    if (transaction_) transaction_->commit(), kept_ = true;
     transaction_.reset();
   }
   std::string told() const override {
@@ -120,6 +126,8 @@ class IntoRepository final : public Destination {
 
  private:
   void open() {
+    std::error_code none;
+    made_ = !std::filesystem::exists(options_.repo, none);
     repository_.emplace(repository::Repository::open(options_.repo, repository::Access::write));
     hash_ = repository_->add_grammar(grammar_.name, grammar_.text, distributions_of(grammar_));
   }
@@ -131,6 +139,7 @@ class IntoRepository final : public Destination {
   std::optional<repository::Repository::Transaction> transaction_;
   std::string hash_;
   std::size_t count_ = 0, there_ = 0;
+  bool made_ = false, kept_ = false;  // the file, by us; and something in it
 };
 
 class IntoFolder final : public Destination {
@@ -232,6 +241,7 @@ void run_into_cells(const Options& options, Console& console) {
       grow_cells([&] { return grammar_of(options); },
                  {options.out, options.count, options.seed, options.force}, *ranks, console);
   if (!ranks->first()) return;
+  tell_doubts(grown.grammar, console);
   report(options, grown.grammar, grown.total,
          {{"file", options.out.string()}, {"bytes", grown.bytes}, {"there_before", grown.there}}, console);
   if (grown.there) console.say(fmt::format("{} of them were there already", grown.there));
@@ -248,6 +258,7 @@ void run(const Options& options, Console& console) {
         "programs that mpirun started grow into one file of cells; name it with --out NAME.cells, or leave "
         "mpirun out");
   const lsystem::Grammar grammar = grammar_of(options);
+  tell_doubts(grammar, console);
   const Surroundings surroundings(options.environment, console);
   const cortex::Site& site = surroundings.site();
   if (site.environment && !lsystem::heeds_surroundings(grammar))

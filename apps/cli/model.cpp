@@ -135,12 +135,26 @@ bool show_distribution(const Repository& repository, const std::string& text, Co
   return !chosen.empty();
 }
 
+/// Throws Error when this is "MODEL.NAME" of a model that has no distribution of that name.
+void must_have_distribution(const Repository& repository, const std::string& text) {
+  const std::size_t dot = text.rfind('.');
+  if (dot == text.npos || repository.model(reference_of(text).name)) return;
+  const auto model = repository.model(text.substr(0, dot));
+  if (!model) return;
+  std::vector<std::string> names;
+  for (const auto& [name, version] : model->distributions) names.push_back(name);
+  throw Error(fmt::format("model {} has no distribution '{}'; {}", repository::shown(model->name),
+                          escaped(text.substr(dot + 1)),
+                          names.empty() ? "it has none" : fmt::format("it has {}", fmt::join(names, ", "))));
+}
+
 void show(const Options& options, Console& console) {
   const Repository repository = Repository::open(options.repo, Access::read);
   Json out = Json::array();
   for (const std::string& name : options.names) {
     if (!repository.model(reference_of(name).name) && show_distribution(repository, name, console, out))
       continue;
+    must_have_distribution(repository, name);
     const ModelRow model = find_model(repository, name);
     Json json = json_of(model);
     json["text"] = model.text;
@@ -155,6 +169,7 @@ void import_models(const Options& options, Console& console) {
   std::vector<NewModel> models;  // all are read before one is stored
   for (const std::string& name : options.names) {
     const lsystem::Grammar grammar = find_grammar(name);
+    tell_doubts(grammar, console);
     const std::string own = escaped(grammar.name);  // a file may have any
     models.push_back(
         model_of(grammar, options.name.empty() ? own : options.name, options.population,
@@ -254,7 +269,9 @@ void edit(const Options& options, Console& console) {
   }
   NewModel next;
   try {
-    next = model_of(lsystem::parse(text, file.string()), model.name, options.population,
+    const lsystem::Grammar grammar = lsystem::parse(text, file.string());
+    tell_doubts(grammar, console);
+    next = model_of(grammar, model.name, options.population,
                     fmt::format("edited from version {}", model.version));
   } catch (const InputError& error) {
     folder.keep = true;

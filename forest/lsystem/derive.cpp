@@ -66,8 +66,13 @@ struct Deriver::State {
     throw InputError(grammar.file, p.line, fmt::format("production {} {}", p.id, what));
   }
 
-  double* evaluate(const Program& program, Random& random) {
-    return run(program, slots.data(), cell, grammar.lookups, random, stack.data());
+  // Of the statement in this line.
+  double* evaluate(const Program& program, std::size_t line, Random& random) {
+    try {
+      return run(program, slots.data(), cell, grammar.lookups, random, stack.data());
+    } catch (const Error& error) {
+      throw InputError(grammar.file, line, error.what());
+    }
   }
 
   // Appends modules whose parameters lie on the stack; false when a number is not finite.
@@ -86,13 +91,13 @@ struct Deriver::State {
   void begin(Random& random, std::uint32_t candidate) {
     nodes.clear(), parameters.clear(), active.clear();
     std::ranges::fill(written, 0);
-    run(grammar.cell, slots.data(), {}, grammar.lookups, random, stack.data());
+    evaluate(grammar.cell, grammar.cell_line, random);
     std::copy_n(slots.begin(), cell.size(), cell.begin());
     for (const Total& t : grammar.totals) cell[t.place] = 0.;
     if (candidate > 0) random = Random(random.seed(), random.item(), candidate_stream + candidate);
-    evaluate(grammar.axiom_values, random);
+    evaluate(grammar.axiom_values, grammar.axiom_line, random);
     if (!append(grammar.axiom))
-      throw InputError(grammar.file, 0,
+      throw InputError(grammar.file, grammar.axiom_line,
                        "the axiom has a parameter that is not a finite number; mend its expression");
     live = nodes.size();
     for (std::uint32_t i = 0; i < nodes.size(); ++i) {
@@ -189,13 +194,13 @@ struct Deriver::State {
     for (const std::uint32_t index : grammar.productions_of[nodes[n].symbol]) {
       const Production& p = grammar.productions[index];
       if ((certain && p.weight.empty()) || !matches(p, n)) continue;
-      if (!p.condition.empty() && evaluate(p.condition, random)[-1] == 0.) continue;
+      if (!p.condition.empty() && evaluate(p.condition, p.line, random)[-1] == 0.) continue;
       last = &p;
       if (p.weight.empty()) {
         certain = &p;
         continue;
       }
-      const double weight = evaluate(p.weight, random)[-1];
+      const double weight = evaluate(p.weight, p.line, random)[-1];
       if (!(weight >= 0. && std::isfinite(weight)))
         fail(p, fmt::format("has probability {}; keep it between 0 and 1", weight));
       candidates.push_back({&p, weight});
@@ -221,7 +226,8 @@ struct Deriver::State {
       for (const std::uint32_t n : active) {
         if (!fits(n, t.module)) continue;
         std::copy_n(parameters.begin() + nodes[n].first, nodes[n].count, slots.begin());
-        const double key = t.key < 0 ? 0. : slots[std::size_t(t.key)], value = evaluate(t.value, random)[-1];
+        const double key = t.key < 0 ? 0. : slots[std::size_t(t.key)],
+                     value = evaluate(t.value, t.line, random)[-1];
         if (key >= 0. && key < double(keys)) cell[t.place + std::size_t(key)] += value;
       }
     }
@@ -237,8 +243,8 @@ struct Deriver::State {
         changes.push_back({n, none, 0});
         continue;
       }
-      if (!p->bindings.empty()) evaluate(p->bindings, random);
-      if (!p->values.empty()) evaluate(p->values, random);
+      if (!p->bindings.empty()) evaluate(p->bindings, p->line, random);
+      if (!p->values.empty()) evaluate(p->values, p->line, random);
       const auto begin = std::uint32_t(nodes.size()), count = std::uint32_t(p->successor.size());
       if (!append(p->successor))
         fail(*p, fmt::format(
@@ -353,7 +359,7 @@ double Deriver::liking(const Morphology& neuron) {
   for (std::size_t i = 0; i < features.size(); ++i) {
     if (std::isnan(features[i])) continue;
     state_->slots[0] = features[i];
-    const double value = state_->evaluate(grammar.tastes[i].value, none)[-1];
+    const double value = state_->evaluate(grammar.tastes[i].value, grammar.tastes[i].line, none)[-1];
     if (!std::isfinite(value))
       throw InputError(
           grammar.file, grammar.tastes[i].line,

@@ -98,7 +98,8 @@ class Compiler {
       const std::size_t place = (text_.more(), text_.at());
       const std::string name = argument_name();
       if (name.empty()) {
-        if (!named.empty()) text_.fail_at(place, "an argument in order stands before those by name");
+        if (!named.empty())
+          text_.fail_at(place, "an argument in order stands before those by name; move it there");
         expression(out);
         ++count;
         continue;
@@ -480,8 +481,9 @@ class Parser {
     for (const Row& row : declarations)
       if (row.word == first) return (this->*row.read)(), finished();
     text_.fail_at(
-        place,
-        fmt::format("a statement cannot begin with '{}'; productions begin with a name and a colon", first));
+        place, fmt::format("a statement cannot begin with '{}'; {}", first,
+                           first[0] == '#' ? "a comment begins with # and a blank"
+                                           : "productions begin with a name and a colon"));
   }
   void finished() {
     if (text_.more())
@@ -546,6 +548,7 @@ class Parser {
     if (compiler.sums())
       text_.fail("a cell's values are drawn before there is a word; use totals in productions");
     note(program, compiler);
+    if (cells_.empty()) grammar_.cell_line = text_.line();
     const auto index = std::int32_t(grammar_.cell_values++);
     program.push_back({Op::store, index, 0.});
     cells_.push_back(std::move(program));
@@ -691,6 +694,7 @@ class Parser {
     if (module.size() != 1 || is(module[0], Action::push) || is(module[0], Action::pop))
       text_.fail_at(place, "a total is of one module; write total NAME = MODULE(parameters) : expression");
     Total total{.module = module[0],
+                .line = text_.line(),
                 .value = {},
                 .key = key.empty() ? -1 : compiler.slot_of(key),
                 .place = grammar_.cell_values};
@@ -758,6 +762,7 @@ class Parser {
 
   void axiom() {
     if (!grammar_.axiom.empty()) text_.fail("there is an axiom already; a grammar has one");
+    grammar_.axiom_line = text_.line();
     Compiler compiler(text_, meanings_);
     successor(compiler, grammar_.axiom, grammar_.axiom_values);
     note(grammar_.axiom_values, compiler);
@@ -826,6 +831,7 @@ class Parser {
     if (text_.takes("ε") || text_.takes("*")) return;
     while (text_.more() && !text_.sees(":")) {
       const std::size_t place = text_.at();
+      note_word();
       Shape s{symbol(), 0};
       if (text_.takes("(")) {
         const Arity& arity = arities_[s.symbol];
@@ -872,6 +878,44 @@ class Parser {
     return Symbol(grammar_.symbols.size() - 1);
   }
 
+  static std::string questions() {
+    std::vector<std::string_view> names;
+    for (const TurtleSymbol& s : turtle_symbols())
+      if (is_question(s.action)) names.push_back(s.symbol);
+    return fmt::format("{}", fmt::join(names, ", "));
+  }
+
+  // What looks like the name of one module and is read as a module for each of its letters.
+  void note_word() {
+    constexpr std::size_t least = 3;
+    const std::string_view rest = text_.rest();
+    const auto length = std::size_t(std::ranges::find_if_not(rest, is_letter) - rest.begin());
+    if (length < least || (noted_ && text_.at() < noted_)) return;
+    noted_ = text_.at() + length;
+    for (const std::string& name : grammar_.symbols)
+      if (name.size() > 1 && rest.substr(0, length).find(name) != std::string_view::npos) return;
+    words_.push_back({std::string(rest.substr(0, length)), text_.line()});
+  }
+  // Of such, those with letters that nothing rewrites and the turtle does not draw.
+  void doubt_words() {
+    for (const auto& [word, line] : words_) {
+      std::string idle;
+      for (const char letter : word) {
+        const auto symbol = std::size_t(std::ranges::find(grammar_.symbols, std::string(1, letter)) -
+                                        grammar_.symbols.begin());
+        if (symbol < turtle_symbols().size() || symbol == grammar_.symbols.size() ||
+            !grammar_.productions_of[symbol].empty() || in_context_[symbol] || idle.find(letter) != idle.npos)
+          continue;
+        idle += idle.empty() ? "" : ", ", idle += letter;
+      }
+      if (!idle.empty())
+        grammar_.doubts.push_back(
+            fmt::format("{}:{}: '{}' is read as {} modules of one letter, and nothing is done with {}; "
+                        "declare it, module {}(…), if it is one",
+                        grammar_.file, line, word, word.size(), idle, word));
+    }
+  }
+
   // The longest declared name that stands here, else one letter (with _ and one more: a_r), digit or mark.
   Symbol symbol() {
     const std::string_view rest = text_.rest();
@@ -885,7 +929,13 @@ class Parser {
     else if (!rest.empty() && (is_digit(rest[0]) || symbol_marks.find(rest[0]) != std::string_view::npos))
       own = 1;
     if (own == 0 && length == 0)
-      text_.fail(rest.empty() ? "a module is missing here" : "this character is no module");
+      text_.fail(rest.empty()            ? "a module is missing here"
+                 : rest[0] == '#'        ? "this character is no module; a comment begins with # and a blank"
+                 : rest.starts_with("→") ? "this arrow is no module; write ->"
+                 : rest[0] == '='        ? "this character is no module; a successor follows ->"
+                                         : "this character is no module");
+    if (own == 1 && rest.size() > 1 && rest[0] == '?' && is_letter(rest[1]) && length == 0)
+      text_.fail(fmt::format("?{} is no question; there are {}", rest[1], questions()));
     if (own > length) {
       best = add_symbol(std::string(rest.substr(0, own)), {});
       length = own;
@@ -914,6 +964,12 @@ class Parser {
     const auto question = [&](const Shape& s) {
       return s.symbol < turtle_symbols().size() && is_question(turtle_symbols()[s.symbol].action);
     };
+    in_context_.assign(grammar_.symbols.size(), false);
+    for (const Production& p : grammar_.productions)
+      for (const auto* side : {&p.left, &p.right})
+        for (const Shape& s : *side) in_context_[s.symbol] = true;
+    for (const Total& t : grammar_.totals) in_context_[t.module.symbol] = true;
+    doubt_words();
     for (const Production& p : grammar_.productions)
       grammar_.queries |= std::ranges::any_of(p.left, question) || std::ranges::any_of(p.right, question);
     // Cell values live in slots 0 to n - 1 while they are drawn; what their functions need lies above.
@@ -938,7 +994,10 @@ class Parser {
   std::map<std::string, std::uint32_t, std::less<>> declarations_;
   std::string declared_;  // by the statement that is read, and whether that is a distribution
   bool draws_ = false;
-  bool closed_ = false;  // no new symbols
+  bool closed_ = false;                                     // no new symbols
+  std::vector<std::pair<std::string, std::size_t>> words_;  // of letters one after the other, and their lines
+  std::size_t noted_ = 0;                                   // where the last of them ends
+  std::vector<bool> in_context_;  // by symbol: some production or total looks for it
 };
 
 }  // namespace

@@ -63,6 +63,7 @@ struct Production {
 /// A sum over the modules of the word, worked out before each step. Its values lie among those drawn once a neuron.
 struct Total {
   Shape module;
+  std::size_t line = 0;
   Program value;          // finds the module's parameters in slots 0 to count - 1
   std::int32_t key = -1;  // the parameter by which there are total_keys sums; -1: there is one
   std::size_t place = 0;  // of the first
@@ -99,12 +100,17 @@ struct Grammar {
   std::uint32_t candidates = 1;           // grown for each neuron, of which one is drawn by the tastes
   std::vector<Declaration> declarations;  // in the order of the text
   Program cell;                           // one store a value that is drawn once a neuron
+  std::size_t cell_line = 0;              // of the first of them
   std::size_t cell_values = 0;
   std::vector<Shape> axiom;
+  std::size_t axiom_line = 0;
   Program axiom_values;
   std::size_t slots = 0, stack = 0;  // what the largest program needs
   bool context = false;              // some production looks at its neighbours
   bool queries = false;              // … or asks where the turtle is
+
+  std::vector<std::string>
+      doubts;  // sentences, with file and line, about what is read otherwise than it looks
 
   int steps = 0;                  // of derivation, when nothing else is said
   std::size_t limit = 1'000'000;  // modules a word may have

@@ -287,6 +287,20 @@ TEST(Grammar, ErrorsNameLineColumnAndRemedy) {
   }
 }
 
+// A name that was not declared is a module for each of its letters, as in the book; it is said where nothing is done with them.
+TEST(Grammar, DoubtsWhatLooksLikeAModule) {
+  const auto doubts = [](const std::string& text) { return parse(text, "g").doubts; };
+  EXPECT_EQ(doubts("axiom: Soma(9) basal A\ng: A -> F(1)\n"),
+            (std::vector<std::string>{
+                "g:1: 'basal' is read as 5 modules of one letter, and nothing is done with b, a, s, l; "
+                "declare it, module basal(…), if it is one"}));
+  EXPECT_EQ(doubts("axiom: A\ng: A -> F(1)\nh: B ->\nforward: C -> Forward(10)\n").size(), 1u);
+  EXPECT_TRUE(doubts("axiom: ABC\na: A -> AB\nb: B -> C\nc: C -> A\n").empty());
+  EXPECT_TRUE(doubts("axiom: FFFF\nf: F -> FFF\n").empty());
+  EXPECT_TRUE(doubts("axiom: ABC\nb: A < B > C -> BAB\n").empty());  // the others are looked for
+  EXPECT_TRUE(doubts("module Tip(x)\naxiom: Tip(1)F\nt: Tip(x) -> Soma(1)BasalTip(x)\n").empty());
+}
+
 TEST(Grammar, DeepNestingIsRefusedNotSuffered) {
   const std::string deep(100000, '(');
   EXPECT_THROW(parse("axiom: A\np: A -> B(" + deep + "1\n", "deep"), InputError);

@@ -441,11 +441,12 @@ class Turtle {
     if (!(sample >= 0. && sample < double(samples.size()))) fail(fmt::format("{} names no sample", by));
     const Sample& s = samples[std::size_t(sample)];
     if (!(row >= 0. && row < double(s.rows())))
-      fail(fmt::format("{} asks for row {} of sample {}, which has {}", by, row, s.name, s.rows()));
+      fail(fmt::format("{} asks for row {} of sample {}, which has {}, counted from 0", by, row, s.name,
+                       s.rows()));
     const auto branches = s.branches(std::size_t(row));
     if (!(which >= 0. && which < double(branches.size())))
-      fail(fmt::format("{} asks for branch {} of row {} of sample {}, which has {}", by, which, row, s.name,
-                       branches.size()));
+      fail(fmt::format("{} asks for branch {} of row {} of sample {}, which has {}, counted from 0", by,
+                       which, row, s.name, branches.size()));
     return branches[std::size_t(which)];
   }
 
