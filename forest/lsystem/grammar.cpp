@@ -480,10 +480,9 @@ class Parser {
     }
     for (const Row& row : declarations)
       if (row.word == first) return (this->*row.read)(), finished();
-    text_.fail_at(
-        place, fmt::format("a statement cannot begin with '{}'; {}", first,
-                           first[0] == '#' ? "a comment begins with # and a blank"
-                                           : "productions begin with a name and a colon"));
+    text_.fail_at(place, fmt::format("a statement cannot begin with '{}'; {}", first,
+                                     first[0] == '#' ? "a comment begins with # and a blank"
+                                                     : "productions begin with a name and a colon"));
   }
   void finished() {
     if (text_.more())

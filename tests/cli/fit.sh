@@ -54,6 +54,24 @@ printf 'mine\n' >kept.lsys
 refuses '--force' $BRAINFOREST fit traced -o kept.lsys
 grep -q mine kept.lsys
 
+# What is far from all else would be grown again: it is told, and refused where no neuron reaches.
+cp -r traced slips
+awk '!/^#/ && $2 == 3 && ++n == 40 { $4 = 90000 } { print }' "$(find traced -name '*.swc' | sort | head -1)" >slips/far.swc
+$BRAINFOREST fit slips -o slips.lsys >/dev/null 2>told.txt
+grep -q '1 of 13 neurons has what may be a slip, which will be grown again, first far: a segment of ' told.txt
+awk '!/^#/ && $2 == 3 && ++n == 40 { $4 = 1e30 } { print }' "$(find traced -name '*.swc' | sort | head -1)" >slips/far.swc
+refuses 'farther away than any neuron reaches; mend it' $BRAINFOREST fit slips -o no.lsys
+[ ! -e no.lsys ]
+
+# Mistakes of a grammar that only growing shows have their line; a repository is not left without a neuron.
+printf 'steps: 2\naxiom: A(1)\n\ng: A(x) ->\n  F(0/0)\n' >nothing.lsys
+refuses 'nothing.lsys:4: production g gives F a parameter that is not a finite number' $BRAINFOREST grow --grammar nothing.lsys --repo nothing.db
+[ ! -e nothing.db ]
+printf 'steps: 2\naxiom: Soma(9) basal A\ng: A -> F(1)\n' >misspelt.lsys
+$BRAINFOREST grow --grammar misspelt.lsys --out misspelt >/dev/null 2>told.txt
+grep -q "misspelt.lsys:2: 'basal' is read as 5 modules of one letter" told.txt
+refuses "model 'like_traced' has no distribution 'nothing'; it has " $BRAINFOREST model show like_traced.nothing --repo cells.db
+
 # The judge grows from the model and fits the control that it must reject.
 $BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
 $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --repeats 2 --json >judged.json
