@@ -102,7 +102,7 @@ distribution thicker(kind, p) = min(plans.most(p),
 # How many tips a stem has, and how far the farthest is: by the styles of whom it is of, and of the two by which it strays.
 distribution tips_of(p, kind, s, u, v, least) = max(least, min(most_tips(kind), round(plans.tips(p) *
   exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))))
-distribution ahead_of(p, kind, s, u, v) = min(most_ahead(kind), reaching(kind) * plans.ahead(p) *
+distribution ahead_of(p, kind, s, u, v) = min(most_ahead(kind), plans.ahead(p) *
   exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =

@@ -30,7 +30,6 @@ inline constexpr std::array knobs{
     Knob{"rugged", stairs, 1., .4, "how unevenly steep steps are"},
     Knob{"climb", slope, 1., .3, "how steep they are"},
     Knob{"deep", depth, 1., .4, "how far along z from the soma the middle of their tips is sought"},
-    Knob{"reaching", extent, 1., .2, "how far from where a stem begins its farthest tip is, along the path"},
 };
 
 /// By kind, in the order of `knobs`.
