@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
 #include <iterator>
 #include <map>
 #include <numbers>
@@ -84,7 +85,7 @@ function cosine(x, y, z, u, v, w) = (x * u + y * v + z * w) / max(1, sqrt((x^2 +
 function along(r, x, y, z) = cosine(x, y, z, forks.tx(r), forks.ty(r), forks.tz(r))
 # By which angle about z a fork is turned, of that between the headings where it was traced and here, and of that by which the middle of
 # its tips then lies beside the heading; less where either leaves the plane of the slice.
-function swing(m, r, x, y) = turn * sqrt(forks.ux(r)^2 + forks.uy(r)^2) * sqrt(x^2 + y^2) *
+function swing(kind, m, r, x, y) = turn(kind) * sqrt(forks.ux(r)^2 + forks.uy(r)^2) * sqrt(x^2 + y^2) *
   atan2(m * forks.ux(r) * y - forks.uy(r) * x, m * forks.ux(r) * x + forks.uy(r) * y)
 function beside(tx, ty, tz, x, y) = sqrt((tx^2 + ty^2) / max(0.001, tx^2 + ty^2 + tz^2)) * sqrt(x^2 + y^2) *
   atan2(tx * y - ty * x, tx * x + ty * y)
@@ -146,7 +147,7 @@ end: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, a
 on: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z)
   : next >= 0 & run < longest & forks.tips(max(0, next)) == tips
     & along(max(0, next), if(mirror, px - ax, ax - px), ay - py, az - pz) > agreed
-  { q = calibre(kind, next, tips, ahead, d), a = swing(if(mirror, -1, 1), next, x, y), phi = spin(kind, a, if(mirror, -1, 1), next, x, y) }
+  { q = calibre(kind, next, tips, ahead, d), a = swing(kind, if(mirror, -1, 1), next, x, y), phi = spin(kind, a, if(mirror, -1, 1), next, x, y) }
   -> Fork(kind, next, q, run + 1, tips, path, order + 1, mirror, d / calibres.d(q), longer(ahead, forks.ahead(next)),
           ax, ay, az, px, py, pz, phi) : follow
 fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az) > ?P(px, py, pz) ?H(x, y, z) ?S(sx, sy, sz)
@@ -158,7 +159,7 @@ fork: Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, 
       side = px * mx, height = py, before = pz,
       gx = mx * (ax - px) / far, gy = (ay - py) / far, gz = (az - pz) / far,
       @style, seldom = 0),
-    q = calibre(kind, r, tips, ahead, d), a = swing(mx, r, x, y), phi = spin(kind, a, mx, r, x, y) }
+    q = calibre(kind, r, tips, ahead, d), a = swing(kind, mx, r, x, y), phi = spin(kind, a, mx, r, x, y) }
   -> Fork(kind, r, q, 1, tips, path, order + 1, mx < 0, d / calibres.d(q), longer(ahead, forks.ahead(r)),
           ax, ay, az, px, py, pz, phi)
 one: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) : forks.daughters(r) == 1
@@ -527,13 +528,18 @@ class Writer {
 # How branches are drawn.
 #define steer 0.35  # how much of the way to where the middle of their tips should be they are drawn aside: 0 to 1
 #define most 0.5  # how far they are drawn aside at most, in shares of their length
-#define turn 0.7  # by how much of the angle between headings, where it was traced and here, a fork is turned: 0 to 1
 #define steep 1  # how much of the difference in slope between their neuron and its donor they make up for: 0 to 1
 #define habits {:.4g}  # the same of how unevenly steep and how kinked their steps are: 0 to 1
 #define fade 20  # µm, along which they give up e times of how much thicker they are than what lends its diameters: above 0
-# Tuned by growing: how many times as much as traced branches those of each kind are told to do.
 )",
         stray(), kin(), kin(), kept(), options_.jitter, options_.familiar, habits_kept(traced_.cells.size()));
+    // The trunk of an apical dendrite forgets where the pia is when each fork is turned as its branch is.
+    std::map<int, double> turns;
+    for (const auto& [kind, unused] : traced_.means) turns[kind] = kind == int(SectionKind::apical) ? .4 : .7;
+    table(
+        "turn", turns, std::identity{},
+        "by how much of the angle between headings, where it was traced and here, a fork is turned: 0 to 1");
+    put("# Tuned by growing: how many times as much as traced branches those of each kind are told to do.\n");
     for (std::size_t k = 0; k < knobs.size(); ++k)
       table(
           knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
