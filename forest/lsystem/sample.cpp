@@ -57,7 +57,8 @@ FOREST_CLONES std::size_t largest(const float* values, std::size_t count) {
     for (std::size_t k = 0; k < lanes; ++k) best[k] = values[i + k] > best[k] ? values[i + k] : best[k];
   const float most = std::max(*std::max_element(best, best + lanes),
                               *std::max_element(values + std::min(i, count - 1), values + count));
-  return std::size_t(std::find(values, values + count, most) - values);
+  const float* const found = std::find(values, values + count, most);
+  return found == values + count ? 0 : std::size_t(found - values);  // when they are no numbers
 }
 
 // How long the step is that ends at a place, when these are the ways to all of them.
@@ -434,7 +435,13 @@ std::size_t Sample::draw(std::span<const double> wanted, Random& random) const {
     column += count;
   }
   asked.clear();
-  for (const Group::Column& c : group->like) asked.push_back(float(wanted[c.condition]) / c.width);
+  for (const Group::Column& c : group->like) {
+    asked.push_back(float(wanted[c.condition]) / c.width);
+    if (std::isnan(asked.back()))
+      throw Error(
+          fmt::format("sample {} is asked for what is no number as {}; keep its expression in its domain",
+                      name, conditions[c.condition].name));
+  }
   // By the first kernels most rows are out of the question.
   const std::size_t first = std::min<std::size_t>(6, wide);
   for (std::size_t k = 0; k < first; ++k)

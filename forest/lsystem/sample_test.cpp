@@ -99,6 +99,10 @@ TEST(Sample, OfManyRowsEachHasItsChance) {
     EXPECT_GT(degrees, 20.);
     EXPECT_LT(chi, degrees + 4. * std::sqrt(2. * degrees));  // one time in some ten thousand more
   }
+  far.back() = NAN;
+  EXPECT_THROW((void)sample.draw(far, random), Error);
+  far.back() = INFINITY;
+  EXPECT_LT(sample.draw(far, random), many);
   // So far that nothing can be told by the last digits: one of the nearest by the first conditions, never a failure.
   near.fill(1e9);
   EXPECT_LT(sample.draw(near, random), many);
