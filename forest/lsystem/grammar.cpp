@@ -915,6 +915,25 @@ class Parser {
     }
   }
 
+  // Questions that a context asks with as many parameters as no word has them.
+  void doubt_questions() {
+    std::set<std::pair<Symbol, std::uint16_t>> written;
+    const auto write = [&](const std::vector<Shape>& word) {
+      for (const Shape& s : word) written.emplace(s.symbol, s.count);
+    };
+    write(grammar_.axiom);
+    for (const Production& p : grammar_.productions) write(p.successor);
+    for (const Production& p : grammar_.productions)
+      for (const auto* side : {&p.left, &p.right})
+        for (const Shape& s : *side)
+          if (s.symbol < turtle_symbols().size() && is_question(turtle_symbols()[s.symbol].action) &&
+              !written.contains({s.symbol, s.count}))
+            grammar_.doubts.push_back(fmt::format(
+                "{}:{}: production {} asks {} with {} parameters, and no word has it so, so that it never "
+                "fits; write as many of them in both",
+                grammar_.file, p.line, p.id, grammar_.symbols[s.symbol], s.count));
+  }
+
   // The longest declared name that stands here, else one letter (with _ and one more: a_r), digit or mark.
   Symbol symbol() {
     const std::string_view rest = text_.rest();
@@ -969,6 +988,7 @@ class Parser {
         for (const Shape& s : *side) in_context_[s.symbol] = true;
     for (const Total& t : grammar_.totals) in_context_[t.module.symbol] = true;
     doubt_words();
+    doubt_questions();
     for (const Production& p : grammar_.productions)
       grammar_.queries |= std::ranges::any_of(p.left, question) || std::ranges::any_of(p.right, question);
     // Cell values live in slots 0 to n - 1 while they are drawn; what their functions need lies above.

@@ -298,6 +298,11 @@ TEST(Grammar, DoubtsWhatLooksLikeAModule) {
   EXPECT_TRUE(doubts("axiom: ABC\na: A -> AB\nb: B -> C\nc: C -> A\n").empty());
   EXPECT_TRUE(doubts("axiom: FFFF\nf: F -> FFF\n").empty());
   EXPECT_TRUE(doubts("axiom: ABC\nb: A < B > C -> BAB\n").empty());  // the others are looked for
+  EXPECT_TRUE(doubts("axiom: A ?P(0, 0, 0)\na: A > ?P(x, y, z) -> F(y)\n").empty());
+  EXPECT_EQ(doubts("axiom: A ?D(0, 0)\na: A > ?D(depth, layer, above, below) -> F(depth)\n"),
+            (std::vector<std::string>{
+                "g:2: production a asks ?D with 4 parameters, and no word has it so, so that it "
+                "never fits; write as many of them in both"}));
   EXPECT_TRUE(doubts("module Tip(x)\naxiom: Tip(1)F\nt: Tip(x) -> Soma(1)BasalTip(x)\n").empty());
 }
 
