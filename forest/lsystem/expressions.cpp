@@ -65,11 +65,11 @@ int Compiler::arguments(Program& out, const Signature& of) {
     }
     const auto parameter = std::size_t(std::ranges::find(of.parameters, name) - of.parameters.begin());
     if (parameter == of.parameters.size())
-      text_.fail_at(
-          place, of.parameters.empty()
-                     ? fmt::format("{} has no parameters with names; give its arguments in order", of.name)
-                     : fmt::format("{} has no parameter '{}'; it has {}", of.name, name,
-                                   fmt::join(of.parameters, ", ")));
+      text_.fail_at(place,
+                    of.parameters.empty()
+                        ? fmt::format("{} has no parameters with names; give its arguments in order", of.name)
+                        : fmt::format("{} has no parameter '{}'; it has {}", of.name, name,
+                                      fmt::join(of.parameters, ", ")));
     if (parameter < count || named.contains(parameter))
       text_.fail_at(place, fmt::format("the parameter '{}' of {} is given twice", name, of.name));
     named[parameter] = apart();
@@ -228,9 +228,8 @@ void Compiler::call(Program& out, const std::string& name, std::size_t place) {
     const auto row = std::ranges::find(functions(), name, &Function::name);
     if (row == functions().end())
       text_.fail_at(
-          place,
-          fmt::format("there is no function '{}'; declare it as function, distribution or table above",
-                      name));
+          place, fmt::format("there is no function '{}'; declare it as function, distribution or table above",
+                             name));
     close(arguments(out, {name}), std::size_t(row->parameters));
     draws_ |= row->draws;
     emit(out, {row->op, 0, 0.}, row->draws ? 0 : row->parameters);
