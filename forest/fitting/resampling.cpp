@@ -104,7 +104,7 @@ distribution thicker(kind, p) = min(plans.most(p),
 distribution tips_of(p, kind, s, u, v, least) = max(least, min(most_tips(kind), round(plans.tips(p) *
   exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))))
 distribution ahead_of(p, kind, s, u, v) = min(most_ahead(kind), plans.ahead(p) *
-  exp(normal(0, jitter) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))))
+  exp(normal(0, jolt) + bold * sd_extent(kind) * (own(styles.extent(s), styles.extent(u), styles.extent(v)) - styles.extent(s))))
 # A fork whose diameters are those of this one: all of one neuron, alike to this.
 distribution calibre(kind, r, tips, ahead, d) =
   calibres(kind, daughters = forks.daughters(r), cell = thin_as, tips = log(tips), first = log(forks.n1(r)), ahead = log(max(ahead, 1)),
@@ -184,7 +184,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
     sz = steeper(kind, from), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
-    mx = m * forks.tx(r), my = forks.ty(r), bears = borne(r, i),
+    mx = m * forks.tx(r), my = forks.ty(r), bears = heed * borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
     wz = max(cells.low(me), min(cells.high(me), deep(kind) * (gz + bears * (az - pz - sz * scale * forks.tz(r))))),
@@ -330,6 +330,20 @@ class Writer {
   // What keeps styles as different among neurons as they are, when the differences of like ones are added.
   double kept() const {
     return differences_ > 0. ? 1. / std::sqrt(1. + std::pow(stray(), 2) * squares_ / differences_) : 1.;
+  }
+
+  // Where the stems of a neuron all reach as far, as to a fissure, they are to remain so: a quarter of how much they differ.
+  double jolt() const {
+    std::vector<double> differ;
+    for (const Cell& c : traced_.cells)
+      for (const auto& [kind, unused] : c.kinds) {
+        std::vector<double> reaches;
+        for (const Stem& s : c.stems)
+          if (s.kind == kind && s.length > 0.) reaches.push_back(std::log(s.ahead));
+        if (reaches.size() > 1) differ.push_back(deviation(reaches));
+      }
+    return differ.empty() ? options_.jitter
+                          : std::min(options_.jitter, statistics::summarize(differ).median / 4.);
   }
 
   void plans() {
@@ -520,7 +534,8 @@ class Writer {
 #define kin {}  # of how many most alike these two are drawn: 1 to {}
 #define kept {:.4g}  # times which styles are taken, so that grown neurons differ as much as traced ones
 #define bold 0.5  # how much of what extents stray goes into how far stems reach: 0 to 1
-#define jitter {:.4g}  # how much a stem's tips and reach are changed: standard deviation of their logarithms
+#define jitter {:.4g}  # how much a stem's tips are changed: standard deviation of their logarithm
+#define jolt {:.4g}  # how much its reach is: likewise
 #define familiar {:.4g}  # how often a fork may come from the neuron whose stems these are: 0 to 1
 #define follow 0.95  # how often a branch goes on as in the neuron that it comes from, where it can: 0 to 1
 #define agreed 0.85  # … which it can when the cosine between the ways to its tips, there and here, is above this
@@ -528,11 +543,13 @@ class Writer {
 # How branches are drawn.
 #define steer 0.35  # how much of the way to where the middle of their tips should be they are drawn aside: 0 to 1
 #define most 0.5  # how far they are drawn aside at most, in shares of their length
+#define heed 0.5  # how much of what a fork misses of where its tips should be its daughters seek: 0 to 1
 #define steep 1  # how much of the difference in slope between their neuron and its donor they make up for: 0 to 1
 #define habits {:.4g}  # the same of how unevenly steep and how kinked their steps are: 0 to 1
 #define fade 20  # µm, along which they give up e times of how much thicker they are than what lends its diameters: above 0
 )",
-        stray(), kin(), kin(), kept(), options_.jitter, options_.familiar, habits_kept(traced_.cells.size()));
+        stray(), kin(), kin(), kept(), options_.jitter, jolt(), options_.familiar,
+        habits_kept(traced_.cells.size()));
     // The trunk of an apical dendrite forgets where the pia is when each fork is turned as its branch is.
     std::map<int, double> turns;
     for (const auto& [kind, unused] : traced_.means) turns[kind] = kind == int(SectionKind::apical) ? .4 : .7;

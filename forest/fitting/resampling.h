@@ -56,7 +56,7 @@ struct Resampling {
   // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
   // .4, or with fewer than 25 neurons 10 over their number, at most 1.2: few show little of what there is.
   std::optional<double> smoothing = {};
-  double jitter = .1;   // of the logarithms of a stem's tips and reach
+  double jitter = .1;   // of the logarithms of a stem's tips and, at most, reach
   std::size_t kin = 4;  // neurons alike, by whose differences it is changed; none is its mate or third
   Evening evening = {};
   TuningOptions tuning = {};

@@ -372,9 +372,11 @@ TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) 
     }
     return std::sqrt(sum / 200.);
   };
-  std::string astray = text;
+  std::string astray = text, heeding = text;
   astray.replace(astray.find("#define steer 0.35"), 18, "#define steer 0   ");
-  EXPECT_LT(missed(text), .7 * missed(astray));
+  heeding.replace(heeding.find("#define heed 0.5"), 16, "#define heed 1  ");
+  EXPECT_LT(missed(text), .9 * missed(astray));
+  EXPECT_LT(missed(heeding), .7 * missed(astray));
 }
 
 // A point so far from the soma in a direction around z, a little above or below.
@@ -411,6 +413,50 @@ TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
   };
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
   EXPECT_NEAR(differ(lsystem::grow_population(grammar, 100, 1)), differ(models), .1 * differ(models));
+}
+
+// All stems of a neuron end at its fissure, which is nearer in one neuron than in another.
+TEST(Resampling, StemsThatAllReachAsFarStayAsAlike) {
+  std::vector<Morphology> models;
+  for (std::uint64_t i = 0; i < 12; ++i) {
+    Random random(6, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    const double fissure = random.uniform(80., 140.);
+    for (int stem = 0; stem < 4; ++stem) {
+      const auto at = [&](double way, double turn) {
+        return away(way, 1.5 * stem + turn + .05 * random.normal(), .5, random);
+      };
+      const Point fork = at(40. + 5. * random.normal(), 0.);
+      const SectionId root = builder.add_section({}, SectionKind::basal, std::array{at(5., 0.), fork});
+      for (const double side : {-.2, .2})
+        builder.add_section(root, SectionKind::basal,
+                            std::array{fork, at(fissure * (1. + .01 * random.normal()), side)});
+    }
+    models.push_back(builder.build());
+  }
+  // How much its tips differ in how far from the soma they lie.
+  const auto differ = [](std::span<const Morphology> neurons) {
+    double sum = 0.;
+    for (const Morphology& n : neurons) {
+      std::vector<double> ways;
+      for (std::uint32_t i = 0; i < n.sections().size(); ++i)
+        if (n.is_terminal(SectionId(i)))
+          ways.push_back(std::log(double(n.points(SectionId(i)).back().position().norm())));
+      sum += statistics::summarize(ways).sd;
+    }
+    return sum / double(neurons.size());
+  };
+  const std::string text = resampling_grammar(models, "t");
+  const auto of = [&](const std::string& grammar) {
+    return differ(lsystem::grow_population(lsystem::parse(grammar, "t"), 100, 1));
+  };
+  EXPECT_LT(differ(models), .02);
+  EXPECT_LT(of(text), .06);
+  std::string jolted = text;
+  const std::size_t at = jolted.find("#define jolt ");
+  jolted.replace(at, jolted.find("  #", at) - at, "#define jolt 0.1");
+  EXPECT_GT(of(jolted), 1.3 * of(text));
 }
 
 // Thin neurons whose stems begin as thick as those of thick ones: a cone that is drawn by a thick neuron is no thicker than any was.

@@ -438,13 +438,16 @@ class Turtle {
 
   const lsystem::Trace& branch(double sample, double row, double which, std::string_view by = "Trace") const {
     const auto& samples = grammar_.lookups.samples;
-    if (!(sample >= 0. && sample < double(samples.size()))) fail(fmt::format("{} names no sample", by));
+    const auto counts = [](double number, std::size_t count) {
+      return number >= 0. && number < double(count) && number == std::floor(number);
+    };
+    if (!counts(sample, samples.size())) fail(fmt::format("{} names no sample", by));
     const Sample& s = samples[std::size_t(sample)];
-    if (!(row >= 0. && row < double(s.rows())))
+    if (!counts(row, s.rows()))
       fail(fmt::format("{} asks for row {} of sample {}, which has {}, counted from 0", by, row, s.name,
                        s.rows()));
     const auto branches = s.branches(std::size_t(row));
-    if (!(which >= 0. && which < double(branches.size())))
+    if (!counts(which, branches.size()))
       fail(fmt::format("{} asks for branch {} of row {} of sample {}, which has {}, counted from 0", by,
                        which, row, s.name, branches.size()));
     return branches[std::size_t(which)];
