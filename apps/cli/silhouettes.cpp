@@ -11,6 +11,7 @@
 #include <fmt/ranges.h>
 
 #include "forest/core/random.h"
+#include "forest/core/round_numbers.h"
 
 namespace forest::cli {
 namespace {
@@ -83,12 +84,12 @@ std::string silhouettes(std::span<const Morphology* const> neurons, const statis
         "<text x=\"{:.1f}\" y=\"{:.1f}\" font-size=\"13\" fill=\"currentColor\" stroke=\"none\">{}</text>\n",
         left - .5 * column + 4., bottom - scale * tallest + 4., letter(i));
   }
-  const double bar = widest > 500. ? 200. : 50.,
+  const double bar = round_below(.4 * column / scale),
                height = row * std::ceil(double(neurons.size()) / double(in_a_row));
   fmt::format_to(out,
                  "<path d=\"M4 {0:.1f}h{1:.1f}\" stroke-width=\"2\"/>\n<text x=\"{2:.1f}\" y=\"{3:.1f}\" "
                  "font-size=\"12\" "
-                 "fill=\"currentColor\" stroke=\"none\">{4:.0f} µm</text>\n",
+                 "fill=\"currentColor\" stroke=\"none\">{4:.6g} µm</text>\n",
                  height + 10., scale * bar, 10. + scale * bar, height + 14., bar);
   return fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {:.0f} {:.0f}\" role=\"img\" "
