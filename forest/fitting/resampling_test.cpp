@@ -49,6 +49,13 @@ double mean_of(std::span<const Morphology> neurons, const char* metric) {
   return statistics::mean(values);
 }
 
+// The grammar with another value of one of its settings.
+std::string with(std::string grammar, const std::string& setting, const std::string& value) {
+  const std::string begin = "#define " + setting + " ";
+  const std::size_t at = grammar.find(begin) + begin.size();
+  return grammar.replace(at, grammar.find("  #", at) - at, value);
+}
+
 TEST(Resampling, GrowsNeuronsLikeTheTracedOnes) {
   const std::vector<Morphology> models = traced(40);
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "like them"), "fitted");
@@ -85,8 +92,7 @@ grow: Tip(n) : n < 8 -> ^(uniform(-climb, climb)) F(8) Tip(n + 1)
                                                                   30, 4);
   // Drawn for all alike, or only branches of neurons as steep would be drawn.
   const std::string text = resampling_grammar(models, "steep", Resampling{.tracer = 5.});
-  std::string evened = text;
-  evened.replace(evened.find("#define steep 1"), 15, "#define steep 0");
+  const std::string evened = with(text, "steep", "0");
   const auto spread = [](std::span<const Morphology> neurons) {
     std::vector<double> slopes;
     for (const Morphology& n : neurons)
@@ -166,8 +172,7 @@ fork: Tip(n, d) : n < 5 { a = d * uniform(0.7, 1), b = d * uniform(0.7, 1) }
                                                                                  "short"),
                                                                   12, 1);
   const std::string text = resampling_grammar(models, "t");
-  std::string at_once = text;
-  at_once.replace(at_once.find("#define fade 20 "), 16, "#define fade 0.1");
+  const std::string at_once = with(text, "fade", "0.1");
   const auto spread = [](std::span<const Morphology> neurons) {
     std::vector<double> ratios;
     for (const Morphology& n : neurons)
@@ -372,16 +377,22 @@ TEST(Resampling, TheMiddleOfItsTipsComesToWhereItWasInTheNeuronWhoseStemsItHas) 
     }
     return std::sqrt(sum / 200.);
   };
-  std::string astray = text, heeding = text;
-  astray.replace(astray.find("#define steer 0.35"), 18, "#define steer 0   ");
-  heeding.replace(heeding.find("#define heed 0.5"), 16, "#define heed 1  ");
-  EXPECT_LT(missed(text), .9 * missed(astray));
-  EXPECT_LT(missed(heeding), .7 * missed(astray));
+  const double astray = missed(with(text, "steer", "0"));
+  EXPECT_LT(missed(text), .9 * astray);
+  EXPECT_LT(missed(with(text, "heed", "1")), .7 * astray);
 }
 
 // A point so far from the soma in a direction around z, a little above or below.
 Point away(double way, double angle, double radius, Random& random) {
   return {float(way * std::cos(angle)), float(way * std::sin(angle)), float(random.normal()), float(radius)};
+}
+
+// A stem through these points, and at its end a fork into two straight tips.
+void add_fork(MorphologyBuilder& builder, const std::vector<Point>& stem, std::array<double, 2> sides,
+              auto&& tip) {
+  const SectionId root = builder.add_section({}, SectionKind::basal, stem);
+  for (const double side : sides)
+    builder.add_section(root, SectionKind::basal, std::array{stem.back(), tip(side)});
 }
 
 // Stems of one neuron are thick and thin, and some neurons are thicker all over.
@@ -398,10 +409,8 @@ TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
         return away(way, angle + turn, thick * (stem % 2 ? 1.5 : .5), random);
       };
       const Point fork = at(40. + 5. * random.normal(), 0.);
-      const SectionId root =
-          builder.add_section({}, SectionKind::basal, std::array{at(5., 0.), at(20., .1), fork});
-      for (const double side : {-.3, .4})
-        builder.add_section(root, SectionKind::basal, std::array{fork, at(90. + 5. * random.normal(), side)});
+      add_fork(builder, {at(5., 0.), at(20., .1), fork}, {-.3, .4},
+               [&](double side) { return at(90. + 5. * random.normal(), side); });
     }
     models.push_back(builder.build());
   }
@@ -428,10 +437,8 @@ TEST(Resampling, StemsThatAllReachAsFarStayAsAlike) {
         return away(way, 1.5 * stem + turn + .05 * random.normal(), .5, random);
       };
       const Point fork = at(40. + 5. * random.normal(), 0.);
-      const SectionId root = builder.add_section({}, SectionKind::basal, std::array{at(5., 0.), fork});
-      for (const double side : {-.2, .2})
-        builder.add_section(root, SectionKind::basal,
-                            std::array{fork, at(fissure * (1. + .01 * random.normal()), side)});
+      add_fork(builder, {at(5., 0.), fork}, {-.2, .2},
+               [&](double side) { return at(fissure * (1. + .01 * random.normal()), side); });
     }
     models.push_back(builder.build());
   }
@@ -453,10 +460,7 @@ TEST(Resampling, StemsThatAllReachAsFarStayAsAlike) {
   };
   EXPECT_LT(differ(models), .02);
   EXPECT_LT(of(text), .06);
-  std::string jolted = text;
-  const std::size_t at = jolted.find("#define jolt ");
-  jolted.replace(at, jolted.find("  #", at) - at, "#define jolt 0.1");
-  EXPECT_GT(of(jolted), 1.3 * of(text));
+  EXPECT_GT(of(with(text, "jolt", "0.1")), 1.3 * of(text));
 }
 
 // Thin neurons whose stems begin as thick as those of thick ones: a cone that is drawn by a thick neuron is no thicker than any was.
@@ -479,11 +483,8 @@ TEST(Resampling, NoStemIsThickerThanTheThickest) {
         return away(way, angle + turn, radius, random);
       };
       const Point fork = at(40. + 5. * random.normal(), 0., thick);
-      const SectionId root =
-          builder.add_section({}, SectionKind::basal, std::array{at(5., 0., 2.5), at(20., .1, thick), fork});
-      for (const double side : {-.3, .4})
-        builder.add_section(root, SectionKind::basal,
-                            std::array{fork, at(90. + 5. * random.normal(), side, thick)});
+      add_fork(builder, {at(5., 0., 2.5), at(20., .1, thick), fork}, {-.3, .4},
+               [&](double side) { return at(90. + 5. * random.normal(), side, thick); });
     }
     models.push_back(builder.build());
     most = std::max(most, thickest(models.back()));
@@ -502,11 +503,9 @@ TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
     for (int stem = 0; stem < 3; ++stem) {
       const double angle = 2. * stem + .1 * random.normal();
       const auto at = [&](double way, double turn) { return away(way, angle + turn, .5, random); };
-      const Point first = at(5., 0.), fork = stem ? first : at(25., 0.);
-      const SectionId root = stem ? builder.add_section({}, SectionKind::basal, std::array{first})
-                                  : builder.add_section({}, SectionKind::basal, std::array{first, fork});
-      for (const double side : {-.3, .4})
-        builder.add_section(root, SectionKind::basal, std::array{fork, at(60. + 5. * random.normal(), side)});
+      std::vector<Point> root{at(5., 0.)};
+      if (!stem) root.push_back(at(25., 0.));
+      add_fork(builder, root, {-.3, .4}, [&](double side) { return at(60. + 5. * random.normal(), side); });
     }
     models.push_back(builder.build());
   }
