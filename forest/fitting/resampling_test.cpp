@@ -56,6 +56,19 @@ std::string with(std::string grammar, const std::string& setting, const std::str
   return grammar.replace(at, grammar.find("  #", at) - at, value);
 }
 
+// Neurons with a soma of 5 µm; what else they have is added to each with random numbers of its own.
+std::vector<Morphology> each_with(std::uint64_t count, std::uint64_t seed, auto&& add) {
+  std::vector<Morphology> neurons;
+  for (std::uint64_t i = 0; i < count; ++i) {
+    Random random(seed, i);
+    MorphologyBuilder builder;
+    builder.set_soma(zoo_parts::sphere(5));
+    add(builder, random, i);
+    neurons.push_back(builder.build());
+  }
+  return neurons;
+}
+
 TEST(Resampling, GrowsNeuronsLikeTheTracedOnes) {
   const std::vector<Morphology> models = traced(40);
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "like them"), "fitted");
@@ -245,32 +258,29 @@ TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
 // Two small neurons and two large ones with basal and apical dendrites, each pair traced in long steps (8 µm) and in short ones
 // (2 µm). How high above the soma stems leave says whose they are.
 std::vector<Morphology> of_two_tracers() {
-  std::vector<Morphology> models;
-  for (std::uint64_t i = 0; i < 4; ++i) {
-    Random random(9, i);
-    MorphologyBuilder builder;
-    builder.set_soma(zoo_parts::sphere(5));
-    const double step = i % 2 ? 2. : 8., size = i < 2 ? 1. : 2.;
-    const auto path = [&](Point from, double angle) {
-      std::vector<Point> points{from};
-      for (double way = 0.; way < 40. * size; way += step) {
-        Point p = points.back();
-        const double turned = angle + .2 * random.normal();
-        p.x += float(step * std::cos(turned)), p.y += float(step * std::sin(turned));
-        points.push_back(p);
-      }
-      return points;
-    };
-    for (int stem = 0; stem < 3; ++stem) {
-      const SectionKind kind = stem ? SectionKind::basal : SectionKind::apical;
-      const double angle = 1.57 + 2.1 * stem;
-      const auto first =
-          path({float(5. * std::cos(angle)), float(5. * std::sin(angle)), float(i), float(.5 * size)}, angle);
-      const SectionId root = builder.add_section({}, kind, first);
-      for (const double side : {-.5, .5}) builder.add_section(root, kind, path(first.back(), angle + side));
-    }
-    models.push_back(builder.build());
-  }
+  const std::vector<Morphology> models =
+      each_with(4, 9, [](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+        const double step = i % 2 ? 2. : 8., size = i < 2 ? 1. : 2.;
+        const auto path = [&](Point from, double angle) {
+          std::vector<Point> points{from};
+          for (double way = 0.; way < 40. * size; way += step) {
+            Point p = points.back();
+            const double turned = angle + .2 * random.normal();
+            p.x += float(step * std::cos(turned)), p.y += float(step * std::sin(turned));
+            points.push_back(p);
+          }
+          return points;
+        };
+        for (int stem = 0; stem < 3; ++stem) {
+          const SectionKind kind = stem ? SectionKind::basal : SectionKind::apical;
+          const double angle = 1.57 + 2.1 * stem;
+          const auto first = path(
+              {float(5. * std::cos(angle)), float(5. * std::sin(angle)), float(i), float(.5 * size)}, angle);
+          const SectionId root = builder.add_section({}, kind, first);
+          for (const double side : {-.5, .5})
+            builder.add_section(root, kind, path(first.back(), angle + side));
+        }
+      });
   return models;
 }
 
@@ -397,23 +407,19 @@ void add_fork(MorphologyBuilder& builder, const std::vector<Point>& stem, std::a
 
 // Stems of one neuron are thick and thin, and some neurons are thicker all over.
 TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
-  std::vector<Morphology> models;
-  for (std::uint64_t i = 0; i < 10; ++i) {
-    Random random(5, i);
-    MorphologyBuilder builder;
-    builder.set_soma(zoo_parts::sphere(5));
-    const double thick = random.uniform(.5, 1.5);
-    for (int stem = 0; stem < 4; ++stem) {
-      const double angle = 1.5 * stem + .1 * random.normal();
-      const auto at = [&](double way, double turn) {
-        return away(way, angle + turn, thick * (stem % 2 ? 1.5 : .5), random);
-      };
-      const Point fork = at(40. + 5. * random.normal(), 0.);
-      add_fork(builder, {at(5., 0.), at(20., .1), fork}, {-.3, .4},
-               [&](double side) { return at(90. + 5. * random.normal(), side); });
-    }
-    models.push_back(builder.build());
-  }
+  const std::vector<Morphology> models =
+      each_with(10, 5, [](MorphologyBuilder& builder, Random& random, std::uint64_t) {
+        const double thick = random.uniform(.5, 1.5);
+        for (int stem = 0; stem < 4; ++stem) {
+          const double angle = 1.5 * stem + .1 * random.normal();
+          const auto at = [&](double way, double turn) {
+            return away(way, angle + turn, thick * (stem % 2 ? 1.5 : .5), random);
+          };
+          const Point fork = at(40. + 5. * random.normal(), 0.);
+          add_fork(builder, {at(5., 0.), at(20., .1), fork}, {-.3, .4},
+                   [&](double side) { return at(90. + 5. * random.normal(), side); });
+        }
+      });
   const auto differ = [](std::span<const Morphology> neurons) {
     const statistics::Metric& radii = *statistics::find_metric("trunk_origin_radii");
     double sum = 0.;
@@ -426,22 +432,18 @@ TEST(Resampling, StemsOfOneNeuronDifferInThicknessAsTheyDid) {
 
 // All stems of a neuron end at its fissure, which is nearer in one neuron than in another.
 TEST(Resampling, StemsThatAllReachAsFarStayAsAlike) {
-  std::vector<Morphology> models;
-  for (std::uint64_t i = 0; i < 12; ++i) {
-    Random random(6, i);
-    MorphologyBuilder builder;
-    builder.set_soma(zoo_parts::sphere(5));
-    const double fissure = random.uniform(80., 140.);
-    for (int stem = 0; stem < 4; ++stem) {
-      const auto at = [&](double way, double turn) {
-        return away(way, 1.5 * stem + turn + .05 * random.normal(), .5, random);
-      };
-      const Point fork = at(40. + 5. * random.normal(), 0.);
-      add_fork(builder, {at(5., 0.), fork}, {-.2, .2},
-               [&](double side) { return at(fissure * (1. + .01 * random.normal()), side); });
-    }
-    models.push_back(builder.build());
-  }
+  const std::vector<Morphology> models =
+      each_with(12, 6, [](MorphologyBuilder& builder, Random& random, std::uint64_t) {
+        const double fissure = random.uniform(80., 140.);
+        for (int stem = 0; stem < 4; ++stem) {
+          const auto at = [&](double way, double turn) {
+            return away(way, 1.5 * stem + turn + .05 * random.normal(), .5, random);
+          };
+          const Point fork = at(40. + 5. * random.normal(), 0.);
+          add_fork(builder, {at(5., 0.), fork}, {-.2, .2},
+                   [&](double side) { return at(fissure * (1. + .01 * random.normal()), side); });
+        }
+      });
   // How much its tips differ in how far from the soma they lie.
   const auto differ = [](std::span<const Morphology> neurons) {
     double sum = 0.;
@@ -465,50 +467,43 @@ TEST(Resampling, StemsThatAllReachAsFarStayAsAlike) {
 
 // Thin neurons whose stems begin as thick as those of thick ones: a cone that is drawn by a thick neuron is no thicker than any was.
 TEST(Resampling, NoStemIsThickerThanTheThickest) {
-  std::vector<Morphology> models;
   const auto thickest = [](const Morphology& n) {
     float radius = 0;
     for (const Point& p : n.points()) radius = std::max(radius, p.radius);
     return radius;
   };
+  const std::vector<Morphology> models =
+      each_with(12, 6, [](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+        const double thick = i % 2 ? 2. : .3;
+        for (int stem = 0; stem < 3; ++stem) {
+          const double angle = 2. * stem + .1 * random.normal();
+          const auto at = [&](double way, double turn, double radius) {
+            return away(way, angle + turn, radius, random);
+          };
+          const Point fork = at(40. + 5. * random.normal(), 0., thick);
+          add_fork(builder, {at(5., 0., 2.5), at(20., .1, thick), fork}, {-.3, .4},
+                   [&](double side) { return at(90. + 5. * random.normal(), side, thick); });
+        }
+      });
   float most = 0;
-  for (std::uint64_t i = 0; i < 12; ++i) {
-    Random random(6, i);
-    MorphologyBuilder builder;
-    builder.set_soma(zoo_parts::sphere(5));
-    const double thick = i % 2 ? 2. : .3;
-    for (int stem = 0; stem < 3; ++stem) {
-      const double angle = 2. * stem + .1 * random.normal();
-      const auto at = [&](double way, double turn, double radius) {
-        return away(way, angle + turn, radius, random);
-      };
-      const Point fork = at(40. + 5. * random.normal(), 0., thick);
-      add_fork(builder, {at(5., 0., 2.5), at(20., .1, thick), fork}, {-.3, .4},
-               [&](double side) { return at(90. + 5. * random.normal(), side, thick); });
-    }
-    models.push_back(builder.build());
-    most = std::max(most, thickest(models.back()));
-  }
+  for (const Morphology& n : models) most = std::max(most, thickest(n));
   const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
   for (const Morphology& n : lsystem::grow_population(grammar, 100, 1)) EXPECT_LE(thickest(n), 1.01f * most);
 }
 
 // Two arbors that fork in their first point, where they leave the soma, and one that does not.
 TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
-  std::vector<Morphology> models;
-  for (std::uint64_t i = 0; i < 6; ++i) {
-    Random random(3, i);
-    MorphologyBuilder builder;
-    builder.set_soma(zoo_parts::sphere(5));
-    for (int stem = 0; stem < 3; ++stem) {
-      const double angle = 2. * stem + .1 * random.normal();
-      const auto at = [&](double way, double turn) { return away(way, angle + turn, .5, random); };
-      std::vector<Point> root{at(5., 0.)};
-      if (!stem) root.push_back(at(25., 0.));
-      add_fork(builder, root, {-.3, .4}, [&](double side) { return at(60. + 5. * random.normal(), side); });
-    }
-    models.push_back(builder.build());
-  }
+  const std::vector<Morphology> models =
+      each_with(6, 3, [](MorphologyBuilder& builder, Random& random, std::uint64_t) {
+        for (int stem = 0; stem < 3; ++stem) {
+          const double angle = 2. * stem + .1 * random.normal();
+          const auto at = [&](double way, double turn) { return away(way, angle + turn, .5, random); };
+          std::vector<Point> root{at(5., 0.)};
+          if (!stem) root.push_back(at(25., 0.));
+          add_fork(builder, root, {-.3, .4},
+                   [&](double side) { return at(60. + 5. * random.normal(), side); });
+        }
+      });
   const lsystem::Grammar grammar =
       lsystem::parse(resampling_grammar(models, "t", Resampling{.jitter = 0.}), "t");
   for (const Morphology& m : lsystem::grow_population(grammar, 12, 1)) {
