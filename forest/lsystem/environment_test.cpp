@@ -73,11 +73,11 @@ TEST(Questions, WithoutAnEnvironmentEverythingIsFarAway) {
             (std::vector<double>{0, 0, 0, 0}));
 }
 
-// A branch in which nothing is asked is not walked over; that must change no answer.
+// A branch with no answer that a production could look at is not walked over; that must change no answer.
 TEST(Questions, SilentBranchesAreSkippedAndNothingElse) {
   const Site site{&cortex_of_layers(), {0, 1000, 0}};
-  for (const char* silent :
-       {"", "[ +(90) F(30) [ F(5) ] F(5) ]", "[ F(3) ] [ [ F(2) ] ]", "[ +(40) F(3) ?D(0) F(2) ]"})
+  for (const char* silent : {"", "[ +(90) F(30) [ F(5) ] F(5) ]", "[ F(3) ] [ [ F(2) ] ]",
+                             "[ +(40) F(3) ?D(0) F(2) ]", "[ +(40) F(3) ?D(0) [ F(2) ] ]"})
     EXPECT_EQ(told(std::string("axiom: ") + silent + " F(7) " + silent +
                        " [ F(3) A ?D(0) ] F(100)\np: A > ?D(d) -> C(d) A\n",
                    "C", site),
@@ -85,6 +85,11 @@ TEST(Questions, SilentBranchesAreSkippedAndNothingElse) {
   EXPECT_EQ(
       told("axiom: F(7) [ Soma(5) ] F(3) A ?P(0, 0, 0)\np: A > ?P(x, y, z) -> C(x, y, z) A\n", "C", site),
       (std::vector<double>{0, 3, 0}));
+  // From within it and from outside branches are seen in which nothing grows.
+  EXPECT_EQ(told("axiom: [ F(7) ?D(0) [ [ A ] ] ]\np: ?D(d) < A -> C(d)\n", "C", site),
+            std::vector<double>{1193});
+  EXPECT_EQ(told("axiom: A(0) [ ?D(0) F(3) ]\np: A(x) > [ ?D(d) ] -> F(10) A(d)\n", "A", site, 3),
+            std::vector<double>{1180});
 }
 
 Vec3 last_heading(const std::string& axiom, const Site& site) {

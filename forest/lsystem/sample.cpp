@@ -301,6 +301,7 @@ constexpr std::size_t window = 4;
 void match_lengths(std::span<float, window + 1> diameters, std::span<const float, window> own,
                    std::span<const float, window> here) {
   const auto [low, high] = std::ranges::minmax(diameters);
+  if (low == high) return;
   constexpr float rounding = 1e-4f;
   std::array<float, window> changes{};
   std::array<std::size_t, window> order{}, best{};
@@ -446,18 +447,21 @@ std::size_t Sample::draw(std::span<const double> wanted, Random& random) const {
   const std::size_t first = std::min<std::size_t>(6, wide);
   for (std::size_t k = 0; k < first; ++k)
     add_kernel(group->columns.data() + k * count, asked[k], count, chances.data());
-  const auto whole = [&](std::size_t i) {
+  // Sums only fall, so the best is no less than any whole one; what is far below that has no chance, and is not summed to its end.
+  const auto whole = [&](std::size_t i, float least) {
     const float* row = group->by_row.data() + i * wide;
     float sum = chances[i];
-    for (std::size_t k = first; k < wide; ++k) sum += kernel(row[k], asked[k]);
+    for (std::size_t k = first; k < wide && sum > least;) {
+      const std::size_t next = std::min<std::size_t>(k + 4, wide);
+      for (; k < next; ++k) sum += kernel(row[k], asked[k]);
+    }
     return sum;
   };
-  // Sums only fall, so the best is no less than any whole one; what is far below that has no chance.
   const std::size_t lead = largest(chances.data(), count);
+  float best = whole(lead, -INFINITY), total = 0.f;
   near.clear();
-  find_above(chances.data(), count, whole(lead) + hardly, near);
-  float best = -INFINITY, total = 0.f;
-  for (const std::uint32_t i : near) best = std::max(best, chances[i] = whole(i));
+  find_above(chances.data(), count, best + hardly, near);
+  for (const std::uint32_t i : near) best = std::max(best, chances[i] = whole(i, best + hardly));
   for (const std::uint32_t i : near)
     total += chances[i] = chances[i] > best + hardly ? std::exp(chances[i] - best) : 0.f;
   float left = chance * total;

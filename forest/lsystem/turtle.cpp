@@ -178,28 +178,39 @@ class Turtle {
     if (!stack_.empty()) fail("a branch is not closed");
   }
 
-  // For every [ of a branch in which nothing is asked its ], else none; for all modules up to the last question.
+  // For every [ of a branch with no answer that a production could look at its ], else none; for all modules up to the last question.
+  // Contexts see what is on their own branch and on those before; into others they look only where they have brackets.
   std::vector<std::uint32_t> ends_of_silent_branches() const {
-    std::vector<std::uint32_t> ends, open;
+    struct Branch {
+      std::uint32_t begin = none;
+      bool asks = false, grows = false, stands = false;  // … the soma, from which places are counted
+    };
+    const bool looks_into = std::ranges::any_of(grammar_.productions, [](const Production& p) {
+      return std::ranges::any_of(p.right, [](const Shape& s) { return s.symbol == Symbol(Action::push); });
+    });
+    std::vector<std::uint32_t> ends;
+    std::vector<Branch> open(1);
     std::size_t asked = 0;  // modules up to the last question
-    std::vector<bool> silent{true};
     for (const Module& m : word_.modules) {
       const auto i = std::uint32_t(ends.size());
       ends.push_back(none);
+      if (!grammar_.productions_of[m.symbol].empty()) open.back().grows = true;
       const Symbol s = grammar_.drawn_as[m.symbol];
       if (s >= std::size(symbol_table)) continue;
       const Action action = symbol_table[s].action;
       if (action == Action::push) {
-        open.push_back(i), silent.push_back(true);
+        open.push_back({.begin = i});
       } else if (action == Action::pop) {
-        if (open.empty()) fail("a ] closes nothing");
-        if (silent.back()) ends[open.back()] = i;
-        const bool was_silent = silent.back();
-        open.pop_back(), silent.pop_back();
-        silent.back() = silent.back() && was_silent;
-      } else if (is_question(action) || action == Action::soma) {  // from which places are counted
-        silent.back() = false;
-        if (is_question(action)) asked = i + 1;
+        if (open.size() == 1) fail("a ] closes nothing");
+        const Branch inner = open.back();
+        open.pop_back();
+        if (!inner.stands && !(inner.asks && (inner.grows || looks_into))) ends[inner.begin] = i;
+        Branch& outer = open.back();
+        outer.asks |= inner.asks, outer.grows |= inner.grows, outer.stands |= inner.stands;
+      } else if (action == Action::soma) {
+        open.back().stands = true;
+      } else if (is_question(action)) {
+        open.back().asks = true, asked = i + 1;
       }
     }
     ends.resize(asked);
@@ -502,10 +513,12 @@ class Turtle {
     const double thickness = told.thickness, thickness_end = told.last < 0. ? thickness : told.last;
     // How many times as thick: from the first to the last as the diameter itself changes, so that what is as thick as what was
     // before it remains so.
+    const bool changes = thickness_end != thickness && thickness > 0.;
+    float changed = 0.f;  // times is of this share
+    double times = thickness;
     const auto thick = [&](float diameter, float part) {
-      const double times = thickness_end == thickness || !(thickness > 0.)
-                               ? thickness
-                               : thickness * std::pow(thickness_end / thickness, double(part));
+      if (changes && part != changed)
+        times = thickness * std::pow(thickness_end / thickness, double(changed = part));
       return std::max(told.thinnest, times * double(diameter));
     };
     const bool free = state_.avoid < 0.;
