@@ -41,9 +41,8 @@ double habits_kept(std::size_t neurons) { return std::pow(std::min(1., double(ne
 double deviation(const std::vector<double>& values) { return statistics::summarize(values).sd; }
 
 // What a neuron begins with, in `growth` and when there are some without a soma.
-constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Gauge(gauges, thin_as) Plan(0)\n",
-                           with_fibre = R"(module Begin
-axiom: Begin Gauge(gauges, thin_as) Plan(0)
+constexpr std::string_view with_soma = "axiom: Soma(cells.soma(me)) Plan(0)\n", with_fibre = R"(module Begin
+axiom: Begin Plan(0)
 body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
 fibre: Begin -> Kind(plans.kind(plan(0))) Fibre(cells.fibre(me))
 )";
@@ -99,7 +98,7 @@ function drawn(length, beyond, x, y, z) = length / max(1, length + beyond) *
 function crowd(tips) = log(tips) - 30 / tips^3
 # How many times thicker a stem is than where it was traced, as the neuron is whose diameters it has.
 distribution thicker(kind, p) = min(plans.most(p),
-  exp(sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(plans.cell(p), kind)))))
+  exp(stout * sd_girth(kind) * (styles.girth(styles(thin_as, kind)) - styles.girth(styles(plans.cell(p), kind)))))
 # How many tips a stem has, and how far the farthest is: by the styles of whom it is of, and of the two by which it strays.
 distribution tips_of(p, kind, s, u, v, least) = max(least, min(most_tips(kind), round(plans.tips(p) *
   exp(normal(0, jitter) + sd_forks(kind) * (own(styles.forks(s), styles.forks(u), styles.forks(v)) - styles.forks(s))))))
@@ -113,7 +112,7 @@ distribution calibre(kind, r, tips, ahead, d) =
 module Plan(i), Twig(kind, donor, next, run, mirror, tips, ahead, path, order, d, ax, ay, az)
 module Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
 module Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
-axiom: Soma(cells.soma(me)) Gauge(gauges, thin_as) Plan(0)
+axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
@@ -126,7 +125,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     from = styles(stems.donor(r), kind), sz = steeper(kind, from), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
+  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
        Trace(stems, r, 0, scale, turn = 0, bent = bending(kind, s, u, v, from), like = p, thickness = thick,
          x = part * ex, y = part * ey, z = part * ez, steep = sz, stairs = stepped(kind, from), kinked = turned(kind, from),
          kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
@@ -136,7 +135,7 @@ bud: Plan(i) : i < planned  # it forks where it leaves
   { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = tips_of(p, kind, s, u, v, 2), ahead = ahead_of(p, kind, s, u, v),
     away = ahead / max(1, plans.ahead(p)), d = thicker(kind, p) * plans.d(p) }
-  -> [ Kind(kind) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
+  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
        Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
        ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0) ] Plan(i + 1)
 done: Plan(i) ->
@@ -263,14 +262,30 @@ class Writer {
   }
 
   void gauges() {
-    put("\n\n# The diameters that each neuron's points have, µm: a tracer has so many to choose from.\n"
-        "sample gauges(-> cell) =");
-    for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
-      row(!i);
-      const auto& diameters = traced_.cells[i].diameters;
-      put("{} | 0 1 0 {}:", i, diameters.front());
-      for (std::size_t k = 0; k < diameters.size(); ++k) put("{} 0 0 0 {}", k ? "," : "", diameters[k]);
-    }
+    put("\n\n# The diameters that each neuron's points of a kind have, µm, and of how many each is: a tracer "
+        "has so "
+        "many to choose from.\n"
+        "sample gauges(cell =, kind = -> points) =");
+    bool first = true;
+    for (std::size_t i = 0; i < traced_.cells.size(); ++i)
+      for (const auto& [kind, unused] : traced_.deviations) {
+        const Diameters diameters = diameters_of(traced_.cells[i], kind);
+        std::size_t points = 0;
+        for (const auto& [diameter, count] : diameters) points += count;
+        row(std::exchange(first, false));
+        put("{} {} -> {} | 0 1 0 {}:", i, kind, points, diameters.begin()->first);
+        std::string_view before;
+        for (const auto& [diameter, count] : diameters)
+          put("{} {} 0 0 {}", std::exchange(before, ","), count, diameter);
+      }
+  }
+  // Of a kind that it has not, those of all.
+  static Diameters diameters_of(const Cell& cell, int kind) {
+    if (const auto found = cell.diameters.find(kind); found != cell.diameters.end()) return found->second;
+    Diameters all;
+    for (const auto& [other, diameters] : cell.diameters)
+      for (const auto& [diameter, count] : diameters) all[diameter] += count;
+    return all;
   }
 
   void styles_of_cells() {
@@ -472,7 +487,7 @@ class Writer {
   void calibres() {
     put("\n\n# The same forks, row by row, asked by how thick they are: the diameters where the branch ends "
         "and its daughters end, µm.\n"
-        "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.15, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, "
+        "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.08, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, "
         "l2 ~ 1, d ~ 0.07, seldom ~ 1\n"
         "  -> d, d1, d2, d3) =");
     for (const Fork& f : traced_.forks) {
@@ -547,6 +562,8 @@ class Writer {
 #define steep 1  # how much of the difference in slope between their neuron and its donor they make up for: 0 to 1
 #define habits {:.4g}  # the same of how unevenly steep and how kinked their steps are: 0 to 1
 #define fade 20  # µm, along which they give up e times of how much thicker they are than what lends its diameters: above 0
+#define stout 0.7  # by how much of the difference between neurons whose diameters are lent stems are as thick: 0 to 1
+#define even 0.3  # how far diameters are taken to being as frequent as they are in the neuron that lends them: 0 to 1
 )",
         stray(), kin(), kin(), kept(), options_.jitter, jolt(), options_.familiar,
         habits_kept(traced_.cells.size()));

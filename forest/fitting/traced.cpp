@@ -133,10 +133,10 @@ struct Learner {
       for (const Point& p : points(i)) {
         cell.low = std::min(cell.low, double(p.z - soma.z()));
         cell.high = std::max(cell.high, double(p.z - soma.z()));
-        cell.diameters.push_back(std::round(2e3 * double(p.radius)) / 1e3);
+        // Where a branch leaves another, the point is that one's.
+        cell.diameters[kind_of(all[i])][std::round(2e3 * double(p.radius)) / 1e3] +=
+            above(i) < 0 || &p != points(i).data();
       }
-    std::ranges::sort(cell.diameters);
-    cell.diameters.erase(std::ranges::unique(cell.diameters).begin(), cell.diameters.end());
     for (std::uint32_t i = 0; i < all.size(); ++i)
       if (above(i) < 0 && (drawn(i) || bud(i))) cell.stems.push_back(stem(i));
     if (cell.stems.empty()) return;

@@ -108,12 +108,15 @@ struct Manner {
   double stairs = .1, kinks = .1;
 };
 
+/// How many points have a diameter, µm.
+using Diameters = std::map<double, std::size_t>;
+
 struct Cell {
   double soma = 0.;    // diameter, µm
   double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
-  double low = 0., high = 0.;          // of its points, along z from the soma, µm
-  std::vector<double> diameters = {};  // that its points have, each once, from the thinnest on, µm
+  double low = 0., high = 0.;  // of its points, along z from the soma, µm
   std::map<int, Manner> kinds;
+  std::map<int, Diameters> diameters = {};  // by kind
   std::vector<Stem> stems;
 };
 

@@ -598,6 +598,39 @@ TEST(Gauge, DiametersAreTheNearestOfThoseThatItHas) {
   EXPECT_THROW((void)diameters("Gauge(gauges, 2)", "1"), Error);  // there is none
 }
 
+// A quarter of its points has .5 µm, a half 1 and a quarter 3.
+TEST(Gauge, DiametersBecomeAsFrequentAsItsOwnAndKeepTheirOrder) {
+  for (const std::size_t count : {20u, 44u, 100u}) {
+    const auto radii = [&](const std::string& even) {
+      std::string axiom = "Soma(1) Basal Gauge(gauges, 0" + even + ") At(0, 1, 0)";
+      for (std::size_t i = 0; i < count; ++i)
+        axiom += fmt::format(" F(1, {})", .1 + .3 * double(7 * i % count));
+      const Grammar g =
+          grammar("sample gauges(-> cell) = 0 | 0 1 0 0.5: 10 0 0 0.5, 20 0 0 1, 10 0 0 3\naxiom: " + axiom +
+                  "\nnothing: z -> z\n");
+      const Morphology m = interpret(derive(g, 0, 0, 0), g);
+      std::vector<float> found;
+      for (const Point& p : m.points(SectionId(0)).subspan(1)) found.push_back(p.radius);
+      return found;
+    };
+    const std::vector<float> before = radii(""), half = radii(", 0.5"), after = radii(", 1");
+    EXPECT_EQ(before, radii(", 0"));
+    std::vector<std::size_t> by_size(count);
+    std::iota(by_size.begin(), by_size.end(), 0);
+    std::ranges::sort(by_size, {}, [&](std::size_t i) { return before[i]; });
+    const auto rises = [&](const std::vector<float>& found) {
+      return std::ranges::is_sorted(by_size, {}, [&](std::size_t i) { return found[i]; });
+    };
+    EXPECT_TRUE(rises(half) && rises(after)) << count;
+    // The point where the branch begins is one, too.
+    const auto expect = [&](float radius, std::size_t times) {
+      EXPECT_NEAR(double(std::ranges::count(after, radius)), double(times), 1.) << count << ": " << radius;
+    };
+    expect(.25f, count / 4), expect(.5f, count / 2), expect(1.5f, count / 4);
+    EXPECT_NE(half, after);
+  }
+}
+
 TEST(Trace, LeavesTheTurtleHeadingAsItEnds) {
   expect_near(end_of("Trace(twigs, 1, 0) F(2)"), {3, 0, 0});
   expect_near(end_of("Head(0, 0, 1) F(2)"), {0, 0, 2});

@@ -76,10 +76,12 @@ constexpr TurtleSymbol symbol_table[] = {
      "becomes "
      "so, or below 0 of those that are as large a share climbs",
      Action::trace, int(tracing_needs), int(tracing_takes), std::span(tracing_values).subspan(tracing_needs)},
-    {"Gauge", "sample, row",
+    {"Gauge", "sample, row, even",
      "from here on every diameter of `Trace` is the nearest of those that the first branch of the row has, "
-     "which must rise",
-     Action::gauge, 2, 2},
+     "which must rise; in the end all that is drawn under it is taken by the share `even`, 0 when not given, "
+     "to having "
+     "each as often as the x of its place says",
+     Action::gauge, 2, 3},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
     {"Avoid", "gap",
@@ -125,6 +127,7 @@ struct Drawn {
   std::uint32_t children;
   std::int32_t tag;
   SectionKind kind;
+  std::uint32_t gauge;  // among Turtle::gauges_
 };
 
 struct State {
@@ -140,8 +143,44 @@ struct State {
   std::uint32_t begun = none;                          // … and that where the traced branch to it began
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
-  std::span<const lsystem::Trace::Stop> gauge;  // whose diameters traced ones have; empty: any
-  double gap = 0.;                              // the least between two of these
+  std::uint32_t gauge = 0;  // among Turtle::gauges_
+};
+
+// Which diameters traced branches have.
+struct Gauge {
+  std::span<const lsystem::Trace::Stop> stops;  // rising; empty: any
+  double even = 0.;
+  double gap = 0.;  // the least between two of them
+
+  Gauge() = default;
+  Gauge(std::span<const lsystem::Trace::Stop> of, double share) : stops(of), even(std::clamp(share, 0., 1.)) {
+    for (std::size_t i = 1; i < stops.size(); ++i) {
+      const double step = double(stops[i].diameter) - double(stops[i - 1].diameter);
+      gap = i == 1 ? step : std::min(gap, step);
+    }
+  }
+
+  // The nearest of them. Beyond the thickest, as far apart as the nearest two are.
+  double nearest(double diameter) const {
+    if (stops.empty()) return diameter;
+    const double thickest = double(stops.back().diameter);
+    if (diameter >= thickest)
+      return gap > 0. ? thickest + std::round((diameter - thickest) / gap) * gap : thickest;
+    const auto above = std::ranges::upper_bound(stops, float(diameter), {}, &lsystem::Trace::Stop::diameter);
+    const double more = above == stops.end() ? thickest : double(above->diameter);
+    if (above == stops.begin()) return more;
+    const double less = double(std::prev(above)->diameter);
+    return more - diameter < diameter - less ? more : less;
+  }
+  // That which is as thick as a share of all.
+  double at_share(double share) const {
+    double left = 0.;
+    for (const auto& s : stops) left += double(s.at.x());
+    left *= share;
+    for (const auto& s : stops)
+      if ((left -= double(s.at.x())) < 0.) return double(s.diameter);
+    return double(stops.back().diameter);
+  }
 };
 
 class Turtle {
@@ -159,6 +198,7 @@ class Turtle {
   Morphology draw(const Annotations& annotations) {
     drawn_.reserve(word_.modules.size() / 2);
     walk();
+    even_out();
     return build(annotations);
   }
   // Draws nothing, and writes its answers into the word.
@@ -305,12 +345,7 @@ class Turtle {
       case Action::trace:
         return trace(m);
       case Action::gauge:
-        state_.gauge = gauge(parameter(0, 0.), parameter(1, 0.));
-        state_.gap = INFINITY;
-        for (std::size_t i = 1; i < state_.gauge.size(); ++i)
-          state_.gap =
-              std::min(state_.gap, double(state_.gauge[i].diameter) - double(state_.gauge[i - 1].diameter));
-        if (state_.gauge.size() < 2) state_.gap = 0.;
+        state_.gauge = gauge(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.));
         return;
       case Action::avoid:
         state_.avoid = parameter(0, 0.);
@@ -435,15 +470,15 @@ class Turtle {
     must_be_size(state_.diameter);
     if (answers_) return;
     if (state_.node == none) {
-      drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind});
+      drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind, state_.gauge});
       state_.node = std::uint32_t(drawn_.size() - 1);
     }
     // What differs by rounding alone is the same: else a file of points has the place of a fork once for each daughter.
     if (const float there = drawn_[state_.node].radius; std::abs(start_radius - there) <= 1e-5f * there)
       start_radius = there;
     ++drawn_[state_.node].children;
-    drawn_.push_back(
-        {place, float(0.5 * state_.diameter), start_radius, state_.node, 0, state_.tag, state_.kind});
+    drawn_.push_back({place, float(0.5 * state_.diameter), start_radius, state_.node, 0, state_.tag,
+                      state_.kind, state_.gauge});
     state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
@@ -464,25 +499,45 @@ class Turtle {
     return branches[std::size_t(which)];
   }
 
-  std::span<const lsystem::Trace::Stop> gauge(double sample, double row) const {
-    const auto& stops = branch(sample, row, 0., "Gauge").stops;
+  // Its place among all there are.
+  std::uint32_t gauge(double sample, double row, double even) {
+    const std::span<const lsystem::Trace::Stop> stops = branch(sample, row, 0., "Gauge").stops;
     if (!std::ranges::is_sorted(stops, {}, &lsystem::Trace::Stop::diameter))
       fail("the diameters of a gauge do not rise");
-    return stops;
+    const auto same = std::ranges::find_if(
+        gauges_, [&](const Gauge& g) { return g.stops.data() == stops.data() && g.even == even; });
+    if (same != gauges_.end()) return std::uint32_t(same - gauges_.begin());
+    gauges_.emplace_back(stops, even);
+    return std::uint32_t(gauges_.size() - 1);
   }
-  // Beyond the thickest, as far apart as the nearest two of them are.
-  double gauged(double diameter) const {
-    if (state_.gauge.empty()) return diameter;
-    const double thickest = double(state_.gauge.back().diameter);
-    if (diameter >= thickest)
-      return state_.gap > 0. ? thickest + std::round((diameter - thickest) / state_.gap) * state_.gap
-                             : thickest;
-    const auto above =
-        std::ranges::upper_bound(state_.gauge, float(diameter), {}, &lsystem::Trace::Stop::diameter);
-    const double more = above == state_.gauge.end() ? thickest : double(above->diameter);
-    if (above == state_.gauge.begin()) return more;
-    const double less = double(std::prev(above)->diameter);
-    return more - diameter < diameter - less ? more : less;
+  double gauged(double diameter) const { return gauges_[state_.gauge].nearest(diameter); }
+
+  // Thicker ones stay thicker, and equal ones equal: what is as thick as a share of all points under a gauge becomes as thick as that
+  // share of its own.
+  void even_out() {
+    for (std::uint32_t g = 1; g < gauges_.size(); ++g) {
+      const Gauge& gauge = gauges_[g];
+      if (gauge.even == 0. || gauge.stops.size() < 2) continue;
+      std::vector<float> radii;
+      for (const Drawn& d : drawn_)
+        if (d.gauge == g) radii.push_back(d.radius);
+      std::ranges::sort(radii);
+      std::vector<std::pair<float, float>> became;  // each once
+      const auto evened = [&](float radius) {
+        const auto known = std::ranges::lower_bound(became, radius, {}, &std::pair<float, float>::first);
+        if (known != became.end() && known->first == radius) return known->second;
+        const auto [from, to] = std::ranges::equal_range(radii, radius);
+        const double share =
+                         .5 * double((from - radii.begin()) + (to - radii.begin())) / double(radii.size()),
+                     wanted = .5 * gauge.at_share(share);
+        const double mixed = radius > 0.f && wanted > 0.
+                                 ? double(radius) * std::pow(wanted / double(radius), gauge.even)
+                                 : double(radius);
+        return became.insert(known, {radius, float(.5 * gauge.nearest(2. * mixed))})->second;
+      };
+      for (Drawn& d : drawn_)
+        if (d.gauge == g) d.radius = evened(d.radius), d.start_radius = evened(d.start_radius);
+    }
   }
 
   void trace(const Module& m) {
@@ -644,7 +699,7 @@ class Turtle {
     state_.diameter = std::max(0., diameter);
     if (answers_) return;
     const auto radius = float(0.5 * state_.diameter);
-    drawn_.push_back({state_.position, radius, radius, none, 0, state_.tag, state_.kind});
+    drawn_.push_back({state_.position, radius, radius, none, 0, state_.tag, state_.kind, state_.gauge});
     state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
@@ -718,6 +773,7 @@ class Turtle {
   State state_;
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
+  std::vector<Gauge> gauges_{{}};           // the first: none
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
