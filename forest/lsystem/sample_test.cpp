@@ -594,8 +594,9 @@ TEST(Gauge, DiametersAreTheNearestOfThoseThatItHas) {
   ASSERT_EQ(thick.size(), expected.size());
   for (std::size_t i = 0; i < thick.size(); ++i) EXPECT_NEAR(thick[i], expected[i], 1e-5f);
   EXPECT_EQ(diameters("[ Gauge(gauges, 0) ]", "1"), diameters("", "1"));
-  EXPECT_THROW((void)diameters("Gauge(gauges, 1)", "1"), Error);  // which fall
-  EXPECT_THROW((void)diameters("Gauge(gauges, 2)", "1"), Error);  // there is none
+  EXPECT_EQ(diameters("Gauge(gauges, 0, 1)", "1"), diameters("Gauge(gauges, 0)", "1"));  // it has no points
+  EXPECT_THROW((void)diameters("Gauge(gauges, 1)", "1"), Error);                         // which fall
+  EXPECT_THROW((void)diameters("Gauge(gauges, 2)", "1"), Error);                         // there is none
 }
 
 // A quarter of its points has .5 µm, a half 1 and a quarter 3.
@@ -615,6 +616,7 @@ TEST(Gauge, DiametersBecomeAsFrequentAsItsOwnAndKeepTheirOrder) {
     };
     const std::vector<float> before = radii(""), half = radii(", 0.5"), after = radii(", 1");
     EXPECT_EQ(before, radii(", 0"));
+    EXPECT_EQ(after, radii(", 7"));
     std::vector<std::size_t> by_size(count);
     std::iota(by_size.begin(), by_size.end(), 0);
     std::ranges::sort(by_size, {}, [&](std::size_t i) { return before[i]; });

@@ -149,11 +149,13 @@ struct State {
 // Which diameters traced branches have.
 struct Gauge {
   std::span<const lsystem::Trace::Stop> stops;  // rising; empty: any
-  double even = 0.;
-  double gap = 0.;  // the least between two of them
+  double even = 0.;                             // 0 to 1
+  double gap = 0.;                              // the least between two of them
+  double points = 0.;                           // that have one of them
 
   Gauge() = default;
-  Gauge(std::span<const lsystem::Trace::Stop> of, double share) : stops(of), even(std::clamp(share, 0., 1.)) {
+  Gauge(std::span<const lsystem::Trace::Stop> of, double share) : stops(of), even(share) {
+    for (const auto& s : stops) points += double(s.at.x());
     for (std::size_t i = 1; i < stops.size(); ++i) {
       const double step = double(stops[i].diameter) - double(stops[i - 1].diameter);
       gap = i == 1 ? step : std::min(gap, step);
@@ -174,9 +176,7 @@ struct Gauge {
   }
   // That which is as thick as a share of all.
   double at_share(double share) const {
-    double left = 0.;
-    for (const auto& s : stops) left += double(s.at.x());
-    left *= share;
+    double left = share * points;
     for (const auto& s : stops)
       if ((left -= double(s.at.x())) < 0.) return double(s.diameter);
     return double(stops.back().diameter);
@@ -504,6 +504,7 @@ class Turtle {
     const std::span<const lsystem::Trace::Stop> stops = branch(sample, row, 0., "Gauge").stops;
     if (!std::ranges::is_sorted(stops, {}, &lsystem::Trace::Stop::diameter))
       fail("the diameters of a gauge do not rise");
+    even = std::clamp(even, 0., 1.);
     const auto same = std::ranges::find_if(
         gauges_, [&](const Gauge& g) { return g.stops.data() == stops.data() && g.even == even; });
     if (same != gauges_.end()) return std::uint32_t(same - gauges_.begin());
@@ -517,7 +518,7 @@ class Turtle {
   void even_out() {
     for (std::uint32_t g = 1; g < gauges_.size(); ++g) {
       const Gauge& gauge = gauges_[g];
-      if (gauge.even == 0. || gauge.stops.size() < 2) continue;
+      if (gauge.even == 0. || !(gauge.points > 0.)) continue;
       std::vector<float> radii;
       for (const Drawn& d : drawn_)
         if (d.gauge == g) radii.push_back(d.radius);
