@@ -263,8 +263,7 @@ class Writer {
 
   void gauges() {
     put("\n\n# The diameters that each neuron's points of a kind have, µm, and of how many each is: a tracer "
-        "has so "
-        "many to choose from.\n"
+        "has so many to choose from.\n"
         "sample gauges(cell =, kind = -> points) =");
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
