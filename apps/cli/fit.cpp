@@ -167,7 +167,7 @@ std::function<void()> fit(CLI::App& command, Console& console) {
   must_be_within(
       *command.add_option("--smoothing", options->resampling.smoothing,
                           "How far a neuron's style may be from that of the traced one whose stems "
-                          "it has; 0: not at all. Without it .4, or with fewer than 25 neurons 10 over "
+                          "it has; 0: not at all. Without it 0, or with fewer than 25 neurons 10 over "
                           "their number, at most 1.2"),
       0., 100.);
   CLI::Option* calibrate =

@@ -7,6 +7,7 @@
 #include <numbers>
 #include <optional>
 #include <set>
+#include <span>
 #include <utility>
 
 #include "forest/statistics/summary.h"
@@ -16,6 +17,12 @@ namespace {
 
 // Degrees between basal and other stems that count as much as a standard deviation of a style, where mates are chosen.
 constexpr double near_angle = 6.;
+
+// How much a standard deviation of how deep in the slice stems lie counts where it is chosen as which they leave.
+constexpr double as_deep = .3;
+
+// What it costs to leave stems as the mate has them, where no other has them much the same.
+constexpr double unmoved = 30.;
 
 // What it costs to be a partner of who lends nothing, of oneself, of one's kin, and of who has other kinds of stems.
 constexpr double hardly = 1e7, oneself = 5e6, unlikely = 1e6, seldom = 1e3;
@@ -145,6 +152,38 @@ std::vector<std::size_t> most_alike(const std::vector<Cell>& cells, std::size_t 
   return order;
 }
 
+// By how much more one neuron's stems of a kind of both leave the plane of the slice, in standard deviations.
+double deeper(const Cell& one, const Cell& other) {
+  for (const auto& [kind, of] : one.kinds)
+    if (const auto found = other.kinds.find(kind); found != other.kinds.end())
+      return of.style[depth] - found->second.style[depth];
+  return 0.;
+}
+
+// What stems must share for one to have the pose of the other: the kind, and whether they have a length or fork where they leave.
+std::pair<int, bool> sort(const Stem* s) { return {s->kind, s->length > 0.}; }
+
+// The stems of a cell that has lent them, each sort by the path to the farthest tip.
+std::vector<const Stem*> ranked(const Cell& cell, Lent lent) {
+  std::vector<const Stem*> stems;
+  for (const Stem& s : cell.stems)
+    if (lent == Lent::all || (lent == Lent::basal_stems && is_basal(s))) stems.push_back(&s);
+  std::ranges::stable_sort(stems, {}, [](const Stem* s) { return std::pair(sort(s), s->ahead); });
+  return stems;
+}
+
+// How unlike the stems of two are, the first beside the first; nothing where one has other sorts of them.
+std::optional<double> unlike(std::span<const Stem* const> ones, std::span<const Stem* const> others) {
+  if (!std::ranges::equal(ones, others, {}, sort, sort)) return std::nullopt;
+  const auto square = [](double one, double other) {
+    return std::pow(std::log(std::max(1., one) / std::max(1., other)), 2);
+  };
+  double sum = 0.;
+  for (std::size_t k = 0; k < ones.size(); ++k)
+    sum += square(ones[k]->ahead, others[k]->ahead) + square(ones[k]->tips, others[k]->tips);
+  return sum / double(std::max<std::size_t>(1, ones.size()));
+}
+
 }  // namespace
 
 std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
@@ -164,12 +203,19 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     return cost(i, j) + (j == mates[i] ? unlikely : 0.);
   });
+  const auto lent_to = [&](std::size_t i) { return lent(kinds[i], kinds[mates[i]]); };
+  const std::vector<std::size_t> fourths = partners(cells.size(), [&](std::size_t i, std::size_t j) {
+    const auto stems = unlike(ranked(cells[mates[i]], lent_to(i)), ranked(cells[j], lent_to(i)));
+    return stems.value_or(hardly) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
+           std::pow(as_deep * deeper(cells[i], cells[j]), 2) + (j == mates[i] ? unmoved : 0.);
+  });
   std::vector<Mixed> mixed;
   for (std::size_t i = 0; i < cells.size(); ++i) {
     const Cell &own = cells[i], &mate = cells[mates[i]];
-    const Lent of_mate = lent(kinds[i], kinds[mates[i]]);
+    const Lent of_mate = lent_to(i);
     Mixed m{.kin = std::move(like[i]),
             .stems = {},
+            .poses = {},
             .basal_as = of_mate == Lent::nothing ? i : mates[i],
             .others_as = of_mate == Lent::all ? mates[i] : i,
             .thin_as = thirds[i]};
@@ -177,6 +223,10 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
       if (of_mate == Lent::nothing || (of_mate == Lent::basal_stems && !is_basal(s))) m.stems.push_back(&s);
     for (const Stem& s : mate.stems)
       if (of_mate == Lent::all || (of_mate == Lent::basal_stems && is_basal(s))) m.stems.push_back(&s);
+    m.poses = m.stems;
+    const std::vector<const Stem*> stems = ranked(mate, of_mate), poses = ranked(cells[fourths[i]], of_mate);
+    if (unlike(stems, poses))
+      for (std::size_t k = 0; k < stems.size(); ++k) std::ranges::replace(m.poses, stems[k], poses[k]);
     mixed.push_back(std::move(m));
   }
   return mixed;

@@ -7,6 +7,10 @@
 // traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice and how its tracer set points are
 // its own, its diameters those of the third. The stems and their style are the mate's: where both have basal dendrites, these
 // alone; else all, if both have the same kinds of them. So no kind of dendrite comes more often than it was traced.
+//
+// Where the mate's stems leave the soma and whither they lead is, stem by stem, as in a fourth neuron that has as many of them: of
+// each once, too. What stems there are says little of where they lie, so that this is nearly free, and what has its stems where no
+// neuron like it has them is farther from all.
 #pragma once
 
 #include <cstddef>
@@ -19,6 +23,7 @@ namespace forest::fitting {
 struct Mixed {
   std::vector<std::size_t> kin;     // the neurons most like it, the most alike first
   std::vector<const Stem*> stems;   // one after the other
+  std::vector<const Stem*> poses;   // … and as which each of these leaves the soma: of its kind
   std::size_t basal_as, others_as;  // the neurons whose style its basal dendrites have, and all else
   std::size_t thin_as;              // … whose diameters it has
 };

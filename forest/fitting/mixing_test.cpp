@@ -135,5 +135,25 @@ TEST(Mixing, NoMateIsOfTheKin) {
   }
 }
 
+// Two in three have other numbers of basal stems: each stem has the pose of one of its kind, of another neuron than the mate, and
+// no pose comes twice.
+TEST(Mixing, StemsLieAsThoseOfAFourthThatHasAsMany) {
+  Traced t = traced(40, true, true);
+  for (std::size_t i = 0; i < t.cells.size(); ++i)
+    for (std::size_t more = 0; more < i % 3; ++more) t.cells[i].stems.push_back(t.cells[i].stems.back());
+  std::set<const Stem*> poses;
+  for (const Mixed& m : mix(t, 4)) {
+    ASSERT_EQ(m.poses.size(), m.stems.size());
+    for (std::size_t k = 0; k < m.stems.size(); ++k) {
+      EXPECT_EQ(m.poses[k]->kind, m.stems[k]->kind);
+      EXPECT_TRUE(poses.insert(m.poses[k]).second);
+      if (m.stems[k]->kind == int(SectionKind::basal))
+        EXPECT_NE(m.poses[k]->cell, m.stems[k]->cell);
+      else
+        EXPECT_EQ(m.poses[k], m.stems[k]);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace forest::fitting

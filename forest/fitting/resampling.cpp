@@ -56,6 +56,7 @@ function share(part, whole, n, others) =
 # The traced neuron whose style branches of a kind have, and the stems, one after the other.
 function whose(kind) = if(kind == 3, basal_as, others_as)
 distribution plan(i) = arbors.plan(arbors(me, i))
+distribution pose(i) = arbors.pose(arbors(me, i))
 # How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
@@ -116,27 +117,27 @@ axiom: Soma(cells.soma(me)) Plan(0)
 
 # Stems leave the soma as planned, each drawn from a stem alike.
 stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
-  { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
+  { p = plan(i), g = pose(i), kind = plans.kind(p), s = styles(whose(kind), kind), t = styles(me, kind), u = styles(one, kind), v = styles(other, kind),
     tips = tips_of(p, kind, s, u, v, 1), ahead = ahead_of(p, kind, s, u, v), thick = thicker(kind, p), d = thick * plans.d(p),
-    away = ahead / max(1, plans.ahead(p)), ax = away * plans.tx(p), ay = away * plans.ty(p), az = away * plans.tz(p),
+    away = ahead / max(1, plans.ahead(g)), ax = away * plans.tx(g), ay = away * plans.ty(g), az = away * plans.tz(g),
     r = stems(kind, cell = plans.cell(p), tips = crowd(tips), ahead = log(ahead), length = log(max(0.05, plans.length(p))),
-      hx = plans.hx(p), hy = plans.hy(p), hz = plans.hz(p), d = log(d),
+      hx = plans.hx(g), hy = plans.hy(g), hz = plans.hz(g), d = log(d),
       @style, seldom = 0),
     from = styles(stems.donor(r), kind), sz = steeper(kind, from), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
-    ex = ax - plans.x(p) - scale * stems.tx(r), ey = ay - plans.y(p) - scale * stems.ty(r), ez = az - plans.z(p) - sz * scale * stems.tz(r),
+    ex = ax - plans.x(g) - scale * stems.tx(r), ey = ay - plans.y(g) - scale * stems.ty(r), ez = az - plans.z(g) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
-  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p))
+  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(g), plans.y(g), plans.z(g)) Head(plans.hx(g), plans.hy(g), plans.hz(g))
        Trace(stems, r, 0, scale, turn = 0, bent = bending(kind, s, u, v, from), like = p, thickness = thick,
          x = part * ex, y = part * ey, z = part * ez, steep = sz, stairs = stepped(kind, from), kinked = turned(kind, from),
          kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
        ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0) ] Plan(i + 1)
 bud: Plan(i) : i < planned  # it forks where it leaves
-  { p = plan(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
+  { p = plan(i), g = pose(i), kind = plans.kind(p), s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind),
     tips = tips_of(p, kind, s, u, v, 2), ahead = ahead_of(p, kind, s, u, v),
-    away = ahead / max(1, plans.ahead(p)), d = thicker(kind, p) * plans.d(p) }
-  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(p), plans.y(p), plans.z(p)) Head(plans.hx(p), plans.hy(p), plans.hz(p)) Fibre(d)
-       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(p), away * plans.ty(p), away * plans.tz(p))
+    away = ahead / max(1, plans.ahead(g)), d = thicker(kind, p) * plans.d(p) }
+  -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(g), plans.y(g), plans.z(g)) Head(plans.hx(g), plans.hy(g), plans.hz(g)) Fibre(d)
+       Twig(kind, -1, -1, 0, 0, tips, ahead, 0, 0, d, away * plans.tx(g), away * plans.ty(g), away * plans.tz(g))
        ?P(0, 0, 0) ?H(0, 0, 0) ?S(0, 0, 0) ] Plan(i + 1)
 done: Plan(i) ->
 
@@ -339,7 +340,8 @@ class Writer {
           squares_ += std::pow(of.style[s] - found->second.style[s], 2);
   }
   double stray() const {
-    return options_.smoothing.value_or(std::clamp(10. / double(traced_.cells.size()), .4, 1.2));
+    const auto count = double(traced_.cells.size());
+    return options_.smoothing.value_or(count < 25. ? std::min(1.2, 10. / count) : 0.);
   }
   // What keeps styles as different among neurons as they are, when the differences of like ones are added.
   double kept() const {
@@ -390,16 +392,18 @@ class Writer {
   }
 
   void arbors() {
-    put("\n\n# The stems that one like each neuron has.\n"
-        "sample arbors(cell =, stem = -> plan) =");
+    put("\n\n# The stems that one like each neuron has, and the stem as which each leaves the soma and heads "
+        "for its tips.\n"
+        "sample arbors(cell =, stem = -> plan, pose) =");
     std::vector<std::size_t> first_of(1, 0);  // the number of a neuron's first stem among all
     for (const Cell& c : traced_.cells) first_of.push_back(first_of.back() + c.stems.size());
     for (std::size_t i = 0; i < mixed_.size(); ++i)
       for (std::size_t k = 0; k < mixed_[i].stems.size(); ++k) {
-        const Stem* stem = mixed_[i].stems[k];
+        const auto number = [&](const Stem* stem) {
+          return first_of[stem->cell] + std::size_t(stem - traced_.cells[stem->cell].stems.data());
+        };
         row(!i && !k);
-        put("{} {} -> {}", i, k,
-            first_of[stem->cell] + std::size_t(stem - traced_.cells[stem->cell].stems.data()));
+        put("{} {} -> {} {}", i, k, number(mixed_[i].stems[k]), number(mixed_[i].poses[k]));
       }
   }
 
@@ -501,7 +505,7 @@ class Writer {
   }
 
   void productions() {
-    put("\n\n# This neuron is made of three traced ones, and its style strays as two neurons alike to it "
+    put("\n\n# This neuron is made of four traced ones, and its style strays as two neurons alike to it "
         "differ.\n"
         "cell me = cells.ring(dealt({}))\ncell one = alike.cell(alike(me, floor(uniform(0, "
         "kin))))\n"

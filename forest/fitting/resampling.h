@@ -11,8 +11,8 @@
 //   slice; daughters bear this together, so that a tuft stays over its trunk;
 // - a neuron has a style of its own, how long, winding, thick, finely and steeply traced its branches are, and forks of
 //   neurons of a like style are drawn for it: else neurons would be more alike than traced ones;
-// - a neuron is made of three traced ones that are alike (mixing.h): it has the stems of a second, of basal and other dendrites
-//   the basal ones alone, and the diameters of a third, so that none is like one of them all over.
+// - a neuron is made of four traced ones that are alike (mixing.h): it has the stems of a second, of basal and other dendrites
+//   the basal ones alone, lying as those of a fourth, and the diameters of a third, so that none is like one of them all over.
 #pragma once
 
 #include <cstddef>
@@ -54,7 +54,7 @@ struct Resampling {
   double tracer = .25;                        // … where the style is the tracer's: how steep, how kinked
   double familiar = 1.;  // how often a fork may come from the neuron whose style its branch has
   // How far a neuron's style strays, in differences of two of its kin: 0 takes that of a traced neuron as it is. When not given,
-  // .4, or with fewer than 25 neurons 10 over their number, at most 1.2: few show little of what there is.
+  // 0, or with fewer than 25 neurons 10 over their number, at most 1.2: few show little of what there is.
   std::optional<double> smoothing = {};
   double jitter = .1;   // of the logarithms of a stem's tips and, at most, reach
   std::size_t kin = 4;  // neurons alike, by whose differences it is changed; none is its mate or third
