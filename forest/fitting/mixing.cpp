@@ -50,6 +50,10 @@ Lent lent(const Kinds& neuron, const Kinds& mate) {
   return neuron == mate ? Lent::all : Lent::nothing;
 }
 
+bool is_lent(const Stem& s, Lent lent) {
+  return lent == Lent::all || (lent == Lent::basal_stems && is_basal(s));
+}
+
 // Of the basal stems, the mean angle between where they leave the soma and where the nearest other stem does, in degrees; none
 // where there are not both.
 std::optional<double> angle_between(const Cell& others, const Cell& basal) {
@@ -65,10 +69,10 @@ std::optional<double> angle_between(const Cell& others, const Cell& basal) {
       }
   return least.empty() ? std::nullopt : std::optional(statistics::mean(least));
 }
-// By how much that angle changes in a neuron when its basal stems are those of another, degrees.
-double widened(const Cell& neuron, const Cell& mate) {
-  const std::optional<double> was = angle_between(neuron, neuron), is = angle_between(neuron, mate);
-  return was && is ? *is - *was : 0.;
+// What it costs that this angle changes in a neuron when its basal stems lie as those of another.
+double widened(const Cell& neuron, const Cell& other) {
+  const std::optional<double> was = angle_between(neuron, neuron), is = angle_between(neuron, other);
+  return was && is ? std::pow((*is - *was) / near_angle, 2) : 0.;
 }
 
 // A permutation of `count` neurons with the least sum of costs, by shortest augmenting paths (Kuhn's Hungarian method; Jonker &
@@ -161,20 +165,20 @@ double deeper(const Cell& one, const Cell& other) {
 }
 
 // What stems must share for one to have the pose of the other: the kind, and whether they have a length or fork where they leave.
-std::pair<int, bool> sort(const Stem* s) { return {s->kind, s->length > 0.}; }
+std::pair<int, bool> sort_of(const Stem* s) { return {s->kind, s->length > 0.}; }
 
 // The stems of a cell that has lent them, each sort by the path to the farthest tip.
 std::vector<const Stem*> ranked(const Cell& cell, Lent lent) {
   std::vector<const Stem*> stems;
   for (const Stem& s : cell.stems)
-    if (lent == Lent::all || (lent == Lent::basal_stems && is_basal(s))) stems.push_back(&s);
-  std::ranges::stable_sort(stems, {}, [](const Stem* s) { return std::pair(sort(s), s->ahead); });
+    if (is_lent(s, lent)) stems.push_back(&s);
+  std::ranges::stable_sort(stems, {}, [](const Stem* s) { return std::pair(sort_of(s), s->ahead); });
   return stems;
 }
 
 // How unlike the stems of two are, the first beside the first; nothing where one has other sorts of them.
 std::optional<double> unlike(std::span<const Stem* const> ones, std::span<const Stem* const> others) {
-  if (!std::ranges::equal(ones, others, {}, sort, sort)) return std::nullopt;
+  if (!std::ranges::equal(ones, others, {}, sort_of, sort_of)) return std::nullopt;
   const auto square = [](double one, double other) {
     return std::pow(std::log(std::max(1., one) / std::max(1., other)), 2);
   };
@@ -197,7 +201,7 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
            (kinds[i] == kinds[j] ? 0. : seldom);
   };
   const std::vector<std::size_t> mates = partners(cells.size(), [&](std::size_t i, std::size_t j) {
-    return cost(i, j) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
+    return cost(i, j) + widened(cells[i], cells[j]) +
            (lent(kinds[i], kinds[j]) == Lent::nothing ? hardly : 0.);
   });
   const std::vector<std::size_t> thirds = partners(cells.size(), [&](std::size_t i, std::size_t j) {
@@ -206,7 +210,7 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
   const auto lent_to = [&](std::size_t i) { return lent(kinds[i], kinds[mates[i]]); };
   const std::vector<std::size_t> fourths = partners(cells.size(), [&](std::size_t i, std::size_t j) {
     const auto stems = unlike(ranked(cells[mates[i]], lent_to(i)), ranked(cells[j], lent_to(i)));
-    return stems.value_or(hardly) + std::pow(widened(cells[i], cells[j]) / near_angle, 2) +
+    return stems.value_or(hardly) + widened(cells[i], cells[j]) +
            std::pow(as_deep * deeper(cells[i], cells[j]), 2) + (j == mates[i] ? unmoved : 0.);
   });
   std::vector<Mixed> mixed;
@@ -220,9 +224,9 @@ std::vector<Mixed> mix(const Traced& traced, std::size_t kin) {
             .others_as = of_mate == Lent::all ? mates[i] : i,
             .thin_as = thirds[i]};
     for (const Stem& s : own.stems)
-      if (of_mate == Lent::nothing || (of_mate == Lent::basal_stems && !is_basal(s))) m.stems.push_back(&s);
+      if (!is_lent(s, of_mate)) m.stems.push_back(&s);
     for (const Stem& s : mate.stems)
-      if (of_mate == Lent::all || (of_mate == Lent::basal_stems && is_basal(s))) m.stems.push_back(&s);
+      if (is_lent(s, of_mate)) m.stems.push_back(&s);
     m.poses = m.stems;
     const std::vector<const Stem*> stems = ranked(mate, of_mate), poses = ranked(cells[fourths[i]], of_mate);
     if (unlike(stems, poses))
