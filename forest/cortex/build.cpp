@@ -132,6 +132,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
     fit_faces(cortex.elements, outer, inner, Fit::volume);
   }
+  keep_volume(cortex.elements, cortex.between - cortex.wall);
 }
 
 }  // namespace

@@ -318,6 +318,31 @@ TEST_F(Shell, GapsAreTheVolumeThatElementsLackAndFacesTakeIt) {
   EXPECT_TRUE(uncertified(thin).empty());
 }
 
+TEST_F(Shell, WhatIsMissingIsSpreadEvenlyAndSoIsWhatIsTooMuch) {
+  const Elements before = made().cortex.elements;
+  double volume = 0.;
+  for (std::size_t e = 0; e < before.size(); ++e) volume += before.hexahedron(e).volume();
+  for (const double share : {.99, 1.01}) {
+    Elements elements = before;
+    keep_volume(elements, share * volume);
+    double kept = 0.;
+    std::vector<double> ways;
+    for (std::size_t e = 0; e < elements.size(); ++e) kept += elements.hexahedron(e).volume();
+    EXPECT_NEAR(kept, share * volume, 1e-4 * volume);
+    EXPECT_TRUE(uncertified(elements).empty());
+    for (std::size_t c = 0; c < before.curves.size(); ++c)
+      for (const std::size_t depth : {0, 3})
+        ways.push_back((elements.curves[c][depth] - before.curves[c][depth]).norm());
+    std::ranges::sort(ways);  // some stay, where an element would lose its shape
+    EXPECT_LE(ways.back(), 25.);
+    EXPECT_GT(ways[ways.size() / 20], .8 * ways.back());
+  }
+  Elements too_much = before;
+  keep_volume(too_much, 2. * volume);
+  for (std::size_t c = 0; c < before.curves.size(); ++c)
+    EXPECT_LE((too_much.curves[c][0] - before.curves[c][0]).norm(), 25.001);
+}
+
 TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   const Cortex& cortex = made().cortex;
   const TriangleTree outer_tree(outer);

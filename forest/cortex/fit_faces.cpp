@@ -3,6 +3,8 @@
 
 #include <algorithm>
 #include <array>
+#include <functional>
+#include <numeric>
 
 #include <Eigen/Cholesky>
 
@@ -64,31 +66,40 @@ Ways ways(const Elements& elements, std::size_t element, std::size_t depth, cons
   return result;
 }
 
-// What is missing between a face and the surface, as a height over all of it.
-Moves raised(const Elements& elements, std::size_t element, std::size_t depth, double gap) {
-  constexpr double most = 300.;  // µm
+double area_of_face(const Elements& elements, std::size_t element, std::size_t depth) {
   const auto& own = elements.elements[element];
   const auto at = [&](int i, int j) -> const Place& { return elements.curves[own[slot(i, j)]][depth]; };
   double area = 0.;
   for (int j = 0; j < 3; ++j)
     for (int i = 0; i < 3; ++i)
       area += .5 * (at(i + 1, j + 1) - at(i, j)).cross(at(i, j + 1) - at(i + 1, j)).norm();
+  return area;
+}
+
+// Where a curve leaves the elements.
+Place outwards(const Depths& curve, std::size_t depth) {
+  return (curve[depth] - curve[depth == 0 ? 1 : 2]).normalized();
+}
+
+// What is missing between a face and the surface, as a height over all of it.
+Moves raised(const Elements& elements, std::size_t element, std::size_t depth, double gap) {
+  constexpr double most = 300.;  // µm
+  const double area = area_of_face(elements, element, depth);
   const double height = area > 0. ? std::clamp(gap / area, -most, most) : 0.;
-  const std::size_t next = depth == 0 ? 1 : 2;
   Moves result;
-  for (std::size_t c = 0; c < 16; ++c) {
-    const Depths& curve = elements.curves[own[c]];
-    result.row(Eigen::Index(c)) = height * (curve[depth] - curve[next]).normalized().transpose();
-  }
+  for (std::size_t c = 0; c < 16; ++c)
+    result.row(Eigen::Index(c)) =
+        height * outwards(elements.curves[elements.elements[element][c]], depth).transpose();
   return result;
 }
+
+constexpr double good = .5;  // scaled Jacobian
 
 }  // namespace
 
 void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit) {
   const int rounds = fit == Fit::places ? 3 : 2;
   const Shares by_place = shares(fit);
-  constexpr double good = .5;  // scaled Jacobian
   const std::vector<double> keep = to_keep(elements, good);
   const std::vector<Depths> before = elements.curves;
   std::vector<Moves> moves(elements.size());
@@ -114,6 +125,30 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
   std::vector<Depths> fitted = before;
   fitted.swap(elements.curves);
   go(elements, fitted, keep);
+}
+
+void keep_volume(Elements& elements, double volume) {
+  constexpr double most = 25.;  // µm
+  const std::vector<double> keep = to_keep(elements, good);
+  const std::size_t n = elements.size();
+  std::vector<double> volumes(n), areas(n);
+  double gone = 0.;
+  constexpr int rounds = 4;  // what some elements cannot take others do
+  for (int round = 0; round < rounds; ++round) {
+    parallel_for(n, 64, [&](std::size_t e) {
+      volumes[e] = elements.hexahedron(e).volume();
+      areas[e] = area_of_face(elements, e, 0) + area_of_face(elements, e, 3);
+    });
+    const double missing = std::accumulate(volumes.begin(), volumes.end(), volume, std::minus()),
+                 area = std::accumulate(areas.begin(), areas.end(), 0.);
+    if (!(area > 0.)) return;
+    const double height = std::clamp(missing / area, -most - gone, most - gone);
+    gone += height;
+    std::vector<Depths> aim = elements.curves;
+    for (Depths& curve : aim)
+      for (const std::size_t depth : {0, 3}) curve[depth] += height * outwards(curve, depth);
+    go(elements, aim, keep);
+  }
 }
 
 }  // namespace forest::cortex
