@@ -132,7 +132,13 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
     fit_faces(cortex.elements, outer, inner, Fit::volume);
   }
-  keep_volume(cortex.elements, cortex.between - cortex.wall);
+  // What some faces cannot take all of them do, and as shapes do not suffer by that, volumes are evened once more, and again.
+  const double whole = cortex.between - cortex.wall;
+  keep_volume(cortex.elements, whole);
+  for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
+    improve_shapes(cortex.elements, outer, inner, roomy, progress);
+    keep_volume(cortex.elements, whole);
+  }
 }
 
 }  // namespace

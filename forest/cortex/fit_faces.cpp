@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <functional>
 #include <numeric>
 
@@ -128,7 +129,8 @@ void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree
 }
 
 void keep_volume(Elements& elements, double volume) {
-  constexpr double most = 25.;  // µm
+  constexpr double most = 25.;    // µm
+  constexpr double close = 1e-5;  // of the volume: what may be missing still
   const std::vector<double> keep = to_keep(elements, good);
   const std::size_t n = elements.size();
   std::vector<double> volumes(n), areas(n);
@@ -141,7 +143,7 @@ void keep_volume(Elements& elements, double volume) {
     });
     const double missing = std::accumulate(volumes.begin(), volumes.end(), volume, std::minus()),
                  area = std::accumulate(areas.begin(), areas.end(), 0.);
-    if (!(area > 0.)) return;
+    if (!(area > 0.) || std::abs(missing) <= close * volume) return;
     const double height = std::clamp(missing / area, -most - gone, most - gone);
     gone += height;
     std::vector<Depths> aim = elements.curves;
