@@ -4,8 +4,8 @@
 //
 // Every neuron has a mate and a third, as alike to it as can be when each is another's mate only once, and third only once, and
 // neither is one of its kin, the few that are most like it: then what is grown would lie too near. So many grown neurons as were
-// traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice and how its tracer set points are
-// its own, its diameters those of the third. The stems and their style are the mate's: where both have basal dendrites, these
+// traced have the stems of each, and the diameters of each. Its soma, where it lies in the slice, how its branches wind and how its
+// tracer set points are its own, its diameters those of the third. The stems and their style are the mate's: where both have basal dendrites, these
 // alone; else all, if both have the same kinds of them. So no kind of dendrite comes more often than it was traced.
 //
 // Where the mate's stems leave the soma and whither they lead is, stem by stem, as in a fourth neuron that has as many of them: of

@@ -60,8 +60,7 @@ distribution pose(i) = arbors.pose(arbors(me, i))
 # How many times longer a branch is drawn than it was traced, so that its farthest tip is as far along it as it should be.
 function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
-function bending(kind, s, u, v, donor) = max(0.5, min(2, straighter(kind) * sqrt(
-  max(0.01, styles.winding(s) + sd_wander(kind) * stray * (styles.wander(u) - styles.wander(v))) / styles.winding(donor))))
+distribution bending(kind, donor) = max(0.5, min(2, straighter(kind) * sqrt(styles.winding(styles(me, kind)) / styles.winding(donor))))
 # How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
 distribution steeper(kind, donor) = climb(kind) *
@@ -127,7 +126,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     ex = ax - plans.x(g) - scale * stems.tx(r), ey = ay - plans.y(g) - scale * stems.ty(r), ez = az - plans.z(g) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(g), plans.y(g), plans.z(g)) Head(plans.hx(g), plans.hy(g), plans.hz(g))
-       Trace(stems, r, 0, scale, turn = 0, bent = bending(kind, s, u, v, from), like = p, thickness = thick,
+       Trace(stems, r, 0, scale, turn = 0, bent = bending(kind, from), like = p, thickness = thick,
          x = part * ex, y = part * ey, z = part * ez, steep = sz, stairs = stepped(kind, from), kinked = turned(kind, from),
          kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
        Twig(kind, stems.donor(r), stems.next(r), 1, 0, tips, scale * (stems.ahead(r) - stems.length(r)), scale * stems.length(r), 0, d, ax, ay, az)
@@ -178,7 +177,7 @@ three: Fork(kind, r, q, run, tips, path, order, mirror, thick, scale, ax, ay, az
      [ Limb(kind, r, q, run, 1, m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
      [ Limb(kind, r, q, run, 2, tips - n - m, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi) ]
 limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, az, px, py, pz, phi)
-  { s = styles(whose(kind), kind), u = styles(one, kind), v = styles(other, kind), donor = forks.donor(r), from = styles(donor, kind),
+  { s = styles(whose(kind), kind), donor = forks.donor(r), from = styles(donor, kind),
     thin = styles.thinnest(styles(thin_as, kind)),
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
@@ -192,7 +191,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     off = sqrt(gx^2 + gy^2 + gz^2), over = max(0, 1 - styles.farthest(s) / max(1, off)),
     back = (1 - steer) * over * drawn(length, beyond, over * gx, over * gy, over * gz),
     last = thick^exp(0 - length / fade), d = max(thin, last * nth(i, calibres.d1(q), calibres.d2(q), calibres.d3(q))) }
-  -> Trace(forks, r, i, scale, mirror, turn = 0, about = phi, bent = bending(kind, s, u, v, from),
+  -> Trace(forks, r, i, scale, mirror, turn = 0, about = phi, bent = bending(kind, from),
        like = q, thickness = thick, last = last, thinnest = thin,
        x = part * (wx - gx) - back * gx, y = part * (wy - gy) - back * gy, z = part * (wz - gz) - back * gz, steep = sz,
        stairs = stepped(kind, from), kinked = turned(kind, from), kinks = kinky(kind, from), climbing = 1, levelled = levelled(kind, from))
@@ -244,14 +243,12 @@ class Writer {
   void row(bool first) { put("{}\n  ", first ? "" : ";"); }
 
   void cells() {
-    put("\n# Neurons: the diameter of their soma (µm), of the point where they begin when they have none "
-        "(else -1),\n"
-        "# between which depths they lie, how many stems one like this has, and the neurons in whose style "
-        "its basal\n"
-        "# dendrites are, in whose all others, and whose diameters it has; and, of as many places of a ring "
-        "in which\n"
-        "# like ones lie side by side, the neuron there.\n"
-        "sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring) =");
+    put(R"(
+# Neurons: the diameter of their soma (µm), of the point where they begin when they have none (else -1),
+# between which depths they lie, how many stems one like this has, and the neurons in whose style its basal
+# dendrites are, in whose all others, and whose diameters it has; and, of as many places of a ring in which
+# like ones lie side by side, the neuron there.
+sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring) =)");
     const std::vector<std::size_t> around = ring(traced_, mixed_);
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
       const Cell& c = traced_.cells[i];
@@ -263,9 +260,10 @@ class Writer {
   }
 
   void gauges() {
-    put("\n\n# The diameters that each neuron's points of a kind have, µm, and of how many each is: a tracer "
-        "has so many to choose from.\n"
-        "sample gauges(cell =, kind = -> points) =");
+    put(R"(
+
+# The diameters that each neuron's points of a kind have, µm, and of how many each is: a tracer has so many to choose from.
+sample gauges(cell =, kind = -> points) =)");
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
       for (const auto& [kind, unused] : traced_.deviations) {
@@ -289,19 +287,14 @@ class Writer {
   }
 
   void styles_of_cells() {
-    put("\n\n# Their styles, in standard deviations, of each kind of section: how long, winding, thick and "
-        "coarsely traced "
-        "branches are,\n"
-        "# how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide "
-        "their forks, how much\n"
-        "# thinner daughters, how far they reach and how often they fork; the thinnest diameter and how far "
-        "from the soma the farthest branch ends (µm), the "
-        "mean "
-        "logarithm of path by chord,\n"
-        "# the mean angle between segments, which share of them is level, and how much the others differ in "
-        "how "
-        "steep they are, and those angles, in shares of the means.\n"
-        "sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky) =",
+    put(R"(
+
+# Their styles, in standard deviations, of each kind of section: how long, winding, thick and coarsely traced branches are,
+# how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide their forks, how much
+# thinner daughters, how far they reach and how often they fork; the thinnest diameter and how far from the soma the farthest
+# branch ends (µm), the mean logarithm of path by chord, the mean angle between segments, which share of them is level, and how
+# much the others differ in how steep they are, and those angles, in shares of the means.
+sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky) =)",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -320,8 +313,10 @@ class Writer {
   std::size_t kin() const { return std::min<std::size_t>(options_.kin, traced_.cells.size() - 1); }
 
   void alike() {
-    put("\n\n# To each neuron those most like it in style, the most alike first.\nsample alike(cell =, rank "
-        "= -> cell) =");
+    put(R"(
+
+# To each neuron those most like it in style, the most alike first.
+sample alike(cell =, rank = -> cell) =)");
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
       const std::vector<std::size_t>& others = mixed_[i].kin;
       for (std::size_t k = 0; k < kin(); ++k) {
@@ -363,12 +358,12 @@ class Writer {
   }
 
   void plans() {
-    put("\n\n# Their stems, in the order of the sample of stems: tips, where they leave the soma's centre "
-        "(µm) and head, their diameter where they end, the path to the farthest tip, their length, where the "
-        "middle of their "
-        "tips is, and how many times thicker they may be,\n# so that none ends or is thicker than the "
-        "thickest that was traced.\n"
-        "sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz, most) =");
+    put(R"(
+
+# Their stems, in the order of the sample of stems: tips, where they leave the soma's centre (µm) and head, their diameter where
+# they end, the path to the farthest tip, their length, where the middle of their tips is, and how many times thicker they may be,
+# so that none ends or is thicker than the thickest that was traced.
+sample plans(-> cell, kind, tips, x, y, z, hx, hy, hz, d, ahead, length, tx, ty, tz, most) =)");
     const auto end = [](const Stem& s) { return std::max(least_diameter, s.end_diameter); };
     const auto widest = [&](const Stem& s) {
       float radius = 0;
@@ -392,9 +387,10 @@ class Writer {
   }
 
   void arbors() {
-    put("\n\n# The stems that one like each neuron has, and the stem as which each leaves the soma and heads "
-        "for its tips.\n"
-        "sample arbors(cell =, stem = -> plan, pose) =");
+    put(R"(
+
+# The stems that one like each neuron has, and the stem as which each leaves the soma and heads for its tips.
+sample arbors(cell =, stem = -> plan, pose) =)");
     std::vector<std::size_t> first_of(1, 0);  // the number of a neuron's first stem among all
     for (const Cell& c : traced_.cells) first_of.push_back(first_of.back() + c.stems.size());
     for (std::size_t i = 0; i < mixed_.size(); ++i)
@@ -408,9 +404,11 @@ class Writer {
   }
 
   void stems() {
-    put("\n\n# Stems as they were traced; tips as a crowd (below), path and diameter as logarithms.\n"
-        "sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, "
-        "d ~ 0.3{}, seldom ~ 1\n  -> donor, next, ahead, length, tx, ty, tz) =",
+    put(R"(
+
+# Stems as they were traced; tips as a crowd (below), path and diameter as logarithms.
+sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, d ~ 0.3{}, seldom ~ 1
+  -> donor, next, ahead, length, tx, ty, tz) =)",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
     std::size_t stem = 0;
@@ -438,21 +436,15 @@ class Writer {
     widths("near_side", options_.height, [](const Fork& f) { return f.side; });
     widths("near_height", options_.height, [](const Fork& f) { return f.height; });
     widths("near_before", options_.depth, [](const Fork& f) { return f.depth; });
-    put("\n# Forks as they were traced: the branch that ends there (tips as a crowd, the path to the "
-        "farthest and "
-        "the diameter as logarithms; heading and\n"
-        "# place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, "
-        "lengths, paths beyond their ends, and whither the middle of their tips is, and of all.\n"
-        "sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ "
-        "near_order(kind), d ~ near_d(kind),\n"
-        "    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, swerve ~ {}, side ~ near_side(kind), height ~ "
-        "near_height(kind), "
-        "before ~ "
-        "near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}, seldom ~ 1\n"
-        "  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, "
-        "next2, "
-        "next3, "
-        "t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =",
+    put(R"(
+# Forks as they were traced: the branch that ends there (tips as a crowd, the path to the farthest and the diameter as logarithms;
+# heading and place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, lengths, paths beyond
+# their ends, and whither the middle of their tips is, and of all.
+sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ near_order(kind), d ~ near_d(kind),
+    hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, swerve ~ {}, side ~ near_side(kind), height ~ near_height(kind),
+    before ~ near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}, seldom ~ 1
+  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, next3,
+     t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =)",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
         options_.lean, options_.swerve, options_.aim, options_.aim, options_.aim_across, kernels_);
     for (const Fork& f : forks) {
@@ -488,11 +480,11 @@ class Writer {
   }
 
   void calibres() {
-    put("\n\n# The same forks, row by row, asked by how thick they are: the diameters where the branch ends "
-        "and its daughters end, µm.\n"
-        "sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.08, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, "
-        "l2 ~ 1, d ~ 0.07, seldom ~ 1\n"
-        "  -> d, d1, d2, d3) =");
+    put(R"(
+
+# The same forks, row by row, asked by how thick they are: the diameters where the branch ends and its daughters end, µm.
+sample calibres(kind =, daughters =, cell ~ 0.1, tips ~ 0.08, first ~ 0.08, ahead ~ 0.8, l1 ~ 1, l2 ~ 1, d ~ 0.07, seldom ~ 1
+  -> d, d1, d2, d3) =)");
     for (const Fork& f : traced_.forks) {
       row(&f == traced_.forks.data());
       put("{} {} {} {} {} {} {} {} {} {} -> {}", f.kind, f.daughters.size(), f.cell, logarithm(f.tips),
@@ -505,21 +497,21 @@ class Writer {
   }
 
   void productions() {
-    put("\n\n# This neuron is made of four traced ones, and its style strays as two neurons alike to it "
-        "differ.\n"
-        "cell me = cells.ring(dealt({}))\ncell one = alike.cell(alike(me, floor(uniform(0, "
-        "kin))))\n"
-        "cell other = alike.cell(alike(me, floor(uniform(0, kin))))\n"
-        "cell planned = cells.stems(me)\ncell basal_as = cells.basal_as(me)\ncell others_as = "
-        "cells.others_as(me)\ncell thin_as = "
-        "cells.thin_as(me)\n"
-        "function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))\n",
+    put(R"(
+
+# This neuron is made of four traced ones, and its style strays as two neurons alike to it differ.
+cell me = cells.ring(dealt({}))
+cell one = alike.cell(alike(me, floor(uniform(0, kin))))
+cell other = alike.cell(alike(me, floor(uniform(0, kin))))
+cell planned = cells.stems(me)
+cell basal_as = cells.basal_as(me)
+cell others_as = cells.others_as(me)
+cell thin_as = cells.thin_as(me)
+function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
+)",
         traced_.cells.size());
-    for (const auto& [name, style] : {std::pair{"forks", number},
-                                      {"extent", extent},
-                                      {"wander", wander},
-                                      {"girth", girth},
-                                      {"slope", slope}}) {
+    for (const auto& [name, style] :
+         {std::pair{"forks", number}, {"extent", extent}, {"girth", girth}, {"slope", slope}}) {
       const std::size_t of = style;
       table(fmt::format("sd_{}", name), traced_.deviations,
             [&](const Style& sd) { return std::min(sd[of], most_deviation); });
@@ -527,14 +519,14 @@ class Writer {
     table("mean_slope", traced_.means, [](const Style& mean) { return mean[slope]; });
     std::string style;
     for (std::size_t i = 0; i < styles; ++i)
-      style +=
-          fmt::format(fmt::runtime(i == girth || i == thinning ? "{1}{0} = styles.{0}(u)"
-                                   : habit(i)                  ? "{1}{0} = styles.{0}(t)"
-                                              : "{1}{0} = own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
-                      style_names[i],
-                      !i      ? ""
-                      : i % 3 ? ", "
-                              : ",\n      ");
+      style += fmt::format(
+          fmt::runtime(i == girth || i == thinning ? "{1}{0} = styles.{0}(u)"
+                       : of_dealt(i)               ? "{1}{0} = styles.{0}(t)"
+                                     : "{1}{0} = own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
+          style_names[i],
+          !i      ? ""
+          : i % 3 ? ", "
+                  : ",\n      ");
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
@@ -580,8 +572,8 @@ class Writer {
     for (std::size_t k = 0; k < knobs.size(); ++k)
       table(
           knobs[k].name, tuning_, [&](const auto& values) { return values[k]; }, knobs[k].says);
-    put("# No stem has more tips, or reaches farther (µm), than half as much again as the largest that was "
-        "traced.\n");
+    put(R"(# No stem has more tips, or reaches farther (µm), than half as much again as the largest that was traced.
+)");
     most("most_tips", 1., [](const Stem& stem) { return stem.tips; });
     most("most_ahead", 10., [](const Stem& stem) { return stem.ahead; });
   }

@@ -11,7 +11,7 @@
 //   slice; daughters bear this together, so that a tuft stays over its trunk;
 // - a neuron has a style of its own, how long, winding, thick, finely and steeply traced its branches are, and forks of
 //   neurons of a like style are drawn for it: else neurons would be more alike than traced ones;
-// - a neuron is made of four traced ones that are alike (mixing.h): it has the stems of a second, of basal and other dendrites
+// - a neuron is made of four traced ones that are alike (mixing.h): it winds as the first, and has the stems of a second, of basal and other dendrites
 //   the basal ones alone, lying as those of a fourth, and the diameters of a third, so that none is like one of them all over.
 #pragma once
 

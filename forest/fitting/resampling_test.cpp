@@ -260,17 +260,23 @@ TEST(Resampling, SoManyNeuronsAsWereTracedHaveEachOnesStems) {
   }
 }
 
-// Two small neurons and two large ones with basal and apical dendrites, each pair traced in long steps (8 µm) and in short ones
-// (2 µm). How high above the soma stems leave says whose they are.
-std::vector<Morphology> of_two_tracers() {
+// How a branch is drawn: µm from point to point, and radians by which they leave its direction.
+struct Drawn {
+  double step, turn;
+};
+
+// Two small neurons and two large ones with basal and apical dendrites, of each pair one drawn in one way and one in the other. How
+// high above the soma stems leave says whose they are.
+std::vector<Morphology> in_pairs(Drawn even, Drawn odd) {
   const std::vector<Morphology> models =
-      each_with(4, 9, [](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
-        const double step = i % 2 ? 2. : 8., size = i < 2 ? 1. : 2.;
-        const auto path = [&](Point from, double angle) {
+      each_with(4, 9, [&](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+        const auto [step, turn] = i % 2 ? odd : even;
+        const double size = i < 2 ? 1. : 2.;
+        const auto path = [&, step = step, turn = turn](Point from, double angle) {
           std::vector<Point> points{from};
           for (double way = 0.; way < 40. * size; way += step) {
             Point p = points.back();
-            const double turned = angle + .2 * random.normal();
+            const double turned = angle + turn * random.normal();
             p.x += float(step * std::cos(turned)), p.y += float(step * std::sin(turned));
             points.push_back(p);
           }
@@ -288,6 +294,8 @@ std::vector<Morphology> of_two_tracers() {
       });
   return models;
 }
+
+std::vector<Morphology> of_two_tracers() { return in_pairs({8., .2}, {2., .2}); }
 
 // Whose the stems of this kind are.
 int whose(const Morphology& n, SectionKind kind) {
@@ -352,6 +360,24 @@ TEST(Resampling, PointsAreAsFarApartInBasalAsInApicalDendrites) {
     apart += std::abs(step(n, SectionKind::basal) - wanted) > most;
   }
   EXPECT_LE(apart, 2);  // of few neurons a branch of the other tracer is drawn at times
+}
+
+// Those of the same size are mates, one straight and one winding; all of a neuron winds as its apical dendrites, which are its own.
+TEST(Resampling, BasalDendritesOfAnotherWindAsTheApicalOne) {
+  const std::vector<Morphology> models = in_pairs({4., .25}, {4., .5});
+  for (std::size_t i = 0; const Mixed& m : mix(learn(models, statistics::dendrites), Resampling().kin))
+    EXPECT_NE(m.basal_as % 2, i++ % 2);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const auto winding = [](const Morphology& n, SectionKind kind) {
+    return std::log(
+        statistics::mean(statistics::find_metric("section_tortuosity")->values(Arbors(n, {kind}))));
+  };
+  for (const SectionKind kind : {SectionKind::apical, SectionKind::basal}) {
+    std::array<std::vector<double>, 2> windings;
+    for (const Morphology& n : lsystem::grow_population(grammar, 80, 3))
+      windings[std::size_t(whose(n, SectionKind::apical) % 2)].push_back(winding(n, kind));
+    EXPECT_GT(statistics::mean(windings[1]), 2. * statistics::mean(windings[0]));
+  }
 }
 
 // A trunk with twigs and a tuft, which lean to one side, another in each; the longest branch of the tuft goes to any side.

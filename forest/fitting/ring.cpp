@@ -26,7 +26,7 @@ std::vector<double> description(const Traced& traced, std::span<const Mixed> mix
     const std::size_t stems_of = kind == int(SectionKind::basal) ? of.basal_as : of.others_as;
     for (std::size_t s = 0; s < styles; ++s) {
       const bool thickness = s == girth || s == thinning;
-      const auto& kinds = traced.cells[habit(s) ? neuron : thickness ? of.thin_as : stems_of].kinds;
+      const auto& kinds = traced.cells[of_dealt(s) ? neuron : thickness ? of.thin_as : stems_of].kinds;
       const auto found = kinds.find(kind);
       all.push_back(found == kinds.end() ? 0. : found->second.style[s]);
     }

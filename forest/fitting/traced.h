@@ -42,6 +42,8 @@ inline constexpr std::array<const char*, styles> style_names{"reach",    "wander
                                                              "thinning", "extent", "forks"};
 // What is a tracer's habit rather than a neuron's.
 constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
+// What a grown neuron has of the neuron that was dealt, whose soma and tracer it has, and not of the mate or the third.
+constexpr bool of_dealt(std::size_t style) { return style == wander || habit(style); }
 using Style = std::array<double, styles>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured
