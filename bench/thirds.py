@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 # SPDX-License-Identifier: Apache-2.0
-"""How well does what `brainforest fit` makes of a folder of cells tell from cells it never saw?
+"""How well can what `brainforest fit` makes of a folder of cells be told from cells that it never saw?
 thirds.py CELLS [--slices REGEX] [--seeds 1,2] [--set NAME=VALUE] [--model-regex 'PATTERN=>TEXT'] [--held-back]
 
 Cells whose slice has a name with a SHA-256 sum that begins with 0 to 4 are held back and left out. The others are dealt
@@ -67,14 +67,14 @@ def run(*words):
 
 def fit(cells, model):
     run("fit", *cells, "-o", model)
-    text = model.read_text()
+    text = model.read_text(encoding="utf-8")
     edits = [(rf"(?m)^(#define {re.escape(name)}) \S+", rf"\g<1> {value}")
              for name, value in (words.split("=") for words in options.set)]
     for pattern, to in edits + [words.split("=>") for words in options.model_regex]:
         text, found = re.subn(pattern, to, text)
         if not found:
             raise RuntimeError(f"the model has no {pattern}")
-    model.write_text(text)
+    model.write_text(text, encoding="utf-8")
 
 
 def dealt(cells, deal):
@@ -148,12 +148,9 @@ def third(deal, part):
         return found
 
 
-def judged(seed):
-    with tempfile.TemporaryDirectory() as folder:
-        model = pathlib.Path(folder) / "m.lsys"
-        fit(free, model)
-        return json.loads(run("judge", "--model", model, "--train", *free, "--held-out", *held_back, "--repeats", 20,
-                              "--seed", seed, "--slices", options.slices, "--json"))
+def judged(model, seed):
+    return json.loads(run("judge", "--model", model, "--train", *free, "--held-out", *held_back, "--repeats", 20,
+                          "--seed", seed, "--slices", options.slices, "--json"))
 
 
 cells = sorted({path for folder in options.cells for path in folder.glob("**/*.swc")}, key=lambda path: path.name)
@@ -162,7 +159,9 @@ if len(free) < 12:
     sys.exit(f"{len(free)} cells are not held back; twelve are needed")
 seeds = [int(seed) for seed in options.seeds.split(",")]
 if options.held_back:
-    print(json.dumps([judged(seed) for seed in seeds], indent=1))
+    with tempfile.TemporaryDirectory() as folder, concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:
+        fit(free, pathlib.Path(folder) / "m.lsys")
+        print(json.dumps(list(pool.map(lambda seed: judged(pathlib.Path(folder) / "m.lsys", seed), seeds)), indent=1))
     sys.exit()
 jobs = [(deal, part) for deal in range(options.deals) for part in range(3)]
 with concurrent.futures.ThreadPoolExecutor(options.jobs) as pool:

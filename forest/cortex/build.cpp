@@ -117,7 +117,10 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
       .enough = .5, .wanted = .62, .volume = volume, .even = 16., .worst_off = 100., .gain = .01};
   Shaping roomy = even;
   roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  constexpr int evenings = 2, last_evenings = 9;
+  // … by weight, held closer to the surfaces, and not given up as soon.
+  Shaping weighty = roomy;
+  weighty.even = 40., weighty.off = 35., weighty.iterations = 120, weighty.gain = .005;
+  constexpr int evenings = 2, evenings_with_faces = 6;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
@@ -128,17 +131,19 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
   fit_faces(cortex.elements, outer, inner, Fit::places);
   for (int time = 0; time < 2; ++time) fit_faces(cortex.elements, outer, inner, Fit::volume);
   // Faces that take what they lacked make volumes uneven again.
-  for (int time = 0; time < last_evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
+  for (int time = 0; time < evenings_with_faces && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
     fit_faces(cortex.elements, outer, inner, Fit::volume);
   }
-  // What some faces cannot take all of them do, and as shapes do not suffer by that, volumes are evened once more, and again.
+  // What some faces cannot take all of them do, and as shapes do not suffer by that, volumes are evened to the end.
   const double whole = cortex.between - cortex.wall;
   keep_volume(cortex.elements, whole);
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
-    improve_shapes(cortex.elements, outer, inner, roomy, progress);
+    improve_shapes(cortex.elements, outer, inner, weighty, progress);
     keep_volume(cortex.elements, whole);
   }
+  begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
+  keep_volume(cortex.elements, whole);
 }
 
 }  // namespace

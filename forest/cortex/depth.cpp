@@ -271,7 +271,12 @@ class DepthError {
     for (std::size_t j = 0; j < side; ++j)
       for (std::size_t i = 0; i < side; ++i) columns_[side * j + i] = Column(h, at(i), at(j));
   }
-  double operator()(const Layers& layers) const {
+  struct Error {
+    double largest = 0.,
+           norm =
+               0.;  // norm: the sum of eighth powers, which knows of those that are nearly the largest, too
+  };
+  Error operator()(const Layers& layers) const {
     std::vector<double> above(std::size_t(levels_) + 1, 0.);
     for (std::size_t j = 0; j < side; ++j)
       for (std::size_t i = 0; i < side; ++i) {
@@ -283,10 +288,13 @@ class DepthError {
               columns_[side * j + i].above(layers.plain_ ? depth : between(knots, depth));
         }
       }
-    double worst = 0.;
-    for (int k = 1; k < levels_; ++k)
-      worst = std::max(worst, std::abs(above[std::size_t(k)] / above.back() - double(k) / levels_));
-    return worst;
+    Error result;
+    for (int k = 1; k < levels_; ++k) {
+      const double off = std::abs(above[std::size_t(k)] / above.back() - double(k) / levels_);
+      result.largest = std::max(result.largest, off);
+      result.norm += std::pow(off, 8);
+    }
+    return result;
   }
 
  private:
@@ -302,7 +310,7 @@ class DepthError {
 };
 
 double depth_error(const Elements& elements, std::size_t element) {
-  return DepthError(elements.hexahedron(element), 24)(Layers(elements, element));
+  return DepthError(elements.hexahedron(element), 24)(Layers(elements, element)).largest;
 }
 
 namespace {
@@ -314,17 +322,20 @@ void settle(const Elements& elements, Depth& depth, std::size_t element) {
   constexpr int levels = 48;
   const DepthError error(elements.hexahedron(element), levels);
   Depth::Table& own = depth.elements[element];
-  double best = error(Layers(elements, depth, element));
-  for (float change = .02f; best > enough && change > 1e-3f; change /= 2.f)
+  DepthError::Error best = error(Layers(elements, depth, element));
+  for (float change = .02f; best.largest > enough && change > 2e-4f;) {
+    bool gained = false;
     for (float& w : own)
       for (const float sign : {1.f, -1.f}) {
         const float before = w;
         w += sign * change;
-        if (const double now = error(Layers(elements, depth, element)); now < best)
-          best = now;
+        if (const DepthError::Error now = error(Layers(elements, depth, element)); now.norm < best.norm)
+          best = now, gained = true;
         else
           w = before;
       }
+    if (!gained) change /= 2.f;
+  }
 }
 
 }  // namespace
