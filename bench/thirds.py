@@ -7,7 +7,8 @@ Cells whose slice has a name with a SHA-256 sum that begins with 0 to 4 are held
 into thirds by slices, four times; a model is fitted to two thirds, grows as many neurons as are in the third, and
 scikit-learn's forests tell these from it, slices kept together and each grown neuron a slice of its own. Beside them, traced
 cells that were fitted to, as many. Printed, as JSON: mean areas under the curve on structure and on all features, and how far
-the nearest training cell is, in what it is for the cells of the third.
+the nearest training cell is, in what it is for the cells of the third; then how often `brainforest judge` finds each of its
+criteria met.
 
 --held-back judges the cells that are held back instead, by `brainforest judge`: for versions that are to be published, once.
 Needs python3-sklearn.
@@ -141,10 +142,12 @@ def third(deal, part):
         found = []
         for seed in seeds:
             run("grow", "--grammar", at / "m.lsys", "--count", len(held), "--seed", seed, "--out", at / f"{seed}")
-            told = run("judge", "--grown", at / f"{seed}", "--train", *train, "--held-out", *held, "--repeats", 1, "--seed",
+            told = run("judge", "--grown", at / f"{seed}", "--train", *train, "--held-out", *held, "--repeats", 5, "--seed",
                        seed, "--slices", options.slices, "--features", at / f"{seed}.csv", "--json")
+            told = json.loads(told)
             found.append(figures(at / f"{seed}.csv", seed, traced=seed == seeds[0]) |
-                         {"nearest": json.loads(told)["copying"]["neighbour_ratio"]})
+                         {"nearest": told["copying"]["neighbour_ratio"]} |
+                         {f"met: {asked['name']}": float(asked["pass"]) for asked in told["criteria"]})
         return found
 
 
