@@ -9,7 +9,6 @@ column "group"; by default grown against held_out and, of as many cells, train a
 Needs python3-sklearn.
 """
 import argparse
-import csv
 import json
 import sys
 
@@ -19,6 +18,7 @@ try:
     from sklearn.linear_model import LogisticRegression
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import StratifiedKFold
+    import features
 except ImportError as error:
     sys.exit(f"scikit-learn for Python cannot be loaded ({error}); install python3-sklearn")
 
@@ -30,21 +30,12 @@ arguments.add_argument("--trees", type=int, default=100)
 arguments.add_argument("--C", type=float, default=1 / 30)
 options = arguments.parse_args()
 
-with open(options.file, newline="", encoding="utf-8-sig") as file:
-    header, *rows = csv.reader(file)
-group = np.array([row[1] for row in rows])
-values = np.array([[float(x) if x else np.nan for x in row[2:]] for row in rows])
-diameters = np.array(["[diameters]" in name for name in header[2:]])
+_, group, values, diameters = features.read(options.file)
 
 
 def completed(X):
-    """Medians where nothing is defined, columns that say so, nothing constant, nothing twice."""
-    missing = np.isnan(X)
-    known = ~missing.all(axis=0)
-    X, missing = X[:, known], missing[:, known]
-    X = np.where(missing, np.nanmedian(X, axis=0), X)
-    X = np.unique(np.hstack([X, missing[:, missing.any(axis=0)].astype(float)]), axis=1)
-    X = X[:, X.std(axis=0) > 0]
+    """… and nothing twice, in standard deviations."""
+    X = np.unique(features.completed(X), axis=1)
     return (X - X.mean(axis=0)) / X.std(axis=0, ddof=1)
 
 

@@ -272,9 +272,8 @@ class DepthError {
       for (std::size_t i = 0; i < side; ++i) columns_[side * j + i] = Column(h, at(i), at(j));
   }
   struct Error {
-    double largest = 0.,
-           norm =
-               0.;  // norm: the sum of eighth powers, which knows of those that are nearly the largest, too
+    double largest = 0.;
+    double norm = 0.;  // the sum of eighth powers: knows of those that are nearly the largest, too
   };
   Error operator()(const Layers& layers) const {
     std::vector<double> above(std::size_t(levels_) + 1, 0.);
@@ -316,7 +315,7 @@ double depth_error(const Elements& elements, std::size_t element) {
 namespace {
 
 // Tables are exact at their depths; where w leaps from one to the next it is not between them. Such an element's own table is changed
-// here and there, by ever less, as long as the largest error becomes less.
+// here and there, by ever less, as long as the norm of its errors falls.
 void settle(const Elements& elements, Depth& depth, std::size_t element) {
   constexpr double enough = .0045;
   constexpr int levels = 48;

@@ -16,7 +16,6 @@ Needs python3-sklearn.
 import argparse
 import collections
 import concurrent.futures
-import csv
 import hashlib
 import json
 import os
@@ -32,10 +31,11 @@ try:
     from sklearn.ensemble import RandomForestClassifier
     from sklearn.metrics import roc_auc_score
     from sklearn.model_selection import StratifiedGroupKFold
+    import features
 except ImportError as error:
     sys.exit(f"scikit-learn for Python cannot be loaded ({error}); install python3-sklearn")
 
-root = pathlib.Path(__file__).resolve().parent.parent
+root = pathlib.Path(__file__).resolve().parents[2]
 arguments = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
 arguments.add_argument("cells", nargs="+", type=pathlib.Path, help="folders of SWC files")
 arguments.add_argument("--slices", default="^[A-Za-z]+[0-9]+", help="what cells of one slice share of their name")
@@ -91,15 +91,6 @@ def dealt(cells, deal):
     return thirds
 
 
-def completed(values):
-    missing = np.isnan(values)
-    known = ~missing.all(axis=0)
-    values, missing = values[:, known], missing[:, known]
-    values = np.where(missing, np.nanmedian(values, axis=0), values)
-    values = np.hstack([values, missing[:, missing.any(axis=0)].astype(float)])
-    return values[:, values.std(axis=0) > 0]
-
-
 def auc(values, y, slices):
     means = []
     for repeat in range(options.repeats):
@@ -113,19 +104,15 @@ def auc(values, y, slices):
     return float(np.mean(means))
 
 
-def figures(features, seed, traced):
-    with open(features, newline="", encoding="utf-8-sig") as file:
-        header, *rows = csv.reader(file)
-    names, group = np.array([row[0] for row in rows]), np.array([row[1] for row in rows])
-    everything = np.array([[float(x) if x else np.nan for x in row[2:]] for row in rows])
-    thickness = np.array(["[diameters]" in name for name in header[2:]])
+def figures(path, seed, traced):
+    names, group, everything, thickness = features.read(path)
     slices = np.array([f"{name} {i}" if g == "grown" else slice_of(os.path.basename(name))
                        for i, (name, g) in enumerate(zip(names, group))])
     chosen = {g: np.flatnonzero(group == g) for g in ("train", "held_out", "grown")}
     few = np.random.default_rng(seed).permutation(chosen["train"])[:len(chosen["held_out"])]
     out = {}
     for kind, columns in (("structure", ~thickness), ("diameters", thickness | True)) if options.repeats else ():
-        values = completed(everything[:, columns])
+        values = features.completed(everything[:, columns])
         for name, against in [("grown", chosen["grown"])] + [("traced", few)] * traced:
             index = np.concatenate([against, chosen["held_out"]])
             y = np.repeat([0, 1], [len(against), len(chosen["held_out"])])
