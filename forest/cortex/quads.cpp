@@ -2,21 +2,17 @@
 #include "forest/cortex/quads.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
-#include <map>
-#include <optional>
 #include <utility>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/core/parallel.h"
 #include "forest/cortex/collapse.h"
 #include "forest/cortex/crosses.h"
+#include "forest/cortex/evening.h"
 #include "forest/cortex/lattice.h"
 #include "forest/cortex/valence.h"
-#include "forest/geometry/triangle_tree.h"
 
 namespace forest::cortex {
 namespace {
@@ -120,126 +116,8 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     factor *= off;
   }
 
-  // Back onto the ribbon, and along it until volumes are even.
-  const RibbonLocator locator(ribbon);
-  const TriangleTree valley_tree(pieces(lines, Line::Kind::valley)),
-      border_tree(pieces(lines, Line::Kind::border)), crest_tree(pieces(lines, Line::Kind::crest));
-  std::vector<Place> crest_along;  // of every piece in the tree
-  for (const Line& line : lines)
-    for (std::size_t i = 0; line.kind == Line::Kind::crest && i + 1 < line.points.size(); ++i)
-      crest_along.push_back(line.direction(i));
-
-  const std::size_t n = quads.middle.size();
-  quads.points.resize(n);
-  std::vector<double> under(n), held(n);  // held: to the directions of a line
-  std::vector<Place> up(n), arm(n);
-  std::vector<std::uint8_t> border(n, 0);  // sides that only one face has, of every vertex
-  constexpr double hold = .6;
-
-  constexpr double evenly = .65;  // stronger, sides turn from crests; weaker, volumes stay uneven
-  const double by_a_crest = std::cbrt(options.volume);
-  const auto put_back = [&](std::size_t v) {
-    if (border[v])
-      if (const auto hit = border_tree.nearest(quads.middle[v], 1.5 * std::cbrt(options.volume)))
-        quads.middle[v] = hit->at;
-    if (quads.on_valley[v] && !border[v])
-      if (const auto hit = valley_tree.nearest(quads.middle[v])) quads.middle[v] = hit->at;
-    const RibbonPoint point = locator.nearest(quads.middle[v]);
-    quads.points[v] = point, quads.middle[v] = on(ribbon.middle, ribbon, point);
-    const Triangle& c = ribbon.triangles[point.triangle];
-    const Place& w = point.weights;
-    std::size_t main = 0;
-    for (const std::size_t k : {1u, 2u})
-      if (w[Eigen::Index(k)] > w[Eigen::Index(main)]) main = k;
-    arm[v] = arms[c[main]];
-    held[v] = by[c[main]] ? hold : 0.;
-    // By a crest sides run along it and across it, the more so the nearer.
-    if (const auto hit = border[v] ? std::nullopt : crest_tree.nearest(quads.middle[v], by_a_crest)) {
-      const Place& normal = curvature[c[main]].normal;
-      const double share = std::min(1., 2. * (1. - hit->distance / by_a_crest));
-      Place along = crest_along[hit->triangle];
-      if (std::abs(along.dot(normal.cross(arm[v]))) > std::abs(along.dot(arm[v])))
-        along = along.cross(normal);
-      arm[v] = ((1. - share) * arm[v] + std::copysign(share, along.dot(arm[v])) * along).normalized();
-      held[v] = std::max(held[v], share * hold);
-    }
-    under[v] = w[0] * height[c[0]] + w[1] * height[c[1]] + w[2] * height[c[2]];
-    up[v] = (w[0] * curvature[c[0]].normal + w[1] * curvature[c[1]].normal + w[2] * curvature[c[2]].normal)
-                .normalized();
-  };
-  parallel_for(n, 256, put_back);
-
-  std::vector<std::vector<std::uint32_t>> of(n);  // quads around a vertex
-  for (std::uint32_t q = 0; q < quads.quads.size(); ++q)
-    for (const std::uint32_t v : quads.quads[q]) of[v].push_back(q);
-  std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;
-  for (const Quad& q : quads.quads)
-    for (std::size_t e = 0; e < 4; ++e) ++sides[std::minmax(q[e], q[(e + 1) % 4])];
-  std::vector<Place> along_border(n);  // the sum of both neighbours
-  std::vector<std::pair<std::uint32_t, std::uint32_t>> rim;
-  for (const auto& [edge, times] : sides)
-    if (times == 1) ++border[edge.first], ++border[edge.second], rim.push_back(edge);
-
-  progress.begin("evening volumes", std::size_t(options.relaxations));
-  const double wanted = volume / double(quads.quads.size());
-  std::vector<Place> moved(n);
-  constexpr int smooth_rounds = 10, last_rounds = 15;
-  for (int round = 0; round < options.relaxations; ++round) {
-    const double shape = .3 + (.06 - .3) * double(round) / double(options.relaxations);
-    // In the end only what is bent is mended.
-    const bool last = round + last_rounds >= options.relaxations;
-    for (const auto& [a, b] : rim) along_border[a] = along_border[b] = Place::Zero();
-    for (const auto& [a, b] : rim) along_border[a] += quads.middle[b], along_border[b] += quads.middle[a];
-    parallel_for(n, 1024, [&](std::size_t v) {
-      if (border[v]) {  // the border becomes smooth and stays
-        moved[v] = border[v] == 2 && round < smooth_rounds
-                       ? Place(.5 * quads.middle[v] + .25 * along_border[v])
-                       : quads.middle[v];
-        return;
-      }
-      // Towards the mean of its neighbours, and to where its sides run along the cross; the more a face around it is bent
-      // out of shape, the more.
-      Place sum = Place::Zero(), mean = Place::Zero(), aligned = Place::Zero();
-      double sides_around = 0., worst = 1.;
-      const Place side = up[v].cross(arm[v]);
-      for (const std::uint32_t i : of[v]) {
-        const Quad& q = quads.quads[i];
-        const std::size_t k = std::size_t(std::find(q.begin(), q.end(), std::uint32_t(v)) - q.begin());
-        const std::array<Place, 4> p{quads.middle[q[k]], quads.middle[q[(k + 1) % 4]],
-                                     quads.middle[q[(k + 2) % 4]], quads.middle[q[(k + 3) % 4]]};
-        for (std::size_t c = 0; c < 4; ++c) {
-          const Place out = p[(c + 1) % 4] - p[c], in = p[(c + 3) % 4] - p[c];
-          worst = std::min(worst, up[v].dot(out.cross(in)) / (out.norm() * in.norm() + 1e-9));
-        }
-        const double tall = .25 * (under[q[0]] + under[q[1]] + under[q[2]] + under[q[3]]);
-        const Place across = .5 * (p[2] - p[0]).cross(p[3] - p[1]);
-        const double ratio = up[v].dot(across) * tall / wanted;
-        const Place grow = .5 * up[v].cross(p[3] - p[1]);  // how the area changes with this corner
-        const double squares = .5 * ((p[2] - p[0]).squaredNorm() + (p[3] - p[1]).squaredNorm());
-        sum += std::clamp(1. - ratio, -1., 1.) * (wanted / tall) / squares * grow;
-        for (const Place& next : {p[1], p[3]}) {
-          const Place way = next - p[0];
-          const double a = way.dot(arm[v]), b = way.dot(side);
-          const Place straight = std::abs(a) > std::abs(b) ? Place(arm[v] * std::copysign(way.norm(), a))
-                                                           : Place(side * std::copysign(way.norm(), b));
-          mean += way, aligned += way - straight, sides_around += 1.;
-        }
-      }
-      const double bent = std::clamp((.5 - worst) / .5, 0., 1.);
-      if (last && bent == 0.) return void(moved[v] = quads.middle[v]);
-      Place pull = (1. - bent) * (shape * .5 * mean + std::max(shape, held[v]) * aligned) / sides_around +
-                   bent * .5 * mean / sides_around;
-      pull -= up[v] * up[v].dot(pull);
-      Place step = (last ? 1. - bent : 1. - .7 * bent) * evenly * sum + pull;
-      const double most = .25 * std::sqrt(wanted / under[v]);
-      if (step.norm() > most) step *= most / step.norm();
-      moved[v] = quads.middle[v] + step;
-    });
-    quads.middle.swap(moved);
-    parallel_for(n, 256, put_back);
-    progress.advance();
-  }
-  progress.end();
+  const Guides guides{.curvatures = curvature, .arms = arms, .by = by, .heights = height, .lines = lines};
+  even_volumes(quads, ribbon, guides, volume, options.relaxations, progress);
   return quads;
 }
 

@@ -5,7 +5,7 @@
 //   1. a cross at every vertex (crosses.h) and a lattice along the crosses, whose spacing makes up the wanted volume with the thickness
 //      there (lattice.h);
 //   2. triangles collapsed to the lattice and paired, all faces halved once (collapse.h), faults mended (valence.h);
-//   3. vertices move along the ribbon until volumes are even.
+//   3. vertices move along the ribbon until volumes are even (evening.h).
 #pragma once
 
 #include <array>
@@ -30,7 +30,7 @@ struct Quads {
 struct QuadOptions {
   double volume = 1e9;          // µm³ under each
   double volume_within = .007;  // of it: how near their mean must come
-  int relaxations = 90;
+  int relaxations = 30;
 };
 
 Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvatures, std::span<const Line> lines,
