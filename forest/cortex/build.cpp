@@ -84,6 +84,23 @@ bool even_and_well_shaped(const Elements& elements, double volume) {
          100 * std::ranges::count(sheared, 1) <= long(elements.size());
 }
 
+// How far 99 of 100 places of faces, four of each, are from a surface, µm.
+double farthest(const Elements& elements, double w, const TriangleTree& surface) {
+  constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
+  std::vector<double> far(at.size() * elements.size());
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const Hexahedron h = elements.hexahedron(e);
+    for (std::size_t k = 0; k < at.size(); ++k)
+      far[at.size() * e + k] = surface.nearest(h.at(at[k][0], at[k][1], w))->distance;
+  });
+  return share_of(far, .99);
+}
+
+bool faces_are_close(const Elements& elements, const TriangleTree& outer, const TriangleTree& inner) {
+  constexpr double close = 50.;  // µm
+  return farthest(elements, 0., outer) <= close && farthest(elements, 1., inner) <= close;
+}
+
 // From elements as they are dropped to those that are valid, well shaped, of even volumes, and lie on both surfaces.
 void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner, double volume,
            Progress& progress) {
@@ -117,9 +134,11 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
       .enough = .5, .wanted = .62, .volume = volume, .even = 16., .worst_off = 100., .gain = .01};
   Shaping roomy = even;
   roomy.along = 1600., roomy.off = 50., roomy.worst_off = 400.;
-  // … by weight, held closer to the surfaces, and not given up as soon.
-  Shaping weighty = roomy;
-  weighty.even = 40., weighty.off = 35., weighty.iterations = 120, weighty.gain = .005;
+  // … and held closer to the surfaces; and what shape is lost to that is found again, with more patience.
+  Shaping closely = roomy;
+  closely.off = 15.;
+  Shaping patient = roomy;
+  patient.off = 30., patient.even = 10., patient.iterations = 120, patient.gain = .005;
   constexpr int evenings = 2, evenings_with_faces = 6;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
@@ -135,13 +154,18 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
     improve_shapes(cortex.elements, outer, inner, roomy, progress);
     fit_faces(cortex.elements, outer, inner, Fit::volume);
   }
-  // What some faces cannot take all of them do, and as shapes do not suffer by that, volumes are evened to the end.
+  // What some faces cannot take all of them do. Then every place of a face comes as near to its surface as shapes allow.
   const double whole = cortex.between - cortex.wall;
   keep_volume(cortex.elements, whole);
-  for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
-    improve_shapes(cortex.elements, outer, inner, weighty, progress);
+  for (int time = 0; time < evenings && !(even_and_well_shaped(cortex.elements, volume) &&
+                                          faces_are_close(cortex.elements, outer, inner));
+       ++time) {
+    fit_faces(cortex.elements, outer, inner, Fit::places);
     keep_volume(cortex.elements, whole);
+    improve_shapes(cortex.elements, outer, inner, closely, progress);
   }
+  if (!even_and_well_shaped(cortex.elements, volume))
+    improve_shapes(cortex.elements, outer, inner, patient, progress);
   begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
   keep_volume(cortex.elements, whole);
 }
@@ -290,9 +314,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   const std::size_t n = elements.size();
   Report result;
   result.elements = n;
-  std::vector<double> volumes(n), equivolume(n), jacobian(n), outer_distance, inner_distance;
-  if (outer) outer_distance.resize(4 * n);
-  if (inner) inner_distance.resize(4 * n);
+  std::vector<double> volumes(n), equivolume(n), jacobian(n);
   std::vector<std::uint8_t> bad(n);
   progress.begin("measuring elements", n);
   parallel_ranges(n, 64, [&](std::size_t begin, std::size_t end) {
@@ -302,11 +324,6 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
       volumes[e] = h.volume();
       equivolume[e] = depth_error(elements, e);
       jacobian[e] = scaled_jacobian(h);
-      constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
-      for (std::size_t k = 0; k < 4; ++k) {
-        if (outer) outer_distance[4 * e + k] = outer->nearest(h.at(at[k][0], at[k][1], 0.))->distance;
-        if (inner) inner_distance[4 * e + k] = inner->nearest(h.at(at[k][0], at[k][1], 1.))->distance;
-      }
     }
     progress.advance(end - begin);
   });
@@ -324,8 +341,8 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   result.equivolume_p99 = share_of(equivolume, .99);
   result.jacobian_least = *std::min_element(jacobian.begin(), jacobian.end());
   result.jacobian_p1 = share_of(jacobian, .01);
-  if (outer) result.outer_distance_p99 = share_of(outer_distance, .99);
-  if (inner) result.inner_distance_p99 = share_of(inner_distance, .99);
+  if (outer) result.outer_distance_p99 = farthest(elements, 0., *outer);
+  if (inner) result.inner_distance_p99 = farthest(elements, 1., *inner);
 
   // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
   const Mesh crests = pieces(cortex.lines, Line::Kind::crest);
