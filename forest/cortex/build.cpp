@@ -181,7 +181,9 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
       if (!mesh->positions[v].allFinite())
         throw Error(
             fmt::format("vertex {} of the {} surface has a coordinate that is no number; mend it", v, name));
-    const auto at = [&](std::uint32_t v) { return place_text(mesh->positions[v].cast<double>()); };
+    const auto at = [&, mesh = mesh](std::uint32_t v) {
+      return place_text(mesh->positions[v].cast<double>());
+    };
     for (std::size_t t = 0; t < mesh->triangles.size(); ++t)
       if (const Triangle& v = mesh->triangles[t]; v[0] == v[1] || v[1] == v[2] || v[2] == v[0])
         throw Error(fmt::format("triangle {} of the {} surface has one vertex twice, {}, {}; take it out", t,

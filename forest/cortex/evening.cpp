@@ -166,7 +166,7 @@ class Evening {
     for (std::size_t i = 0; i < grow.size(); ++i)
       for (std::size_t k = 0; k < 4; ++k)
         for (Eigen::Index one = 0; one < 3; ++one)
-          grows.insert(Eigen::Index(i), Eigen::Index(3 * quads_.quads[i][k]) + one) = grow[i][k][one];
+          grows.insert(Eigen::Index(i), 3 * Eigen::Index(quads_.quads[i][k]) + one) = grow[i][k][one];
     grows.makeCompressed();
     Eigen::SparseMatrix<double, Eigen::RowMajor> system = grows * grows.transpose();
     system.diagonal().array() += ease;
@@ -177,7 +177,7 @@ class Evening {
     if (multipliers_.size() != faces) multipliers_.setZero(faces);
     multipliers_ = gradients.solveWithGuess(lacks, multipliers_).eval();
     const Eigen::VectorXd ways = grows.transpose() * multipliers_;
-    for (std::uint32_t v = 0; v < size(); ++v) ways_[v] = side(v) * ways.segment<3>(Eigen::Index(3 * v));
+    for (std::uint32_t v = 0; v < size(); ++v) ways_[v] = side(v) * ways.segment<3>(3 * Eigen::Index(v));
   }
 
   // Of a vertex inside: the way to even volumes, towards the mean of its neighbours and to where its sides run along the cross; the
