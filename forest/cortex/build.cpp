@@ -348,10 +348,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
 
   // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
   const Mesh crests = pieces(cortex.lines, Line::Kind::crest);
-  std::vector<Place> along;
-  for (const Line& line : cortex.lines)
-    for (std::size_t i = 0; line.kind == Line::Kind::crest && i + 1 < line.points.size(); ++i)
-      along.push_back(line.direction(i));
+  const std::vector<Place> along = directions(cortex.lines, Line::Kind::crest);
   if (!crests.triangles.empty()) {
     const TriangleTree tree(crests);
     std::vector<double> angles;

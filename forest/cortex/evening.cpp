@@ -21,11 +21,8 @@ using Edge = std::pair<std::uint32_t, std::uint32_t>;
 
 // Lines of one kind, to be asked for the nearest place and the direction there.
 struct Nearest {
-  Nearest(std::span<const Line> lines, Line::Kind kind) : tree(pieces(lines, kind)) {
-    for (const Line& line : lines)
-      for (std::size_t i = 0; line.kind == kind && i + 1 < line.points.size(); ++i)
-        along.push_back(line.direction(i));
-  }
+  Nearest(std::span<const Line> lines, Line::Kind kind)
+      : tree(pieces(lines, kind)), along(directions(lines, kind)) {}
   TriangleTree tree;
   std::vector<Place> along;  // of every piece in the tree
 };

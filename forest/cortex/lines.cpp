@@ -338,4 +338,12 @@ Mesh pieces(std::span<const Line> lines, Line::Kind kind) {
   return mesh;
 }
 
+std::vector<Place> directions(std::span<const Line> lines, Line::Kind kind) {
+  std::vector<Place> result;
+  for (const Line& line : lines)
+    for (std::size_t i = 0; line.kind == kind && i + 1 < line.points.size(); ++i)
+      result.push_back(line.direction(i));
+  return result;
+}
+
 }  // namespace forest::cortex

@@ -56,5 +56,7 @@ std::vector<Line> crests_and_valleys(const Ribbon& ribbon, std::span<const Curva
 
 /// The pieces of all lines of a kind, one after the other, as triangles without area, for a TriangleTree to find them.
 Mesh pieces(std::span<const Line> lines, Line::Kind kind);
+/// Unit, the direction of each of these pieces.
+std::vector<Place> directions(std::span<const Line> lines, Line::Kind kind);
 
 }  // namespace forest::cortex

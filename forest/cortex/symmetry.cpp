@@ -344,10 +344,7 @@ std::optional<std::pair<double, double>> measure(const Elements& elements,
 Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const SymmetryOptions& options) {
   const Mesh crests = pieces(lines, Line::Kind::crest);
   if (crests.triangles.empty()) return {};
-  std::vector<Place> directions;
-  for (const Line& line : lines)
-    for (std::size_t i = 0; line.kind == Line::Kind::crest && i + 1 < line.points.size(); ++i)
-      directions.push_back(line.direction(i));
+  const std::vector<Place> alongs = directions(lines, Line::Kind::crest);
   const TriangleTree tree(crests);
   const Lattice lattice(elements);
 
@@ -365,7 +362,7 @@ Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const S
         .25 * (corner(slot(0, 0)) + corner(slot(3, 0)) + corner(slot(0, 3)) + corner(slot(3, 3)));
     const auto hit = tree.nearest(centre, .7 * (corner(slot(3, 0)) - corner(slot(0, 0))).norm());
     if (!hit) continue;
-    const Place& along = directions[hit->triangle];
+    const Place& along = alongs[hit->triangle];
     const auto runs = [&] {
       return (corner(slot(0, 3)) - corner(slot(0, 0)) + corner(slot(3, 3)) - corner(slot(3, 0)))
           .normalized()
