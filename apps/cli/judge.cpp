@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <memory>
+#include <numeric>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
@@ -43,7 +44,9 @@ std::string shown(const Estimate& e) {
 std::string verdict(const Judgement& j) {
   const auto failed = std::ranges::count(j.criteria, false, &Criterion::pass);
   const std::string cells =
-      fmt::format("{} grown, {} held-out and {}", j.compared, j.held_out, counted(j.train, "training cell"));
+      fmt::format("{}{} grown, {} held-out and {}",
+                  j.populations > 1 ? fmt::format("{} populations of ", j.populations) : "", j.compared,
+                  j.held_out, counted(j.train, "training cell"));
   if (j.pass)
     return fmt::format(
         "PASS: by {} the grown cells cannot be told from traced ones; a random forest tells them with AUC "
@@ -71,13 +74,15 @@ Control changed(std::string name, const Sample& real, std::span<const Group> gro
 
 }  // namespace
 
-Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& grown,
+Judged judge_samples(const Sample& train, const Sample& held_out, std::span<const Sample> grown,
                      const Sample* parametric, const std::string& kind, const ProtocolOptions& options,
                      Console& console, const std::string& slices) {
   const std::vector<Group> groups = groups_of(kind);
-  Judged judged{.tables = {measured(train, groups, console), measured(held_out, groups, console),
-                           measured(grown, groups, console)},
+  Judged judged{.train = measured(train, groups, console),
+                .held_out = measured(held_out, groups, console),
+                .grown = {},
                 .judgement = {}};
+  for (const Sample& population : grown) judged.grown.push_back(measured(population, groups, console));
   std::vector<Control> controls;
   if (parametric) controls.push_back({"burke", measured(*parametric, groups, console)});
   controls.push_back(changed("stretched", train, groups, console, [&](std::size_t i) {
@@ -87,22 +92,24 @@ Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& 
     return jittered(train.neurons[i], 10.f, options.seed, i);
   }));
   if (!slices.empty()) {
-    set_slices(std::array{&judged.tables[0], &judged.tables[1]}, slices);
-    for (std::size_t i = 0; i < grown.cells.size(); ++i)
-      judged.tables[2].slices.push_back(fmt::format("grown {}", i));
+    set_slices(std::array{&judged.train, &judged.held_out}, slices);
+    const auto each_its_own = [](FeatureTable& table, const std::string& name) {
+      for (std::size_t i = 0; i < table.size(); ++i) table.slices.push_back(fmt::format("{} {}", name, i));
+    };
+    for (std::size_t k = 0; k < judged.grown.size(); ++k)
+      each_its_own(judged.grown[k], fmt::format("grown {}", k));
     for (Control& control : controls)
       if (control.name == "burke")
-        for (std::size_t i = 0; i < control.cells.size(); ++i)
-          control.cells.slices.push_back(fmt::format("burke {}", i));
+        each_its_own(control.cells, control.name);
       else
-        control.cells.slices = judged.tables[0].slices;
+        control.cells.slices = judged.train.slices;
   }
   judged.judgement =
-      judge(judged.tables[0], judged.tables[1], judged.tables[2], controls, options, console.progress());
+      judge(judged.train, judged.held_out, judged.grown, controls, options, console.progress());
   return judged;
 }
 
-Json json_of(const Judgement& j, std::uint64_t seed) {
+Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
   Json controls = Json::object();
   for (const char* name : {"burke", "stretched", "jittered"}) controls[name] = nullptr;  // not asked
   for (const ControlResult& c : j.controls) {
@@ -117,8 +124,10 @@ Json json_of(const Judgement& j, std::uint64_t seed) {
       {"auc",
        {{"structure", interval_of(j.auc.structure)},
         {"diameters", interval_of(j.auc.diameters)},
+        {"slopes", interval_of(j.auc.slopes)},
         {"real_control", interval_of(j.auc.real_control)},
         {"real_control_diameters", interval_of(j.auc.real_control_diameters)},
+        {"real_control_slopes", interval_of(j.auc.real_control_slopes)},
         {"logistic", interval_of(j.auc.logistic)}}},
       {"energy_p", j.energy_p},
       {"mmd_p", j.mmd_p},
@@ -129,11 +138,12 @@ Json json_of(const Judgement& j, std::uint64_t seed) {
        {{"neighbour_ratio", j.neighbour_ratio},
         {"longest_run", j.longest_run ? Json(*j.longest_run) : Json()}}},
       {"controls", controls},
-      {"seeds", Json::array({seed})},
+      {"seeds", seeds},
       {"mvs",
        {{"median", j.mvs_median}, {"worst", j.mvs_feature}, {"ratio", j.mvs_ratio}, {"limit", j.mvs_limit}}},
       {"ks_features", j.ks_rejections},
       {"cells", {{"train", j.train}, {"held_out", j.held_out}, {"grown", j.grown}, {"compared", j.compared}}},
+      {"populations", j.populations},
       {"features", j.features},
       {"detectable_auc", j.detectable_auc},
       {"criteria", criteria}};
@@ -171,8 +181,10 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
                     .colour = colour});
   };
   add("grown, structure", j.auc.structure, 1, "≤ 0.60");
+  add("grown, slopes in the slice", j.auc.slopes, 1, "≤ 0.60");
   add("grown, with diameters", j.auc.diameters, 1, "≤ 0.65");
   add("real training cells, structure", j.auc.real_control, 0);
+  add("real training cells, slopes", j.auc.real_control_slopes, 0);
   add("real training cells, with diameters", j.auc.real_control_diameters, 0);
   for (const ControlResult& c : j.controls)
     add(("control: " + c.name).c_str(), c.auc, 3,
@@ -200,7 +212,7 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
               "The band holds, in 95 % of the cases, as many other real cells at 95 % of radii.");
 
   report.heading("Where they differ most");
-  const std::array<FeatureTable, 2> two{judged.tables[1], judged.tables[2]};
+  const std::array<FeatureTable, 2> two{judged.held_out, judged.grown.front()};
   const FeatureTable all = stacked(two), whole = completed(all);
   std::vector<std::size_t> order;
   std::vector<double> surely;  // how far the interval of Cliff's delta stays from none
@@ -217,8 +229,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
     const Feature& feature = whole.features[f];
     const auto column = std::ranges::find(all.features, feature) - all.features.begin();
     StripPanel panel{.title = feature.name, .unit = feature.unit, .samples = {}};
-    for (const FeatureTable& t : judged.tables) {
-      const auto values = t.values.col(column);
+    for (const FeatureTable* t : {&judged.train, &judged.held_out, &judged.grown.front()}) {
+      const auto values = t->values.col(column);
       panel.samples.emplace_back(values.begin(), values.end());
     }
     panels.push_back(std::move(panel));
@@ -236,10 +248,17 @@ struct Options {
   std::vector<std::string> train, held_out, grown, parametric;
   std::string model, repo, slices, kind = "dendrite";
   std::filesystem::path features, report;
-  std::uint32_t repeats = 50, count = 0;
+  std::uint32_t repeats = 50, count = 0, populations = 25;
   std::uint64_t seed = 0;
   bool leave_one_out = false, force = false;
 };
+
+/// Of the populations: other ones for every other seed of the judgement.
+std::vector<std::uint64_t> seeds_of(const Options& options) {
+  std::vector<std::uint64_t> seeds(options.populations);
+  std::iota(seeds.begin(), seeds.end(), options.seed * options.populations);
+  return seeds;
+}
 
 /// A grammar's file or built-in name, or a model of the repository.
 lsystem::Grammar model_of(const Options& options) {
@@ -291,15 +310,20 @@ void run(const Options& options, Console& console) {
   const Sample train = read_sample(options.train, options.repo, console),
                held_out = read_sample(options.held_out, options.repo, console);
   for (const Sample* sample : {&train, &held_out}) must_have_sections(*sample, options.kind);
-  Sample grown, parametric;
+  std::vector<Sample> grown;
+  std::vector<std::uint64_t> seeds{options.seed};
+  Sample parametric;
   std::optional<std::size_t> longest_run;
   if (options.model.empty()) {
-    grown = read_sample(options.grown, options.repo, console);
+    grown.push_back(read_sample(options.grown, options.repo, console));
   } else {
     const lsystem::Grammar grammar = model_of(options);
     const std::size_t count = options.count ? options.count : held_out.neurons.size();
-    grown = grown_from(grammar, grammar.name, count, options.seed, console);
-    longest_run = longest_run_of(grammar, count, options.seed);
+    seeds = seeds_of(options);
+    for (const std::uint64_t seed : seeds) {
+      grown.push_back(grown_from(grammar, grammar.name, count, seed, console));
+      longest_run = std::max(longest_run, longest_run_of(grammar, count, seed));
+    }
   }
   if (!options.parametric.empty()) {
     parametric = read_sample(options.parametric, options.repo, console);
@@ -315,18 +339,23 @@ void run(const Options& options, Console& console) {
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
-  if (!options.features.empty())
-    write_unless_there(options.features,
-                       features_csv(judged.tables, std::array<std::string, 3>{"train", "held_out", "grown"}),
-                       options.force);
+  if (!options.features.empty()) {
+    std::vector<FeatureTable> tables{judged.train, judged.held_out};
+    std::vector<std::string> names{"train", "held_out"};
+    for (const FeatureTable& population : judged.grown) {
+      tables.push_back(population);
+      names.push_back(names.size() == 2 ? "grown" : fmt::format("grown {}", names.size() - 1));
+    }
+    write_unless_there(options.features, features_csv(tables, names), options.force);
+  }
   if (!options.report.empty())
     write_unless_there(options.report,
                        report_of(judged,
-                                 which_is_which(held_out.neurons, grown.neurons, 6,
+                                 which_is_which(held_out.neurons, grown.front().neurons, 6,
                                                 statistics::kind_set(options.kind), options.seed),
-                                 "Grown neurons on trial: " + grown.name),
+                                 "Grown neurons on trial: " + grown.front().name),
                        options.force);
-  console.print(json_of(judged.judgement, options.seed));
+  console.print(json_of(judged.judgement, seeds));
   tell_judgement(judged.judgement, console);
 }
 
@@ -353,7 +382,10 @@ std::function<void()> judge(CLI::App& command, Console& console) {
   judged->add_option("--grown", options->grown, "Neurons that it grew")->type_name("FILES");
   judged->require_option(0, 1);
   add_whole(command, "--count", options->count,
-            "Neurons to grow; 0: as many as are held out, or 99 for each that is left out", 0, 1'000'000);
+            "Neurons of a population to grow; 0: as many as are held out, or 99 for each that is left out", 0,
+            1'000'000);
+  add_whole(command, "--populations", options->populations,
+            "How many populations the model grows: the middle one is judged, and mean AUCs", 1, 1000);
   sample(
       "--burke", options->parametric,
       "Neurons of a parametric model, which the protocol must reject; with --model one is fitted and grown");

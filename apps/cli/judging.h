@@ -5,7 +5,9 @@
 #include <array>
 #include <filesystem>
 #include <optional>
+#include <span>
 #include <string>
+#include <vector>
 
 #include <nlohmann/json_fwd.hpp>
 
@@ -18,15 +20,17 @@
 namespace forest::cli {
 
 struct Judged {
-  std::array<statistics::FeatureTable, 3> tables;  // training, held-out, grown
+  statistics::FeatureTable train, held_out;
+  std::vector<statistics::FeatureTable> grown;  // populations
   statistics::Judgement judgement;
 };
 
 /// With the controls that need no model: training cells stretched by 1.2 along z, and with their angles jittered by 10°.
+/// @param grown       populations, one or more
 /// @param parametric  cells of a parametric model, the control 'burke'; null when there are none
 /// @param kind        sections to measure, as for the verb measure
 /// @param slices      a regular expression that finds the slice in the name of a traced cell; empty when each has its own
-Judged judge_samples(const Sample& train, const Sample& held_out, const Sample& grown,
+Judged judge_samples(const Sample& train, const Sample& held_out, std::span<const Sample> grown,
                      const Sample* parametric, const std::string& kind,
                      const statistics::ProtocolOptions& options, Console& console,
                      const std::string& slices = {});
@@ -54,7 +58,8 @@ struct LeftOutTrial {
 };
 void judge_leaving_out(const LeftOutTrial& trial, Console& console);
 
-nlohmann::ordered_json json_of(const statistics::Judgement& judgement, std::uint64_t seed);
+/// @param seeds  of the populations
+nlohmann::ordered_json json_of(const statistics::Judgement& judgement, std::span<const std::uint64_t> seeds);
 void tell_judgement(const statistics::Judgement& judgement, Console& console);
 std::string report_of(const Judged& judged, const Riddle& riddle, const std::string& title);  // HTML
 

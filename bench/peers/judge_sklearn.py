@@ -5,11 +5,13 @@ judge_sklearn.py FILE [GROUP GROUP] [--repeats 20] [--trees 100]
 
 Prints, as JSON, the mean area under the curve (AUC) over repeated stratified 5-fold cross-validations of a random forest
 and of a logistic regression, on structure (columns without "[diameters]") and on all columns. Groups are those of the
-column "group"; by default grown against held_out and, of as many cells, train against held_out, or the two there are.
+column "group"; by default grown against held_out and, of as many cells, train against held_out, or the two there are. Each
+repeat takes another of the populations that were grown (grown, grown 2, ...).
 Needs python3-sklearn.
 """
 import argparse
 import json
+import re
 import sys
 
 try:
@@ -40,12 +42,13 @@ def completed(X):
 
 
 def auc(first, second, columns, make, draw):
-    everything = np.isin(group, list({first, second} | ({"train", "held_out", "grown"} & set(group))))
+    populations = [name for name in names if name == first or re.fullmatch(f"{re.escape(first)} [0-9]+", name)]
+    everything = np.isin(group, list({*populations, second} | ({"train", "held_out", "grown"} & set(group))))
     X, g = completed(values[everything][:, columns]), group[everything]
     means = []
     for repeat in range(options.repeats):
         random = np.random.default_rng(repeat)
-        a, b = np.flatnonzero(g == first), np.flatnonzero(g == second)
+        a, b = np.flatnonzero(g == populations[repeat % len(populations)]), np.flatnonzero(g == second)
         a = random.permutation(a)[:draw or len(a)]
         index = np.concatenate([a, b])
         y = np.repeat([0, 1], [len(a), len(b)])

@@ -4,11 +4,11 @@
 thirds.py CELLS [--slices REGEX] [--seeds 1,2] [--set NAME=VALUE] [--model-regex 'PATTERN=>TEXT'] [--held-back]
 
 Cells whose slice has a name with a SHA-256 sum that begins with 0 to 4 are held back and left out. The others are dealt
-into thirds by slices, four times; a model is fitted to two thirds, grows as many neurons as are in the third, and
-scikit-learn's forests tell these from it, slices kept together and each grown neuron a slice of its own. Beside them, traced
-cells that were fitted to, as many. Printed, as JSON: mean areas under the curve on structure and on all features, and how far
-the nearest training cell is, in what it is for the cells of the third; then how often `brainforest judge` finds each of its
-criteria met.
+into thirds by slices, four times; a model is fitted to two thirds, grows populations of as many neurons as are in the third,
+and scikit-learn's forests tell the first of these from it, slices kept together and each grown neuron a slice of its own. Beside
+them, traced cells that were fitted to, as many. Printed, as JSON: mean areas under the curve on structure and on all features, and
+how far the nearest training cell is, in what it is for the cells of the third; then how often `brainforest judge` finds each of
+its criteria met, and all of them.
 
 --held-back judges the cells that are held back instead, by `brainforest judge`: for versions that are to be published, once.
 Needs python3-sklearn.
@@ -42,6 +42,7 @@ arguments.add_argument("--slices", default="^[A-Za-z]+[0-9]+", help="what cells 
 arguments.add_argument("--seeds", default="1,2")
 arguments.add_argument("--deals", type=int, default=4)
 arguments.add_argument("--repeats", type=int, default=2, help="cross-validations; 0: none")
+arguments.add_argument("--populations", type=int, default=25, help="that are grown for a judgement")
 arguments.add_argument("--set", action="append", default=[], metavar="NAME=VALUE", help="a setting of the model, changed")
 arguments.add_argument("--model-regex", action="append", default=[], metavar="PATTERN=>TEXT")
 arguments.add_argument("--held-back", action="store_true")
@@ -128,19 +129,21 @@ def third(deal, part):
         fit(train, at / "m.lsys")
         found = []
         for seed in seeds:
-            run("grow", "--grammar", at / "m.lsys", "--count", len(held), "--seed", seed, "--out", at / f"{seed}")
-            told = run("judge", "--grown", at / f"{seed}", "--train", *train, "--held-out", *held, "--repeats", 5, "--seed",
-                       seed, "--slices", options.slices, "--features", at / f"{seed}.csv", "--json")
+            told = run("judge", "--model", at / "m.lsys", "--train", *train, "--held-out", *held, "--populations",
+                       options.populations, "--repeats", 25, "--seed", seed, "--slices", options.slices, "--features",
+                       at / f"{seed}.csv", "--json")
             told = json.loads(told)
             found.append(figures(at / f"{seed}.csv", seed, traced=seed == seeds[0]) |
                          {"nearest": told["copying"]["neighbour_ratio"]} |
-                         {f"met: {asked['name']}": float(asked["pass"]) for asked in told["criteria"]})
+                         {f"judged: {name}": auc["value"] for name, auc in told["auc"].items()} |
+                         {f"met: {asked['name']}": float(asked["pass"]) for asked in told["criteria"]} |
+                         {"met: all": float(told["pass"])})
         return found
 
 
 def judged(model, seed):
-    return json.loads(run("judge", "--model", model, "--train", *free, "--held-out", *held_back, "--repeats", 20,
-                          "--seed", seed, "--slices", options.slices, "--json"))
+    return json.loads(run("judge", "--model", model, "--train", *free, "--held-out", *held_back, "--populations",
+                          options.populations, "--seed", seed, "--slices", options.slices, "--json"))
 
 
 cells = sorted({path for folder in options.cells for path in folder.glob("**/*.swc")}, key=lambda path: path.name)

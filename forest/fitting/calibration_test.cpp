@@ -69,7 +69,7 @@ TEST(Calibration, BringsGrownNeuronsNearerToOthersOfTheirKind) {
 }
 
 TEST(Calibration, IsInTheText) {
-  const std::vector<Morphology> known = traced(15);
+  const std::vector<Morphology> known = traced(20);
   const Calibrated fitted = calibrated_grammar(known, {}, "like them", {}, quick);
   ASSERT_GT(fitted.rounds, 0u);
   const lsystem::Grammar grammar = lsystem::parse(fitted.text, "fitted");

@@ -61,10 +61,13 @@ distribution pose(i) = arbors.pose(arbors(me, i))
 function longer(wanted, traced) = max(0.5, min(2.5, wanted / max(traced, 1)))
 # How many times farther from its chord a branch bends than in the neuron it comes from.
 distribution bending(kind, donor) = max(0.5, min(2, straighter(kind) * sqrt(styles.winding(styles(me, kind)) / styles.winding(donor))))
-# How many times steeper a branch is drawn than it was traced, so that this neuron is as steep as its style says.
+# How many times steeper a branch is drawn than it was traced, `rise` of its length along z, so that branches of this neuron are as
+# steep as its style says and differ as much.
 function slope(kind, style) = max(0.02, mean_slope(kind) + sd_slope(kind) * style)
-distribution steeper(kind, donor) = climb(kind) *
-  max(0.6, min(1.6, (slope(kind, styles.slope(styles(me, kind))) / slope(kind, styles.slope(donor)))^steep))
+function risen(rise, theirs, mine, uneven) = mine * max(0.1, 1 + uneven^ragged * (rise / theirs - 1)) / max(0.01, rise)
+distribution steeper(kind, donor, rise) = climb(kind) *
+  max(0.5, min(2, risen(rise, slope(kind, styles.slope(donor)), slope(kind, styles.slope(styles(me, kind))),
+                        styles.uneven(styles(me, kind)) / styles.uneven(donor))^steep))
 # How much more unevenly steep it is drawn, how many times as large the angles between its steps are, and how much more they differ,
 # as this neuron's tracer would have done.
 distribution stepped(kind, donor) = rugged(kind) * max(0.4, min(2.5, (styles.stepped(styles(me, kind)) / styles.stepped(donor))^(2 * habits)))
@@ -122,7 +125,7 @@ stem: Plan(i) : if(i < planned, plans.length(plan(i)), 0) > 0
     r = stems(kind, cell = plans.cell(p), tips = crowd(tips), ahead = log(ahead), length = log(max(0.05, plans.length(p))),
       hx = plans.hx(g), hy = plans.hy(g), hz = plans.hz(g), d = log(d),
       @style, seldom = 0),
-    from = styles(stems.donor(r), kind), sz = steeper(kind, from), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
+    from = styles(stems.donor(r), kind), sz = steeper(kind, from, stems.rise(r)), scale = longer(ahead, stems.ahead(r)), length = scale * stems.length(r), beyond = scale * (stems.ahead(r) - stems.length(r)),
     ex = ax - plans.x(g) - scale * stems.tx(r), ey = ay - plans.y(g) - scale * stems.ty(r), ez = az - plans.z(g) - sz * scale * stems.tz(r),
     part = steer * drawn(length, beyond, ex, ey, ez) }
   -> [ Kind(kind) Gauge(gauges, gauges(thin_as, kind), even) At(plans.x(g), plans.y(g), plans.z(g)) Head(plans.hx(g), plans.hy(g), plans.hz(g))
@@ -182,7 +185,7 @@ limb: Limb(kind, r, q, run, i, tips, path, order, mirror, thick, scale, ax, ay, 
     length = scale * nth(i, forks.l1(r), forks.l2(r), forks.l3(r)), beyond = scale * nth(i, forks.b1(r), forks.b2(r), forks.b3(r)),
     m = if(mirror, -1, 1), tx = m * nth(i, forks.t1x(r), forks.t2x(r), forks.t3x(r)), ty = nth(i, forks.t1y(r), forks.t2y(r), forks.t3y(r)),
     gx = px + scale * (cos(phi) * tx - sin(phi) * ty), gy = py + scale * (sin(phi) * tx + cos(phi) * ty),
-    sz = steeper(kind, from), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
+    sz = steeper(kind, from, nth(i, forks.rise1(r), forks.rise2(r), forks.rise3(r))), gz = pz + sz * scale * nth(i, forks.t1z(r), forks.t2z(r), forks.t3z(r)),
     mx = m * forks.tx(r), my = forks.ty(r), bears = heed * borne(r, i),
     wx = gx + bears * (ax - px - scale * (cos(phi) * mx - sin(phi) * my)),
     wy = gy + bears * (ay - py - scale * (sin(phi) * mx + cos(phi) * my)),
@@ -210,12 +213,12 @@ class Writer {
          const Resampling& options, const Seldom& seldom, const Tuning& tuning)
       : traced_(traced), options_(options), seldom_(seldom), tuning_(tuning), mixed_(mixed) {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
-      kernels_ +=
-          fmt::format(", {} ~ {:.2g}", style_names[s],
-                      s == grain                  ? .2 * options.style
-                      : s == stairs || s == kinks ? habits_of_many(options.tracer, traced.cells.size())
-                      : habit(s)                  ? options.tracer
-                                                  : options.style);
+      kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
+                              s == grain    ? .2 * options.style
+                              : s == stairs ? .5 * habits_of_many(options.tracer, traced.cells.size())
+                              : s == kinks  ? habits_of_many(options.tracer, traced.cells.size())
+                              : habit(s)    ? options.tracer
+                                            : options.style);
     cells();
     gauges();
     styles_of_cells();
@@ -293,8 +296,8 @@ sample gauges(cell =, kind = -> points) =)");
 # how steep and how kinked, and how unevenly so (stairs, kinks), how deep in the slice, how wide their forks, how much
 # thinner daughters, how far they reach and how often they fork; the thinnest diameter and how far from the soma the farthest
 # branch ends (µm), the mean logarithm of path by chord, the mean angle between segments, which share of them is level, and how
-# much the others differ in how steep they are, and those angles, in shares of the means.
-sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky) =)",
+# much the others differ in how steep they are, those angles, and branches in how steep they are, in shares of the means.
+sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, stepped, kinky, uneven) =)",
         fmt::join(style_names, ", "));
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
@@ -304,9 +307,9 @@ sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, s
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
-        put(" {} {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
+        put(" {} {} {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
             rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.level, 1e3), rounded(of.stairs, 1e4),
-            rounded(of.kinks, 1e4));
+            rounded(of.kinks, 1e4), rounded(of.uneven, 1e3));
       }
   }
 
@@ -408,7 +411,7 @@ sample arbors(cell =, stem = -> plan, pose) =)");
 
 # Stems as they were traced; tips as a crowd (below), path and diameter as logarithms.
 sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy ~ 0.2, hz ~ {}, d ~ 0.3{}, seldom ~ 1
-  -> donor, next, ahead, length, tx, ty, tz) =)",
+  -> donor, next, ahead, length, rise, tx, ty, tz) =)",
         options_.ahead, 2. * options_.heading_across, kernels_);
     bool first = true;
     std::size_t stem = 0;
@@ -420,8 +423,8 @@ sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy
         vector(s.heading, 1e3);
         put(" {}", logarithm(s.end_diameter));
         style(c.kinds.at(s.kind).style);
-        put(" {} -> {} {} {} {} ", rounded(seldom_.stems[stem++], 1e3), s.cell, s.next, rounded(s.ahead, 10.),
-            rounded(s.length, 1e2));
+        put(" {} -> {} {} {} {} {} ", rounded(seldom_.stems[stem++], 1e3), s.cell, s.next,
+            rounded(s.ahead, 10.), rounded(s.length, 1e2), rounded(slope_of(s.points), 1e3));
         vector(s.aim - s.place, 10.);
         trace(s.heading, Vec3::Zero(), s.points);
       }
@@ -439,11 +442,11 @@ sample stems(kind =, cell !=, tips ~ 0.1, ahead ~ {}, length ~ 0.4, hx ~ 0.2, hy
     put(R"(
 # Forks as they were traced: the branch that ends there (tips as a crowd, the path to the farthest and the diameter as logarithms;
 # heading and place, from the soma), and its daughters, fewest tips first (turned: traced last first): tips, lengths, paths beyond
-# their ends, and whither the middle of their tips is, and of all.
+# their ends, how steep they are (rise), and whither the middle of their tips is, and of all.
 sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(kind), order ~ near_order(kind), d ~ near_d(kind),
     hx ~ {}, hy ~ {}, hz ~ {}, lean ~ {}, swerve ~ {}, side ~ near_side(kind), height ~ near_height(kind),
     before ~ near_before(kind), gx ~ {}, gy ~ {}, gz ~ {}{}, seldom ~ 1
-  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, next1, next2, next3,
+  -> donor, ux, uy, daughters, turned, tips, ahead, n1, n2, l1, l2, l3, b1, b2, b3, rise1, rise2, rise3, next1, next2, next3,
      t1x, t1y, t1z, t2x, t2y, t2z, t3x, t3y, t3z, tx, ty, tz) =)",
         options_.tips, options_.ahead, options_.heading, options_.heading, options_.heading_across,
         options_.lean, options_.swerve, options_.aim, options_.aim, options_.aim_across, kernels_);
@@ -467,6 +470,8 @@ sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(
       each(&Fork::Daughter::tips, 2, 1.);
       each(&Fork::Daughter::length, most_daughters, 1e2);
       each(&Fork::Daughter::ahead, most_daughters, 10.);
+      for (std::size_t i = 0; i < most_daughters; ++i)
+        put(" {}", i < f.daughters.size() ? rounded(slope_of(f.daughters[i].points), 1e3) : 0.);
       for (std::size_t i = 0; i < most_daughters; ++i)
         put(" {}", i < f.daughters.size() ? f.daughters[i].next : none);
       for (std::size_t i = 0; i < most_daughters; ++i) {
@@ -555,6 +560,7 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
 #define most 0.5  # how far they are drawn aside at most, in shares of their length
 #define heed 0.5  # how much of what a fork misses of where its tips should be its daughters seek: 0 to 1
 #define steep 1  # how much of the difference in slope between their neuron and its donor they make up for: 0 to 1
+#define ragged 1  # … of how much its branches differ in slope: 0 to 1
 #define habits {:.4g}  # the same of how unevenly steep and how kinked their steps are: 0 to 1
 #define fade 20  # µm, along which they give up e times of how much thicker they are than what lends its diameters: above 0
 #define stout 0.7  # by how much of the difference between neurons whose diameters are lent stems are as thick: 0 to 1

@@ -120,6 +120,38 @@ grow: Tip(n) : n < 8 -> ^(uniform(-climb, climb)) F(8) Tip(n + 1)
   EXPECT_LT(spread(grown(evened)), .95 * spread(grown(text)));
 }
 
+// In some neurons all branches are about as steep, in others they differ; a neuron's branches come from both.
+TEST(Resampling, BranchesOfANeuronDifferInHowSteepTheyAreAsItsOwnDid) {
+  const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(
+steps: 60
+module Tip(n, climb), Stems(n)
+cell uneven = uniform(4, 16)
+distribution climb(i) = uniform(20 - uneven, 20 + uneven)
+axiom: Soma(14) Basal Stems(0)
+stem: Stems(n) : n < 4 -> [ -(90 * n + uniform(-20, 20)) f(7) !(1) F(8) Tip(0, climb(0)) ] Stems(n + 1)
+fork: Tip(n, c) : n > 1 & n < 7 -> [ +(30) Tip(n + 1, climb(1)) ] -(30) Tip(n + 1, climb(2)) : 0.3
+grow: Tip(n, c) : n < 10 { a = if(chance(0.5), c, 0 - c) } -> ^(a) F(8) &(a) Tip(n + 1, c)
+)",
+                                                                                 "uneven"),
+                                                                  40, 6);
+  const std::string text = resampling_grammar(models, "uneven", Resampling{.tracer = 5.});
+  const auto spread =
+      [](std::span<const Morphology> neurons) {  // among neurons, of how much their sections differ
+        std::vector<double> differ;
+        for (const Morphology& n : neurons)
+          differ.push_back(statistics::summarize(
+                               statistics::find_metric("section_length_fractions_along_z")->values(Arbors(n)))
+                               .sd);
+        return statistics::summarize(differ).sd;
+      };
+  const auto grown = [](const std::string& grammar) {
+    return lsystem::grow_population(lsystem::parse(grammar, "fitted"), 80, 1);
+  };
+  EXPECT_GT(spread(grown(text)), 1.1 * spread(grown(with(text, "ragged", "0"))));
+  EXPECT_GT(spread(grown(text)), .6 * spread(models));
+  EXPECT_LT(spread(grown(text)), 1.2 * spread(models));
+}
+
 // Half of them were traced by somebody who changes the plane of focus at one step of three, half by somebody who does at each.
 TEST(Resampling, KeepsThePlanesOfFocusOfWhoTracedThem) {
   const std::vector<Morphology> models = lsystem::grow_population(lsystem::parse(R"(

@@ -30,17 +30,6 @@ Vec3 start_heading(std::span<const Point> points) {
   const std::vector<Point> back(points.rbegin(), points.rend());
   return -end_heading(back);
 }
-
-// How far along z it goes, forth or back, in shares of its length.
-double slope_of(std::span<const Point> points) {
-  double along = 0., length = 0.;
-  for (std::size_t i = 1; i < points.size(); ++i) {
-    along += std::abs(double(points[i].z) - double(points[i - 1].z));
-    length += double((points[i].position() - points[i - 1].position()).norm());
-  }
-  return length > 0. ? along / length : 0.;
-}
-
 // By which angle it turns from one segment to the next.
 void add_turns(std::span<const Point> points, std::vector<double>& to) {
   for (std::size_t i = 2; i < points.size(); ++i) {
@@ -221,6 +210,10 @@ struct Learner {
         const statistics::Summary climbs = statistics::summarize(elevations);
         manner.stairs = std::max(manner.stairs, climbs.sd / std::max(flat, climbs.mean));
       }
+      if (of.values[slope].size() > 1) {
+        const statistics::Summary slopes = statistics::summarize(of.values[slope]);
+        manner.uneven = std::max(manner.uneven, slopes.sd / std::max(flat, slopes.mean));
+      }
       const double turn = std::max(manner.turn, mean_of(kinks));
       for (const std::size_t s : {stairs, kinks})  // not their mean: how much they differ
         of.values[s] = {of.values[s].size() > 1 ? statistics::summarize(of.values[s]).sd : 0.};
@@ -277,6 +270,15 @@ void standardise(Traced& traced) {
 }
 
 }  // namespace
+
+double slope_of(std::span<const Point> points) {
+  double along = 0., length = 0.;
+  for (std::size_t i = 1; i < points.size(); ++i) {
+    along += std::abs(double(points[i].z) - double(points[i - 1].z));
+    length += double((points[i].position() - points[i - 1].position()).norm());
+  }
+  return length > 0. ? along / length : 0.;
+}
 
 Traced learn(std::span<const Morphology> neurons, statistics::KindSet kinds) {
   Traced traced;

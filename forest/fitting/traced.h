@@ -108,6 +108,7 @@ struct Manner {
   double level = 0.;                 // share of its segments that stay as high as they begin
   // How much the others differ in how steep they are, and those angles: standard deviations in shares of the mean.
   double stairs = .1, kinks = .1;
+  double uneven = .1;  // … and how much its branches differ in how steep they are: likewise
 };
 
 /// How many points have a diameter, µm.
@@ -130,6 +131,9 @@ struct Traced {
 };
 
 Traced learn(std::span<const Morphology> neurons, statistics::KindSet kinds);
+
+/// How steep a branch is: the share of its length that goes along z, up or down.
+double slope_of(std::span<const Point> points);
 
 /// A branch from its beginning on.
 std::vector<lsystem::Trace::Stop> stops_of(std::span<const Point> points);

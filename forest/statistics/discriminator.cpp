@@ -45,7 +45,8 @@ class CrossValidation {
       : options_(options),
         classifier_(classifier),
         sizes_{std::size_t(first.rows()), std::size_t(second.rows())},
-        drawn_{pick(options.first, sizes_[0]), pick(options.second, sizes_[1])},
+        drawn_{options.draws.empty() ? pick(options.first, sizes_[0]) : options.draws.front().size(),
+               pick(options.second, sizes_[1])},
         features_(classifier == Classifier::random_forest
                       ? stack(first, second)
                       : Eigen::MatrixXd(first.rows() + second.rows(), 0)) {
@@ -65,14 +66,17 @@ class CrossValidation {
   const Labels& labels() const { return labels_; }
   double drawn(int sample) const { return double(drawn_[sample]); }
 
-  /// @param item  of the random numbers
+  /// @param item  of the random numbers, and of the draws
   Scored run(const Labels& labels, std::uint64_t item) const {
     Random random(options_.seed, item, fold_stream);
     Scored out;
     for (std::uint8_t sample = 0; sample < 2; ++sample) {
       Rows rows;
-      for (std::uint32_t i = 0; i < labels.size(); ++i)
-        if (labels[i] == sample) rows.push_back(i);
+      if (sample == 0 && !options_.draws.empty())
+        rows = options_.draws[item % options_.draws.size()];
+      else
+        for (std::uint32_t i = 0; i < labels.size(); ++i)
+          if (labels[i] == sample) rows.push_back(i);
       shuffle(rows, random);
       rows.resize(drawn_[sample]);
       for (const std::uint32_t row : rows) out.rows.push_back(row);

@@ -25,6 +25,8 @@ struct DiscriminatorOptions {
   double ridge = 30.;                 // of a logistic regression; scikit-learn's C is its inverse
   std::size_t permutations = 0;       // cross-validations with kinds dealt anew: what guessing reaches
   std::size_t first = 0, second = 0;  // cells of each that a repeat draws, without repetition; 0 for all
+  std::vector<std::vector<std::uint32_t>> draws =
+      {};  // or else rows of the first sample, by turns; all as many
   std::uint64_t seed = 0;
   std::vector<std::uint32_t> slices =
       {};  // of the cells, first sample first (dealing.h): a slice is never trained on and tested

@@ -126,6 +126,29 @@ TEST_P(EitherClassifier, IsTheSameAtAnyNumberOfThreadsAndFollowsTheSeed) {
   EXPECT_NE(run(1, 7), run(1, 8));
 }
 
+TEST(Discriminate, TakesDrawsOfTheFirstSampleByTurns) {
+  // Of forty rows ten are as the second sample and the others far off: the draws say which are seen.
+  Eigen::MatrixXd first(40, 4);
+  first << cloud(1, 10, 4), cloud(2, 30, 4, 6.);
+  const Eigen::MatrixXd second = cloud(3, 12, 4);
+  const auto rows = [](std::uint32_t from) {
+    std::vector<std::uint32_t> out(10);
+    std::iota(out.begin(), out.end(), from);
+    return out;
+  };
+  const auto told = [&](std::vector<std::vector<std::uint32_t>> draws) {
+    return discriminate(first, second, Classifier::random_forest,
+                        {.repeats = 4, .trees = 30, .draws = std::move(draws)});
+  };
+  EXPECT_GT(told({rows(10), rows(20)}).auc.value, .95);
+  EXPECT_LT(told({rows(0)}).auc.value, .8);
+  const auto turns = told({rows(0), rows(10)});
+  EXPECT_LT(turns.repeats[0], .8);
+  EXPECT_GT(turns.repeats[1], .95);
+  EXPECT_LT(turns.repeats[2], .8);
+  EXPECT_EQ(turns.scores[35], .5) << "never drawn";
+}
+
 TEST(Discriminate, RefusesAHandfulOfCells) {
   EXPECT_THROW(discriminate(cloud(1, 3, 4), cloud(2, 30, 4), Classifier::logistic, {}), Error);
   const auto few = discriminate(cloud(1, 4, 4), cloud(2, 4, 4, 9.), Classifier::random_forest,

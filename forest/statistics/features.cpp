@@ -30,6 +30,12 @@ constexpr auto skewed = std::to_array<std::string_view>(
     {"section_lengths", "section_term_lengths", "section_bif_lengths", "section_end_distances",
      "section_tortuosity", "section_mean_radii", "daughter_ratio"});
 
+// How steeply branches leave the plane of the slice, which is where a tracing is least sure: depth shrinks as the slice dries, and
+// is read from a microscope's focus.
+constexpr auto slopes = std::to_array<std::string_view>({"length_along_z_by_x", "length_fraction_along_z",
+                                                         "section_length_fractions_along_z",
+                                                         "segment_elevations", "level_segment_fraction"});
+
 // What repeats another metric, or tells the tracer and not the cell.
 constexpr auto left_out =
     std::to_array<std::string_view>({"segment_midpoints_x", "segment_midpoints_y", "segment_midpoints_z",
@@ -48,7 +54,7 @@ const std::vector<const Metric*>& chosen() {
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
-                   m.diameters};
+                   m.diameters, std::ranges::count(slopes, m.name) > 0};
   };
   if (m.level == Level::neuron) return {column("", m.unit)};
   if (m.level == Level::shell) {
@@ -195,7 +201,9 @@ FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> row
   return part;
 }
 
-FeatureTable structure_of(const FeatureTable& table) {
+namespace {
+
+FeatureTable columns_that(const FeatureTable& table, auto&& wanted) {
   FeatureTable part{.cells = table.cells,
                     .features = {},
                     .values = {},
@@ -204,12 +212,22 @@ FeatureTable structure_of(const FeatureTable& table) {
                     .slices = table.slices};
   std::vector<Eigen::Index> columns;
   for (std::size_t i = 0; i < table.features.size(); ++i)
-    if (!table.features[i].diameters) {
+    if (wanted(table.features[i])) {
       columns.push_back(Eigen::Index(i));
       part.features.push_back(table.features[i]);
     }
   part.values = table.values(Eigen::all, columns);
   return part;
+}
+
+}  // namespace
+
+FeatureTable structure_of(const FeatureTable& table) {
+  return columns_that(table, [](const Feature& f) { return !f.diameters; });
+}
+
+FeatureTable slopes_of(const FeatureTable& table) {
+  return columns_that(table, [](const Feature& f) { return f.slope; });
 }
 
 FeatureTable distinct(const FeatureTable& table) {
@@ -249,7 +267,7 @@ FeatureTable distinct(const FeatureTable& table) {
     for (const double x : table.values.col(c)) defined.push_back(std::isfinite(x));
     if (!missing.insert(defined).second) continue;
     for (Eigen::Index r = 0; r < rows; ++r) out.values(r, count) = defined[std::size_t(r)];
-    keep({feature.name + " is defined", "", feature.diameters},
+    keep({feature.name + " is defined", "", feature.diameters, feature.slope},
          std::span(out.values.col(count).data(), std::size_t(rows)));
   }
   out.values.conservativeResize(rows, count);

@@ -19,6 +19,7 @@ struct Feature {
   std::string name;  // "basal contraction sd": group, metric, summary
   std::string unit;
   bool diameters = false;  // changes when nothing but diameters do
+  bool slope = false;      // says how steeply branches leave the plane of the slice
 
   bool operator==(const Feature&) const = default;
 };
@@ -65,6 +66,8 @@ FeatureTable stacked(std::span<const FeatureTable> tables);
 FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> rows);
 /// Only what does not depend on diameters: the structure.
 FeatureTable structure_of(const FeatureTable& table);
+/// Only how steep branches are in the slice; it may be nothing.
+FeatureTable slopes_of(const FeatureTable& table);
 
 /// What of a table may tell cells apart: without columns that are the same in all cells, repeat another, or are defined in
 /// fewer than one of twenty cells. For features that are missing in some cells a column "… is defined" (0 or 1) is added,

@@ -110,6 +110,19 @@ TEST(Completed, TakesTheMedianForWhatIsMissing) {
   EXPECT_NEAR(X.col(0).squaredNorm(), 3., 1e-12);
 }
 
+TEST(Slopes, AreOfBranchesInTheSliceAndOfNothingElse) {
+  const std::vector<Group> groups = groups_of("all");
+  const FeatureTable all = table_of({}, groups, {});
+  const FeatureTable slopes = slopes_of(all);
+  const auto has = [&](const char* name) {
+    return std::ranges::count(slopes.features, name, &Feature::name) > 0;
+  };
+  EXPECT_TRUE(has("all length_fraction_along_z"));
+  EXPECT_TRUE(has("basal segment_elevations sd"));
+  EXPECT_FALSE(has("all depth"));
+  EXPECT_FALSE(has("all total_length"));
+}
+
 TEST(Unlike, LeavesOutWhatFollowsFromOneBefore) {
   const FeatureTable t =
       small_table({{1, 1, 5, -1}, {2, 8, 1, -2}, {3, 27, 4, -3}, {4, 64, 2, -4}, {5, 65, 3, -5}});

@@ -31,6 +31,11 @@ FeatureTable cells(std::uint64_t seed, std::size_t count, double angle_shift = 0
 
 constexpr ProtocolOptions quick{.repeats = 8, .trees = 40, .dealings = 299, .resamples = 200, .seed = 3};
 
+Judgement judge_population(const FeatureTable& train, const FeatureTable& held_out, const FeatureTable& grown,
+                           std::span<const Control> controls, const ProtocolOptions& options) {
+  return judge(train, held_out, {&grown, 1}, controls, options);
+}
+
 const Criterion& criterion(const Judgement& j, std::string_view name) {
   const auto at = std::ranges::find(j.criteria, name, &Criterion::name);
   EXPECT_NE(at, j.criteria.end()) << name;
@@ -43,7 +48,7 @@ TEST(Protocol, PassesCellsOfTheSamePopulationMostly) {
     ProtocolOptions options = quick;
     options.longest_run = 2;
     const Judgement j =
-        judge(cells(10 + trial, 60), cells(30 + trial, 60), cells(50 + trial, 60), {}, options);
+        judge_population(cells(10 + trial, 60), cells(30 + trial, 60), cells(50 + trial, 60), {}, options);
     for (const Criterion& c : j.criteria) ++asked, passed += c.pass;
   }
   EXPECT_GT(double(passed), .85 * double(asked))
@@ -52,7 +57,7 @@ TEST(Protocol, PassesCellsOfTheSamePopulationMostly) {
 
 TEST(Protocol, RejectsWhatIsShiftedAndSaysWhy) {
   const std::vector<Control> controls{{"stretched", cells(4, 50, 1.5)}, {"the same", cells(5, 50)}};
-  const Judgement j = judge(cells(1, 50), cells(2, 40), cells(3, 70, 2.), controls, quick);
+  const Judgement j = judge_population(cells(1, 50), cells(2, 40), cells(3, 70, 2.), controls, quick);
   EXPECT_FALSE(j.pass);
   EXPECT_EQ(j.compared, 50u);
   EXPECT_EQ(j.train, 50u);
@@ -78,7 +83,7 @@ TEST(Protocol, SeesCopiesAndLongRuns) {
   ProtocolOptions options = quick;
   options.longest_run = 7;
   const FeatureTable train = cells(1, 40);
-  const Judgement j = judge(train, cells(2, 40), train, {}, options);
+  const Judgement j = judge_population(train, cells(2, 40), train, {}, options);
   EXPECT_EQ(j.neighbour_ratio, 0.);
   EXPECT_FALSE(criterion(j, "copying.neighbour_ratio").pass);
   EXPECT_FALSE(criterion(j, "copying.longest_run").pass);
@@ -87,22 +92,74 @@ TEST(Protocol, SeesCopiesAndLongRuns) {
 
 TEST(Protocol,
      SeesThatAllCellsAreAlike) {  // no differences between cells: the means are right, the spread is not
-  const Judgement j = judge(cells(1, 60), cells(2, 60), cells(3, 60, 0., 0.), {}, quick);
+  const Judgement j = judge_population(cells(1, 60), cells(2, 60), cells(3, 60, 0., 0.), {}, quick);
   EXPECT_FALSE(j.pass);
 }
 
 TEST(Protocol, RefusesTooFewCellsAndUnlikeTables) {
-  EXPECT_THROW(judge(cells(1, 3), cells(2, 9), cells(3, 9), {}, quick), Error);
+  EXPECT_THROW(judge_population(cells(1, 3), cells(2, 9), cells(3, 9), {}, quick), Error);
   FeatureTable unlike = cells(3, 9);
   unlike.features[0].name = "another";
-  EXPECT_THROW(judge(cells(1, 9), cells(2, 9), unlike, {}, quick), Error);
+  EXPECT_THROW(judge_population(cells(1, 9), cells(2, 9), unlike, {}, quick), Error);
 }
 
 TEST(Protocol, JudgesAFewCellsAndSaysWhatTheyAllow) {
-  const Judgement j = judge(cells(1, 5), cells(2, 4), cells(3, 30), {}, quick);
+  const Judgement j = judge_population(cells(1, 5), cells(2, 4), cells(3, 30), {}, quick);
   EXPECT_EQ(j.compared, 5u);
   EXPECT_GT(j.detectable_auc, .85);
 }
+
+TEST(Protocol, JudgesTheMiddleOfPopulations) {
+  // Of five populations two are of another kind: the middle ones are as they should be. Of five four: they are not.
+  const FeatureTable train = cells(1, 50), held_out = cells(2, 40);
+  std::vector<FeatureTable> grown;
+  for (std::uint64_t k = 0; k < 5; ++k) grown.push_back(cells(20 + k, 40, k < 2 ? 3. : 0.));
+  const Judgement most_right = judge(train, held_out, grown, {}, quick);
+  EXPECT_EQ(most_right.populations, 5u);
+  EXPECT_EQ(most_right.grown, 40u);
+  EXPECT_EQ(most_right.compared, 40u);
+  for (const char* name : {"energy_p", "mmd_p", "ks_rejections", "mvs_max", "sholl_inside"})
+    EXPECT_TRUE(criterion(most_right, name).pass) << name;
+  EXPECT_GT(most_right.auc.structure.value, .6) << "a mean, to which the two belong";
+  for (std::uint64_t k = 0; k < 4; ++k) grown[k] = cells(20 + k, 40, 3.);
+  const Judgement most_wrong = judge(train, held_out, grown, {}, quick);
+  for (const char* name : {"auc.structure", "energy_p", "mmd_p", "ks_rejections", "mvs_max"})
+    EXPECT_FALSE(criterion(most_wrong, name).pass) << name;
+}
+
+TEST(Protocol, VariesLessFromSeedToSeedByManyPopulations) {
+  const FeatureTable train = cells(1, 40), held_out = cells(2, 20);
+  const auto spread = [&](std::size_t populations) {
+    std::vector<double> areas;
+    for (std::uint64_t trial = 0; trial < 8; ++trial) {
+      std::vector<FeatureTable> grown;
+      for (std::size_t k = 0; k < populations; ++k) grown.push_back(cells(100 + trial * populations + k, 20));
+      areas.push_back(judge(train, held_out, grown, {}, quick).auc.structure.value);
+    }
+    const auto [least, most] = std::ranges::minmax(areas);
+    return most - least;
+  };
+  EXPECT_LT(spread(8), .7 * spread(1));
+}
+
+// One feature of thirteen says how steep branches are; that it is amiss is seen in it alone, with a criterion of its own.
+TEST(Protocol, AsksHowSteepBranchesAreByItself) {
+  const auto steep = [](FeatureTable t, double shift) {
+    t.features.front().slope = true;
+    t.values.col(0).array() += shift;
+    return t;
+  };
+  const FeatureTable train = steep(cells(1, 60), 0.), held_out = steep(cells(2, 60), 0.);
+  const Judgement wrong = judge_population(train, held_out, steep(cells(3, 60), .6), {}, quick),
+                  right = judge_population(train, held_out, steep(cells(3, 60), 0.), {}, quick);
+  EXPECT_FALSE(criterion(wrong, "auc.slopes").pass);
+  EXPECT_GT(wrong.auc.slopes.value, wrong.auc.structure.value);
+  EXPECT_TRUE(criterion(right, "auc.slopes").pass);
+  const Judgement none = judge_population(cells(1, 20), cells(2, 20), cells(3, 20), {}, quick);
+  EXPECT_EQ(std::ranges::count(none.criteria, "auc.slopes", &Criterion::name), 0) << "nothing says so";
+}
+
+TEST(Protocol, RefusesNothing) { EXPECT_THROW(judge(cells(1, 9), cells(2, 9), {}, {}, quick), Error); }
 
 }  // namespace
 }  // namespace forest::statistics
