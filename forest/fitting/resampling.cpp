@@ -215,7 +215,7 @@ class Writer {
     for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
       kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
                               s == grain    ? .2 * options.style
-                              : s == stairs ? .5 * habits_of_many(options.tracer, traced.cells.size())
+                              : s == stairs ? .25 * habits_of_many(options.tracer, traced.cells.size())
                               : s == kinks  ? habits_of_many(options.tracer, traced.cells.size())
                               : habit(s)    ? options.tracer
                                             : options.style);
