@@ -149,6 +149,13 @@ Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
       {"criteria", criteria}};
 }
 
+/// Of which populations the values are; nothing where there is one.
+std::string averaged(const Judgement& j) {
+  return j.populations > 1
+             ? fmt::format("AUCs are means over {} populations, all else their medians. ", j.populations)
+             : "";
+}
+
 void tell_judgement(const Judgement& j, Console& console) {
   console.say(verdict(j));
   console.say("");
@@ -156,8 +163,8 @@ void tell_judgement(const Judgement& j, Console& console) {
   for (const Criterion& c : j.criteria) lines.push_back({c.pass ? "pass" : "FAIL", c.name, c.reason});
   console.table({"", "criterion", "why"}, lines);
   console.say("");
-  console.say(fmt::format("Power: {}. Logistic regression, for comparison: AUC {}.", power_of(j),
-                          shown(j.auc.logistic)));
+  console.say(averaged(j) + fmt::format("Power: {}. Logistic regression, for comparison: AUC {}.",
+                                        power_of(j), shown(j.auc.logistic)));
 }
 
 std::string report_of(const Judged& judged, const Riddle& riddle, const std::string& title) {
@@ -193,7 +200,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
                                    .high = 1.,
                                    .marks = {.5, .6},
                                    .title = "area under the curve (0.5: guessing; 1: surely told apart)"}),
-              "Mean over repeated cross-validations with 95 % intervals of the cells; " + power_of(j) + ".");
+              "Mean over repeated cross-validations with 95 % intervals of the cells; " + power_of(j) + ". " +
+                  averaged(j));
 
   report.heading("Criteria");
   std::vector<std::vector<std::string>> lines;

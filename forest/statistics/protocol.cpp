@@ -288,45 +288,41 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   }
   progress.end();
 
-  const std::string of_populations =
-      found.size() > 1 ? fmt::format(" in the middle one of {} samples", found.size()) : "";
   j.energy_p = middle(found, true, [](const Found& f) { return f.energy_p; }).energy_p;
   ask(j, "energy_p", j.energy_p > least_p,
-      fmt::format("energy distance of grown and held-out cells{}: p = {:.4f}; more than {} is asked",
-                  of_populations, j.energy_p, least_p));
+      fmt::format("energy distance of grown and held-out cells: p = {:.4f}; more than {} is asked",
+                  j.energy_p, least_p));
   j.mmd_p = middle(found, true, [](const Found& f) { return f.mmd_p; }).mmd_p;
   ask(j, "mmd_p", j.mmd_p > least_p,
-      fmt::format("maximum mean discrepancy{}: p = {:.4f}; more than {} is asked", of_populations, j.mmd_p,
-                  least_p));
+      fmt::format("maximum mean discrepancy: p = {:.4f}; more than {} is asked", j.mmd_p, least_p));
   j.ks_rejections = middle(found, false, [](const Found& f) { return f.ks_rejections.size(); }).ks_rejections;
   ask(j, "ks_rejections", j.ks_rejections.empty(),
-      fmt::format("Kolmogorov–Smirnov rejects {} of {} features after Holm's correction{}{}",
-                  j.ks_rejections.size(), j.features, of_populations,
+      fmt::format("Kolmogorov–Smirnov rejects {} of {} features after Holm's correction{}",
+                  j.ks_rejections.size(), j.features,
                   j.ks_rejections.empty() ? "" : ", the first: " + j.ks_rejections.front()));
   j.mvs_median = middle(found, false, [](const Found& f) { return f.mvs_median; }).mvs_median;
   ask(j, "mvs_median", j.mvs_median <= most_mvs,
-      fmt::format("median visible spread of half of the features{} is at most {:.3f}; {} is asked",
-                  of_populations, j.mvs_median, most_mvs));
+      fmt::format("median visible spread of half of the features is at most {:.3f}; {} is asked",
+                  j.mvs_median, most_mvs));
   const Found& spread = middle(found, false, [](const Found& f) { return f.mvs_ratio; });
   j.mvs_ratio = spread.mvs_ratio, j.mvs_max = spread.mvs_max, j.mvs_feature = spread.mvs_feature;
   ask(j, "mvs_max", j.mvs_ratio <= j.mvs_limit,
-      fmt::format("the worst feature{}, {}, has {:.2f} times the spread that real samples stay below in 95 "
+      fmt::format("the worst feature, {}, has {:.2f} times the spread that real samples stay below in 95 "
                   "of 100; the "
                   "worst of real samples has up to {:.2f} times",
-                  of_populations, j.mvs_feature.empty() ? "none" : j.mvs_feature, j.mvs_ratio, j.mvs_limit));
+                  j.mvs_feature.empty() ? "none" : j.mvs_feature, j.mvs_ratio, j.mvs_limit));
   j.sholl_inside = middle(found, true, [](const Found& f) { return f.sholl_inside; }).sholl_inside;
   ask(j, "sholl_inside", j.sholl_inside >= least_inside,
-      fmt::format(
-          "the mean of Sholl's crossings{} is in the band of real cells at {:.1f} % of radii; {:.0f} % "
-          "is asked",
-          of_populations, 100. * j.sholl_inside, 100. * least_inside));
+      fmt::format("the mean of Sholl's crossings is in the band of real cells at {:.1f} % of radii; {:.0f} % "
+                  "is asked",
+                  100. * j.sholl_inside, 100. * least_inside));
   if (!full) return j;
 
   j.neighbour_ratio = middle(found, true, [](const Found& f) { return f.neighbour_ratio; }).neighbour_ratio;
   ask(j, "copying.neighbour_ratio", j.neighbour_ratio >= least_neighbour_ratio,
-      fmt::format("the nearest training cell{} is {:.3f} times as far from grown as from held-out cells; at "
+      fmt::format("the nearest training cell is {:.3f} times as far from grown as from held-out cells; at "
                   "least {} is asked",
-                  of_populations, j.neighbour_ratio, least_neighbour_ratio));
+                  j.neighbour_ratio, least_neighbour_ratio));
   if (j.longest_run)
     ask(j, "copying.longest_run", *j.longest_run <= most_run,
         fmt::format("at most {} consecutive branches come from one traced cell; {} are allowed",
