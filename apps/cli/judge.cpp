@@ -393,7 +393,7 @@ std::function<void()> judge(CLI::App& command, Console& console) {
             "Neurons of a population to grow; 0: as many as are held out, or 99 for each that is left out", 0,
             1'000'000);
   add_whole(command, "--populations", options->populations,
-            "How many populations the model grows: the middle one is judged, and mean AUCs", 1, 1000);
+            "How many populations the model grows; their median is judged, and mean AUCs", 1, 1000);
   sample(
       "--burke", options->parametric,
       "Neurons of a parametric model, which the protocol must reject; with --model one is fitted and grown");

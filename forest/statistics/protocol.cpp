@@ -83,6 +83,9 @@ struct Samples {
   }
 };
 
+FeatureTable whole_of(const FeatureTable& table) { return table; }
+
+/// @param part  structure_of, slopes_of or whole_of
 Samples samples_of(const std::array<FeatureTable, 3>& tables, FeatureTable (*part)(const FeatureTable&)) {
   const FeatureTable all = stacked(tables);
   return {standardised(completed(part(all))), tables[0].values.rows(), tables[1].values.rows(),
@@ -133,8 +136,7 @@ void find_of_each_feature(const std::array<FeatureTable, 3>& tables, const Drawn
   const std::vector<std::uint32_t> real = all_rows(Eigen::Index(n_real));
   const std::span<const std::uint32_t> held_out = std::span(real).subspan(n_train);
 
-  // Real cells dealt to two samples of the same sizes, as far as there are enough; the same dealings for all features.
-  const std::size_t n_judged = std::min(judged.size(), n_train);
+  // Real cells dealt to two samples of the same sizes (none has more cells than were fitted to); the same dealings for all features.
   const std::vector<std::uint32_t> slices =
       numbered(std::span(all.slices).first(std::min(all.slices.size(), n_real)));
   std::vector<std::vector<std::uint8_t>> dealt(
@@ -143,7 +145,7 @@ void find_of_each_feature(const std::array<FeatureTable, 3>& tables, const Drawn
     Random random(options.seed, k, 0x6d767320);  // "mvs "
     const std::vector<std::uint32_t> deal = statistics::dealt(n_real, slices, random);
     dealt[k].assign(n_real, 0);
-    for (std::size_t i = 0; i < n_held + n_judged; ++i) dealt[k][deal[i]] = i < n_held ? 1 : 2;
+    for (std::size_t i = 0; i < n_held + judged.size(); ++i) dealt[k][deal[i]] = i < n_held ? 1 : 2;
   });
 
   struct OfFeature {
@@ -237,7 +239,7 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   const bool full = known == nullptr;
 
   const Samples structure = samples_of(tables, structure_of), slopes = samples_of(tables, slopes_of),
-                whole = samples_of(tables, [](const FeatureTable&all) { return all; });
+                whole = samples_of(tables, whole_of);
   const auto tell = [&](const Samples& of, bool real, Classifier by) {
     const std::vector<std::uint32_t> rows = all_rows(real ? of.train : of.of_judged().rows());
     DiscriminatorOptions how{.repeats = options.repeats,
