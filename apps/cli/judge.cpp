@@ -246,7 +246,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   report.plot(strip_plots(panels, std::array<std::string, 3>{"training", "held out", "grown"}),
               "The features by which grown and held-out cells are most surely apart (Cliff's delta), none "
               "nearly the same as another; every dot "
-              "is a cell.");
+              "is a cell" +
+                  std::string(judged.grown.size() > 1 ? ", grown ones of the first population." : "."));
   return report.html();
 }
 
@@ -408,9 +409,12 @@ std::function<void()> judge(CLI::App& command, Console& console) {
       ->type_name("FILE");
   add_report(command, options->report);
   add_force(command, options->force);
-  command.parse_complete_callback([options] {
+  command.parse_complete_callback([options, &command] {
     if (!options->held_out.empty() && options->model.empty() && options->grown.empty())
       throw CLI::RequiredError("--model or --grown, beside --held-out");
+    if (command.count("--populations") && (options->model.empty() || options->held_out.empty()))
+      throw CLI::ValidationError(
+          "--populations is how many a --model grows beside --held-out cells; leave it out without these");
     if (options->count && !options->grown.empty())
       throw CLI::ValidationError("--count is how many neurons a model grows; leave it out with --grown");
   });

@@ -74,11 +74,13 @@ refuses "model 'like_traced' has no distribution 'nothing'; it has " $BRAINFORES
 
 # The judge grows from the model and fits the control that it must reject.
 $BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
-$BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --repeats 2 --json >judged.json
+$BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --populations 3 --repeats 2 --features judged.csv --json >judged.json
 python3 - <<'PY'
 import json
 judged = json.load(open("judged.json"))
-assert judged["cells"]["grown"] == 10, judged["cells"]
+assert judged["cells"]["grown"] == 10 and judged["seeds"] == [0, 1, 2], (judged["cells"], judged["seeds"])
+groups = [line.split(",")[1] for line in open("judged.csv", encoding="utf-8-sig")][1:]
+assert [groups.count(g) for g in ("grown", "grown 2", "grown 3")] == [10, 10, 10], groups
 assert 1 <= judged["copying"]["longest_run"] <= 3, judged["copying"]
 assert judged["controls"]["burke"]["rejected"] in (True, False)
 PY

@@ -143,3 +143,4 @@ told alike.json 'd["auc"]["structure"]["value"] < .85 and d["controls"]["burke"]
 $BRAINFOREST judge --train one --held-out two --grown one --repeats 3 >copied.txt
 grep -q 'FAIL *copying.neighbour_ratio' copied.txt
 fails_with 2 'grown' $BRAINFOREST judge --train one --held-out two
+fails_with 2 'populations' $BRAINFOREST judge --train one --held-out two --grown three --populations 3
