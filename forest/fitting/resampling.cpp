@@ -212,7 +212,8 @@ class Writer {
   Writer(const Traced& traced, const std::vector<Mixed>& mixed, const std::string& title,
          const Resampling& options, const Seldom& seldom, const Tuning& tuning)
       : traced_(traced), options_(options), seldom_(seldom), tuning_(tuning), mixed_(mixed) {
-    for (std::size_t s = 0; s < styles; ++s)  // how finely a neuron was traced is the same all over it
+    // How finely a neuron was traced is the same all over it; how unevenly steep its steps are no factor makes up for.
+    for (std::size_t s = 0; s < styles; ++s)
       kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
                               s == grain    ? .2 * options.style
                               : s == stairs ? .25 * habits_of_many(options.tracer, traced.cells.size())
@@ -463,15 +464,14 @@ sample forks(kind =, cell !=, other !=, tips ~ {}, ahead ~ {}, path ~ near_path(
       put(" {} -> {} {} {} {} {} {} {}", rounded(seldom_.forks[std::size_t(&f - forks.data())], 1e3), f.cell,
           rounded(double(f.heading.x()), 1e3), rounded(double(f.heading.y()), 1e3), f.daughters.size(),
           int(f.turned), f.tips, rounded(f.ahead, 10.));
-      const auto each = [&](double Fork::Daughter::*what, std::size_t most, double steps) {
+      const auto each = [&](auto&& what, std::size_t most, double steps) {
         for (std::size_t i = 0; i < most; ++i)
-          put(" {}", i < f.daughters.size() ? rounded(f.daughters[i].*what, steps) : 0.);
+          put(" {}", i < f.daughters.size() ? rounded(std::invoke(what, f.daughters[i]), steps) : 0.);
       };
       each(&Fork::Daughter::tips, 2, 1.);
       each(&Fork::Daughter::length, most_daughters, 1e2);
       each(&Fork::Daughter::ahead, most_daughters, 10.);
-      for (std::size_t i = 0; i < most_daughters; ++i)
-        put(" {}", i < f.daughters.size() ? rounded(slope_of(f.daughters[i].points), 1e3) : 0.);
+      each([](const Fork::Daughter& d) { return slope_of(d.points); }, most_daughters, 1e3);
       for (std::size_t i = 0; i < most_daughters; ++i)
         put(" {}", i < f.daughters.size() ? f.daughters[i].next : none);
       for (std::size_t i = 0; i < most_daughters; ++i) {
