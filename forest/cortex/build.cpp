@@ -36,20 +36,6 @@ std::string place_text(const Place& p) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
 }
 
-// The normal of a surface around a place of it, the mean over a disc: what is smaller than that is not its direction.
-Place normal_around(const TriangleTree& tree, const Place& at, const Place& outwards) {
-  constexpr double radius = 300.;  // µm
-  const auto hit = tree.nearest(at);
-  Place sum = tree.normal(hit->triangle);
-  const Place u = outwards.unitOrthogonal(), v = outwards.normalized().cross(u);
-  for (int k = 0; k < 8; ++k) {
-    const double angle = k * std::numbers::pi / 4.;
-    const auto near = tree.nearest(at + radius * (std::cos(angle) * u + std::sin(angle) * v), radius);
-    if (near && tree.normal(near->triangle).dot(outwards) > 0.) sum += tree.normal(near->triangle);
-  }
-  return sum;
-}
-
 // Volume under the wall, µm³: under its triangles of the outer surface, down to the inner one. What lies between that and the
 // ribbon's inner triangles, which cut its folds, is measured at the middle of each. Not as what the rest leaves of all that the
 // surfaces enclose: a hundred times the volume, of which folds cut as much as the wall has.
@@ -264,8 +250,9 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
 Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& options, Progress& progress) {
   const auto oddities = check_surfaces(outer, inner);
   const Laplace field(outer, inner, {.spacing = options.spacing}, progress);
-  const TriangleTree outer_tree(outer), inner_tree(inner);
-  const WCurves curves(field, outer_tree, inner_tree);
+  const Boundary outside(outer, progress), inside(inner, progress);
+  const TriangleTree &outer_tree = outside.tree(), &inner_tree = inside.tree();
+  const WCurves curves(field, outside, inside);
   // Two triangles to a side of the lattice that elements are laid by, or more.
   const double side = std::sqrt(options.volume / 2500.);
   const Ribbon dropped = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
@@ -298,8 +285,9 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
       const double share = length > 2. * piece ? piece / length : .5;
       const Place out = start - curve.at_length(share),
                   in = curve.at_length(1. - share) - curve.points.back();
-      angles[2 * v] = degrees_between(out, normal_around(outer_tree, start, out));
-      angles[2 * v + 1] = degrees_between(in, normal_around(inner_tree, curve.points.back(), in));
+      angles[2 * v] = degrees_between(out, normal_around(outer_tree, *outer_tree.nearest(start), out));
+      angles[2 * v + 1] =
+          degrees_between(in, normal_around(inner_tree, *inner_tree.nearest(curve.points.back()), in));
     }
     progress.advance(end - begin);
   });

@@ -8,11 +8,35 @@
 namespace forest::cortex {
 namespace {
 
-constexpr double step_share = .5;  // of the spacing of the lattice
-constexpr double touching = .1;    // … surfaces are one
-constexpr double longest = 3e4;    // µm; no cortex is a third as thick
+constexpr double step_share = .5;  // of the spacing of the lattice, and half of that where curves turn
+// Nearer to a surface curves turn to the line that meets it at right angles, and then follow it, µm. Over half the radius of the
+// disc that normals are of a line's own hardly turns.
+constexpr double turning = normal_radius, straight = .5 * normal_radius;
+constexpr double touching = .1;  // … surfaces are one
+constexpr double longest = 3e4;  // µm; no cortex is a third as thick
 constexpr double least_slope =
     1e-5;  // 1/µm, a hundredth of that of a thick cortex; below it the tube would be endless
+
+// The direction, outwards, of the line that meets a surface at right angles and leads through a place, as nearly as is found; where
+// banks meet, or the floor of a sulcus is sharp, that is not the way to the nearest place. The surface is `distance` beyond the
+// place, or below 0 before it; its normal where the line meets it is `normal(met, direction)`.
+template <class Normal>
+Place across(const TriangleTree& surface, const Place& at, double distance, Place direction,
+             Normal&& normal) {
+  constexpr int rounds = 4;
+  constexpr double enough = .99985;  // one degree off
+  Place best = direction;
+  double closest = -1.;
+  for (int round = 0; round < rounds; ++round) {
+    const auto met = surface.nearest(at + distance * direction, turning);
+    if (!met) break;
+    const Place there = normal(*met, direction);
+    if (const double close = there.dot(direction); close > closest) closest = close, best = direction;
+    if (closest > enough) break;
+    direction = (direction + there).normalized();
+  }
+  return best;
+}
 
 }  // namespace
 
@@ -42,7 +66,7 @@ Place WCurve::at_length(double share) const {
 }
 
 double WCurves::straight_way(const Place& from) const {
-  const auto hit = inner_.nearest(from);
+  const auto hit = inner_.tree().nearest(from);
   return hit ? hit->distance : longest;
 }
 
@@ -54,38 +78,82 @@ struct WCurves::Way {
   bool arrived = false, sloping = false;  // sloping: the field has a slope at the start
 };
 
+struct WCurves::Slope {
+  Place along;  // where the field grows, and how steeply
+  bool turning = false;
+};
+
+std::optional<WCurves::Slope> WCurves::slope(const Place& at, const Place& heading) const {
+  const auto g = field_.gradient(at, heading);
+  if (!g) return std::nullopt;
+  const double steep = g->norm();
+  Place turned = Place::Zero();
+  double rest = 1.;
+  for (const Boundary* surface : {&outer_, &inner_})
+    if (const auto hit = surface->tree().nearest(at, turning)) {
+      const Place normal = across(
+          surface->tree(), at, surface == &outer_ ? hit->distance : -hit->distance, surface->normal(*hit),
+          [&](const TriangleTree::Hit& met, const Place&) { return surface->normal(met); });
+      if (normal.dot(*g) <= .1 * steep) continue;  // another bank's
+      const double near = std::clamp((turning - hit->distance) / (turning - straight), 0., 1.);
+      const double share = near * near * (3. - 2. * near);
+      turned += share * normal, rest *= 1. - share;
+    }
+  const bool near = rest < 1.;
+  return Slope{near ? Place(steep * (turned + rest * *g / steep).normalized()) : *g, near};
+}
+
 WCurves::Way WCurves::follow(const Place& start, const Place& towards, bool upwards) const {
-  const TriangleTree& aim = upwards ? outer_ : inner_;
-  const double step = step_share * field_.spacing();
-  const auto slope = [&](const Place& place, const Place& heading) -> std::optional<Place> {
-    const auto g = field_.gradient(place, upwards ? heading : Place(-heading));
-    return g ? std::optional<Place>(upwards ? *g : Place(-*g)) : std::nullopt;
+  const TriangleTree& aim = (upwards ? outer_ : inner_).tree();
+  bool turns = false;
+  const auto slope_at = [&](const Place& place, const Place& towards_aim) -> std::optional<Place> {
+    const auto g = slope(place, upwards ? towards_aim : Place(-towards_aim));
+    turns = g && g->turning;
+    return g ? std::optional<Place>(upwards ? g->along : Place(-g->along)) : std::nullopt;
   };
   const auto width_of = [](const Place& g) { return 1. / std::max(g.norm(), least_slope); };
   Way way{{start}, {0.}};
   Place at = start, heading = towards.normalized();
   double width = 0.;  // 1/slope at `at`
-  if (const auto g = slope(at, heading)) heading = g->normalized(), width = width_of(*g), way.sloping = true;
+  if (const auto g = slope_at(at, heading))
+    heading = g->normalized(), width = width_of(*g), way.sloping = true;
   const auto add = [&](const Place& place, double width_there) {
     const double ds = (place - way.points.back()).norm();
     way.volume.push_back(way.volume.back() + ds * .5 * (width + width_there));
     way.points.push_back(place);
     width = width_there;
   };
-  for (double gone = 0.; gone < longest; gone += step) {
+  const auto arrive = [&](const TriangleTree::Hit& hit, double width_there) {
+    add(hit.at, width_there);
+    way.triangle = hit.triangle, way.arrived = true;
+  };
+  // At right angles to the surface, as nearly as it can be told.
+  const auto last_way = [&](const Place& from, double distance, const Place& now) -> Place {
+    const double sign = upwards ? 1. : -1.;
+    return sign * across(aim, from, sign * distance, sign * now,
+                         [&](const TriangleTree::Hit& met, const Place& outwards) -> Place {
+                           return normal_around(aim, met, outwards).normalized();
+                         });
+  };
+  for (double gone = 0., step = 0.; gone < longest; gone += step) {
+    step = (turns ? .5 : 1.) * step_share * field_.spacing();
+    if (const auto near = aim.nearest(at, straight))
+      if (const auto hit = aim.first(at, at + 2. * straight * last_way(at, near->distance, heading))) {
+        arrive(*hit, width);
+        return way;
+      }
     // Midpoint rule.
     Place middle = heading;
-    if (const auto g = slope(at + .5 * step * heading, heading)) middle = g->normalized();
+    if (const auto g = slope_at(at + .5 * step * heading, heading)) middle = g->normalized();
     const Place next = at + step * middle;
     // The surface may be met in either half; the way there is straight within a step.
     if (const auto hit = aim.first(at, next)) {
       double width_there = width;
-      if (const auto g = slope(hit->at, middle)) width_there = width_of(*g);
-      add(hit->at, width_there);
-      way.triangle = hit->triangle, way.arrived = true;
+      if (const auto g = slope_at(hit->at, middle)) width_there = width_of(*g);
+      arrive(*hit, width_there);
       return way;
     }
-    const auto g = slope(next, middle);
+    const auto g = slope_at(next, middle);
     if (!g && gone > 0. && !aim.nearest(next, 2. * field_.spacing())) break;  // it left the tissue
     add(next, g ? width_of(*g) : width);
     at = next, heading = g ? g->normalized() : middle;
@@ -98,7 +166,7 @@ WCurves::Way WCurves::follow(const Place& start, const Place& towards, bool upwa
 }
 
 WCurve WCurves::drop(const Place& start, const Place& inward) const {
-  if (const auto hit = inner_.nearest(start, touching * field_.spacing()))  // there is no tissue here
+  if (const auto hit = inner_.tree().nearest(start, touching * field_.spacing()))  // there is no tissue here
     return {{start, hit->at}, {0., 0.}, hit->triangle, true};
   Way way = follow(start, inward, false);
   return {std::move(way.points), std::move(way.volume), way.triangle, way.arrived};

@@ -1,6 +1,8 @@
 // SPDX-License-Identifier: Apache-2.0
 // w-curves: the field lines of a cortex, dropped from the outer surface along the axis of its pyramidal cells to the inner
-// one, and how deep a place on one is.
+// one, and how deep a place on one is. A field on a lattice does not see how surfaces turn between two nodes, in the floors of
+// sulci above all: near a surface curves leave the field's way for the line that meets the surface at right angles, and all do
+// so the same way, so that none cross.
 //
 // Two measures of depth, both 0 on the outer surface and 1 on the inner one: the share of the curve's length (equidistant),
 // and the share of the volume of the thin tube around it (equivolumetric, after Bok 1929: layers keep their share of volume
@@ -11,8 +13,8 @@
 #include <optional>
 #include <vector>
 
+#include "forest/cortex/boundary.h"
 #include "forest/cortex/laplace.h"
-#include "forest/geometry/triangle_tree.h"
 
 namespace forest::cortex {
 
@@ -30,10 +32,10 @@ struct WCurve {
   Place at_length(double share) const;
 };
 
-/// Drops curves; the field and the trees must outlive it.
+/// Drops curves; the field and the surfaces must outlive it.
 class WCurves {
  public:
-  WCurves(const Laplace& field, const TriangleTree& outer, const TriangleTree& inner)
+  WCurves(const Laplace& field, const Boundary& outer, const Boundary& inner)
       : field_(field), outer_(outer), inner_(inner) {}
 
   /// @param start   on the outer surface
@@ -48,10 +50,12 @@ class WCurves {
 
  private:
   struct Way;
+  struct Slope;
+  std::optional<Slope> slope(const Place& at, const Place& heading) const;
   Way follow(const Place& start, const Place& heading, bool upwards) const;
 
   const Laplace& field_;
-  const TriangleTree &outer_, &inner_;
+  const Boundary &outer_, &inner_;
 };
 
 }  // namespace forest::cortex
