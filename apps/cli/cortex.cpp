@@ -42,8 +42,6 @@ namespace {
 namespace fs = std::filesystem;
 using Json = nlohmann::ordered_json;
 
-Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).text(), path.string()); }
-
 // What is measured beside the report: of the elements alone, or with what else is given.
 struct Deeper {
   struct Border {
@@ -342,6 +340,10 @@ constexpr Verb actions[] = {
      "brainforest cortex distance lh.pial outer.surf.gii --values away.txt\n"
      "  brainforest render lh.pial --overlay away.txt -o away.png",
      cortex_distance},
+    {"curves", "Drop w-curves between two surfaces: thickness along them, and a surface at a depth",
+     "brainforest cortex curves lh.pial lh.white -o lh.middle --depth .5 --values thickness.txt\n"
+     "  brainforest render lh.middle --overlay thickness.txt -o thickness.png",
+     cortex_curves},
     {"build", "Fill the space between two surfaces with certified elements",
      "brainforest cortex build lh.pial lh.white -o elements.h5", build},
     {"report", "Measure a file of elements",
@@ -355,6 +357,8 @@ constexpr Verb actions[] = {
 };
 
 }  // namespace
+
+Mesh read_mesh(const fs::path& path) { return io::read_surface(MappedFile(path).text(), path.string()); }
 
 std::function<void()> cortex(CLI::App& command, Console& console) {
   command.require_subcommand(1);

@@ -53,9 +53,7 @@ void must_be_alike(const Options& o, const Mesh (&meshes)[2]) {
 
 void run(const Options& o, Console& console) {
   if (!o.values.empty()) must_take_files({o.values}, o.force);
-  for (const fs::path& read_here : {o.first, o.second})
-    if (std::error_code none; !o.values.empty() && fs::equivalent(o.values, read_here, none))
-      throw Error(fmt::format("{} is read here; give --values another name", o.values.string()));
+  must_not_be_read("--values", o.values, {o.first, o.second});
   const Mesh meshes[] = {read(o.first), read(o.second)};
   must_be_alike(o, meshes);
   const TriangleTree trees[] = {TriangleTree(meshes[0]), TriangleTree(meshes[1])};

@@ -278,16 +278,8 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   std::vector<double> angles(2 * quads.points.size());
   parallel_ranges(quads.points.size(), 256, [&](std::size_t begin, std::size_t end) {
     for (std::size_t v = begin; v < end; ++v) {
-      const WCurve curve = curve_at(ribbon, quads.points[v], curves);
-      const Place& start = curve.points.front();
-      const double length = curve.length();
-      constexpr double piece = 150.;  // µm
-      const double share = length > 2. * piece ? piece / length : .5;
-      const Place out = start - curve.at_length(share),
-                  in = curve.at_length(1. - share) - curve.points.back();
-      angles[2 * v] = degrees_between(out, normal_around(outer_tree, *outer_tree.nearest(start), out));
-      angles[2 * v + 1] =
-          degrees_between(in, normal_around(inner_tree, *inner_tree.nearest(curve.points.back()), in));
+      const EndAngles at = end_angles(curve_at(ribbon, quads.points[v], curves), outer_tree, inner_tree);
+      angles[2 * v] = at.outer, angles[2 * v + 1] = at.inner;
     }
     progress.advance(end - begin);
   });

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <numbers>
 #include <utility>
 
 namespace forest::cortex {
@@ -63,6 +64,20 @@ Place WCurve::at_length(double share) const {
     left -= piece;
   }
   return points.back();
+}
+
+EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const TriangleTree& inner) {
+  constexpr double piece = 150.;  // µm
+  const auto between = [](const TriangleTree& surface, const Place& end, const Place& outwards) {
+    const Place normal = normal_around(surface, *surface.nearest(end), outwards);
+    return std::atan2(outwards.cross(normal).norm(), outwards.dot(normal)) * 180. / std::numbers::pi;
+  };
+  const Place &start = curve.points.front(), &end = curve.points.back();
+  const double length = curve.length();
+  if (length == 0.) return {};
+  const double share = length > 2. * piece ? piece / length : .5;
+  return {between(outer, start, start - curve.at_length(share)),
+          between(inner, end, curve.at_length(1. - share) - end)};
 }
 
 double WCurves::straight_way(const Place& from) const {

@@ -32,6 +32,12 @@ struct WCurve {
   Place at_length(double share) const;
 };
 
+/// Between the last .15 mm of a curve and the surfaces' normals where it ends, degrees.
+struct EndAngles {
+  double outer = 0., inner = 0.;
+};
+EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const TriangleTree& inner);
+
 /// Drops curves; the field and the surfaces must outlive it.
 class WCurves {
  public:

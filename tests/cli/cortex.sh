@@ -146,6 +146,23 @@ refuses 'no_such' $BRAINFOREST cortex distance outer no_such
 refuses 'check that both are in mm' $BRAINFOREST cortex distance outer small
 refuses 'is read here' $BRAINFOREST cortex distance outer inner --values inner --force
 refuses 'nan: has a vertex that is nowhere' $BRAINFOREST cortex distance nan inner
+
+# w-curves alone: between balls two millimetres apart, but for the dent, which both have.
+$BRAINFOREST cortex curves outer inner -o middle --values thick.txt --json >curves.json
+told curves.json 'd["curves"] == d["reached"] > 500 and 1.8 < d["thickness"] < 2.2 and d["w_angle"]["median"] < 3 and d["w_angle"]["p99"] < 15'
+[ "$(wc -l <thick.txt)" = "$(python3 -c 'import json;print(json.load(open("curves.json"))["curves"])')" ]
+for by in volume length; do
+  $BRAINFOREST cortex curves outer inner -o $by.gii --by $by --depth .5 >said.txt
+  grep -q 'reach the inner surface' said.txt
+  $BRAINFOREST cortex distance inner $by.gii --json >$by.json
+done
+# Half of the volume of a convex shell lies outside of the middle of its curves.
+python3 -c 'import json; v, l = (json.load(open(f"{by}.json"))[0]["mean"] for by in ("volume", "length")); assert .9 < l < 1.1 and l + .02 < v < l + .3, (v, l)'
+refuses 'already' $BRAINFOREST cortex curves outer inner -o middle
+refuses 'is read here' $BRAINFOREST cortex curves outer inner -o inner --force
+refuses 'swapped' $BRAINFOREST cortex curves inner outer -o no.gii
+fails_with 2 'values' $BRAINFOREST cortex curves outer inner -o no.gii --measure thickness
+[ ! -e no.gii ]
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
 
