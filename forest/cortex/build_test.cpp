@@ -246,7 +246,8 @@ TEST_F(Shell, AHeapThatCannotBeMendedDoesNotKeepOthersFromBeginningAnew) {
   constexpr std::uint32_t mendable = 7, hopeless = 450;
   const auto corners = elements.corners_of(mendable);
   std::swap(elements.curves[corners[0]], elements.curves[corners[3]]);
-  elements.elements[hopeless][3] = elements.elements[hopeless][0];  // an edge without a length
+  for (const std::size_t k : {1u, 2u, 3u})  // an edge without a length
+    elements.elements[hopeless][k] = elements.elements[hopeless][0];
   const std::vector<Depths> before = elements.curves;
   const auto tangled = uncertified(elements);
   ASSERT_GT(tangled.size(), 3u);
