@@ -30,10 +30,7 @@ struct Options {
 
 void run(const Options& options, Console& console) {
   const auto begin = Clock::now();
-  std::error_code none;
-  for (const auto& input : {options.report, options.spikes})
-    if (std::filesystem::equivalent(input, options.out, none))
-      throw Error(options.out.string() + ": is what is read, so it is not replaced; name another file");
+  must_not_be_read("--out", options.out, {options.report, options.spikes});
   must_take(options.out, activity_file);
   const bool spikes_alone = options.report.empty();
   if (spikes_alone && options.spikes.empty())

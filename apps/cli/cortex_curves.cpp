@@ -16,6 +16,7 @@
 #include "forest/cortex/build.h"
 #include "forest/cortex/w_curve.h"
 #include "forest/io/surface.h"
+#include "forest/statistics/two_samples.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/cortex.h"
@@ -81,16 +82,9 @@ std::vector<Dropped> drop_all(const Options& o, const Mesh& outer, const Mesh& i
   return all;
 }
 
-double quantile(std::vector<double>& values, double share) {
-  if (values.empty()) return 0.;
-  const auto at = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-  std::ranges::nth_element(values, at);
-  return *at;
-}
-
 void run(const Options& o, Console& console) {
   must_take_surfaces({o.out}, o.force);
-  if (!o.values.empty()) must_take_files({o.out, o.values}, o.force);
+  must_take_files({o.out, o.values}, o.force);
   must_not_be_read("--out", o.out, {o.outer, o.inner});
   must_not_be_read("--values", o.values, {o.outer, o.inner});
   Mesh outer = read_mesh(o.outer);
@@ -114,6 +108,9 @@ void run(const Options& o, Console& console) {
   if (!o.values.empty()) files.emplace_back(o.values, std::move(text));
   write_unless_there(files, o.force);
 
+  const auto quantile = [](const std::vector<double>& values, double share) {
+    return values.empty() ? 0. : statistics::quantile(values, share);
+  };
   const double thickness = quantile(lengths, .5), usual = quantile(angles, .5), far = quantile(angles, .99);
   console.say(
       fmt::format("{} of {} reach the inner surface; {:.2f} mm long in the median; {:.2f}° off "

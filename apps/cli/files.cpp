@@ -232,8 +232,8 @@ void must_take_surfaces(const std::vector<fs::path>& files, bool force) {
 void must_not_be_read(const char* option, const fs::path& written, const std::vector<fs::path>& read) {
   for (const fs::path& file : read)
     if (std::error_code none; fs::equivalent(written, file, none))
-      throw Error(fmt::format("{} is read here; give {} another name", repository::escaped(written.string()),
-                              option));
+      throw Error(fmt::format("{} is what is read here, so it is not replaced; give {} another name",
+                              repository::escaped(written.string()), option));
 }
 
 void refuse_existing(const std::vector<fs::path>& files) {

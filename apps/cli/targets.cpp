@@ -93,9 +93,7 @@ void remove(const std::string& name, scene::Targets& targets) {
 }
 
 void run(const Options& options, Console& console) {
-  std::error_code none;
-  if (std::filesystem::equivalent(options.forest, options.out, none))
-    throw Error(options.out.string() + ": is what is read, so it is not replaced; name another file");
+  must_not_be_read("--out", options.out, {options.forest});
   const scene::Forest forest = scene::Forest::open(options.forest);
   scene::Targets targets(forest, read_node_sets(forest, options.node_sets, console));
   for (const std::string& name : options.remove) remove(name, targets);

@@ -21,6 +21,10 @@ int sides_of(std::uint32_t places) { return int(std::lround((std::sqrt(8. * plac
 
 }  // namespace
 
+double degrees_between(const Place& a, const Place& b) {
+  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / std::numbers::pi;
+}
+
 Place normal_around(const TriangleTree& surface, const TriangleTree::Hit& hit, const Place& outwards) {
   Place sum = surface.normal(hit.triangle);
   const Place u = outwards.unitOrthogonal(), v = outwards.normalized().cross(u);

@@ -12,6 +12,9 @@ namespace forest::cortex {
 
 using Place = Eigen::Vector3d;  // µm
 
+/// The angle between two directions.
+double degrees_between(const Place& a, const Place& b);
+
 inline constexpr double normal_radius = 300.;  // µm, of the disc
 
 /// The mean normal of a disc around a place of a surface, at right angles to `outwards`; not a unit. Of the nearest triangles to 19

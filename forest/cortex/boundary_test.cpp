@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <vector>
 
 #include <gtest/gtest.h>
@@ -13,10 +12,6 @@
 
 namespace forest::cortex {
 namespace {
-
-double degrees_between(const Place& a, const Place& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / std::numbers::pi;
-}
 
 // A roof over 20 by 20 mm: its ridge along y, its sides this steep.
 Mesh roof(double slope) {

@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <numbers>
 
 #include <fmt/format.h>
 
@@ -18,10 +17,6 @@
 
 namespace forest::cortex {
 namespace {
-
-double degrees_between(const Place& a, const Place& b) {
-  return std::atan2(a.cross(b).norm(), a.dot(b)) * 180. / std::numbers::pi;
-}
 
 double share_of(std::vector<double>& values, double share) {
   if (values.empty()) return 0.;

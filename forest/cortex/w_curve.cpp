@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <cmath>
-#include <numbers>
 #include <utility>
 
 namespace forest::cortex {
@@ -69,8 +68,7 @@ Place WCurve::at_length(double share) const {
 EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const TriangleTree& inner) {
   constexpr double piece = 150.;  // µm
   const auto between = [](const TriangleTree& surface, const Place& end, const Place& outwards) {
-    const Place normal = normal_around(surface, *surface.nearest(end), outwards);
-    return std::atan2(outwards.cross(normal).norm(), outwards.dot(normal)) * 180. / std::numbers::pi;
+    return degrees_between(outwards, normal_around(surface, *surface.nearest(end), outwards));
   };
   const Place &start = curve.points.front(), &end = curve.points.back();
   const double length = curve.length();
