@@ -10,6 +10,7 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/fit_faces.h"
+#include "forest/cortex/gauge.h"
 #include "forest/cortex/shape.h"
 #include "forest/cortex/sulci.h"
 #include "forest/geometry/isosurface.h"
@@ -56,13 +57,11 @@ bool as_wanted(double volume, double wanted) { return volume >= .8 * wanted && v
 
 // Whether 95 of 100 have about the wanted volume, and 99 of 100 a scaled Jacobian of .5.
 bool even_and_well_shaped(const Elements& elements, double volume) {
-  std::vector<std::uint8_t> odd(elements.size()), sheared(elements.size());
-  parallel_for(elements.size(), 64, [&](std::size_t e) {
-    const Hexahedron h = elements.hexahedron(e);
-    odd[e] = !as_wanted(h.volume(), volume), sheared[e] = scaled_jacobian(h) < .5;
-  });
-  return 20 * std::ranges::count(odd, 1) <= long(elements.size()) &&
-         100 * std::ranges::count(sheared, 1) <= long(elements.size());
+  const Looks looks = look(elements);
+  const auto odd =
+                 std::ranges::count_if(looks.volume, [&](float v) { return !as_wanted(double(v), volume); }),
+             sheared = std::ranges::count_if(looks.least, [](float least) { return least < .5f; });
+  return 20 * odd <= long(elements.size()) && 100 * sheared <= long(elements.size());
 }
 
 // How far 99 of 100 places of faces, four of each, are from a surface, µm.
@@ -120,7 +119,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
   closely.off = 15.;
   Shaping patient = roomy;
   patient.off = 30., patient.even = 10., patient.iterations = 120, patient.gain = .005;
-  constexpr int evenings = 2, evenings_with_faces = 6;
+  constexpr int evenings = 2, evenings_with_faces = 3;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
     improve_shapes(cortex.elements, outer, inner, roomy, progress);

@@ -6,14 +6,15 @@
 #include <utility>
 
 #include "forest/core/parallel.h"
+#include "forest/cortex/gauge.h"
 
 namespace forest::cortex {
 
 std::vector<double> to_keep(const Elements& elements, double good) {
   std::vector<double> keep(elements.size(), -1.);
+  const Looks looks = look(elements);
   parallel_for(elements.size(), 64, [&](std::size_t e) {
-    const Hexahedron h = elements.hexahedron(e);
-    if (certify(h).positive()) keep[e] = std::min(good, scaled_jacobian(h));
+    if (certify(elements.hexahedron(e)).positive()) keep[e] = std::clamp(double(looks.least[e]), 0., good);
   });
   return keep;
 }
@@ -23,22 +24,22 @@ void go(Elements& elements, std::span<const Depths> aim, std::span<const double>
   const std::vector<Depths> start = elements.curves;
   const Stars stars(elements);
   std::vector<std::uint8_t> halved(start.size(), 0);
-  std::vector<std::uint32_t> look;  // elements of which something moved
+  std::vector<std::uint32_t> touched;  // elements of which something moved
   for (std::uint32_t c = 0; c < start.size(); ++c)
-    if (aim[c] != start[c]) std::ranges::copy(stars.of(c), std::back_inserter(look));
-  look = distinct(std::move(look));
+    if (aim[c] != start[c]) std::ranges::copy(stars.of(c), std::back_inserter(touched));
+  touched = distinct(std::move(touched));
   std::ranges::copy(aim, elements.curves.begin());
-  while (!look.empty()) {
-    std::vector<std::uint8_t> lost(look.size(), 0);
-    parallel_for(look.size(), 64, [&](std::size_t i) {
-      const double wanted = keep[look[i]];
-      if (wanted < 0.) return;
-      const Hexahedron h = elements.hexahedron(look[i]);
-      lost[i] = scaled_jacobian(h) < wanted || !certify(h).positive();
+  while (!touched.empty()) {
+    std::vector<std::uint8_t> lost(touched.size(), 0);
+    const Looks looks = look(elements, touched);
+    parallel_for(touched.size(), 64, [&](std::size_t i) {
+      const double wanted = keep[touched[i]];
+      lost[i] = wanted >= 0. &&
+                (double(looks.least[i]) < wanted || !certify(elements.hexahedron(touched[i])).positive());
     });
     std::vector<std::uint32_t> less, next;
-    for (std::size_t i = 0; i < look.size(); ++i)
-      if (lost[i]) std::ranges::copy(elements.elements[look[i]], std::back_inserter(less));
+    for (std::size_t i = 0; i < touched.size(); ++i)
+      if (lost[i]) std::ranges::copy(elements.elements[touched[i]], std::back_inserter(less));
     for (const std::uint32_t c : distinct(std::move(less))) {
       if (halved[c] > most_halvings) continue;
       const double share = ++halved[c] > most_halvings ? 0. : 1. / double(1 << halved[c]);
@@ -46,7 +47,7 @@ void go(Elements& elements, std::span<const Depths> aim, std::span<const double>
         elements.curves[c][d] = start[c][d] + share * (aim[c][d] - start[c][d]);
       std::ranges::copy(stars.of(c), std::back_inserter(next));
     }
-    look = distinct(std::move(next));
+    touched = distinct(std::move(next));
   }
 }
 

@@ -8,6 +8,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <numeric>
 #include <type_traits>
 #include <vector>
 
@@ -122,6 +123,8 @@ void coefficients_of(const double* du, const double* dv, const double* dw, const
   along_slow<nodes, nodes * nodes>(a, 1, t.to_bernstein, out);
 }
 
+constexpr std::array<int, 3> stride{1, nodes, nodes* nodes};
+
 struct Box {
   Coefficients coefficients;
   Eigen::Vector3d low = Eigen::Vector3d::Zero();
@@ -129,47 +132,66 @@ struct Box {
   int halvings = 0;
 };
 
-constexpr std::array<int, 3> stride{1, 9, 81};
-
 Eigen::Vector3d place_of(const Box& box, std::size_t coefficient) {
   const Eigen::Vector3d at(double(coefficient % 9), double(coefficient / 9 % 9), double(coefficient / 81));
   return box.low + box.size.cwiseProduct(at / 8.);
 }
 
-// The axis along which neighbouring coefficients differ most.
-int steepest(const Coefficients& c) {
-  int best = 0;
-  double most = -1.;
-  for (int axis = 0; axis < 3; ++axis) {
-    double sum = 0.;
-    for (int n = 0; n < 729; ++n)
-      if (n / stride[std::size_t(axis)] % 9 < 8)
-        sum += std::abs(c[std::size_t(n + stride[std::size_t(axis)])] - c[std::size_t(n)]);
-    if (sum > most) most = sum, best = axis;
-  }
-  return best;
+FOREST_CLONES
+double least_of(const double* c) {
+  double least[nodes];
+  std::copy_n(c, nodes, least);
+  for (int r = 1; r < 81; ++r)
+    for (int x = 0; x < nodes; ++x) least[x] = c[9 * r + x] < least[x] ? c[9 * r + x] : least[x];
+  return *std::min_element(least, least + nodes);
 }
 
-// The upper half is returned, the box becomes the lower one: de Casteljau's algorithm at the middle.
-Box halve(Box& box, int axis) {
-  Box upper = box;
-  const std::size_t step = std::size_t(stride[std::size_t(axis)]);
-  for (std::size_t n = 0; n < 729; ++n) {
-    if (n / step % 9 != 0) continue;
-    double row[9];
-    for (std::size_t i = 0; i < 9; ++i) row[i] = box.coefficients[n + i * step];
-    for (std::size_t level = 0; level < 9; ++level) {
-      box.coefficients[n + level * step] = row[0];
-      upper.coefficients[n + (8 - level) * step] = row[8 - level];
-      for (std::size_t i = 0; i + level < 8; ++i) row[i] = .5 * (row[i] + row[i + 1]);
-    }
+// The axis along which neighbouring coefficients differ most. Sums are kept apart as far as vectors reach.
+FOREST_CLONES
+int steepest(const double* c) {
+  double u[8] = {}, v[9] = {}, w[81] = {};
+  for (int r = 0; r < 81; ++r)
+    for (int i = 0; i < 8; ++i) u[i] += std::abs(c[9 * r + i + 1] - c[9 * r + i]);
+  for (int k = 0; k < 9; ++k)
+    for (int j = 0; j < 8; ++j)
+      for (int i = 0; i < 9; ++i) v[i] += std::abs(c[81 * k + 9 * j + 9 + i] - c[81 * k + 9 * j + i]);
+  for (int k = 0; k < 8; ++k)
+    for (int x = 0; x < 81; ++x) w[x] += std::abs(c[81 * k + 81 + x] - c[81 * k + x]);
+  const std::array sums{std::accumulate(u, u + 8, 0.), std::accumulate(v, v + 9, 0.),
+                        std::accumulate(w, w + 81, 0.)};
+  return int(std::ranges::max_element(sums) - sums.begin());
+}
+
+// visit(i, r, x): of the i-th of nine on the r-th of 81 lines along an axis where it is among all.
+template <class Visit>
+[[gnu::always_inline]] inline void on_lines(int axis, Visit&& visit) {
+  const int step = stride[std::size_t(axis)];
+  for (int i = 0; i < nodes; ++i)
+    for (int r = 0, first = i * step; r < 81; first += nodes * step)
+      for (int x = 0; x < step; ++x, ++r) visit(i, r, first + x);
+}
+
+// All becomes the lower half along an axis: de Casteljau's algorithm at the middle, on all lines at once.
+FOREST_CLONES
+void halve(double* lower, double* upper, int axis) {
+  double line[nodes][81], end[nodes][81];
+  on_lines(axis, [&](int i, int r, int x) { line[i][r] = lower[x]; });
+  for (int level = 0; level < nodes; ++level) {
+    for (int i = nodes - 1; level > 0 && i >= level; --i)
+      for (int r = 0; r < 81; ++r) line[i][r] = .5 * (line[i - 1][r] + line[i][r]);
+    std::copy_n(line[nodes - 1], 81, end[nodes - 1 - level]);
   }
-  box.size[axis] *= .5;
-  upper.size[axis] = box.size[axis];
-  upper.low[axis] += box.size[axis];
-  ++box.halvings;
-  upper.halvings = box.halvings;
-  return upper;
+  on_lines(axis, [&](int i, int r, int x) { lower[x] = line[i][r], upper[x] = end[i][r]; });
+}
+
+// A box becomes its lower half, and what was a copy of it the upper one.
+void halve(Box& lower, Box& upper) {
+  const int axis = steepest(lower.coefficients.data());
+  halve(lower.coefficients.data(), upper.coefficients.data(), axis);
+  lower.size[axis] *= .5;
+  upper.size[axis] = lower.size[axis];
+  upper.low[axis] += lower.size[axis];
+  upper.halvings = ++lower.halvings;
 }
 
 // Control points of the cubic through f at 0, 1/3, 2/3 and 1.
@@ -360,16 +382,17 @@ Certificate certify(const Hexahedron& hexahedron, int halvings) {
     const Coefficients& c = box.coefficients;
     for (const std::size_t corner : {0, 8, 72, 80, 648, 656, 720, 728})
       if (!(c[corner] > margin)) return {not_positive, c[corner], place_of(box, corner)};
-    const auto least = std::ranges::min_element(c);
-    const double bound = *least - margin;
+    const double least = least_of(c.data()), bound = least - margin;
     if (!(bound > 0.) && box.halvings < halvings) {
-      Box upper = halve(box, steepest(c));
-      open.push_back(std::move(upper));
+      open.reserve(std::size_t(halvings) + 1);
+      open.push_back(open.back());
+      halve(open[open.size() - 2], open.back());
       continue;
     }
     if (!(bound > 0.)) result.verdict = undecided;
     if (bound < result.least)
-      result.least = bound, result.where = place_of(box, std::size_t(least - c.begin()));
+      result.least = bound,
+      result.where = place_of(box, std::size_t(std::ranges::find(c, least) - c.begin()));
     open.pop_back();
   }
   return result;

@@ -8,6 +8,7 @@
 
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/cortex/gauge.h"
 #include "forest/cortex/go.h"
 #include "forest/cortex/neighbourhood.h"
 
@@ -22,10 +23,10 @@ struct Faults {
   std::vector<double> how;  // of every one that was asked
 
   Faults(const Elements& all, std::span<const std::uint32_t> of, double least) : how(of.size()) {
+    const Looks looks = look(all, of);
     parallel_for(of.size(), 64, [&](std::size_t i) {
-      const Hexahedron h = all.hexahedron(of[i]);
-      const double scaled = scaled_jacobian(h);
-      const bool valid = certify(h).positive();
+      const double scaled = double(looks.least[i]);
+      const bool valid = certify(all.hexahedron(of[i])).positive();
       how[i] = valid ? std::max(0., least - scaled) : 3. - std::max(-1., scaled);
     });
     for (std::size_t i = 0; i < of.size(); ++i)
@@ -293,9 +294,9 @@ LeftOut leave_out(Elements& elements, double least) {
   for (std::uint32_t c = 0; c < elements.corners; ++c)
     if ((elements.curves[c][0] - elements.curves[c][3]).norm() < no_tissue) rim[c] = 1;
   std::vector<std::uint8_t> bad(elements.size(), 0), gone(elements.size(), 0);
+  const Looks looks = look(elements);
   parallel_for(elements.size(), 64, [&](std::size_t e) {
-    const Hexahedron h = elements.hexahedron(e);
-    bad[e] = scaled_jacobian(h) < least || !certify(h).positive();
+    bad[e] = double(looks.least[e]) < least || !certify(elements.hexahedron(e)).positive();
   });
   for (bool more = true; more;) {
     more = false;
