@@ -268,7 +268,8 @@ void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTre
   struct Try {
     int evened, room;  // rings: that are evened out, and around these that move, too
   };
-  constexpr std::array tries{Try{0, 1}, Try{1, 1}, Try{0, 3}, Try{1, 2}, Try{2, 1}, Try{3, 1}};
+  constexpr std::array tries{Try{0, 1}, Try{1, 1}, Try{0, 3}, Try{1, 2}, Try{2, 1},
+                             Try{3, 1}, Try{2, 2}, Try{3, 2}, Try{4, 2}, Try{6, 2}};
   Shaping wide = shaping;
   wide.patch = 200;
   wide.finely = true;
