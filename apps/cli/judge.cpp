@@ -124,9 +124,11 @@ Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
       {"auc",
        {{"structure", interval_of(j.auc.structure)},
         {"diameters", interval_of(j.auc.diameters)},
+        {"depth", interval_of(j.auc.depth)},
         {"slopes", interval_of(j.auc.slopes)},
         {"real_control", interval_of(j.auc.real_control)},
         {"real_control_diameters", interval_of(j.auc.real_control_diameters)},
+        {"real_control_depth", interval_of(j.auc.real_control_depth)},
         {"real_control_slopes", interval_of(j.auc.real_control_slopes)},
         {"logistic", interval_of(j.auc.logistic)}}},
       {"energy_p", j.energy_p},
@@ -188,11 +190,13 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
                     .colour = colour});
   };
   add("grown, structure", j.auc.structure, 1, "≤ 0.60");
-  add("grown, slopes in the slice", j.auc.slopes, 1, "≤ 0.60");
   add("grown, with diameters", j.auc.diameters, 1, "≤ 0.65");
+  add("grown, by depth over breadth alone", j.auc.depth, 1, "≤ 0.60");
+  add("grown, slopes in the slice", j.auc.slopes, 1, "not asked");
   add("real training cells, structure", j.auc.real_control, 0);
-  add("real training cells, slopes", j.auc.real_control_slopes, 0);
   add("real training cells, with diameters", j.auc.real_control_diameters, 0);
+  add("real training cells, by depth", j.auc.real_control_depth, 0);
+  add("real training cells, slopes", j.auc.real_control_slopes, 0);
   for (const ControlResult& c : j.controls)
     add(("control: " + c.name).c_str(), c.auc, 3,
         c.rejected ? "rejected by " + counted(c.reasons.size(), "criterion", "criteria") : "missed");

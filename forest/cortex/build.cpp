@@ -119,7 +119,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
   closely.off = 15.;
   Shaping patient = roomy;
   patient.off = 30., patient.even = 10., patient.iterations = 120, patient.gain = .005;
-  constexpr int evenings = 2, evenings_with_faces = 3;
+  constexpr int evenings = 2, evenings_with_faces = 6;
   for (int time = 0; time < evenings && !even_and_well_shaped(cortex.elements, volume); ++time) {
     improve_shapes(cortex.elements, outer, inner, even, progress);
     improve_shapes(cortex.elements, outer, inner, roomy, progress);

@@ -36,6 +36,10 @@ constexpr auto slopes = std::to_array<std::string_view>({"length_along_z_by_x", 
                                                          "section_length_fractions_along_z",
                                                          "segment_elevations", "level_segment_fraction"});
 
+// Of these the one that tells best by itself whether cells are too deep: a plane has two directions to turn a neuron in, so that
+// lengths along one of them are what lengths along z can be measured by.
+constexpr std::string_view depth = "length_along_z_by_x";
+
 // What repeats another metric, or tells the tracer and not the cell.
 constexpr auto left_out =
     std::to_array<std::string_view>({"segment_midpoints_x", "segment_midpoints_y", "segment_midpoints_z",
@@ -54,7 +58,7 @@ const std::vector<const Metric*>& chosen() {
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
-                   m.diameters, std::ranges::count(slopes, m.name) > 0};
+                   m.diameters, std::ranges::count(slopes, m.name) > 0, m.name == depth};
   };
   if (m.level == Level::neuron) return {column("", m.unit)};
   if (m.level == Level::shell) {
@@ -228,6 +232,11 @@ FeatureTable structure_of(const FeatureTable& table) {
 
 FeatureTable slopes_of(const FeatureTable& table) {
   return columns_that(table, [](const Feature& f) { return f.slope; });
+}
+
+FeatureTable depth_of(const FeatureTable& table) {
+  const auto first = std::ranges::find_if(table.features, &Feature::depth);
+  return columns_that(table, [&](const Feature& f) { return first != table.features.end() && f == *first; });
 }
 
 FeatureTable distinct(const FeatureTable& table) {

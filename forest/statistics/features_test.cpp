@@ -121,6 +121,11 @@ TEST(Slopes, AreOfBranchesInTheSliceAndOfNothingElse) {
   EXPECT_TRUE(has("basal segment_elevations sd"));
   EXPECT_FALSE(has("all depth"));
   EXPECT_FALSE(has("all total_length"));
+  const FeatureTable depth = depth_of(all);
+  ASSERT_EQ(depth.features.size(), 1u);
+  EXPECT_EQ(depth.features[0].name, "all length_along_z_by_x");
+  EXPECT_TRUE(
+      depth_of(depth_of(structure_of(table_of({}, std::span(groups).first(0), {})))).features.empty());
 }
 
 TEST(Unlike, LeavesOutWhatFollowsFromOneBefore) {

@@ -221,10 +221,17 @@ void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& a
              double most) {
   const double beside = std::max(.5, control.value) + most_above_control;
   ask(j, name, auc.value <= std::min(most, beside),
-      fmt::format("a random forest tells grown from held-out cells by {} with AUC {:.3f} ({:.3f}–{:.3f}); at "
-                  "most {:.2f} "
-                  "is asked, and {:.3f} where it tells real training cells with {:.3f}",
-                  what, auc.value, auc.lower, auc.upper, most, beside, control.value));
+      fmt::format(
+          "{} grown from held-out cells with AUC {:.3f} ({:.3f}–{:.3f}); at most {:.2f} is asked, and "
+          "{:.3f} where real training cells are told with {:.3f}",
+          what, auc.value, auc.lower, auc.upper, most, beside, control.value));
+}
+
+/// How well one number tells two samples apart, whichever has the larger values: from .5 on.
+Estimate told_by(std::span<const double> a, std::span<const double> b) {
+  const Estimate more = area_under_curve(a, b);
+  if (std::isnan(more.value)) return {.5, 0., 1.};
+  return more.value < .5 ? Estimate{1. - more.value, 1. - more.upper, 1. - more.lower} : more;
 }
 
 /// All criteria but those on the controls. With the areas of real cells what is judged is a control: of it nothing is asked that
@@ -238,8 +245,7 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   const std::array<FeatureTable, 3> tables{train, held_out, judged.cells};
   const bool full = known == nullptr;
 
-  const Samples structure = samples_of(tables, structure_of), slopes = samples_of(tables, slopes_of),
-                whole = samples_of(tables, whole_of);
+  const Samples structure = samples_of(tables, structure_of), whole = samples_of(tables, whole_of);
   const auto tell = [&](const Samples& of, bool real, Classifier by) {
     const std::vector<std::uint32_t> rows = all_rows(real ? of.train : of.of_judged().rows());
     DiscriminatorOptions how{.repeats = options.repeats,
@@ -255,18 +261,31 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   constexpr auto forest = Classifier::random_forest;
   j.auc.structure = tell(structure, false, forest);
   j.auc.real_control = full ? tell(structure, true, forest) : known->real_control;
-  ask_auc(j, "auc.structure", "structure", j.auc.structure, j.auc.real_control, most_auc);
-  if (slopes.values.cols() > 0) {
-    j.auc.slopes = tell(slopes, false, forest);
-    j.auc.real_control_slopes = full ? tell(slopes, true, forest) : known->real_control_slopes;
-    ask_auc(j, "auc.slopes", "slopes in the slice", j.auc.slopes, j.auc.real_control_slopes, most_auc);
+  ask_auc(j, "auc.structure", "by structure a random forest tells", j.auc.structure, j.auc.real_control,
+          most_auc);
+  if (const FeatureTable deep = depth_of(train); !deep.features.empty()) {
+    const auto of = [](const FeatureTable& table, std::span<const std::uint32_t> rows) {
+      return column(depth_of(table).values, 0, rows);
+    };
+    std::vector<std::uint32_t> rows;
+    for (const auto& sample : judged.samples) rows.insert(rows.end(), sample.begin(), sample.end());
+    const std::vector<double> held = of(held_out, all_rows(held_out.values.rows()));
+    j.auc.depth = told_by(of(judged.cells, rows), held);
+    j.auc.real_control_depth =
+        full ? told_by(of(train, all_rows(train.values.rows())), held) : known->real_control_depth;
+    ask_auc(j, "auc.depth", "by depth over breadth alone one tells", j.auc.depth, j.auc.real_control_depth,
+            most_auc);
   }
   if (full) {
+    if (const Samples slopes = samples_of(tables, slopes_of); slopes.values.cols() > 0) {
+      j.auc.slopes = tell(slopes, false, forest);
+      j.auc.real_control_slopes = tell(slopes, true, forest);
+    }
     j.auc.logistic = tell(structure, false, Classifier::logistic);
     j.auc.diameters = tell(whole, false, forest);
     j.auc.real_control_diameters = tell(whole, true, forest);
-    ask_auc(j, "auc.diameters", "structure and diameters", j.auc.diameters, j.auc.real_control_diameters,
-            most_auc_diameters);
+    ask_auc(j, "auc.diameters", "by structure and diameters a random forest tells", j.auc.diameters,
+            j.auc.real_control_diameters, most_auc_diameters);
   }
   j.detectable_auc = detectable_auc(j.compared, j.held_out);
 

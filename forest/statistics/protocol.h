@@ -61,10 +61,12 @@ struct Judgement {
                              // beside them: the smaller number
 
   struct Areas {
-    Estimate structure{}, slopes{}, diameters{};  // grown against held-out cells
-    Estimate real_control{}, real_control_slopes{},
-        real_control_diameters{};  // training against held-out cells of the same numbers
-    Estimate logistic{};           // on structure, by regression; no criterion
+    // Grown against held-out cells, by forests, and by how deep cells are for their breadth, which is one number and no forest's.
+    Estimate structure{}, diameters{}, depth{};
+    // Training against held-out cells of the same numbers.
+    Estimate real_control{}, real_control_diameters{}, real_control_depth{};
+    // No criteria: on structure by regression, and by a forest on how steep branches are in the slice.
+    Estimate logistic{}, slopes{}, real_control_slopes{};
   } auc;
   double detectable_auc = 1.;  // in four of five cases, by these numbers
   double energy_p = 1., mmd_p = 1.;

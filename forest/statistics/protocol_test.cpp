@@ -142,21 +142,29 @@ TEST(Protocol, VariesLessFromSeedToSeedByManyPopulations) {
   EXPECT_LT(spread(8), .7 * spread(1));
 }
 
-// One feature of thirteen says how steep branches are; that it is amiss is seen in it alone, with a criterion of its own.
-TEST(Protocol, AsksHowSteepBranchesAreByItself) {
-  const auto steep = [](FeatureTable t, double shift) {
-    t.features.front().slope = true;
+// One feature of thirteen says how deep cells are; that it is amiss is seen in it alone, with a criterion of its own, deeper or flatter.
+TEST(Protocol, AsksHowDeepCellsAreByItself) {
+  const auto deep = [](FeatureTable t, double shift) {
+    t.features.front().slope = t.features.front().depth = true;
     t.values.col(0).array() += shift;
     return t;
   };
-  const FeatureTable train = steep(cells(1, 60), 0.), held_out = steep(cells(2, 60), 0.);
-  const Judgement wrong = judge_population(train, held_out, steep(cells(3, 60), .6), {}, quick),
-                  right = judge_population(train, held_out, steep(cells(3, 60), 0.), {}, quick);
-  EXPECT_FALSE(criterion(wrong, "auc.slopes").pass);
-  EXPECT_GT(wrong.auc.slopes.value, wrong.auc.structure.value);
-  EXPECT_TRUE(criterion(right, "auc.slopes").pass);
+  const FeatureTable train = deep(cells(1, 60), 0.), held_out = deep(cells(2, 60), 0.);
+  for (const double shift : {.6, -.6}) {
+    const Judgement wrong = judge_population(train, held_out, deep(cells(3, 60), shift), {}, quick);
+    EXPECT_FALSE(criterion(wrong, "auc.depth").pass);
+    EXPECT_GT(wrong.auc.depth.value, .6) << "whichever are deeper";
+    EXPECT_LT(wrong.auc.depth.lower, wrong.auc.depth.value);
+  }
+  const std::vector<Control> controls{{"deep", deep(train, .6)}, {"right", deep(cells(4, 60), 0.)}};
+  const Judgement right = judge_population(train, held_out, deep(cells(3, 60), 0.), controls, quick);
+  EXPECT_TRUE(criterion(right, "auc.depth").pass);
+  EXPECT_TRUE(right.controls[0].rejected);
+  EXPECT_TRUE(std::ranges::any_of(right.controls[0].reasons, [](const std::string& reason) {
+    return reason.starts_with("by depth over breadth");
+  }));
   const Judgement none = judge_population(cells(1, 20), cells(2, 20), cells(3, 20), {}, quick);
-  EXPECT_EQ(std::ranges::count(none.criteria, "auc.slopes", &Criterion::name), 0) << "nothing says so";
+  EXPECT_EQ(std::ranges::count(none.criteria, "auc.depth", &Criterion::name), 0) << "nothing says so";
 }
 
 TEST(Protocol, RefusesNothing) { EXPECT_THROW(judge(cells(1, 9), cells(2, 9), {}, {}, quick), Error); }
