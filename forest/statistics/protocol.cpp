@@ -263,16 +263,12 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   j.auc.real_control = full ? tell(structure, true, forest) : known->real_control;
   ask_auc(j, "auc.structure", "by structure a random forest tells", j.auc.structure, j.auc.real_control,
           most_auc);
-  if (const FeatureTable deep = depth_of(train); !deep.features.empty()) {
-    const auto of = [](const FeatureTable& table, std::span<const std::uint32_t> rows) {
-      return column(depth_of(table).values, 0, rows);
+  if (!depth_of(train).features.empty()) {  // nothing is learned, so that all cells count, however many
+    const auto of = [](const FeatureTable& table) {
+      return column(depth_of(table).values, 0, all_rows(table.values.rows()));
     };
-    std::vector<std::uint32_t> rows;
-    for (const auto& sample : judged.samples) rows.insert(rows.end(), sample.begin(), sample.end());
-    const std::vector<double> held = of(held_out, all_rows(held_out.values.rows()));
-    j.auc.depth = told_by(of(judged.cells, rows), held);
-    j.auc.real_control_depth =
-        full ? told_by(of(train, all_rows(train.values.rows())), held) : known->real_control_depth;
+    j.auc.depth = told_by(of(judged.cells), of(held_out));
+    j.auc.real_control_depth = full ? told_by(of(train), of(held_out)) : known->real_control_depth;
     ask_auc(j, "auc.depth", "by depth over breadth alone one tells", j.auc.depth, j.auc.real_control_depth,
             most_auc);
   }
