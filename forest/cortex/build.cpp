@@ -146,7 +146,7 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
   }
   if (!even_and_well_shaped(cortex.elements, volume))
     improve_shapes(cortex.elements, outer, inner, patient, progress);
-  begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress);
+  begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress, Rings::many);
   keep_volume(cortex.elements, whole);
 }
 

@@ -264,19 +264,20 @@ void even_out(Elements& elements, std::span<const std::uint32_t> heap, int rings
 }
 
 void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                const Shaping& shaping, double least, Progress& progress) {
+                const Shaping& shaping, double least, Progress& progress, Rings rings) {
   struct Try {
     int evened, room;  // rings: that are evened out, and around these that move, too
   };
   constexpr std::array tries{Try{0, 1}, Try{1, 1}, Try{0, 3}, Try{1, 2}, Try{2, 1},
                              Try{3, 1}, Try{2, 2}, Try{3, 2}, Try{4, 2}, Try{6, 2}};
+  constexpr std::size_t near = 6;  // the first so many
   Shaping wide = shaping;
   wide.patch = 200;
   wide.finely = true;
   const Stars stars(elements);
   std::vector<std::uint32_t> all(elements.size());
   std::iota(all.begin(), all.end(), 0u);
-  for (const auto& [evened, room] : tries) {
+  for (const auto& [evened, room] : std::span(tries).first(rings == Rings::few ? near : tries.size())) {
     const std::vector<std::uint32_t> heaps = Faults(elements, all, least).elements;
     if (heaps.empty()) return;
     std::vector<Depths> before = elements.curves;

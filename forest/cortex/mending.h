@@ -21,11 +21,13 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
 /// surfaces, and sides are straight; the rim stays. A start for shaping.
 void even_out(Elements& elements, std::span<const std::uint32_t> heap, int rings);
 
+enum class Rings : unsigned char { few, many };  // many leave the surfaces farther
+
 /// Heaps of elements that are not valid, or whose scaled Jacobian is less than `least` somewhere, begin anew: they are shaped with
 /// what is around them, from where they are and from even_out over ever other rings. Each heap keeps of every try what leaves fewer
 /// elements of it not valid, or as many and the rest better shaped.
 void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                const Shaping& shaping, double least, Progress& progress);
+                const Shaping& shaping, double least, Progress& progress, Rings rings = Rings::few);
 
 struct LeftOut {
   std::size_t elements = 0;
