@@ -119,18 +119,18 @@ Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
   Json criteria = Json::array();
   for (const Criterion& c : j.criteria)
     criteria.push_back({{"name", c.name}, {"pass", c.pass}, {"reason", c.reason}});
+  Json auc{{"structure", interval_of(j.auc.structure)},
+           {"diameters", interval_of(j.auc.diameters)},
+           {"slopes", interval_of(j.auc.slopes)},
+           {"real_control", interval_of(j.auc.real_control)},
+           {"real_control_diameters", interval_of(j.auc.real_control_diameters)},
+           {"real_control_slopes", interval_of(j.auc.real_control_slopes)},
+           {"logistic", interval_of(j.auc.logistic)}};
+  for (const Judgement::Alone& a : j.alone)
+    auc[a.name] = interval_of(a.grown), auc["real_control_" + a.name] = interval_of(a.real);
   return {
       {"pass", j.pass},
-      {"auc",
-       {{"structure", interval_of(j.auc.structure)},
-        {"diameters", interval_of(j.auc.diameters)},
-        {"depth", interval_of(j.auc.depth)},
-        {"slopes", interval_of(j.auc.slopes)},
-        {"real_control", interval_of(j.auc.real_control)},
-        {"real_control_diameters", interval_of(j.auc.real_control_diameters)},
-        {"real_control_depth", interval_of(j.auc.real_control_depth)},
-        {"real_control_slopes", interval_of(j.auc.real_control_slopes)},
-        {"logistic", interval_of(j.auc.logistic)}}},
+      {"auc", auc},
       {"energy_p", j.energy_p},
       {"mmd_p", j.mmd_p},
       {"ks_rejections", j.ks_rejections.size()},
@@ -181,8 +181,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
 
   report.heading("Told from held-out cells by a random forest");
   std::vector<IntervalRow> rows;
-  const auto add = [&](const char* label, const Estimate& e, std::size_t colour, std::string note = {}) {
-    rows.push_back({.label = label,
+  const auto add = [&](std::string label, const Estimate& e, std::size_t colour, std::string note = {}) {
+    rows.push_back({.label = std::move(label),
                     .value = e.value,
                     .lower = e.lower,
                     .upper = e.upper,
@@ -191,14 +191,16 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   };
   add("grown, structure", j.auc.structure, 1, "≤ 0.60");
   add("grown, with diameters", j.auc.diameters, 1, "≤ 0.65");
-  add("grown, by depth over breadth alone", j.auc.depth, 1, "≤ 0.60");
   add("grown, slopes in the slice", j.auc.slopes, 1, "not asked");
   add("real training cells, structure", j.auc.real_control, 0);
   add("real training cells, with diameters", j.auc.real_control_diameters, 0);
-  add("real training cells, by depth", j.auc.real_control_depth, 0);
   add("real training cells, slopes", j.auc.real_control_slopes, 0);
+  for (const Judgement::Alone& a : j.alone) {
+    add("grown, more " + a.name + " alone", a.grown, 1, "within 0.05 of training cells");
+    add("real training cells, more " + a.name, a.real, 0);
+  }
   for (const ControlResult& c : j.controls)
-    add(("control: " + c.name).c_str(), c.auc, 3,
+    add("control: " + c.name, c.auc, 3,
         c.rejected ? "rejected by " + counted(c.reasons.size(), "criterion", "criteria") : "missed");
   report.plot(interval_plot(rows, {.low = .3,
                                    .high = 1.,

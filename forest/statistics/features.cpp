@@ -36,9 +36,14 @@ constexpr auto slopes = std::to_array<std::string_view>({"length_along_z_by_x", 
                                                          "section_length_fractions_along_z",
                                                          "segment_elevations", "level_segment_fraction"});
 
-// Of these the one that tells best by itself whether cells are too deep: a plane has two directions to turn a neuron in, so that
-// lengths along one of them are what lengths along z can be measured by.
-constexpr std::string_view depth = "length_along_z_by_x";
+// What one number tells better than a forest among all others, of what is measured together first: whether cells are too deep (a plane
+// has two directions to turn a neuron in, so that lengths along one of them are what lengths along z can be measured by), and whether
+// branches lie in the planes of focus that they were traced in.
+struct Alone {
+  std::string_view metric, name;
+};
+constexpr auto alone =
+    std::to_array<Alone>({{"length_along_z_by_x", "depth"}, {"level_segment_fraction", "level"}});
 
 // What repeats another metric, or tells the tracer and not the cell.
 constexpr auto left_out =
@@ -58,7 +63,7 @@ const std::vector<const Metric*>& chosen() {
 std::vector<Feature> columns_of(const Metric& m, const std::string& group) {
   const auto column = [&](std::string_view part, std::string_view unit) {
     return Feature{fmt::format("{} {}{}{}", group, m.name, part.empty() ? "" : " ", part), std::string(unit),
-                   m.diameters, std::ranges::count(slopes, m.name) > 0, m.name == depth};
+                   m.diameters, std::ranges::count(slopes, m.name) > 0};
   };
   if (m.level == Level::neuron) return {column("", m.unit)};
   if (m.level == Level::shell) {
@@ -115,7 +120,11 @@ std::vector<Feature> features_of(std::span<const Group> groups) {
   std::vector<Feature> features;
   for (const Group& group : groups)
     for (const Metric* m : chosen())
-      std::ranges::move(columns_of(*m, group.name), std::back_inserter(features));
+      for (Feature& column : columns_of(*m, group.name)) {
+        const auto asked = std::ranges::find(alone, m->name, &Alone::metric);
+        if (asked != alone.end() && &group == &groups.front()) column.alone = asked->name;
+        features.push_back(std::move(column));
+      }
   return features;
 }
 
@@ -232,11 +241,6 @@ FeatureTable structure_of(const FeatureTable& table) {
 
 FeatureTable slopes_of(const FeatureTable& table) {
   return columns_that(table, [](const Feature& f) { return f.slope; });
-}
-
-FeatureTable depth_of(const FeatureTable& table) {
-  const auto first = std::ranges::find_if(table.features, &Feature::depth);
-  return columns_that(table, [&](const Feature& f) { return first != table.features.end() && f == *first; });
 }
 
 FeatureTable distinct(const FeatureTable& table) {

@@ -6,6 +6,7 @@
 
 #include <span>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include <Eigen/Core>
@@ -18,9 +19,9 @@ namespace forest::statistics {
 struct Feature {
   std::string name;  // "basal contraction sd": group, metric, summary
   std::string unit;
-  bool diameters = false;  // changes when nothing but diameters do
-  bool slope = false;      // says how steeply branches leave the plane of the slice
-  bool depth = false;      // … and by itself how deep a cell is for its breadth
+  bool diameters = false;       // changes when nothing but diameters do
+  bool slope = false;           // says how steeply branches leave the plane of the slice
+  std::string_view alone = {};  // what the protocol calls it where it asks of it by itself: "depth", "level"
 
   bool operator==(const Feature&) const = default;
 };
@@ -69,8 +70,6 @@ FeatureTable rows_of(const FeatureTable& table, std::span<const std::size_t> row
 FeatureTable structure_of(const FeatureTable& table);
 /// Only how steep branches are in the slice; it may be nothing.
 FeatureTable slopes_of(const FeatureTable& table);
-/// Of what all is measured together first, how deep cells are for their breadth: one column, or none.
-FeatureTable depth_of(const FeatureTable& table);
 
 /// What of a table may tell cells apart: without columns that are the same in all cells, repeat another, or are defined in
 /// fewer than one of twenty cells. For features that are missing in some cells a column "… is defined" (0 or 1) is added,

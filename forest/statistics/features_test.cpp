@@ -121,11 +121,14 @@ TEST(Slopes, AreOfBranchesInTheSliceAndOfNothingElse) {
   EXPECT_TRUE(has("basal segment_elevations sd"));
   EXPECT_FALSE(has("all depth"));
   EXPECT_FALSE(has("all total_length"));
-  const FeatureTable depth = depth_of(all);
-  ASSERT_EQ(depth.features.size(), 1u);
-  EXPECT_EQ(depth.features[0].name, "all length_along_z_by_x");
-  EXPECT_TRUE(
-      depth_of(depth_of(structure_of(table_of({}, std::span(groups).first(0), {})))).features.empty());
+}
+
+TEST(Features, OfAllTogetherTwoAreAskedOfAlone) {
+  std::vector<std::string> asked;
+  for (const Feature& f : features_of(groups_of("all")))
+    if (!f.alone.empty()) asked.push_back(std::string(f.alone) + ": " + f.name);
+  EXPECT_EQ(asked, (std::vector<std::string>{"level: all level_segment_fraction",
+                                             "depth: all length_along_z_by_x"}));
 }
 
 TEST(Unlike, LeavesOutWhatFollowsFromOneBefore) {

@@ -19,7 +19,7 @@ namespace forest::statistics {
 namespace {
 
 // The limits of the protocol.
-constexpr double most_auc = .60, most_auc_diameters = .65, most_above_control = .05;
+constexpr double most_auc = .60, most_auc_diameters = .65, most_beside_control = .05;
 constexpr double least_p = .05, level = .05;
 constexpr double most_mvs = .10;
 constexpr double least_inside = .95;
@@ -219,7 +219,7 @@ void ask(Judgement& j, std::string name, bool pass, std::string reason) {
 
 void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& auc, const Estimate& control,
              double most) {
-  const double beside = std::max(.5, control.value) + most_above_control;
+  const double beside = std::max(.5, control.value) + most_beside_control;
   ask(j, name, auc.value <= std::min(most, beside),
       fmt::format(
           "{} grown from held-out cells with AUC {:.3f} ({:.3f}–{:.3f}); at most {:.2f} is asked, and "
@@ -227,11 +227,27 @@ void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& a
           what, auc.value, auc.lower, auc.upper, most, beside, control.value));
 }
 
-/// How well one number tells two samples apart, whichever has the larger values: from .5 on.
-Estimate told_by(std::span<const double> a, std::span<const double> b) {
-  const Estimate more = area_under_curve(a, b);
-  if (std::isnan(more.value)) return {.5, 0., 1.};
-  return more.value < .5 ? Estimate{1. - more.value, 1. - more.upper, 1. - more.lower} : more;
+/// What is asked of features one by one. Nothing is learned, so that all cells count, however many; and an area has a sign: how much
+/// nearer chance has brought the held-out cells to the training cells or to wrong ones is the same for both, and falls out.
+void ask_of_each_alone(Judgement& j, const std::array<FeatureTable, 3>& tables) {
+  for (std::size_t f = 0; f < tables[0].features.size(); ++f) {
+    const Feature& feature = tables[0].features[f];
+    if (feature.alone.empty()) continue;
+    const auto above =
+        [&](const FeatureTable& cells) {  // the chance that one of them has more than a held-out cell
+          const auto of = [&](const FeatureTable& table) {
+            return column(table.values, Eigen::Index(f), all_rows(table.values.rows()));
+          };
+          const Estimate area = area_under_curve(of(tables[1]), of(cells));
+          return std::isnan(area.value) ? Estimate{.5, 0., 1.} : area;
+        };
+    const Judgement::Alone& found = j.alone.emplace_back(
+        Judgement::Alone{std::string(feature.alone), above(tables[2]), above(tables[0])});
+    ask(j, "auc." + found.name, std::abs(found.grown.value - found.real.value) <= most_beside_control,
+        fmt::format("by '{}' alone, grown cells have more than held-out ones with AUC {:.3f}, training cells "
+                    "with {:.3f}; at most {:.2f} between the two is asked",
+                    feature.name, found.grown.value, found.real.value, most_beside_control));
+  }
 }
 
 /// All criteria but those on the controls. With the areas of real cells what is judged is a control: of it nothing is asked that
@@ -263,15 +279,7 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   j.auc.real_control = full ? tell(structure, true, forest) : known->real_control;
   ask_auc(j, "auc.structure", "by structure a random forest tells", j.auc.structure, j.auc.real_control,
           most_auc);
-  if (!depth_of(train).features.empty()) {  // nothing is learned, so that all cells count, however many
-    const auto of = [](const FeatureTable& table) {
-      return column(depth_of(table).values, 0, all_rows(table.values.rows()));
-    };
-    j.auc.depth = told_by(of(judged.cells), of(held_out));
-    j.auc.real_control_depth = full ? told_by(of(train), of(held_out)) : known->real_control_depth;
-    ask_auc(j, "auc.depth", "by depth over breadth alone one tells", j.auc.depth, j.auc.real_control_depth,
-            most_auc);
-  }
+  ask_of_each_alone(j, tables);
   if (full) {
     if (const Samples slopes = samples_of(tables, slopes_of); slopes.values.cols() > 0) {
       j.auc.slopes = tell(slopes, false, forest);

@@ -61,13 +61,19 @@ struct Judgement {
                              // beside them: the smaller number
 
   struct Areas {
-    // Grown against held-out cells, by forests, and by how deep cells are for their breadth, which is one number and no forest's.
-    Estimate structure{}, diameters{}, depth{};
+    // Grown against held-out cells, by forests.
+    Estimate structure{}, diameters{};
     // Training against held-out cells of the same numbers.
-    Estimate real_control{}, real_control_diameters{}, real_control_depth{};
+    Estimate real_control{}, real_control_diameters{};
     // No criteria: on structure by regression, and by a forest on how steep branches are in the slice.
     Estimate logistic{}, slopes{}, real_control_slopes{};
   } auc;
+  /// One number without a forest: the chance that a cell has more of it than a held-out one.
+  struct Alone {
+    std::string name;  // that of Feature
+    Estimate grown, real;
+  };
+  std::vector<Alone> alone;
   double detectable_auc = 1.;  // in four of five cases, by these numbers
   double energy_p = 1., mmd_p = 1.;
   std::vector<std::string>

@@ -142,10 +142,10 @@ TEST(Protocol, VariesLessFromSeedToSeedByManyPopulations) {
   EXPECT_LT(spread(8), .7 * spread(1));
 }
 
-// One feature of thirteen says how deep cells are; that it is amiss is seen in it alone, with a criterion of its own, deeper or flatter.
+// One feature of thirteen says how deep cells are. That it is amiss is seen in it alone, with a criterion of its own, deeper or flatter.
 TEST(Protocol, AsksHowDeepCellsAreByItself) {
   const auto deep = [](FeatureTable t, double shift) {
-    t.features.front().slope = t.features.front().depth = true;
+    t.features.front().slope = true, t.features.front().alone = "depth";
     t.values.col(0).array() += shift;
     return t;
   };
@@ -153,18 +153,40 @@ TEST(Protocol, AsksHowDeepCellsAreByItself) {
   for (const double shift : {.6, -.6}) {
     const Judgement wrong = judge_population(train, held_out, deep(cells(3, 60), shift), {}, quick);
     EXPECT_FALSE(criterion(wrong, "auc.depth").pass);
-    EXPECT_GT(wrong.auc.depth.value, .6) << "whichever are deeper";
-    EXPECT_LT(wrong.auc.depth.lower, wrong.auc.depth.value);
+    ASSERT_EQ(wrong.alone.size(), 1u);
+    EXPECT_EQ(wrong.alone[0].name, "depth");
+    EXPECT_EQ(wrong.alone[0].grown.value > .5, shift > 0.);
+    EXPECT_LT(wrong.alone[0].grown.lower, wrong.alone[0].grown.value);
   }
   const std::vector<Control> controls{{"deep", deep(train, .6)}, {"right", deep(cells(4, 60), 0.)}};
   const Judgement right = judge_population(train, held_out, deep(cells(3, 60), 0.), controls, quick);
   EXPECT_TRUE(criterion(right, "auc.depth").pass);
   EXPECT_TRUE(right.controls[0].rejected);
   EXPECT_TRUE(std::ranges::any_of(right.controls[0].reasons, [](const std::string& reason) {
-    return reason.starts_with("by depth over breadth");
+    return reason.starts_with("by '") && reason.find("' alone, grown cells") != reason.npos;
   }));
   const Judgement none = judge_population(cells(1, 20), cells(2, 20), cells(3, 20), {}, quick);
   EXPECT_EQ(std::ranges::count(none.criteria, "auc.depth", &Criterion::name), 0) << "nothing says so";
+}
+
+// What cells happened to be held back moves training, right and wrong cells alike: the wrong ones are told nevertheless.
+TEST(Protocol, SeesWhatIsAmissWhereHeldOutCellsAreFarFromTheOthers) {
+  const auto deep = [](FeatureTable t, double shift) {
+    t.features.front().alone = "depth";
+    t.values.col(0).array() += shift;
+    return t;
+  };
+  const FeatureTable train = deep(cells(1, 40), 0.);
+  for (const double chance : {-.5, .5}) {
+    const FeatureTable held_out = deep(cells(2, 20), chance);
+    const std::vector<Control> controls{{"deep", deep(train, .5)}, {"flat", deep(train, -.5)}};
+    const Judgement j = judge_population(train, held_out, train, controls, quick);
+    EXPECT_TRUE(criterion(j, "auc.depth").pass);
+    for (const ControlResult& control : j.controls)
+      EXPECT_TRUE(std::ranges::any_of(control.reasons, [](const std::string& reason) {
+        return reason.starts_with("by '") && reason.find("' alone, grown cells") != reason.npos;
+      })) << control.name;
+  }
 }
 
 TEST(Protocol, RefusesNothing) { EXPECT_THROW(judge(cells(1, 9), cells(2, 9), {}, {}, quick), Error); }
