@@ -75,7 +75,7 @@ Control changed(std::string name, const Sample& real, std::span<const Group> gro
 }  // namespace
 
 Judged judge_samples(const Sample& train, const Sample& held_out, std::span<const Sample> grown,
-                     const Sample* parametric, const std::string& kind, const ProtocolOptions& options,
+                     const Sample& parametric, const std::string& kind, const ProtocolOptions& options,
                      Console& console, const std::string& slices) {
   const std::vector<Group> groups = groups_of(kind);
   Judged judged{.train = measured(train, groups, console),
@@ -84,7 +84,7 @@ Judged judge_samples(const Sample& train, const Sample& held_out, std::span<cons
                 .judgement = {}};
   for (const Sample& population : grown) judged.grown.push_back(measured(population, groups, console));
   std::vector<Control> controls;
-  if (parametric) controls.push_back({"burke", measured(*parametric, groups, console)});
+  controls.push_back({"burke", measured(parametric, groups, console)});
   controls.push_back(changed("stretched", train, groups, console, [&](std::size_t i) {
     return stretched(train.neurons[i], {1.f, 1.f, 1.2f});
   }));
@@ -111,10 +111,12 @@ Judged judge_samples(const Sample& train, const Sample& held_out, std::span<cons
 
 Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
   Json controls = Json::object();
-  for (const char* name : {"burke", "stretched", "jittered"}) controls[name] = nullptr;  // not asked
   for (const ControlResult& c : j.controls) {
     controls[c.name] = interval_of(c.auc);
     controls[c.name]["rejected"] = c.rejected;
+    Json missed = Json::array();
+    for (const Criterion& criterion : c.missed) missed.push_back(criterion.name);
+    controls[c.name]["by"] = std::move(missed);
   }
   Json criteria = Json::array();
   for (const Criterion& c : j.criteria)
@@ -201,7 +203,7 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   }
   for (const ControlResult& c : j.controls)
     add("control: " + c.name, c.auc, 3,
-        c.rejected ? "rejected by " + counted(c.reasons.size(), "criterion", "criteria") : "missed");
+        c.rejected ? "rejected by " + counted(c.missed.size(), "criterion", "criteria") : "missed");
   report.plot(interval_plot(rows, {.low = .3,
                                    .high = 1.,
                                    .marks = {.5, .6},
@@ -342,15 +344,14 @@ void run(const Options& options, Console& console) {
   }
   if (!options.parametric.empty()) {
     parametric = read_sample(options.parametric, options.repo, console);
-  } else if (!options.model
-                  .empty()) {  // the control that the protocol must reject, fitted to the same neurons
+  } else {  // the control that the protocol must reject, fitted to the same neurons
     const std::string text = fitting::burke_grammar(
         train.neurons, "burke", {.kinds = statistics::kind_set(options.kind), .seed = options.seed});
     parametric =
         grown_from(lsystem::parse(text, "burke"), "burke", held_out.neurons.size(), options.seed, console);
   }
   const Judged judged =
-      judge_samples(train, held_out, grown, parametric.neurons.empty() ? nullptr : &parametric, options.kind,
+      judge_samples(train, held_out, grown, parametric, options.kind,
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
@@ -401,9 +402,8 @@ std::function<void()> judge(CLI::App& command, Console& console) {
             1'000'000);
   add_whole(command, "--populations", options->populations,
             "How many populations the model grows; their median is judged, and mean AUCs", 1, 1000);
-  sample(
-      "--burke", options->parametric,
-      "Neurons of a parametric model, which the protocol must reject; with --model one is fitted and grown");
+  sample("--burke", options->parametric,
+         "Neurons of a parametric model, which the protocol must reject; without, one is fitted and grown");
   command.add_option("--repo", options->repo, "Take populations of this repository")->type_name("REPO");
   add_kind(command, options->kind);
   add_slices(command, options->slices);

@@ -25,13 +25,13 @@ struct Judged {
   statistics::Judgement judgement;
 };
 
-/// With the controls that need no model: training cells stretched by 1.2 along z, and with their angles jittered by 10°.
+/// With controls of their own: training cells stretched by 1.2 along z, and with their angles jittered by 10°.
 /// @param grown       populations, one or more
-/// @param parametric  cells of a parametric model, the control 'burke'; null when there are none
+/// @param parametric  cells of a parametric model, the control 'burke'
 /// @param kind        sections to measure, as for the verb measure
 /// @param slices      a regular expression that finds the slice in the name of a traced cell; empty when each has its own
 Judged judge_samples(const Sample& train, const Sample& held_out, std::span<const Sample> grown,
-                     const Sample* parametric, const std::string& kind,
+                     const Sample& parametric, const std::string& kind,
                      const statistics::ProtocolOptions& options, Console& console,
                      const std::string& slices = {});
 

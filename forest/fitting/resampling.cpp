@@ -47,6 +47,11 @@ body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
 fibre: Begin -> Kind(plans.kind(plan(0))) Fibre(cells.fibre(me))
 )";
 
+// What stems bear beside their diameters where some were traced with spines.
+constexpr std::string_view gauged = "Gauge(gauges, gauges(thin_as, kind), even)", bearing = R"(
+       Spiny(spines.density(spines(whose(kind), kind)), spines.reach(spines(whose(kind), kind)), spines.head(spines(whose(kind), kind)),
+         spines.neck(spines(whose(kind), kind)), spines.spread(spines(whose(kind), kind)), dice = uniform(0, 1)))";
+
 // What grows of all this. @style stands for a neuron's own style.
 constexpr std::string_view growth = R"(
 # Of n tips, those of a daughter that had `part` of `whole` where it was traced, when `others` share the rest: a single one
@@ -223,6 +228,7 @@ class Writer {
     cells();
     gauges();
     styles_of_cells();
+    if (spiny()) spines();
     alike();
     plans();
     arbors();
@@ -311,6 +317,28 @@ sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, s
         put(" {} {} {} {} {} {} {} {}", rounded(of.thinnest, 1e3), rounded(of.farthest, 10.),
             rounded(of.winding, 1e4), rounded(of.turn, 1e4), rounded(of.level, 1e3), rounded(of.stairs, 1e4),
             rounded(of.kinks, 1e4), rounded(of.uneven, 1e3));
+      }
+  }
+
+  bool spiny() const {
+    return std::ranges::any_of(traced_.cells, [](const Cell& c) {
+      return std::ranges::any_of(c.kinds, [](const auto& kind) { return kind.second.spines.density > 0.; });
+    });
+  }
+  void spines() {
+    put(R"(
+
+# Their spines: how many per µm, how far their heads are from the axis, how wide these and the necks are (µm), and the standard
+# deviation of the logarithm of how far.
+sample spines(cell =, kind = -> density, reach, head, neck, spread) =)");
+    bool first = true;
+    for (std::size_t i = 0; i < traced_.cells.size(); ++i)
+      for (const auto& [kind, unused] : traced_.deviations) {
+        const auto found = traced_.cells[i].kinds.find(kind);
+        const Spininess of = found == traced_.cells[i].kinds.end() ? Spininess() : found->second.spines;
+        row(std::exchange(first, false));
+        put("{} {} -> {} {} {} {} {}", i, kind, rounded(of.density, 1e4), rounded(of.reach, 1e3),
+            rounded(of.head, 1e3), rounded(of.neck, 1e3), rounded(of.spread, 1e3));
       }
   }
 
@@ -535,6 +563,10 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
+    if (spiny())
+      for (std::size_t at = 0; (at = rules.find(gauged, at)) != rules.npos;
+           at += gauged.size() + bearing.size())
+        rules.insert(at + gauged.size(), bearing);
     std::string_view rest = rules;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);

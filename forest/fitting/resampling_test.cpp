@@ -623,6 +623,43 @@ TEST(Resampling, WhatForksWhereItLeavesTheSomaStaysOneArbor) {
   }
 }
 
+// Of neurons some bear many spines, some few and some none; without any, nothing is said of them.
+TEST(Resampling, BearsAsManySpinesAsWereTraced) {
+  const auto spiny = [](double times) {
+    return each_with(9, 3, [times](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+      for (int stem = 0; stem < 3; ++stem) {
+        const double angle = 2. * stem + .1 * random.normal();
+        add_fork(builder, {away(5., angle, .5, random), away(60., angle, .5, random)}, {-.3, .4},
+                 [&](double side) { return away(150. + 5. * random.normal(), angle + side, .5, random); });
+      }
+      for (std::uint32_t section = 0; section < 9; ++section)
+        for (float at = 1.f; at < 50.f; at += 2.f)
+          if (random.uniform() < times * double(i % 3))
+            builder.add_spine({.section = SectionId(section),
+                               .position = at,
+                               .head = Vec3(0.f, 0.f, float(1. + .2 * random.normal())),
+                               .head_diameter = .5f,
+                               .neck_diameter = .2f});
+    });
+  };
+  const auto bears = [](std::span<const Morphology> neurons) {
+    std::vector<double> densities, reach;
+    for (const Morphology& m : neurons) {
+      densities.push_back(double(m.spines().size()) / total_length(m));
+      for (const Spine& spine : m.spines()) reach.push_back(double(spine.head.norm()));
+    }
+    return std::pair(statistics::summarize(densities), statistics::summarize(reach));
+  };
+  const std::vector<Morphology> models = spiny(.4);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const auto [traced, traced_reach] = bears(models);
+  const auto [grown, grown_reach] = bears(lsystem::grow_population(grammar, 36, 1));
+  EXPECT_NEAR(grown.mean, traced.mean, .15 * traced.mean);
+  EXPECT_NEAR(grown.sd, traced.sd, .25 * traced.sd) << "neurons differ as they did";
+  EXPECT_NEAR(grown_reach.mean, traced_reach.mean, .03 * traced_reach.mean);
+  EXPECT_EQ(resampling_grammar(spiny(0.), "t").find("Spiny"), std::string::npos);
+}
+
 // Arbors that leave one point, and no soma.
 Morphology insect(std::uint64_t i, int stems) {
   Random random(7, i);

@@ -224,8 +224,30 @@ struct Learner {
       manner.winding = std::max(.01, manner.style[wander]);
       manner.turn = turn;
       manner.kinks = std::max(manner.kinks, manner.style[kinks] / turn);
+      manner.spines = spines_of(kind);
     }
     return manners;
+  }
+
+  Spininess spines_of(int kind) const {
+    const Morphology& neuron = arbors.neuron();
+    std::vector<double> reach, head, neck, logarithms;
+    for (const Spine& spine : neuron.spines()) {
+      if (int(neuron.section(spine.section).kind) != kind) continue;
+      reach.push_back(double(spine.head.norm()));
+      head.push_back(double(spine.head_diameter)), neck.push_back(double(spine.neck_diameter));
+      if (reach.back() > 0.) logarithms.push_back(std::log(reach.back()));
+    }
+    if (reach.empty()) return {};
+    double length = 0.;
+    for (std::uint32_t i = 0; i < all.size(); ++i)
+      if (!begins(i) && kind_of(all[i]) == kind) length += all[i].length;
+    if (!(length > 0.)) return {};
+    return {.density = double(reach.size()) / length,
+            .reach = statistics::mean(reach),
+            .head = statistics::mean(head),
+            .neck = statistics::mean(neck),
+            .spread = logarithms.size() > 1 ? statistics::summarize(logarithms).sd : 0.};
   }
 
   void measure(std::uint32_t i, std::array<std::vector<double>, styles>& values) const {

@@ -98,6 +98,12 @@ struct Fork {
   bool turned = false;  // … though the one with more came first
 };
 
+/// The spines of one kind of section of a neuron: how many per µm, and as means how far their heads are from the axis, and how wide
+/// these and the necks are, µm; the spread is that of the logarithms of distances.
+struct Spininess {
+  double density = 0., reach = 0., head = 0., neck = 0., spread = 0.;
+};
+
 // What is true of one kind of section of a neuron.
 struct Manner {
   Style style{};
@@ -109,6 +115,7 @@ struct Manner {
   // How much the others differ in how steep they are, and those angles: standard deviations in shares of the mean.
   double stairs = .1, kinks = .1;
   double uneven = .1;  // … and how much its branches differ in how steep they are: likewise
+  Spininess spines = {};
 };
 
 /// How many points have a diameter, µm.

@@ -14,6 +14,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/random.h"
 #include "forest/lsystem/exclusion.h"
 
 namespace forest::lsystem {
@@ -27,6 +28,8 @@ struct Tracing {
 };
 constexpr std::size_t tracing_needs = 3, tracing_takes = sizeof(Tracing) / sizeof(double);
 constexpr auto tracing_values = std::bit_cast<std::array<double, tracing_takes>>(Tracing{});
+
+constexpr double spines_as_usual[] = {1.2, .5, .15, .3, 0.};
 
 constexpr TurtleSymbol symbol_table[] = {
     {"F", "length, diameter", "draw a segment; it tapers to the diameter, when given", Action::draw, 0, 2},
@@ -84,6 +87,12 @@ constexpr TurtleSymbol symbol_table[] = {
      Action::gauge, 2, 3},
     {"Fibre", "diameter", "a neuron without soma begins here: what is drawn next leaves this point",
      Action::fibre, 1, 1},
+    {"Spiny", "density, reach, head, neck, spread, dice",
+     "from here on what is drawn bears so many spines per µm, anywhere and to any side, as `dice`, a number "
+     "of chance, "
+     "says: heads `reach` from the axis (1.2), in logarithms with this spread (0.3), `head` and `neck` wide "
+     "(0.5, 0.15), µm; density 0 ends it",
+     Action::spiny, 1, 6, spines_as_usual},
     {"Avoid", "gap",
      "from here on keep this far from somata, the own one included, and below the pia, by bending around; "
      "below 0 ends it",
@@ -127,7 +136,7 @@ struct Drawn {
   std::uint32_t children;
   std::int32_t tag;
   SectionKind kind;
-  std::uint32_t gauge;  // among Turtle::gauges_
+  std::uint32_t gauge, spines;  // among Turtle::gauges_, Turtle::spines_
 };
 
 struct State {
@@ -143,7 +152,7 @@ struct State {
   std::uint32_t begun = none;                          // … and that where the traced branch to it began
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
-  std::uint32_t gauge = 0;  // among Turtle::gauges_
+  std::uint32_t gauge = 0, spines = 0;  // among Turtle::gauges_, Turtle::spines_
 };
 
 // Which diameters traced branches have.
@@ -180,6 +189,43 @@ struct Gauge {
     for (const auto& s : stops)
       if ((left -= double(s.at.x())) < 0.) return double(s.diameter);
     return double(stops.back().diameter);
+  }
+};
+
+// Spines, at random along all that is drawn under them.
+struct Spines {
+  double density = 0., reach = 0., head = 0., neck = 0., spread = 0.;
+  Random random{0, 0, 0};
+  double left = 0.;  // µm to the next
+
+  Spines() = default;
+  Spines(double density_, double reach_, double head_, double neck_, double spread_, double dice)
+      : density(density_),
+        reach(reach_),
+        head(head_),
+        neck(neck_),
+        spread(spread_),
+        random(std::bit_cast<std::uint64_t>(dice), 0, 0x73706e73),  // "spns"
+        left(gap()) {}
+  double gap() { return random.exponential(1. / density); }
+
+  /// Those on the segment between two points, whose first lies `along` the section, µm.
+  void stand(MorphologyBuilder& builder, SectionId section, const Point& from, const Point& to,
+             double along) {
+    const Eigen::Vector3d way = to.position().cast<double>() - from.position().cast<double>();
+    const double length = way.norm();
+    for (; left < length; left += gap()) {
+      const Eigen::Vector3d side = way.unitOrthogonal();
+      const Eigen::Vector3d out =
+          Eigen::AngleAxisd(random.uniform(0., 2. * std::numbers::pi), way / length) * side;
+      const double far = reach * std::exp(random.normal(-.5 * spread * spread, spread));
+      builder.add_spine({.section = section,
+                         .position = float(along + left),
+                         .head = (far * out).cast<float>(),
+                         .head_diameter = float(head),
+                         .neck_diameter = float(neck)});
+    }
+    left -= length;
   }
 };
 
@@ -347,6 +393,10 @@ class Turtle {
       case Action::gauge:
         state_.gauge = gauge(parameter(0, 0.), parameter(1, 0.), parameter(2, 0.));
         return;
+      case Action::spiny:
+        return spiny({parameter(0, 0.), parameter(1, spines_as_usual[0]), parameter(2, spines_as_usual[1]),
+                      parameter(3, spines_as_usual[2]), parameter(4, spines_as_usual[3]),
+                      parameter(5, spines_as_usual[4])});
       case Action::avoid:
         state_.avoid = parameter(0, 0.);
         return;
@@ -470,7 +520,8 @@ class Turtle {
     must_be_size(state_.diameter);
     if (answers_) return;
     if (state_.node == none) {
-      drawn_.push_back({from, start_radius, start_radius, none, 0, state_.tag, state_.kind, state_.gauge});
+      drawn_.push_back(
+          {from, start_radius, start_radius, none, 0, state_.tag, state_.kind, state_.gauge, state_.spines});
       state_.node = std::uint32_t(drawn_.size() - 1);
     }
     // What differs by rounding alone is the same: else a file of points has the place of a fork once for each daughter.
@@ -478,7 +529,7 @@ class Turtle {
       start_radius = there;
     ++drawn_[state_.node].children;
     drawn_.push_back({place, float(0.5 * state_.diameter), start_radius, state_.node, 0, state_.tag,
-                      state_.kind, state_.gauge});
+                      state_.kind, state_.gauge, state_.spines});
     state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
@@ -695,12 +746,25 @@ class Turtle {
     return {number, direction.x(), direction.y(), direction.z()};
   }
 
+  void spiny(const std::array<double, 6>& told) {
+    const auto [density, reach, head, neck, spread, dice] = told;
+    if (!(*std::ranges::min_element(told.begin(), told.end() - 1) >= 0.))
+      fail("Spiny has a parameter below 0");
+    constexpr double most = 100.;  // per µm: hundreds of times what any dendrite bears
+    if (density > most) fail(fmt::format("Spiny({:g}) asks for more than {:g} spines per µm", density, most));
+    state_.spines = 0;
+    if (density == 0. || answers_) return;
+    spines_.emplace_back(density, reach, head, neck, spread, dice);
+    state_.spines = std::uint32_t(spines_.size() - 1);
+  }
+
   // A root of one point. Somata are kept together by their soma; this keeps together what has none.
   void begin(double diameter) {
     state_.diameter = std::max(0., diameter);
     if (answers_) return;
     const auto radius = float(0.5 * state_.diameter);
-    drawn_.push_back({state_.position, radius, radius, none, 0, state_.tag, state_.kind, state_.gauge});
+    drawn_.push_back(
+        {state_.position, radius, radius, none, 0, state_.tag, state_.kind, state_.gauge, state_.spines});
     state_.node = std::uint32_t(drawn_.size() - 1);
   }
 
@@ -736,7 +800,7 @@ class Turtle {
   }
 
   // A section runs on while a point has one drawn daughter, which is the next point, of the same kind.
-  Morphology build(const Annotations& annotations) const {
+  Morphology build(const Annotations& annotations) {
     MorphologyBuilder builder;
     if (soma_)
       builder.set_soma({.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}});
@@ -763,6 +827,12 @@ class Turtle {
       const SectionId id = builder.add_section(parent, drawn_[begin].kind, points, drawn_[begin].tag,
                                                parent.valid() || !soma_ ? -1 : 0);
       for (std::uint32_t k = begin; k <= i; ++k) section_of[k] = id;
+      double along = 0.;
+      for (std::size_t k = 1; spines_.size() > 1 && k < points.size(); ++k) {
+        const Drawn& end = drawn_[i - (points.size() - 1 - k)];
+        if (end.spines != 0) spines_[end.spines].stand(builder, id, points[k - 1], points[k], along);
+        along += double((points[k].position() - points[k - 1].position()).norm());
+      }
       ++i;
     }
     for (const auto& [key, value] : annotations) builder.annotate(key, value);
@@ -775,6 +845,7 @@ class Turtle {
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
   std::vector<Gauge> gauges_{{}};           // the first: none
+  std::vector<Spines> spines_{{}};          // likewise
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();

@@ -19,7 +19,7 @@ enum class Action : std::uint8_t {
   // clang-format off
   draw, move, turn_left, turn_right, pitch_down, pitch_up, roll_left, roll_right, turn_around, level,
   push, pop, diameter, tropism, soma, axon, basal, apical, glia, kind, outward, flat,
-  place, head, trace, gauge, fibre, avoid, seek, shun,
+  place, head, trace, gauge, fibre, spiny, avoid, seek, shun,
   ask_place, ask_heading, ask_step, ask_depth, ask_near, ask_attraction,  // questions are the last
   // clang-format on
 };

@@ -132,6 +132,32 @@ TEST(Turtle, TropismBendsTowardsItsDirection) {
   EXPECT_GT((end - before).dot(end.normalized()), .99f);
 }
 
+TEST(Turtle, BearsSpinesWhereItIsToldTo) {
+  const Morphology m =
+      drawn("Soma(10) Basal Spiny(2, 1.5, .6, .1, .2, .7) F(400) [ Spiny(0) +F(100) ] [ -F(300) ]");
+  ASSERT_EQ(m.sections().size(), 3u);
+  std::array<double, 3> count{};
+  double reach = 0.;
+  for (const Spine& s : m.spines()) {
+    count[s.section.value()] += 1.;
+    const auto points = m.points(s.section);
+    const Vec3 way = (points.back().position() - points.front().position()).normalized();
+    EXPECT_NEAR(way.dot(s.head), 0.f, 1e-4f) << "to the side";
+    EXPECT_GE(s.position, 0.f);
+    EXPECT_LE(s.position, (points.back().position() - points.front().position()).norm());
+    EXPECT_EQ(s.head_diameter, .6f);
+    EXPECT_EQ(s.neck_diameter, .1f);
+    reach += double(s.head.norm());
+  }
+  EXPECT_NEAR(count[0], 800., 4. * std::sqrt(800.));  // of a Poisson process
+  EXPECT_EQ(count[1], 0.);
+  EXPECT_NEAR(count[2], 600., 4. * std::sqrt(600.));
+  EXPECT_NEAR(reach / double(m.spines().size()), 1.5, .03);
+  EXPECT_EQ(m, drawn("Soma(10) Basal Spiny(2, 1.5, .6, .1, .2, .7) F(400) [ Spiny(0) +F(100) ] [ -F(300) ]"));
+  EXPECT_NE(m, drawn("Soma(10) Basal Spiny(2, 1.5, .6, .1, .2, .8) F(400) [ Spiny(0) +F(100) ] [ -F(300) ]"));
+  EXPECT_TRUE(validate(m).empty());
+}
+
 TEST(Turtle, RefusesWhatItCannotDraw) {
   EXPECT_THROW(drawn("Soma(1) Soma(2)"), Error);
   EXPECT_THROW(drawn("Soma(-1)"), Error);

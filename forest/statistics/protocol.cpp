@@ -7,6 +7,7 @@
 #include <numeric>
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
@@ -229,7 +230,9 @@ void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& a
 
 /// What is asked of features one by one. Nothing is learned, so that all cells count, however many; and an area has a sign: how much
 /// nearer chance has brought the held-out cells to the training cells or to wrong ones is the same for both, and falls out.
-void ask_of_each_alone(Judgement& j, const std::array<FeatureTable, 3>& tables) {
+/// @param drawn  independent cells that the model is judged by: few differ from training cells by chance
+void ask_of_each_alone(Judgement& j, const std::array<FeatureTable, 3>& tables, std::size_t drawn) {
+  const double limit = std::max(most_beside_control, 1.96 * std::sqrt(1. / 12. / double(drawn)));
   for (std::size_t f = 0; f < tables[0].features.size(); ++f) {
     const Feature& feature = tables[0].features[f];
     if (feature.alone.empty()) continue;
@@ -243,17 +246,17 @@ void ask_of_each_alone(Judgement& j, const std::array<FeatureTable, 3>& tables) 
         };
     const Judgement::Alone& found = j.alone.emplace_back(
         Judgement::Alone{std::string(feature.alone), above(tables[2]), above(tables[0])});
-    ask(j, "auc." + found.name, std::abs(found.grown.value - found.real.value) <= most_beside_control,
+    ask(j, "auc." + found.name, std::abs(found.grown.value - found.real.value) <= limit,
         fmt::format("by '{}' alone, grown cells have more than held-out ones with AUC {:.3f}, training cells "
-                    "with {:.3f}; at most {:.2f} between the two is asked",
-                    feature.name, found.grown.value, found.real.value, most_beside_control));
+                    "with {:.3f}; at most {:.3f} between the two is asked",
+                    feature.name, found.grown.value, found.real.value, limit));
   }
 }
 
-/// All criteria but those on the controls. With the areas of real cells what is judged is a control: of it nothing is asked that
+/// All criteria but those on the controls. With what is known of grown cells what is judged is a control: of it nothing is asked that
 /// has to do with diameters, which are right, or with copying, which it is.
 Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, const Drawn& judged,
-                    const Judgement::Areas* known, const ProtocolOptions& options, Progress& progress) {
+                    const Judgement* known, const ProtocolOptions& options, Progress& progress) {
   Judgement j;
   j.train = train.size(), j.held_out = held_out.size();
   j.populations = judged.samples.size(), j.compared = judged.size();
@@ -276,10 +279,10 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   };
   constexpr auto forest = Classifier::random_forest;
   j.auc.structure = tell(structure, false, forest);
-  j.auc.real_control = full ? tell(structure, true, forest) : known->real_control;
+  j.auc.real_control = full ? tell(structure, true, forest) : known->auc.real_control;
   ask_auc(j, "auc.structure", "by structure a random forest tells", j.auc.structure, j.auc.real_control,
           most_auc);
-  ask_of_each_alone(j, tables);
+  ask_of_each_alone(j, tables, (full ? j : *known).populations * j.compared);
   if (full) {
     if (const Samples slopes = samples_of(tables, slopes_of); slopes.values.cols() > 0) {
       j.auc.slopes = tell(slopes, false, forest);
@@ -374,18 +377,20 @@ Judgement judge(const FeatureTable& train, const FeatureTable& held_out, std::sp
   j.grown = grown.front().size();
   for (const Control& control : controls) {
     const Judgement c =
-        judge_one(train, held_out, drawn_from(control.cells, compared, grown.size(), options.seed), &j.auc,
+        judge_one(train, held_out, drawn_from(control.cells, compared, grown.size(), options.seed), &j,
                   options, progress);
-    ControlResult result{.name = control.name, .auc = c.auc.structure, .rejected = false, .reasons = {}};
+    ControlResult result{.name = control.name, .auc = c.auc.structure, .rejected = false, .missed = {}};
+    std::vector<std::string_view> names;
     for (const Criterion& criterion : c.criteria)
-      if (!criterion.pass) result.reasons.push_back(criterion.reason);
-    result.rejected = !result.reasons.empty();
+      if (!criterion.pass) names.push_back(result.missed.emplace_back(criterion).name);
+    result.rejected = !result.missed.empty();
     ask(j, "controls." + control.name, result.rejected,
-        result.rejected ? fmt::format("the control '{}' is rejected, as it must be (AUC {:.3f})",
-                                      control.name, result.auc.value)
-                        : fmt::format("the control '{}' is not told from real cells (AUC {:.3f}): these "
-                                      "cells are too few to judge by",
-                                      control.name, result.auc.value));
+        result.rejected
+            ? fmt::format("the control '{}' is rejected, as it must be, by {} (on structure AUC {:.3f})",
+                          control.name, fmt::join(names, ", "), result.auc.value)
+            : fmt::format("the control '{}' is not told from real cells (AUC {:.3f}): these "
+                          "cells are too few to judge by",
+                          control.name, result.auc.value));
     j.controls.push_back(std::move(result));
   }
   j.pass = std::ranges::all_of(j.criteria, &Criterion::pass);

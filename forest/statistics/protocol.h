@@ -49,7 +49,7 @@ struct ControlResult {
   std::string name;
   Estimate auc;           // against held-out cells, on structure
   bool rejected = false;  // by any criterion but copying, as the grown cells would be
-  std::vector<std::string> reasons;
+  std::vector<Criterion> missed;
 };
 
 struct Judgement {

@@ -75,7 +75,7 @@ TEST(Protocol, RejectsWhatIsShiftedAndSaysWhy) {
   ASSERT_EQ(j.controls.size(), 2u);
   EXPECT_TRUE(j.controls[0].rejected);
   EXPECT_GT(j.controls[0].auc.value, .8);
-  EXPECT_FALSE(j.controls[0].reasons.empty());
+  EXPECT_FALSE(j.controls[0].missed.empty());
   EXPECT_LT(j.controls[1].auc.value, .7);
 }
 
@@ -162,9 +162,7 @@ TEST(Protocol, AsksHowDeepCellsAreByItself) {
   const Judgement right = judge_population(train, held_out, deep(cells(3, 60), 0.), controls, quick);
   EXPECT_TRUE(criterion(right, "auc.depth").pass);
   EXPECT_TRUE(right.controls[0].rejected);
-  EXPECT_TRUE(std::ranges::any_of(right.controls[0].reasons, [](const std::string& reason) {
-    return reason.starts_with("by '") && reason.find("' alone, grown cells") != reason.npos;
-  }));
+  EXPECT_EQ(std::ranges::count(right.controls[0].missed, "auc.depth", &Criterion::name), 1);
   const Judgement none = judge_population(cells(1, 20), cells(2, 20), cells(3, 20), {}, quick);
   EXPECT_EQ(std::ranges::count(none.criteria, "auc.depth", &Criterion::name), 0) << "nothing says so";
 }
@@ -183,10 +181,24 @@ TEST(Protocol, SeesWhatIsAmissWhereHeldOutCellsAreFarFromTheOthers) {
     const Judgement j = judge_population(train, held_out, train, controls, quick);
     EXPECT_TRUE(criterion(j, "auc.depth").pass);
     for (const ControlResult& control : j.controls)
-      EXPECT_TRUE(std::ranges::any_of(control.reasons, [](const std::string& reason) {
-        return reason.starts_with("by '") && reason.find("' alone, grown cells") != reason.npos;
-      })) << control.name;
+      EXPECT_EQ(std::ranges::count(control.missed, "auc.depth", &Criterion::name), 1) << control.name;
   }
+}
+
+// One draw of few cells differs from training cells by chance, and is allowed to: perfect cells are not missed more often than that.
+TEST(Protocol, AllowsFewCellsWhatChanceDoes) {
+  const auto deep = [](FeatureTable t) {
+    t.features.front().alone = "depth";
+    return t;
+  };
+  const FeatureTable train = deep(cells(1, 60)), held_out = deep(cells(2, 30));
+  int missed = 0;
+  for (std::uint64_t k = 0; k < 40; ++k)
+    missed += !criterion(judge_population(train, held_out, deep(cells(100 + k, 30)), {},
+                                          {.repeats = 1, .trees = 1, .dealings = 9, .resamples = 9}),
+                         "auc.depth")
+                   .pass;
+  EXPECT_LE(missed, 8) << "one in twenty, and what training cells differ by themselves";
 }
 
 TEST(Protocol, RefusesNothing) { EXPECT_THROW(judge(cells(1, 9), cells(2, 9), {}, {}, quick), Error); }
