@@ -66,6 +66,27 @@ void look_for_slips(const Sample& sample, statistics::KindSet kinds, Console& co
         with, counted(sample.neurons.size(), "neuron"), with == 1 ? "has" : "have", first));
 }
 
+/// By what the model was fitted, how, and to which neurons: comments that the text begins with.
+std::string provenance(const Options& options, const Sample& sample) {
+  std::string how =
+      fmt::format("--kind {} --style {:g}", fmt::join(options.kinds, " "), options.resampling.style);
+  if (options.resampling.smoothing) how += fmt::format(" --smoothing {:g}", *options.resampling.smoothing);
+  if (options.calibrate) how += fmt::format(" --calibrate --candidates {}", options.calibration.candidates);
+  if (!options.slices.empty()) how += fmt::format(" --slices '{}'", repository::escaped(options.slices));
+  std::string text =
+      fmt::format("# Fitted by brainforest {} to {} of {}: fit {}\n", FOREST_VERSION,
+                  counted(sample.cells.size(), "neuron"), repository::escaped(sample.name), how);
+  constexpr std::size_t width = 120;
+  std::string line = "# They are";
+  for (std::size_t i = 0; i < sample.cells.size(); ++i) {
+    const std::string cell =
+        ' ' + repository::escaped(sample.cells[i]) + (i + 1 < sample.cells.size() ? "," : "");
+    if (line.size() + cell.size() > width) text += std::exchange(line, "#") + '\n';
+    line += cell;
+  }
+  return text + line + '\n';
+}
+
 void run(const Options& options, Console& console) {
   must_take_files({options.out}, options.force);
   const bool files = !options.files.empty();
@@ -96,7 +117,7 @@ void run(const Options& options, Console& console) {
   const fitting::Calibrated fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices),
                                                                  fmt::format("neurons like those of {}", of),
                                                                  resampling, calibration, console.progress());
-  const std::string& text = fitted.text;
+  const std::string text = provenance(options, sample) + fitted.text;
   const std::string name = options.model.empty() ? options.out.stem().string() : options.model;
   const lsystem::Grammar grammar =
       lsystem::parse(text, name);  // finds our own mistakes before anybody else does

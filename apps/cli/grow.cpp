@@ -271,7 +271,8 @@ void run(const Options& options, Console& console) {
   if (!options.repo.empty()) destinations.push_back(std::make_unique<IntoRepository>(options, grammar));
   if (!options.out.empty()) destinations.push_back(std::make_unique<IntoFolder>(options.out));
 
-  const std::vector<int> steps = moments(options, grammar);
+  std::vector<int> steps = moments(options, grammar);
+  std::size_t longest = 0;  // of them, until all were full-grown
   io::CellsTotal total;
   console.progress().begin("growing", options.count);
   parallel_in_order(
@@ -280,13 +281,16 @@ void run(const Options& options, Console& console) {
         Ready ready{lsystem::grow(grammar, options.seed, i, site), {}, {}};
         if (!options.repo.empty()) ready.prepared.emplace(ready.neuron);
         lsystem::Deriver deriver(grammar, site);
-        for (const int step : steps)
+        for (const int step : steps) {
           ready.younger.push_back({step, lsystem::grow_to(deriver, grammar, options.seed, i, step)});
+          if (deriver.full_grown()) break;
+        }
         return ready;
       },
       [&](std::size_t i, Ready&& ready) {
         const std::string name = name_of(options, grammar, i);
         for (const auto& destination : destinations) destination->put(ready, name, i);
+        longest = std::max(longest, ready.younger.size());
         total.segments += ready.neuron.segment_count();
         total.length += total_length(ready.neuron);
         console.progress().advance();
@@ -295,6 +299,7 @@ void run(const Options& options, Console& console) {
   for (const auto& destination : destinations) destination->finish();
 
   nlohmann::ordered_json facts = nlohmann::ordered_json::object();
+  steps.resize(longest);
   if (!steps.empty()) facts["steps"] = steps;
   for (const auto& destination : destinations) facts.update(destination->facts());
   report(options, grammar, total, facts, console);

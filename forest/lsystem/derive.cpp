@@ -351,6 +351,8 @@ const Word& Deriver::derive(std::uint64_t seed, std::uint64_t index, std::option
   return state_->word;
 }
 
+bool Deriver::full_grown() const { return state_->active.empty(); }
+
 double Deriver::liking(const Morphology& neuron) {
   const Grammar& grammar = state_->grammar;
   const std::vector<double> features = grammar.tasted.measure(neuron);

@@ -29,6 +29,9 @@ class Deriver {
   const Word& derive(std::uint64_t seed = 0, std::uint64_t index = 0, std::optional<int> steps = {},
                      std::uint32_t candidate = 0);
 
+  /// Whether nothing of the word that was derived last is left to rewrite: with more steps it stays as it is.
+  bool full_grown() const;
+
   /// How well a grown neuron is liked: the sum of the grammar's tastes, of those features that are defined. It must have been
   /// derived last, or another candidate of it. Throws Error when a number is not finite.
   double liking(const Morphology& neuron);

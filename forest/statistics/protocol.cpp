@@ -4,7 +4,10 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <functional>
+#include <iterator>
 #include <numeric>
+#include <ranges>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -380,14 +383,14 @@ Judgement judge(const FeatureTable& train, const FeatureTable& held_out, std::sp
         judge_one(train, held_out, drawn_from(control.cells, compared, grown.size(), options.seed), &j,
                   options, progress);
     ControlResult result{.name = control.name, .auc = c.auc.structure, .rejected = false, .missed = {}};
-    std::vector<std::string_view> names;
-    for (const Criterion& criterion : c.criteria)
-      if (!criterion.pass) names.push_back(result.missed.emplace_back(criterion).name);
+    std::ranges::copy_if(c.criteria, std::back_inserter(result.missed), std::logical_not{}, &Criterion::pass);
     result.rejected = !result.missed.empty();
     ask(j, "controls." + control.name, result.rejected,
         result.rejected
             ? fmt::format("the control '{}' is rejected, as it must be, by {} (on structure AUC {:.3f})",
-                          control.name, fmt::join(names, ", "), result.auc.value)
+                          control.name,
+                          fmt::join(result.missed | std::views::transform(&Criterion::name), ", "),
+                          result.auc.value)
             : fmt::format("the control '{}' is not told from real cells (AUC {:.3f}): these "
                           "cells are too few to judge by",
                           control.name, result.auc.value));

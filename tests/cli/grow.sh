@@ -66,6 +66,10 @@ for i in range(2):
     assert tree(f"lapse/bes-3-0000{i}.swc") == tree(text)  # at the end it is the grown one
 PY
 [ "$(ls lapse | wc -l)" = 12 ]
+# What is full-grown is not written over and over.
+printf 'steps: 1000\naxiom: !(1) A(0)\ngo: A(n) : n < 7 -> F(10) A(n + 1)\nend: A(n) ->\n' >seven.lsys
+$BRAINFOREST grow --grammar seven.lsys --out seven --time-lapse 2 --json >seven.json
+grep -q '"steps": *\[2, *4, *6, *8\]' <(tr -d '\n ' <seven.json | sed 's/,/, /g; s/:/: /g') && [ "$(ls seven | wc -l)" = 5 ]
 grep -q 'step.*200' lapse/bes-3-00001-step000200.swc
 $BRAINFOREST grow --grammar bes --count 2 --seed 3 --out lapse --time-lapse 100 >/dev/null  # again: nothing changes
 echo '# changed' >>lapse/bes-3-00000-step000300.swc
