@@ -469,6 +469,20 @@ void run(const Options& options, Console& console) {
                             measured.size()));
 }
 
+/// What to say of a name that no metric has: those that NeuroM has in one name and we in several, or that begin with the same word.
+std::string no_such_metric(std::string_view name) {
+  std::vector<std::string_view> like;
+  for (const std::string_view beginning : {name, name.substr(0, name.find('_'))}) {
+    for (const Metric& m : metrics())
+      if (!beginning.empty() && m.name.size() > beginning.size() && m.name.starts_with(beginning) &&
+          m.name[beginning.size()] == '_')
+        like.push_back(m.name);
+    if (!like.empty()) break;
+  }
+  return fmt::format("There is no metric called '{}'{}; --list shows them", name,
+                     like.empty() ? "" : fmt::format(", but {}", fmt::join(like, ", ")));
+}
+
 }  // namespace
 
 std::function<void()> measure(CLI::App& command, Console& console) {
@@ -486,10 +500,8 @@ std::function<void()> measure(CLI::App& command, Console& console) {
                   "Metrics to show, by their or L-Measure's name; all by default")
       ->type_name("NAME")
       ->delimiter(',')
-      ->check([](const std::string& name) {
-        return find_metric(name) ? ""
-                                 : fmt::format("There is no metric called '{}'; --list shows them", name);
-      });
+      ->check(
+          [](const std::string& name) { return find_metric(name) ? std::string() : no_such_metric(name); });
   command.add_option("--kind", options->kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
       ->type_name("KIND")
       ->capture_default_str()

@@ -134,6 +134,7 @@ fails_with 1 'nothing was measured' $BRAINFOREST measure bad.swc --csv none.csv
 fails_with 1 'folder' $BRAINFOREST measure fork.swc --csv missing/folder/cells.csv
 
 fails_with 2 'files' $BRAINFOREST measure
+fails_with 2 "no metric called 'trunk_vectors', but trunk_vectors_x, trunk_vectors_y, trunk_vectors_z" $BRAINFOREST measure fork.swc --metric trunk_vectors
 fails_with 2 'no metric called' $BRAINFOREST measure fork.swc --metric lengthiness
 fails_with 2 'no kind of section' $BRAINFOREST measure fork.swc --kind dragon
 fails_with 2 'no value for each section' $BRAINFOREST measure fork.swc --level section --metric total_length
