@@ -8,7 +8,13 @@
 //     Σ |way of a vertex|² / (side of a face)²  least,  with  volume of each face + its change by these ways = what is wanted,
 //
 // whose multipliers are one number of every face that a sparse system gives. Vertices on a valley go along it, those on the border
-// stay. After each step sides turn back to the crosses and faces that are bent out of shape are mended. Private to this room.
+// stay. After each step sides turn back to the crosses and faces that are bent out of shape are mended. Turning and evening undo each
+// other, though, so in the end both are asked for at once, three times, by least squares over all vertices:
+//
+//     Σ (what a face lacks)² + Σ (v-isoline of a face by a crest, its cosine with the crest)² + .01 Σ (side beside its cross)²
+//       + .25 Σ |difference of the ways of two neighbours|² + .01 Σ |way|²  least.
+//
+// Private to this room.
 #pragma once
 
 #include <optional>

@@ -109,6 +109,34 @@ TEST(EvenVolumes, VerticesOfAValleyGoAlongIt) {
     for (int i = 0; i < side; ++i) EXPECT_NEAR(sheet.volume(i, j), 1., .15) << i << ' ' << j;
 }
 
+// A crest that runs across the rows 8° askew: rows turn by it until they cross it at a right angle, and volumes stay even.
+TEST(EvenVolumes, RowsTurnAcrossACrest) {
+  Sheet sheet(0.);
+  const double askew = std::tan(8. * std::numbers::pi / 180.);
+  Line crest{.kind = Line::Kind::crest, .points = {}, .triangles = {}};
+  for (int j = 0; j <= side; ++j)
+    crest.points.emplace_back(.5 * whole + askew * (step * j - .5 * whole), step * j, 0.);
+  crest.triangles.assign(side, 0);
+  sheet.lines.push_back(crest);
+  sheet.even(30);
+  const Place along = Place(askew, 1., 0.).normalized();
+  std::vector<double> angles;
+  for (int j = 4; j < side - 4; ++j)
+    for (int i = 0; i < side; ++i) {
+      const Quad& q = sheet.quads.quads[std::size_t(i + side * j)];
+      const auto& at = sheet.quads.middle;
+      const Place middle = .25 * (at[q[0]] + at[q[1]] + at[q[2]] + at[q[3]]);
+      if (std::abs(middle.x() - .5 * whole - askew * (middle.y() - .5 * whole)) > .5 * step) continue;
+      const Place across = at[q[1]] - at[q[0]] + at[q[2]] - at[q[3]];
+      angles.push_back(std::asin(std::abs(along.dot(across.normalized()))) * 180. / std::numbers::pi);
+    }
+  ASSERT_GT(angles.size(), 10u);
+  std::ranges::nth_element(angles, angles.begin() + std::ptrdiff_t(angles.size() / 2));
+  EXPECT_LT(angles[angles.size() / 2], 2.);
+  for (int j = 4; j < side - 4; ++j)
+    for (int i = 4; i < side - 4; ++i) EXPECT_NEAR(sheet.volume(i, j), 1., .1) << i << ' ' << j;
+}
+
 TEST(EvenVolumes, AreTheSameAtAnyNumberOfThreads) {
   Sheet one(1500.), two(1500.);
   {
