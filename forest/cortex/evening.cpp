@@ -56,7 +56,7 @@ class Evening {
 
   void operator()(int rounds, Progress& progress) {
     constexpr int smooth_rounds = 10, last_rounds = 15, settlings = 3, mending_rounds = 3;
-    progress.begin("evening volumes", std::size_t(rounds + settlings));
+    progress.begin("evening volumes", std::size_t(rounds) + std::size_t(settlings));
     std::vector<Place> moved(size()), along_border(size());  // the latter: the sum of both neighbours
     for (int round = 0; round < rounds; ++round) {
       const double shape = .3 + (least_shape - .3) * double(round) / double(rounds);

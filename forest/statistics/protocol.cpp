@@ -7,7 +7,6 @@
 #include <functional>
 #include <iterator>
 #include <numeric>
-#include <ranges>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -384,13 +383,13 @@ Judgement judge(const FeatureTable& train, const FeatureTable& held_out, std::sp
                   options, progress);
     ControlResult result{.name = control.name, .auc = c.auc.structure, .rejected = false, .missed = {}};
     std::ranges::copy_if(c.criteria, std::back_inserter(result.missed), std::logical_not{}, &Criterion::pass);
+    std::vector<std::string_view> names;
+    for (const Criterion& criterion : result.missed) names.push_back(criterion.name);
     result.rejected = !result.missed.empty();
     ask(j, "controls." + control.name, result.rejected,
         result.rejected
             ? fmt::format("the control '{}' is rejected, as it must be, by {} (on structure AUC {:.3f})",
-                          control.name,
-                          fmt::join(result.missed | std::views::transform(&Criterion::name), ", "),
-                          result.auc.value)
+                          control.name, fmt::join(names, ", "), result.auc.value)
             : fmt::format("the control '{}' is not told from real cells (AUC {:.3f}): these "
                           "cells are too few to judge by",
                           control.name, result.auc.value));
