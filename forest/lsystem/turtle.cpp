@@ -199,13 +199,14 @@ struct Spines {
   double left = 0.;  // µm to the next
 
   Spines() = default;
-  Spines(double density_, double reach_, double head_, double neck_, double spread_, double dice)
-      : density(density_),
-        reach(reach_),
-        head(head_),
-        neck(neck_),
-        spread(spread_),
-        random(std::bit_cast<std::uint64_t>(dice), 0, 0x73706e73),  // "spns"
+  /// @param told  as Spiny is told
+  explicit Spines(const std::array<double, 6>& told)
+      : density(told[0]),
+        reach(told[1]),
+        head(told[2]),
+        neck(told[3]),
+        spread(told[4]),
+        random(std::bit_cast<std::uint64_t>(told[5]), 0, 0x73706e73),  // "spns"
         left(gap()) {}
   double gap() { return random.exponential(1. / density); }
 
@@ -747,14 +748,14 @@ class Turtle {
   }
 
   void spiny(const std::array<double, 6>& told) {
-    const auto [density, reach, head, neck, spread, dice] = told;
+    const double density = told[0];
     if (!(*std::ranges::min_element(told.begin(), told.end() - 1) >= 0.))
       fail("Spiny has a parameter below 0");
     constexpr double most = 100.;  // per µm: hundreds of times what any dendrite bears
     if (density > most) fail(fmt::format("Spiny({:g}) asks for more than {:g} spines per µm", density, most));
     state_.spines = 0;
     if (density == 0. || answers_) return;
-    spines_.emplace_back(density, reach, head, neck, spread, dice);
+    spines_.emplace_back(told);
     state_.spines = std::uint32_t(spines_.size() - 1);
   }
 
@@ -845,7 +846,7 @@ class Turtle {
   std::vector<State> stack_;
   std::vector<Drawn> drawn_;
   std::vector<Gauge> gauges_{{}};           // the first: none
-  std::vector<Spines> spines_{{}};          // likewise
+  std::vector<Spines> spines_{Spines()};    // likewise
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
