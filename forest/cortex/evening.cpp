@@ -130,6 +130,9 @@ class Evening {
     return .5 * height(q) / wanted_ * at_[q[k]].up.cross(corner(q, k + 3) - corner(q, k + 1));
   }
 
+  // How much a crest counts from there, 0 to 1: nothing from one side of an element on.
+  double heed(double distance) const { return std::min(1., 2. * (1. - distance / std::cbrt(wanted_))); }
+
   void put_back() {
     parallel_for(size(), 256, [&](std::size_t v) { put_back(v); });
   }
@@ -156,7 +159,7 @@ class Evening {
     // By a crest sides run along it and across it, the more so the nearer.
     if (const auto hit = at.border ? std::nullopt : crests_.tree.nearest(middle, side)) {
       const Place& normal = guides_.curvatures[c[main]].normal;
-      const double share = std::min(1., 2. * (1. - hit->distance / side));
+      const double share = heed(hit->distance);
       Place along = crests_.along[hit->triangle];
       if (std::abs(along.dot(normal.cross(at.arm))) > std::abs(along.dot(at.arm)))
         along = along.cross(normal);
@@ -256,7 +259,7 @@ class Evening {
       const bool second = askew(ways[1]) < askew(ways[0]);
       const double length = std::max(1., ways[second].norm());
       const Place across = ways[second] / length;
-      const double weight = by_crest * std::min(1., 2. * (1. - hit->distance / near));
+      const double weight = by_crest * heed(hit->distance);
       constexpr double share[2][4] = {{-.5, .5, .5, -.5}, {-.5, -.5, .5, .5}};
       ask(-weight * along.dot(across));
       for (std::size_t k = 0; k < 4; ++k)

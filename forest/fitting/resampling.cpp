@@ -287,6 +287,10 @@ sample gauges(cell =, kind = -> points) =)");
           put("{} {} 0 0 {}", std::exchange(before, ","), count, diameter);
       }
   }
+  static Manner manner_of(const Cell& cell, int kind) {
+    const auto found = cell.kinds.find(kind);
+    return found == cell.kinds.end() ? Manner() : found->second;
+  }
   // Of a kind that it has not, those of all.
   static Diameters diameters_of(const Cell& cell, int kind) {
     if (const auto found = cell.diameters.find(kind); found != cell.diameters.end()) return found->second;
@@ -309,8 +313,7 @@ sample styles(cell =, kind = -> {}, thinnest, farthest, winding, angle, level, s
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
       for (const auto& [kind, sd] : traced_.deviations) {
-        const auto found = traced_.cells[i].kinds.find(kind);
-        const Manner of = found == traced_.cells[i].kinds.end() ? Manner() : found->second;
+        const Manner of = manner_of(traced_.cells[i], kind);
         row(std::exchange(first, false));
         put("{} {} ->", i, kind);
         style(of.style);
@@ -334,8 +337,7 @@ sample spines(cell =, kind = -> density, reach, head, neck, spread) =)");
     bool first = true;
     for (std::size_t i = 0; i < traced_.cells.size(); ++i)
       for (const auto& [kind, unused] : traced_.deviations) {
-        const auto found = traced_.cells[i].kinds.find(kind);
-        const Spininess of = found == traced_.cells[i].kinds.end() ? Spininess() : found->second.spines;
+        const Spininess of = manner_of(traced_.cells[i], kind).spines;
         row(std::exchange(first, false));
         put("{} {} -> {} {} {} {} {}", i, kind, rounded(of.density, 1e4), rounded(of.reach, 1e3),
             rounded(of.head, 1e3), rounded(of.neck, 1e3), rounded(of.spread, 1e3));
