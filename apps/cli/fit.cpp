@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest fit: from traced neurons to a model that grows more of them.
+#include <cmath>
 #include <memory>
 
 #include <CLI/App.hpp>
@@ -12,6 +13,7 @@
 #include "forest/morphology/validate.h"
 #include "forest/repository/names.h"
 #include "forest/statistics/dealing.h"
+#include "forest/statistics/flattening.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -84,7 +86,13 @@ std::string provenance(const Options& options, const Sample& sample) {
     if (line.size() + cell.size() > width) text += std::exchange(line, "#") + '\n';
     line += cell;
   }
-  return text + line + '\n';
+  text += line + '\n';
+  if (const auto [ratio, error] = statistics::flattening(sample.neurons); std::isfinite(error))
+    text += fmt::format(
+        "# They go {:.2f} (± {:.2f}) times as far along x as along z, as those that grow do: 'plant "
+        "--slice-correction' makes up for it.\n",
+        ratio, error);
+  return text;
 }
 
 void run(const Options& options, Console& console) {

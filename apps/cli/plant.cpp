@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest plant: neurons of a repository into a column, or into curved elements of a cortex, as a SONATA circuit.
+#include <cmath>
 #include <filesystem>
 #include <memory>
 
@@ -24,6 +25,7 @@ struct Options {
   std::filesystem::path out;
   std::uint64_t seed = 0;
   std::uint32_t synapses = 0;
+  std::string slice;
   ElementOptions elements;
 };
 
@@ -73,10 +75,26 @@ std::string sentence_of(const Bending& b) {
       100. * b.beyond_pia, 100. * b.pressed, 100. * b.beyond_white, 100. * b.beside);
 }
 
+/// What the command line says of slices, for all types of which the recipe says nothing.
+void correct_slices(circuit::Recipe& recipe, const std::string& words) {
+  recipe.sources.resize(recipe.types.size());
+  const circuit::SliceCorrection given = circuit::parse_slice_correction(words);
+  for (circuit::Recipe::Source& source : recipe.sources)
+    if (!source.slice) source.slice = given;
+}
+
+std::string sentence_of(const Unflattened& u) {
+  return fmt::format("neurons of {} are stretched {:.2f} times along z{}", u.name, u.factor,
+                     !u.error               ? ""
+                     : std::isnan(*u.error) ? ", as their dendrites say"
+                                            : fmt::format(", as their dendrites say (± {:.2f})", *u.error));
+}
+
 void run(const Options& options, Console& console) {
   must_have_folder(options.out);
   io::must_take_sonata(options.out);
-  const circuit::Recipe recipe = find_recipe(options.recipe);
+  circuit::Recipe recipe = find_recipe(options.recipe);
+  if (!options.slice.empty()) correct_slices(recipe, options.slice);
   const bool curved = !options.elements.file.empty();
   PlantedElements all;
   if (curved)
@@ -116,7 +134,11 @@ void run(const Options& options, Console& console) {
                               {"neurons", circuit.instances.size()},
                               {"morphologies", circuit.morphologies.size()},
                               {"made_up_synapses", synapses},
+                              {"slice_correction", nlohmann::ordered_json::array()},
                               {"planted", list}};
+  for (const Unflattened& u : planted.unflattened)
+    json["slice_correction"].push_back(
+        {{"name", u.name}, {"factor", u.factor}, {"measured", u.error.has_value()}});
   if (curved) json["tissue"] = json_of(all);
   console.print(json);
   console.table({"layer", "type", "neurons", "neurons/mm³"}, lines);
@@ -127,6 +149,7 @@ void run(const Options& options, Console& console) {
                             counted(all.elements.size(), "element"), all.volume * 1e-9,
                             all.measured ? "as measured" : "by volume", all.seconds));
   if (all.bending) console.say(sentence_of(*all.bending));
+  for (const Unflattened& u : planted.unflattened) console.say(sentence_of(u));
   if (synapses)
     console.say(fmt::format("{} synapses are made up: nobody measured them, they are there to be looked at",
                             synapses));
@@ -152,6 +175,14 @@ std::function<void()> plant(CLI::App& command, Console& console) {
                   "Folder of the SONATA circuit; a circuit of Brain Forest there is replaced")
       ->required()
       ->type_name("DIR");
+  command
+      .add_option("--slice-correction", options->slice,
+                  "Neurons lie flat as in the slice in which they were traced: stretch them along z so many "
+                  "times (1 to "
+                  "5), or `measured`, until dendrites go as far along z as along x; types of which the "
+                  "recipe says it keep "
+                  "to that")
+      ->type_name("FACTOR|measured");
   add_elements(command, options->elements);
   add_whole(command, "--synapses", options->synapses,
             "Make up so many synapses on each neuron, from others drawn by lot (docs/scene/synapses.md)", 0,

@@ -2,9 +2,11 @@
 #include "apps/cli/planting.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <optional>
 #include <set>
+#include <span>
 
 #include <fmt/format.h>
 
@@ -17,6 +19,7 @@
 #include "forest/morphology/transform.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
+#include "forest/statistics/flattening.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/grammars.h"
@@ -30,8 +33,26 @@ using repository::NeuronRow;
 using repository::Repository;
 
 const std::string& grammar_of(const circuit::Recipe& recipe, std::size_t type) {
-  static const std::string none;
-  return type < recipe.grammars.size() ? recipe.grammars[type] : none;
+  return source_of(recipe, type).grammar;
+}
+
+/// Stretches neurons along z, as their slice is to be corrected. Throws Error where that cannot be measured.
+Unflattened unflatten(const std::string& name, const circuit::SliceCorrection& slice,
+                      std::span<Morphology> neurons) {
+  Unflattened result{name, slice.factor};
+  if (slice.measured) {
+    const auto [ratio, error] = statistics::flattening(neurons);
+    if (!(ratio <= circuit::SliceCorrection::most))
+      throw Error(fmt::format(
+          "neurons of {} go {}, so that they are flat themselves or were traced in a plane; give their "
+          "slice-correction as a number (1: as they are)",
+          name,
+          std::isnan(ratio) ? "nowhere along z" : fmt::format("1/{:.2g} as far along z as along x", ratio)));
+    result.factor = std::max(1., ratio), result.error = error;
+  }
+  const Vec3 factors(1.f, 1.f, float(result.factor));
+  parallel_for(neurons.size(), 8, [&](std::size_t i) { neurons[i] = stretched(neurons[i], factors); });
+  return result;
 }
 
 /// The neurons of a type that grow where they stand: as many somata at first, of which the largest decides how far all of
@@ -60,8 +81,9 @@ std::vector<std::optional<Seedlings>> seedlings_of(const circuit::Recipe& recipe
 }
 
 /// Grows what stands for seedlings in the circuit, in place of their candidates.
-void grow_in_place(Planted& planted, const std::vector<std::optional<Seedlings>>& seedlings,
-                   std::uint64_t seed, Progress& progress) {
+void grow_in_place(Planted& planted, const circuit::Recipe& recipe,
+                   const std::vector<std::optional<Seedlings>>& seedlings, std::uint64_t seed,
+                   Progress& progress) {
   circuit::Circuit& circuit = planted.circuit;
   std::vector<std::size_t> index(circuit.instances.size());  // of its grammar
   std::vector<std::size_t> count(seedlings.size());
@@ -87,6 +109,16 @@ void grow_in_place(Planted& planted, const std::vector<std::optional<Seedlings>>
     progress.advance();
   });
   progress.end();
+  for (std::size_t type = 0; type < seedlings.size(); ++type) {
+    const auto& slice = source_of(recipe, type).slice;
+    if (!seedlings[type] || !slice || !count[type]) continue;
+    std::vector<Morphology> own;
+    for (std::size_t i = 0; i < index.size(); ++i)
+      if (circuit.instances[i].type == type) own.push_back(std::move(grown[i]));
+    planted.unflattened.push_back(unflatten(circuit.types[type].name, *slice, own));
+    for (std::size_t i = index.size(); i-- > 0;)
+      if (circuit.instances[i].type == type) grown[i] = std::move(own.back()), own.pop_back();
+  }
 
   // The morphologies that are still planted, then the grown ones.
   std::vector<std::string> names;
@@ -194,6 +226,17 @@ Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, c
     }
   });
   progress.end();
+  for (std::size_t begin = 0, end; begin < rows.size(); begin = end) {  // each population
+    const std::string& population = rows[begin].population;
+    for (end = begin + 1; end < rows.size() && rows[end].population == population;) ++end;
+    for (std::size_t type = 0; type < recipe.types.size(); ++type)
+      if (const auto& source = source_of(recipe, type);
+          recipe.types[type].population == population && source.grammar.empty() && source.slice) {
+        stock.unflattened.push_back(
+            unflatten(population, *source.slice, std::span(stock.neurons).subspan(begin, end - begin)));
+        break;  // what other types say of it is the same
+      }
+  }
   return stock;
 }
 
@@ -218,7 +261,7 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
   for (const auto& layer : circuit::counts(recipe))
     for (std::size_t type = 0; type < wanted.size(); ++type)
       if (layer[type]) wanted[type] = true;
-  auto [candidates, neurons] = stock_of(recipe, wanted, repo, progress);
+  auto [candidates, neurons, unflattened] = stock_of(recipe, wanted, repo, progress);
 
   // A candidate for all seedlings of a type; its population is one that no repository has.
   circuit::Recipe planted_by = recipe;
@@ -229,15 +272,17 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
       candidates.push_back({planted_by.types[type].population, planted_by.types[type].population,
                             std::ranges::max(seedlings[type]->radii), 0.f});
     }
-  Planted planted{
-      circuit::plant(planted_by, candidates, seed, progress), {}, circuit::too_tall(planted_by, candidates)};
+  Planted planted{circuit::plant(planted_by, candidates, seed, progress),
+                  {},
+                  circuit::too_tall(planted_by, candidates),
+                  std::move(unflattened)};
   planted.circuit.types = recipe.types;
   for (std::size_t i = 0; i < candidates.size(); ++i)  // the circuit keeps their order
     if (planted.morphologies.size() < planted.circuit.morphologies.size() &&
         planted.circuit.morphologies[planted.morphologies.size()] == candidates[i].name)
       planted.morphologies.push_back(neurons[i]);
   if (std::ranges::any_of(seedlings, [](const auto& s) { return s.has_value(); }))
-    grow_in_place(planted, seedlings, seed, progress);
+    grow_in_place(planted, recipe, seedlings, seed, progress);
   mark_glia(planted);
   return planted;
 }

@@ -3,6 +3,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -16,10 +17,18 @@ namespace forest::cli {
 /// The recipe at a path, or the one that ships under a name ("column-1000"). Throws InputError that lists the names.
 circuit::Recipe find_recipe(const std::string& name_or_path);
 
+/// Neurons that were stretched along z, as their slice had shrunk.
+struct Unflattened {
+  std::string name;  // of their population, or of their type where they grew
+  double factor = 1.;
+  std::optional<double> error = {};  // where it was measured
+};
+
 /// The neurons of a repository that a recipe plants from, centre at the origin; names are safe as those of files.
 struct Stock {
   std::vector<circuit::Candidate> candidates;
   std::vector<Morphology> neurons;  // one for each
+  std::vector<Unflattened> unflattened = {};
 };
 /// Throws Error when a population that the recipe plants from is empty, with the commands that fill it.
 /// @param wanted  of each type whether any of it is planted
@@ -31,6 +40,7 @@ struct Planted {
   circuit::Circuit circuit;
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin
   std::vector<circuit::TooTall> too_tall = {};
+  std::vector<Unflattened> unflattened = {};
 };
 
 /// A type all of whose cells have no other processes than those of glia is glia, also when the recipe does not say so.

@@ -277,13 +277,13 @@ std::vector<std::uint32_t> parse_elements(const std::string& text, const std::fi
 
 PlantedElements plant_in_elements(const ElementOptions& options, const circuit::Recipe& recipe,
                                   const std::string& repo, std::uint64_t seed, Progress& progress) {
-  for (std::size_t t = 0; t < recipe.grammars.size(); ++t)
-    if (!recipe.grammars[t].empty())
+  for (std::size_t t = 0; t < recipe.types.size(); ++t)
+    if (const std::string& grammar = source_of(recipe, t).grammar; !grammar.empty())
       throw Error(
           fmt::format("neurons of type {} would grow by grammar {} where they stand, which is not so in "
                       "elements; grow some "
                       "into a repository (brainforest grow), and name their population instead",
-                      recipe.types[t].name, recipe.grammars[t]));
+                      recipe.types[t].name, grammar));
   if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty())
     throw Error("say which elements are planted: --element, --near, --sphere or --box");
   const io::ElementsFile file = io::read_elements(options.file);
@@ -327,6 +327,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
       if (layer.mix[type] > 0. && (layer.count ? *layer.count > 0 : layer.density > 0.))
         wanted_types[type] = true;
   Stock stock = stock_of(recipe, wanted_types, repo, progress);
+  all.planted.unflattened = stock.unflattened;
   const auto start = Clock::now();
   const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
                                         {.scale = scale, .element = file.volume});

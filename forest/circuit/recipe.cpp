@@ -2,6 +2,7 @@
 #include "forest/circuit/recipe.h"
 
 #include <algorithm>
+#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <unordered_set>
@@ -21,7 +22,7 @@ constexpr double fraction_slack = 1e-3;      // people write 0.33 + 0.33 + 0.34
 constexpr double longest = Node::longest;
 
 CellType read_type(const Node& node) {
-  node.allow({"name", "population", "grammar", "excitatory", "glia"});
+  node.allow({"name", "population", "grammar", "slice-correction", "excitatory", "glia"});
   CellType type;
   type.name = node.at("name").string();
   type.population = node.find("population") ? node.at("population").string() : type.name;
@@ -70,6 +71,17 @@ Recipe::Layer read_layer(const Node& node, std::span<const CellType> types) {
   return layer;
 }
 
+std::optional<SliceCorrection> read_correction(const Node& type) {
+  const auto node = type.find("slice-correction");
+  if (!node) return std::nullopt;
+  if (!node->is_string()) return SliceCorrection{float(node->number(1., SliceCorrection::most, "times"))};
+  try {
+    return parse_slice_correction(node->string());
+  } catch (const Error& error) {
+    node->refuse(error.what());
+  }
+}
+
 Recipe read_root(const Node& root) {
   root.allow({"name", "neurons", "rotate", "column", "soma", "type", "layer"});
   Recipe recipe;
@@ -89,10 +101,17 @@ Recipe read_root(const Node& root) {
   for (const Node& node : root.tables("type")) {
     recipe.types.push_back(read_type(node));
     const auto grammar = node.find("grammar");
-    recipe.grammars.push_back(grammar ? grammar->string() : "");
+    recipe.sources.push_back({grammar ? grammar->string() : "", read_correction(node)});
     if (grammar && node.find("population"))
       grammar->refuse(
           fmt::format("type {} has a grammar and a population; give one of them", recipe.types.back().name));
+    for (std::size_t other = 0; !grammar && other + 1 < recipe.types.size(); ++other)
+      if (recipe.sources[other].grammar.empty() &&
+          recipe.sources[other].slice != recipe.sources.back().slice &&
+          recipe.types[other].population == recipe.types.back().population)
+        node.refuse(
+            fmt::format("types {} and {} come from population {}; give both the same slice-correction",
+                        recipe.types[other].name, recipe.types.back().name, recipe.types[other].population));
     if (!seen.insert(recipe.types.back().name).second)
       node.refuse(fmt::format("two types are called {}; names must differ", recipe.types.back().name));
   }
@@ -119,6 +138,24 @@ Recipe parse_recipe(std::string_view text, const std::string& file) {
 
 Recipe read_recipe(const std::filesystem::path& path) {
   return parse_recipe(MappedFile(path).text(), path.string());
+}
+
+SliceCorrection parse_slice_correction(std::string_view words) {
+  if (words == "measured") return {.measured = true};
+  float factor = 0.f;
+  const char* const end = words.data() + words.size();
+  if (const auto [at, error] = std::from_chars(words.data(), end, factor);
+      error != std::errc() || at != end || !(factor >= 1.f && factor <= SliceCorrection::most))
+    throw Error(fmt::format(
+        "'{}' corrects no slice; give \"measured\", or how many times neurons are stretched along z, 1 to "
+        "{:g}",
+        words, SliceCorrection::most));
+  return {.factor = factor};
+}
+
+const Recipe::Source& source_of(const Recipe& recipe, std::size_t type) {
+  static const Recipe::Source none;
+  return type < recipe.sources.size() ? recipe.sources[type] : none;
 }
 
 void check(const Recipe& recipe) {

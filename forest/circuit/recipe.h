@@ -16,6 +16,17 @@
 
 namespace forest::circuit {
 
+/// Neurons that were traced in a slice lie as flat in it as it became; they are stretched along z so many times.
+struct SliceCorrection {
+  static constexpr float most = 5.f;
+  float factor = 1.f;     // 1 to `most`
+  bool measured = false;  // instead of it what their dendrites say, all neurons of a population together
+
+  bool operator==(const SliceCorrection&) const = default;
+};
+/// "measured", or a number. Throws Error for anything else.
+SliceCorrection parse_slice_correction(std::string_view words);
+
 struct Recipe {
   /// A layer and what stands in it. Its number of neurons is `count`, or else follows from `density`.
   struct Layer {
@@ -26,12 +37,18 @@ struct Recipe {
     std::vector<double> mix;  // fraction of each of Recipe::types, in their order; sums to 1
   };
 
+  /// How the neurons of a type are come by.
+  struct Source {
+    std::string
+        grammar;  // by it they grow where they stand, among the others; empty: they come from its population
+    std::optional<SliceCorrection> slice = {};  // the same of all types of a population
+  };
+
   std::string name = "column";
   float radius = 0.f;  // of the column, µm; 0: of a tissue of which only densities are known
   std::vector<CellType> types;
-  /// Of each type the grammar by which its neurons grow where they stand, among the others; empty: they come from its
-  /// population. A vector shorter than `types` stands for empty ones.
-  std::vector<std::string> grammars = {};
+  std::vector<Source> sources =
+      {};  // one for each of `types`; a shorter vector stands for neurons as they are in populations
   std::vector<Layer> layers;  // from the pia downwards
   /// The exact number of neurons in all. Densities then only say how they are shared among the layers without
   /// a count.
@@ -44,6 +61,9 @@ struct Recipe {
 /// of range, a type that is not declared, fractions that do not sum to 1.
 Recipe parse_recipe(std::string_view text, const std::string& file);
 Recipe read_recipe(const std::filesystem::path& path);
+
+/// How the neurons of a type are come by, also where `sources` is shorter.
+const Recipe::Source& source_of(const Recipe& recipe, std::size_t type);
 
 /// Throws Error that says which of the sentences above is violated.
 void check(const Recipe& recipe);

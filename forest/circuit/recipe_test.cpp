@@ -68,6 +68,22 @@ TEST(Recipe, IsReadKeyByKey) {
   EXPECT_THAT(recipe.layers[1].mix, testing::ElementsAre(1., 0.));
 }
 
+TEST(Recipe, SaysOfWhichTypesTheSliceIsCorrected) {
+  const auto slices = [](const std::string& text) {
+    const Recipe recipe = parse_recipe(text, "slices.toml");
+    return std::pair(source_of(recipe, 0).slice, source_of(recipe, 1).slice);
+  };
+  using Both = std::pair<std::optional<SliceCorrection>, std::optional<SliceCorrection>>;
+  EXPECT_EQ(slices(good), Both());
+  const std::string tall = "name = \"tall\"", small = "name = \"small\"";
+  EXPECT_EQ(slices(with(tall, tall + "\nslice-correction = 1.5")), Both(SliceCorrection{.factor = 1.5f}, {}));
+  EXPECT_EQ(slices(with(small, small + "\nslice-correction = \"measured\"")),
+            Both({}, SliceCorrection{.measured = true}));
+  Recipe shorter = parse_recipe(good, "good.toml");
+  shorter.sources.clear();
+  EXPECT_EQ(source_of(shorter, 1).slice, std::nullopt);
+}
+
 TEST(Recipe, DensitiesGiveTheNumbersWhenNoTotalIsGiven) {
   Recipe recipe = parse_recipe(with("neurons = 10\n", ""), "x.toml");
   recipe.layers[0].density = 1e6;
@@ -176,6 +192,12 @@ INSTANTIATE_TEST_SUITE_P(
                     Mistake{"thickness = 100\n", "", 19, "lacks \"thickness\""},
                     Mistake{"density = 1000", "", 25, "lacks \"density\""},
                     Mistake{"density = 1000", "density = 1000\ncount = 3", 28, "give one of them"},
+                    Mistake{"name = \"small\"", "name = \"small\"\nslice-correction = 0.9", 17,
+                            "must be a number"},
+                    Mistake{"name = \"small\"", "name = \"small\"\nslice-correction = \"6\"", 17, "1 to 5"},
+                    Mistake{"name = \"small\"",
+                            "name = \"small\"\npopulation = \"pyramidal\"\nslice-correction = \"measured\"",
+                            15, "give both the same slice-correction"},
                     Mistake{"small = 0.75", "small = 0.5", 23, "sum to 0.75; make them sum to 1"},
                     Mistake{"small = 0.75", "giant = 0.75", 23, "add a [[type]]"},
                     Mistake{"density = 3000", "count = 11", 2, "raise \"neurons\""}));

@@ -31,6 +31,8 @@ class Node {
   /// Throws InputError: the file, the line of this value, and the sentence.
   [[noreturn]] void refuse(const std::string& sentence) const;
 
+  bool is_string() const { return value_.is_string(); }
+
   // Each refuses a value that is something else.
   std::string string() const;  // not empty
   bool boolean() const;

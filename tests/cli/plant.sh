@@ -39,6 +39,25 @@ printf 'name = "thin"\nneurons = 20\n[column]\nradius = 200\n[[type]]\nname = "t
 $BRAINFOREST plant --recipe thin.toml --repo names.db --out thin 2>thin.txt >/dev/null
 grep -q '^1 of the 1 neurons of type tall are taller than the tissue in which it is planted; the lowest stands for all' thin.txt
 
+# Neurons from slices are stretched along z: by so many times, or until they go as far along z as along x.
+printf 'name = "slice"\nneurons = 20\nrotate = false\n[column]\nradius = 200\n[[type]]\nname = "flat"\n[[layer]]\nname = "L"\nthickness = 900\ndensity = 2000\nmix = { flat = 1 }\n' >slice.toml
+printf '1 1 0 0 0 5 -1\n2 3 0 9 0 1 1\n3 3 30 30 15 1 2\n4 3 -40 30 20 1 2\n' >flat.swc
+$BRAINFOREST import flat.swc --repo flat.db --population flat >/dev/null
+$BRAINFOREST plant --recipe slice.toml --repo flat.db --out flat --slice-correction measured >said.txt
+grep -q '^neurons of flat are stretched 2.00 times along z, as their dendrites say$' said.txt
+grep -q '30 30 30 ' flat/morphologies/flat.swc
+$BRAINFOREST plant --recipe slice.toml --repo flat.db --out flat --slice-correction 1.2 --json | grep -A4 slice_correction | grep -q '"factor": 1.2'
+grep -q ' 30 30 18 ' flat/morphologies/flat.swc
+sed 's/^name = "flat"/&\nslice-correction = 1.4/' slice.toml >corrected.toml
+$BRAINFOREST plant --recipe corrected.toml --repo flat.db --out flat --slice-correction measured >/dev/null
+grep -q ' 30 30 21 ' flat/morphologies/flat.swc
+fails_with 1 "'twice' corrects no slice" $BRAINFOREST plant --recipe slice.toml --repo flat.db --out few --slice-correction twice
+sed 's/1.4/"much"/' corrected.toml >wrong.toml
+fails_with 1 "wrong.toml:8: 'much' corrects no slice" $BRAINFOREST plant --recipe wrong.toml --repo flat.db --out few
+sed 's/ 15 1 2/ 1 1 2/; s/ 20 1 2/ 1 1 2/' flat.swc >plane.swc
+$BRAINFOREST import plane.swc --repo plane.db --population flat >/dev/null
+fails_with 1 'neurons of flat go 1/35 as far along z as along x' $BRAINFOREST plant --recipe slice.toml --repo plane.db --out few --slice-correction measured
+
 # What is wrong is said in a sentence with what to do, and nothing is left behind.
 $BRAINFOREST import pyramidal-1.swc --repo few.db --population pyramidal >/dev/null
 fails_with 1 'populations purkinje, motoneuron, which are empty; grow' $BRAINFOREST plant --recipe column-1000 --repo few.db --out few
