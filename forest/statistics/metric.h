@@ -34,7 +34,7 @@ struct Metric {
   /// crossed (sholl.h), or Barcodes::bars(). NaN where it is not defined for an element.
   std::vector<double> (*values)(const Arbors& arbors);
   std::string_view definition;  // with its formula
-  std::string_view source;      // the paper it comes from, or empty when it is plain geometry
+  std::string_view source;      // the paper or the program that defines it; empty when it is plain geometry
   std::string_view
       l_measure;  // L-Measure's name of it, or of what it is the total or maximum of; empty when it has none
 };
