@@ -58,6 +58,14 @@ class Evening {
     constexpr int smooth_rounds = 10, last_rounds = 15, settlings = 3, mending_rounds = 3;
     progress.begin("evening volumes", std::size_t(rounds) + std::size_t(settlings));
     std::vector<Place> moved(size()), along_border(size());  // the latter: the sum of both neighbours
+    const auto step_all = [&](double shape, bool last, auto&& on_border) {
+      parallel_for(size(), 1024, [&](std::size_t v) {
+        moved[v] =
+            at_[v].border ? on_border(v) : Place(quads_.middle[v] + step(std::uint32_t(v), shape, last));
+      });
+      quads_.middle.swap(moved);
+      put_back();
+    };
     for (int round = 0; round < rounds; ++round) {
       const double shape = .3 + (least_shape - .3) * double(round) / double(rounds);
       const bool last = round + last_rounds >= rounds;  // in the end only what is bent is mended
@@ -65,16 +73,11 @@ class Evening {
       for (const auto& [a, b] : rim_)
         along_border[a] += quads_.middle[b], along_border[b] += quads_.middle[a];
       find_ways();
-      parallel_for(size(), 1024, [&](std::size_t v) {
-        if (at_[v].border)  // it becomes smooth and stays
-          moved[v] = at_[v].border == 2 && round < smooth_rounds
-                         ? Place(.5 * quads_.middle[v] + .25 * along_border[v])
-                         : quads_.middle[v];
-        else
-          moved[v] = quads_.middle[v] + step(std::uint32_t(v), shape, last);
+      step_all(shape, last, [&](std::size_t v) {  // a border becomes smooth and stays
+        return at_[v].border == 2 && round < smooth_rounds
+                   ? Place(.5 * quads_.middle[v] + .25 * along_border[v])
+                   : quads_.middle[v];
       });
-      quads_.middle.swap(moved);
-      put_back();
       progress.advance();
     }
     for (int round = 0; rounds > 0 && round < settlings; ++round) {
@@ -82,14 +85,8 @@ class Evening {
       put_back();
       progress.advance();
     }
-    for (int round = 0; rounds > 0 && round < mending_rounds; ++round) {
-      parallel_for(size(), 1024, [&](std::size_t v) {
-        moved[v] = quads_.middle[v];
-        if (!at_[v].border) moved[v] += step(std::uint32_t(v), least_shape, true);
-      });
-      quads_.middle.swap(moved);
-      put_back();
-    }
+    for (int round = 0; rounds > 0 && round < mending_rounds; ++round)
+      step_all(least_shape, true, [&](std::size_t v) { return quads_.middle[v]; });
     progress.end();
   }
 
