@@ -47,6 +47,12 @@ body: Begin : cells.fibre(me) < 0 -> Soma(cells.soma(me))
 fibre: Begin -> Kind(plans.kind(plan(0))) Fibre(cells.fibre(me))
 )";
 
+// … and when some somata are not round: of the neuron whose diameters it has, so that a soma's size and shape are of two.
+constexpr std::string_view round_soma = "Soma(cells.soma(me))",
+                           outlined_soma =
+                               "Soma(cells.soma(me), cells.a2(thin_as), cells.b2(thin_as), "
+                               "cells.a3(thin_as), cells.b3(thin_as))";
+
 // What stems bear beside their diameters where some were traced with spines.
 constexpr std::string_view gauged = "Gauge(gauges, gauges(thin_as, kind), even)", bearing = R"(
        Spiny(spines.density(spines(whose(kind), kind)), spines.reach(spines(whose(kind), kind)), spines.head(spines(whose(kind), kind)),
@@ -257,8 +263,9 @@ class Writer {
 # Neurons: the diameter of their soma (µm), of the point where they begin when they have none (else -1),
 # between which depths they lie, how many stems one like this has, and the neurons in whose style its basal
 # dendrites are, in whose all others, and whose diameters it has; and, of as many places of a ring in which
-# like ones lie side by side, the neuron there.
-sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring) =)");
+# like ones lie side by side, the neuron there{}.
+sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, ring{}) =)",
+        outlined() ? "; then how its soma's outline is not round" : "", outlined() ? ", a2, b2, a3, b3" : "");
     const std::vector<std::size_t> around = ring(traced_, mixed_);
     for (std::size_t i = 0; i < traced_.cells.size(); ++i) {
       const Cell& c = traced_.cells[i];
@@ -266,7 +273,12 @@ sample cells(-> soma, fibre, low, high, stems, basal_as, others_as, thin_as, rin
       row(!i);
       put("{} {} {} {} {} {} {} {} {}", rounded(c.soma, 1e3), rounded(c.fibre, 1e3), rounded(c.low, 10.),
           rounded(c.high, 10.), m.stems.size(), m.basal_as, m.others_as, m.thin_as, around[i]);
+      if (outlined())
+        for (const double one : c.outline) put(" {}", rounded(one, 1e3));
     }
+  }
+  bool outlined() const {
+    return std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.outline != Outline{}; });
   }
 
   void gauges() {
@@ -565,10 +577,12 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
     std::string rules(growth);
     if (std::ranges::any_of(traced_.cells, [](const Cell& c) { return c.fibre >= 0.; }))
       rules.replace(rules.find(with_soma), with_soma.size(), with_fibre);
-    if (spiny())
-      for (std::size_t at = 0; (at = rules.find(gauged, at)) != rules.npos;
-           at += gauged.size() + bearing.size())
-        rules.insert(at + gauged.size(), bearing);
+    const auto replace = [&](std::string_view from, std::string_view to) {
+      for (std::size_t at = 0; (at = rules.find(from, at)) != rules.npos; at += to.size())
+        rules.replace(at, from.size(), to);
+    };
+    if (outlined()) replace(round_soma, outlined_soma);
+    if (spiny()) replace(gauged, std::string(gauged) + std::string(bearing));
     std::string_view rest = rules;
     for (std::size_t at; (at = rest.find("@style")) != rest.npos; rest.remove_prefix(at + 6))
       text_.append(rest.substr(0, at)).append(style);

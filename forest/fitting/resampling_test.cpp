@@ -660,6 +660,56 @@ TEST(Resampling, BearsAsManySpinesAsWereTraced) {
   EXPECT_EQ(resampling_grammar(spiny(0.), "t").find("Spiny"), std::string::npos);
 }
 
+// How many times as high as wide somata are.
+std::vector<double> shapes_of(std::span<const Morphology> neurons) {
+  std::vector<double> all;
+  for (const Morphology& m : neurons) {
+    Bounds bounds;
+    for (const Point& p : m.soma().points) bounds.add(p.position(), 0.f);
+    const Vec3 size = bounds.high - bounds.low;
+    all.push_back(double(size.y() / size.x()));
+  }
+  return all;
+}
+
+TEST(Resampling, SomataAreAsLongAsWereTraced) {
+  const auto neurons = [](double longer) {
+    return each_with(12, 3, [longer](MorphologyBuilder& builder, Random& random, std::uint64_t i) {
+      Soma soma{.kind = SomaKind::contours, .points = {}, .parents = {}, .contour_starts = {0}};
+      const double a = 5. * (1. + longer * (1. + .1 * double(i % 5)));  // upright ellipses
+      for (int k = 0; k < 36; ++k)
+        soma.points.push_back({float(5. * std::cos(k * std::numbers::pi / 18.)),
+                               float(a * std::sin(k * std::numbers::pi / 18.)), 0.f, .1f});
+      builder.set_soma(soma);
+      for (int stem = 0; stem < 3; ++stem) {
+        const double angle = 2. * stem + .1 * random.normal();
+        add_fork(builder, {away(5., angle, .5, random), away(60., angle, .5, random)}, {-.3, .4},
+                 [&](double side) { return away(150. + 5. * random.normal(), angle + side, .5, random); });
+      }
+    });
+  };
+  const std::vector<Morphology> models = neurons(.4);
+  const lsystem::Grammar grammar = lsystem::parse(resampling_grammar(models, "t"), "t");
+  const std::vector<Morphology> grown = lsystem::grow_population(grammar, 36, 1);
+  for (const Morphology& m : grown) ASSERT_EQ(m.soma().kind, SomaKind::contours);
+  const auto traced = statistics::summarize(shapes_of(models)),
+             found = statistics::summarize(shapes_of(grown));
+  EXPECT_NEAR(found.mean, traced.mean, .05 * traced.mean);
+  EXPECT_NEAR(found.sd, traced.sd, .3 * traced.sd) << "neurons differ as they did";
+  std::vector<double> sizes, grown_sizes;
+  for (const Morphology& m : models) sizes.push_back(double(m.soma().sphere().radius));
+  for (const Morphology& m : grown) grown_sizes.push_back(double(m.soma().sphere().radius));
+  EXPECT_NEAR(statistics::mean(grown_sizes), statistics::mean(sizes), .01 * statistics::mean(sizes));
+  const std::string round = resampling_grammar(
+      each_with(12, 3,
+                [](MorphologyBuilder& builder, Random& random, std::uint64_t) {
+                  add_fork(builder, {away(5., 0., .5, random), away(60., 0., .5, random)}, {-.3, .4},
+                           [&](double side) { return away(150., side, .5, random); });
+                }),
+      "t");
+  EXPECT_EQ(round.find("a2"), std::string::npos) << "of balls nothing is said";
+}
+
 // Arbors that leave one point, and no soma.
 Morphology insect(std::uint64_t i, int stems) {
   Random random(7, i);

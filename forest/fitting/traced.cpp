@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 #include <utility>
 
 #include "forest/statistics/summary.h"
@@ -54,6 +55,65 @@ Vec3 last_step_of(std::span<const Point> points) {
     if (const Vec3 step = points[i].position() - points[i - 1].position(); !step.isZero(0.f))
       return step.stableNormalized();
   return Vec3::Zero();
+}
+
+// How far from `middle` the outermost edge of a soma lies towards each of so many sides; 0 where none does.
+std::array<double, 72> edges_of(const Soma& soma, const Eigen::Vector2d& middle) {
+  std::array<double, 72> far{};
+  const auto flat = [&](const Point& p) {
+    return Eigen::Vector2d(double(p.x) - middle.x(), double(p.y) - middle.y());
+  };
+  const auto cross = [](const Eigen::Vector2d& a, const Eigen::Vector2d& b) {
+    return a.x() * b.y() - a.y() * b.x();
+  };
+  for (std::size_t side = 0; side < far.size(); ++side) {
+    const double phi = 2. * std::numbers::pi * double(side) / double(far.size());
+    const Eigen::Vector2d out(std::cos(phi), std::sin(phi));
+    const auto edge = [&](const Eigen::Vector2d& from, const Eigen::Vector2d& to) {
+      const double a = cross(out, from), b = cross(out, to);
+      if ((a <= 0.) == (b <= 0.)) return;  // it does not cross the line through the middle
+      far[side] = std::max(far[side], out.dot(from + a / (a - b) * (to - from)));
+    };
+    const auto disc = [&](const Eigen::Vector2d& at, double radius) {
+      const double beside = cross(out, at);
+      if (std::abs(beside) < radius)
+        far[side] = std::max(far[side], out.dot(at) + std::sqrt(radius * radius - beside * beside));
+    };
+    for (std::size_t i = 0; i < soma.contour_starts.size(); ++i) {
+      const auto contour = soma.contour(i);
+      for (std::size_t k = 0; k < contour.size(); ++k)
+        edge(flat(contour[k]), flat(contour[(k + 1) % contour.size()]));
+    }
+    constexpr int discs = 8;  // along a cylinder
+    for (std::size_t i = 0; i < soma.parents.size(); ++i) {
+      if (soma.parents[i] < 0) continue;
+      const Point &from = soma.points[std::size_t(soma.parents[i])], &to = soma.points[i];
+      for (int k = 0; k <= discs; ++k) {
+        const double t = double(k) / discs;
+        disc(flat(from) + t * (flat(to) - flat(from)), std::lerp(double(from.radius), double(to.radius), t));
+      }
+    }
+  }
+  return far;
+}
+
+Outline outline_of(const Soma& soma) {
+  const Point sphere = soma.sphere();
+  const auto far = edges_of(soma, {double(sphere.x), double(sphere.y)});
+  if (*std::ranges::min_element(far) <= 0.) return {};  // a ball, or its middle is outside
+  Outline outline{};
+  double mean = 0.;
+  for (std::size_t side = 0; side < far.size(); ++side) {
+    const double phi = 2. * std::numbers::pi * double(side) / double(far.size());
+    const Outline waves{std::cos(2. * phi), std::sin(2. * phi), std::cos(3. * phi), std::sin(3. * phi)};
+    for (std::size_t k = 0; k < waves.size(); ++k) outline[k] += 2. * far[side] * waves[k];
+    mean += far[side];
+  }
+  double bent = 0.;
+  for (double& one : outline) one /= mean, bent += std::abs(one);
+  constexpr double most = .9;  // more, and it would cross itself
+  for (double& one : outline) one *= std::min(1., most / bent);
+  return outline;
 }
 
 double diameter_of(const Point& p) { return std::max(least_diameter, 2. * double(p.radius)); }
@@ -116,7 +176,10 @@ struct Learner {
         middle[before] += float(tips[i] / tips[before]) * (middle[i] - middle[before]);
       }
     }
-    Cell cell{.soma = 2. * double(arbors.origin().radius), .kinds = manners(), .stems = {}};
+    Cell cell{.soma = 2. * double(arbors.origin().radius),
+              .outline = outline_of(arbors.neuron().soma()),
+              .kinds = manners(),
+              .stems = {}};
     if (arbors.neuron().soma().kind == SomaKind::none) cell.fibre = cell.soma;
     for (std::uint32_t i = 0; i < all.size(); ++i)
       for (const Point& p : points(i)) {

@@ -121,9 +121,15 @@ struct Manner {
 /// How many points have a diameter, µm.
 using Diameters = std::map<double, std::size_t>;
 
+/// How the outline of a soma, seen along z, is not round, by its Fourier series about the middle: a2, b2, a3 and b3 of its radius over the
+/// mean one, 1 + a2 cos 2φ + b2 sin 2φ + a3 cos 3φ + b3 sin 3φ, φ from +x to +y. The second tell how long it is and
+/// whither, the third how much of a triangle.
+using Outline = std::array<double, 4>;
+
 struct Cell {
-  double soma = 0.;    // diameter, µm
-  double fibre = -1.;  // … of the point where it begins, when it has no soma, as an insect's tracing
+  double soma = 0.;      // diameter, µm
+  Outline outline = {};  // of a soma that was traced with one, or as cylinders
+  double fibre = -1.;    // … of the point where it begins, when it has no soma, as an insect's tracing
   double low = 0., high = 0.;  // of its points, along z from the soma, µm
   std::map<int, Manner> kinds;
   std::map<int, Diameters> diameters = {};  // by kind

@@ -29,6 +29,7 @@ struct Tracing {
 constexpr std::size_t tracing_needs = 3, tracing_takes = sizeof(Tracing) / sizeof(double);
 constexpr auto tracing_values = std::bit_cast<std::array<double, tracing_takes>>(Tracing{});
 
+constexpr double round_soma[] = {0., 0., 0., 0.};
 constexpr double spines_as_usual[] = {1.2, .5, .15, .3, 0.};
 
 constexpr TurtleSymbol symbol_table[] = {
@@ -48,7 +49,11 @@ constexpr TurtleSymbol symbol_table[] = {
     {"T", "strength, x, y, z",
      "from here on bend by strength towards a direction, (0, 1, 0) when not given; 0 ends it",
      Action::tropism, 1, 4},
-    {"Soma", "diameter", "a soma here", Action::soma, 1, 1},
+    {"Soma", "diameter, a2, b2, a3, b3",
+     "a soma here; with the others not round: seen along z its outline is diameter / 2 × (1 + a2 cos 2φ + b2 "
+     "sin 2φ + "
+     "a3 cos 3φ + b3 sin 3φ) from its middle, φ from +x to +y",
+     Action::soma, 1, 5, round_soma},
     {"Axon", "", "what follows is axon", Action::axon, 0, 0},
     {"Basal", "", "what follows is basal dendrite", Action::basal, 0, 0},
     {"Apical", "", "what follows is apical dendrite", Action::apical, 0, 0},
@@ -372,7 +377,8 @@ class Turtle {
         state_.outward = parameter(0, 0.);
         return;
       case Action::soma:
-        return soma(parameter(0, 0.));
+        return soma(parameter(0, 0.),
+                    {parameter(1, 0.), parameter(2, 0.), parameter(3, 0.), parameter(4, 0.)});
       case Action::axon:
         return become(SectionKind::axon);
       case Action::basal:
@@ -778,13 +784,36 @@ class Turtle {
     state_.node = none;
   }
 
-  void soma(double diameter) {
+  void soma(double diameter, const std::array<double, 4>& outline) {
     if (soma_) fail("there are two somata; a neuron has one");
     if (!(diameter >= 0.)) fail("the soma has a negative diameter");
     must_be_size(diameter);
     soma_ = Point{float(state_.position.x()), float(state_.position.y()), float(state_.position.z()),
                   float(0.5 * diameter)};
     soma_place_ = state_.position;
+    double bent = 0.;
+    for (const double one : outline) bent += std::abs(one);
+    if (!(bent < 1.))
+      fail(
+          fmt::format("the soma's outline may reach its middle; what makes it not round must add up to less "
+                      "than 1, and is {:g}",
+                      bent));
+    outline_ = outline;
+  }
+  Soma soma() const {
+    if (outline_ == std::array<double, 4>{})
+      return {.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}};
+    constexpr int places = 24;
+    Soma result{.kind = SomaKind::contours, .points = {}, .parents = {}, .contour_starts = {0}};
+    for (int i = 0; i < places; ++i) {
+      const double phi = 2. * std::numbers::pi * i / places;
+      const double r =
+          double(soma_->radius) * (1. + outline_[0] * std::cos(2. * phi) + outline_[1] * std::sin(2. * phi) +
+                                   outline_[2] * std::cos(3. * phi) + outline_[3] * std::sin(3. * phi));
+      result.points.push_back(
+          {soma_->x + float(r * std::cos(phi)), soma_->y + float(r * std::sin(phi)), soma_->z, 0.f});
+    }
+    return result;
   }
 
   void become(SectionKind kind) { state_.kind = kind, state_.tag = std::int32_t(kind); }
@@ -803,8 +832,7 @@ class Turtle {
   // A section runs on while a point has one drawn daughter, which is the next point, of the same kind.
   Morphology build(const Annotations& annotations) {
     MorphologyBuilder builder;
-    if (soma_)
-      builder.set_soma({.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}});
+    if (soma_) builder.set_soma(soma());
     const auto point = [](const Drawn& d, float radius) {
       return Point{float(d.position.x()), float(d.position.y()), float(d.position.z()), radius};
     };
@@ -849,6 +877,7 @@ class Turtle {
   std::vector<Spines> spines_{Spines()};    // likewise
   std::vector<double>* answers_ = nullptr;  // then nothing is drawn
   std::optional<Point> soma_;
+  std::array<double, 4> outline_{};
   Eigen::Vector3d soma_place_ = Eigen::Vector3d::Zero();
   const cortex::Environment& environment_;
   Eigen::Vector3d at_;  // of the turtle's origin in the tissue

@@ -158,8 +158,27 @@ TEST(Turtle, BearsSpinesWhereItIsToldTo) {
   EXPECT_TRUE(validate(m).empty());
 }
 
+TEST(Turtle, DrawsSomataThatAreNotRound) {
+  EXPECT_EQ(drawn("f(7) Soma(10, 0, 0, 0, 0) F(9)"), drawn("f(7) Soma(10) F(9)"));
+  const Morphology m = drawn("f(7) Soma(10, -.2, 0, 0, -.1) F(9)");
+  ASSERT_EQ(m.soma().kind, SomaKind::contours);
+  const Point ball = m.soma().sphere();
+  expect_near(ball.position(), {0, 7, 0});
+  EXPECT_NEAR(ball.radius, 5.f, 1e-4f);
+  Bounds bounds;
+  for (const Point& p : m.soma().points) bounds.add(p.position() - ball.position(), 0.f);
+  EXPECT_NEAR(bounds.high.y(), 5. * (1. + .2 + .1),
+              1e-4);  // a3 and b3 of -sin 3φ: upwards a tip, downwards none
+  EXPECT_NEAR(bounds.low.y(), -5. * (1. + .2 - .1), .2);
+  EXPECT_NEAR(bounds.high.x(), 5. * (1. - .2), .5);
+  EXPECT_EQ(bounds.high.z(), 0.f);
+  EXPECT_TRUE(validate(m).empty());
+}
+
 TEST(Turtle, RefusesWhatItCannotDraw) {
   EXPECT_THROW(drawn("Soma(1) Soma(2)"), Error);
+  EXPECT_THAT(refused([] { drawn("Soma(9, .5, .3, 0, -.2)"); }),
+              ::testing::HasSubstr("less than 1, and is 1"));
   EXPECT_THROW(drawn("Soma(-1)"), Error);
   for (const char* too_large : {"F(1e39)", "!(1e39) F(1)", "Soma(1e39)"})
     EXPECT_THAT(refused([&] { drawn(too_large); }), ::testing::StartsWith("turtle: ")) << too_large;
