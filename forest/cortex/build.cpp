@@ -148,6 +148,8 @@ void shape(Cortex& cortex, const TriangleTree& outer, const TriangleTree& inner,
     improve_shapes(cortex.elements, outer, inner, patient, progress);
   begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress, Rings::many);
   keep_volume(cortex.elements, whole);
+  begin_anew(cortex.elements, outer, inner, last, least_jacobian, progress,
+             Rings::many);  // a height for all costs some
 }
 
 }  // namespace

@@ -267,23 +267,31 @@ void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTre
                 const Shaping& shaping, double least, Progress& progress, Rings rings) {
   struct Try {
     int evened, room;  // rings: that are evened out, and around these that move, too
+    bool modest = false;
   };
-  constexpr std::array tries{Try{0, 1}, Try{1, 1}, Try{0, 3}, Try{1, 2}, Try{2, 1},
-                             Try{3, 1}, Try{2, 2}, Try{3, 2}, Try{4, 2}, Try{6, 2}};
+  constexpr std::array tries{Try{0, 1},       Try{1, 1},       Try{0, 3},      Try{1, 2}, Try{2, 1},
+                             Try{3, 1},       Try{2, 2},       Try{3, 2},      Try{4, 2}, Try{6, 2},
+                             Try{0, 1, true}, Try{0, 2, true}, Try{0, 3, true}};
   constexpr std::size_t near = 6;  // the first so many
   Shaping wide = shaping;
   wide.patch = 200;
   wide.finely = true;
+  // Where all that is good to have leaves one below what is needed, a little more than that alone is asked for, of any volume.
+  Shaping modest = wide;
+  modest.wanted = 1.25 * least;
+  modest.even = 0.;
   const Stars stars(elements);
   std::vector<std::uint32_t> all(elements.size());
   std::iota(all.begin(), all.end(), 0u);
-  for (const auto& [evened, room] : std::span(tries).first(rings == Rings::few ? near : tries.size())) {
+  for (const auto& [evened, room, is_modest] :
+       std::span(tries).first(rings == Rings::few ? near : tries.size())) {
     const std::vector<std::uint32_t> heaps = Faults(elements, all, least).elements;
     if (heaps.empty()) return;
     std::vector<Depths> before = elements.curves;
     if (evened > 0) even_out(elements, heaps, evened);
-    wide.room = room;
-    improve_shapes(elements, outer, inner, wide, progress, widened(elements, stars, heaps, evened + room));
+    Shaping asked = is_modest ? modest : wide;
+    asked.room = room;
+    improve_shapes(elements, outer, inner, asked, progress, widened(elements, stars, heaps, evened + room));
     keep_gains(elements, before, least);
     go(elements, before, to_keep(elements, shaping.enough));  // back, what need not have left
   }

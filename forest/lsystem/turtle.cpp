@@ -805,13 +805,14 @@ class Turtle {
       return {.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}};
     constexpr int places = 24;
     Soma result{.kind = SomaKind::contours, .points = {}, .parents = {}, .contour_starts = {0}};
+    const auto to_nm = [](double um) { return float(std::round(1e3 * um) / 1e3); };
     for (int i = 0; i < places; ++i) {
       const double phi = 2. * std::numbers::pi * i / places;
       const double r =
           double(soma_->radius) * (1. + outline_[0] * std::cos(2. * phi) + outline_[1] * std::sin(2. * phi) +
                                    outline_[2] * std::cos(3. * phi) + outline_[3] * std::sin(3. * phi));
-      result.points.push_back(
-          {soma_->x + float(r * std::cos(phi)), soma_->y + float(r * std::sin(phi)), soma_->z, 0.f});
+      result.points.push_back({to_nm(double(soma_->x) + r * std::cos(phi)),
+                               to_nm(double(soma_->y) + r * std::sin(phi)), to_nm(double(soma_->z)), 0.f});
     }
     return result;
   }
