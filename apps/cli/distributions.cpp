@@ -11,14 +11,13 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
-#include "forest/fitting/burke.h"
-#include "forest/fitting/hillman.h"
 #include "forest/repository/repository.h"
 #include "forest/statistics/segment_families.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
+#include "apps/cli/parametric_model.h"
 #include "apps/cli/plots.h"
 #include "apps/cli/report.h"
 #include "apps/cli/samples.h"
@@ -244,19 +243,9 @@ void run(const Options& options, Console& console) {
     throw Error(fmt::format("none of the {} has a section of kind {}; say another --kind",
                             counted(cells.size(), "neuron"), options.kind));
   if (!options.grammar.empty()) {
-    const auto write = options.form == "burke" ? fitting::burke_grammar : fitting::hillman_grammar;
-    const std::string name = options.grammar.stem().string();
-    const auto tell = [&](const fitting::Corrected& c) {
-      constexpr double alike = 1.25;
-      if (c.grown < alike * c.traced && c.traced < alike * c.grown) return;
-      console.warn(
-          fmt::format("what grows of kind {} by these rules has {:.3g} tips in the mean, where the traced "
-                      "ones have {:.3g}; "
-                      "'brainforest fit' keeps how many a neuron has",
-                      name_of(c.kind), c.grown, c.traced));
-    };
     write_unless_there(options.grammar,
-                       write(cells, name, {.kinds = kinds, .seed = options.seed, .tell = tell}),
+                       parametric_grammar(options.form, cells, options.grammar.stem().string(), kinds,
+                                          options.seed, console),
                        options.force);
   }
   if (!options.report.empty())
@@ -335,7 +324,7 @@ std::function<void()> distributions(CLI::App& command, Console& console) {
           ->type_name("FILE");
   command
       .add_option("--form", options->form, "Of that grammar: burke (chances by µm) or hillman (a threshold)")
-      ->check(CLI::IsMember({"burke", "hillman"}))
+      ->check(CLI::IsMember(parametric_forms))
       ->needs(grammar)
       ->capture_default_str();
   add_report(command, options->report);

@@ -19,6 +19,7 @@
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/options.h"
+#include "apps/cli/parametric_model.h"
 #include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
 
@@ -27,7 +28,7 @@ namespace {
 
 struct Options {
   std::vector<std::string> files, kinds{"dendrite"};
-  std::string repo, population, model, slices;
+  std::string repo, population, model, slices, form;  // form: of a parametric model; empty: resampled
   std::filesystem::path out;
   fitting::Resampling resampling;
   fitting::Calibration calibration;
@@ -70,11 +71,15 @@ void look_for_slips(const Sample& sample, statistics::KindSet kinds, Console& co
 
 /// By what the model was fitted, how, and to which neurons: comments that the text begins with.
 std::string provenance(const Options& options, const Sample& sample) {
-  std::string how =
-      fmt::format("--kind {} --style {:g}", fmt::join(options.kinds, " "), options.resampling.style);
-  if (options.resampling.smoothing) how += fmt::format(" --smoothing {:g}", *options.resampling.smoothing);
-  if (options.calibrate) how += fmt::format(" --calibrate --candidates {}", options.calibration.candidates);
-  if (!options.slices.empty()) how += fmt::format(" --slices '{}'", repository::escaped(options.slices));
+  std::string how = fmt::format("--kind {}", fmt::join(options.kinds, " "));
+  if (!options.form.empty()) {
+    how += fmt::format(" --form {}", options.form);
+  } else {
+    how += fmt::format(" --style {:g}", options.resampling.style);
+    if (options.resampling.smoothing) how += fmt::format(" --smoothing {:g}", *options.resampling.smoothing);
+    if (options.calibrate) how += fmt::format(" --calibrate --candidates {}", options.calibration.candidates);
+    if (!options.slices.empty()) how += fmt::format(" --slices '{}'", repository::escaped(options.slices));
+  }
   std::string text =
       fmt::format("# Fitted by brainforest {} to {} of {}: fit {}\n", FOREST_VERSION,
                   counted(sample.cells.size(), "neuron"), repository::escaped(sample.name), how);
@@ -122,9 +127,13 @@ void run(const Options& options, Console& console) {
   if (options.calibrate && neurons.size() < enough)
     console.warn(
         fmt::format("--calibrate learns nothing of fewer than {} neurons, so there is no taste", enough));
-  const fitting::Calibrated fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices),
-                                                                 fmt::format("neurons like those of {}", of),
-                                                                 resampling, calibration, console.progress());
+  const std::string title = fmt::format("neurons like those of {}", of);
+  fitting::Calibrated fitted;
+  if (options.form.empty())
+    fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices), title, resampling,
+                                         calibration, console.progress());
+  else
+    fitted.text = parametric_grammar(options.form, neurons, title, resampling.kinds, 1, console);
   const std::string text = provenance(options, sample) + fitted.text;
   const std::string name = options.model.empty() ? options.out.stem().string() : options.model;
   const lsystem::Grammar grammar =
@@ -145,7 +154,7 @@ void run(const Options& options, Console& console) {
     rows.push_back({s.name, fmt::format("{}", s.rows())});
     samples[s.name] = s.rows();
   }
-  console.table({"branches are drawn from", "rows"}, rows);
+  if (!rows.empty()) console.table({"branches are drawn from", "rows"}, rows);
   if (fitted.gap_before > 0.)
     console.say(
         fmt::format("calibrated in {} rounds: mean square gap to thirds held back {:.3f}, {:.3f} before",
@@ -186,23 +195,32 @@ std::function<void()> fit(CLI::App& command, Console& console) {
       .add_option("--kind", options->kinds,
                   "Kinds of sections to model: dendrite, axon, basal, apical, glia, all")
       ->capture_default_str();
-  must_be_within(
-      *command
-           .add_option("--style", options->resampling.style,
-                       "How far the style of the neurons that are drawn from may be from a neuron's own, in "
-                       "standard deviations")
-           ->capture_default_str(),
-      .01, 100.);
-  must_be_within(
-      *command.add_option("--smoothing", options->resampling.smoothing,
-                          "How far a neuron's style may be from that of the traced one whose stems "
-                          "it has; 0: not at all. Without it 0, or with fewer than 25 neurons 10 over "
-                          "their number, at most 1.2"),
-      0., 100.);
+  CLI::Option* form =
+      command
+          .add_option(
+              "--form", options->form,
+              "A published form instead, which forgets all but the diameter: burke (chances to fork by µm) "
+              "or hillman (a threshold)")
+          ->check(CLI::IsMember(parametric_forms));
+  CLI::Option* style =
+      command
+          .add_option("--style", options->resampling.style,
+                      "How far the style of the neurons that are drawn from may be from a neuron's own, in "
+                      "standard deviations")
+          ->capture_default_str();
+  must_be_within(*style->excludes(form), .01, 100.);
+  CLI::Option* smoothing =
+      command.add_option("--smoothing", options->resampling.smoothing,
+                         "How far a neuron's style may be from that of the traced one whose stems "
+                         "it has; 0: not at all. Without it 0, or with fewer than 25 neurons 10 over "
+                         "their number, at most 1.2");
+  must_be_within(*smoothing->excludes(form), 0., 100.);
   CLI::Option* calibrate =
-      command.add_flag("--calibrate", options->calibrate,
-                       "Learn a taste: of some candidates of each neuron one is drawn, by weights from a "
-                       "discriminator of traced and grown ones");
+      command
+          .add_flag("--calibrate", options->calibrate,
+                    "Learn a taste: of some candidates of each neuron one is drawn, by weights from a "
+                    "discriminator of traced and grown ones")
+          ->excludes(form);
   command
       .add_option("--candidates", options->calibration.candidates,
                   "How many candidates are grown for each neuron then")

@@ -75,6 +75,17 @@ $BRAINFOREST grow --grammar misspelt.lsys --out misspelt >/dev/null 2>told.txt
 grep -q "misspelt.lsys:2: 'basal' is read as 5 modules of one letter" told.txt
 refuses "model 'like_traced' has no distribution 'nothing'; it has " $BRAINFOREST model show like_traced.nothing --repo cells.db
 
+# Published forms are models of the same kind: fitted, stored, grown.
+for form in burke hillman; do
+  $BRAINFOREST fit traced --form $form -o $form.lsys >/dev/null 2>&1
+  grep -q "^# Fitted by brainforest .* --kind dendrite --form $form$" $form.lsys
+  $BRAINFOREST fit --repo cells.db --population traced --form $form --model $form >/dev/null 2>&1
+  $BRAINFOREST model list --repo cells.db | grep -q "^$form "
+  $BRAINFOREST grow --repo cells.db --model $form --count 3 --seed 1 --out by_$form >/dev/null
+  [ "$(ls by_$form | wc -l)" = 3 ]
+done
+fails_with 2 'excludes' $BRAINFOREST fit traced --form burke --calibrate -o both.lsys
+
 # The judge grows from the model and fits the control that it must reject.
 $BRAINFOREST grow --grammar motoneuron --count 12 --seed 2 --out others >/dev/null
 $BRAINFOREST judge --model like_them.lsys --train traced --held-out others --count 10 --populations 3 --repeats 2 --features judged.csv --json >judged.json
