@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/heap.h"
 #include "forest/core/parallel.h"
 #include "forest/core/signals.h"
 #include "forest/repository/names.h"
@@ -37,6 +38,7 @@ std::string missing_verb(const CLI::App& app) {
 
 int main(int argc, char** argv) {
   using namespace forest;
+  keep_freed_memory();
   say_signals("brainforest");
   cli::Console console;
   CLI::App app{"Brain Forest: from traced neurons to a forest one can walk through.", "brainforest"};
