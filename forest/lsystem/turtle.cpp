@@ -14,7 +14,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
-#include "forest/core/random.h"
+#include "forest/lsystem/body.h"
 #include "forest/lsystem/exclusion.h"
 
 namespace forest::lsystem {
@@ -158,81 +158,6 @@ struct State {
   SectionKind kind = SectionKind::undefined;
   std::int32_t tag = 0;
   std::uint32_t gauge = 0, spines = 0;  // among Turtle::gauges_, Turtle::spines_
-};
-
-// Which diameters traced branches have.
-struct Gauge {
-  std::span<const lsystem::Trace::Stop> stops;  // rising; empty: any
-  double even = 0.;                             // 0 to 1
-  double gap = 0.;                              // the least between two of them
-  double points = 0.;                           // that have one of them
-
-  Gauge() = default;
-  Gauge(std::span<const lsystem::Trace::Stop> of, double share) : stops(of), even(share) {
-    for (const auto& s : stops) points += double(s.at.x());
-    for (std::size_t i = 1; i < stops.size(); ++i) {
-      const double step = double(stops[i].diameter) - double(stops[i - 1].diameter);
-      gap = i == 1 ? step : std::min(gap, step);
-    }
-  }
-
-  // The nearest of them. Beyond the thickest, as far apart as the nearest two are.
-  double nearest(double diameter) const {
-    if (stops.empty()) return diameter;
-    const double thickest = double(stops.back().diameter);
-    if (diameter >= thickest)
-      return gap > 0. ? thickest + std::round((diameter - thickest) / gap) * gap : thickest;
-    const auto above = std::ranges::upper_bound(stops, float(diameter), {}, &lsystem::Trace::Stop::diameter);
-    const double more = above == stops.end() ? thickest : double(above->diameter);
-    if (above == stops.begin()) return more;
-    const double less = double(std::prev(above)->diameter);
-    return more - diameter < diameter - less ? more : less;
-  }
-  // That which is as thick as a share of all.
-  double at_share(double share) const {
-    double left = share * points;
-    for (const auto& s : stops)
-      if ((left -= double(s.at.x())) < 0.) return double(s.diameter);
-    return double(stops.back().diameter);
-  }
-};
-
-// Spines, at random along all that is drawn under them.
-struct Spines {
-  double density = 0., reach = 0., head = 0., neck = 0., spread = 0.;
-  Random random{0, 0, 0};
-  double left = 0.;  // µm to the next
-
-  Spines() = default;
-  /// @param told  as Spiny is told
-  explicit Spines(const std::array<double, 6>& told)
-      : density(told[0]),
-        reach(told[1]),
-        head(told[2]),
-        neck(told[3]),
-        spread(told[4]),
-        random(std::bit_cast<std::uint64_t>(told[5]), 0, 0x73706e73),  // "spns"
-        left(gap()) {}
-  double gap() { return random.exponential(1. / density); }
-
-  /// Those on the segment between two points, whose first lies `along` the section, µm.
-  void stand(MorphologyBuilder& builder, SectionId section, const Point& from, const Point& to,
-             double along) {
-    const Eigen::Vector3d way = to.position().cast<double>() - from.position().cast<double>();
-    const double length = way.norm();
-    for (; left < length; left += gap()) {
-      const Eigen::Vector3d side = way.unitOrthogonal();
-      const Eigen::Vector3d out =
-          Eigen::AngleAxisd(random.uniform(0., 2. * std::numbers::pi), way / length) * side;
-      const double far = reach * std::exp(random.normal(-.5 * spread * spread, spread));
-      builder.add_spine({.section = section,
-                         .position = float(along + left),
-                         .head = (far * out).cast<float>(),
-                         .head_diameter = float(head),
-                         .neck_diameter = float(neck)});
-    }
-    left -= length;
-  }
 };
 
 class Turtle {
@@ -803,18 +728,7 @@ class Turtle {
   Soma soma() const {
     if (outline_ == std::array<double, 4>{})
       return {.kind = SomaKind::sphere, .points = {*soma_}, .parents = {}, .contour_starts = {}};
-    constexpr int places = 24;
-    Soma result{.kind = SomaKind::contours, .points = {}, .parents = {}, .contour_starts = {0}};
-    const auto to_nm = [](double um) { return float(std::round(1e3 * um) / 1e3); };
-    for (int i = 0; i < places; ++i) {
-      const double phi = 2. * std::numbers::pi * i / places;
-      const double r =
-          double(soma_->radius) * (1. + outline_[0] * std::cos(2. * phi) + outline_[1] * std::sin(2. * phi) +
-                                   outline_[2] * std::cos(3. * phi) + outline_[3] * std::sin(3. * phi));
-      result.points.push_back({to_nm(double(soma_->x) + r * std::cos(phi)),
-                               to_nm(double(soma_->y) + r * std::sin(phi)), to_nm(double(soma_->z)), 0.f});
-    }
-    return result;
+    return outlined_soma(*soma_, outline_);
   }
 
   void become(SectionKind kind) { state_.kind = kind, state_.tag = std::int32_t(kind); }
