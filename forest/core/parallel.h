@@ -13,11 +13,12 @@
 namespace forest {
 
 /// Calls body(begin, end) for disjoint ranges that cover [0, count), at least `grain` iterations each where
-/// possible. The first exception thrown by a body is rethrown here.
+/// possible. Of bodies that throw, what the first range that does throws is rethrown here, at any number of threads, when all
+/// ranges before it are done; some of those after it are left out.
 void parallel_ranges(std::size_t count, std::size_t grain,
                      const std::function<void(std::size_t begin, std::size_t end)>& body);
 
-/// Calls body(i) for every i in [0, count).
+/// Calls body(i) for every i in [0, count), or for every one before the first that throws, which is rethrown here.
 template <class Body>
 void parallel_for(std::size_t count, std::size_t grain, Body&& body) {
   parallel_ranges(count, grain, [&](std::size_t begin, std::size_t end) {
@@ -31,7 +32,7 @@ void in_order(std::size_t count, const std::function<std::shared_ptr<void>(std::
 }
 
 /// What make(i) returns goes to take(i, …), in the order of i and one at a time, while later ones are being made on all
-/// cores; no more than `ahead` wait at any time. The first exception thrown by either is rethrown here.
+/// cores; no more than `ahead` wait at any time. What the first i that throws does is rethrown here, when all before it are taken.
 template <class Make, class Take>
 void parallel_in_order(std::size_t count, Make&& make, Take&& take, std::size_t ahead = 64) {
   using T = decltype(make(std::size_t()));
