@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest clamp: what compartments did over the whole of a simulation.
 #include <algorithm>
-#include <charconv>
 #include <chrono>
 #include <cmath>
 #include <filesystem>
@@ -13,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/reports/trace.h"
 
 #include "apps/cli/console.h"
@@ -64,10 +64,11 @@ reports::Trace find(const reports::Activity& activity, const Options& options, s
                     const std::string& name, float position) {
   std::uint32_t section = reports::soma_run;
   if (name != soma) {
-    const auto [end, error] = std::from_chars(name.data(), name.data() + name.size(), section);
-    if (error != std::errc() || end != name.data() + name.size())
+    const auto number = number_of<std::uint32_t>(name);
+    if (!number)
       throw Error(fmt::format(
           "'{}' is no section; give its number, from 0, as a selection shows it, or 'soma'", name));
+    section = *number;
   }
   const std::uint32_t row = row_of(activity, options, node);
   const reports::LayoutView layout = activity.layout(activity.rows()[row].layout);

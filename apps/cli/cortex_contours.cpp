@@ -18,6 +18,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/lower.h"
 #include "forest/cortex/compare.h"
 #include "forest/cortex/volume.h"
 #include "forest/io/contours.h"
@@ -66,11 +67,8 @@ bool before(const fs::path& one, const fs::path& other) {
 
 std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
   std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder)) {
-    std::string own = entry.path().extension().string();
-    std::ranges::transform(own, own.begin(), [](unsigned char c) { return char(std::tolower(c)); });
-    if (own == extension) files.push_back(entry.path());
-  }
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (lower(entry.path().extension().string()) == extension) files.push_back(entry.path());
   std::ranges::sort(files, before);
   return files;
 }
@@ -353,15 +351,15 @@ void run(const Options& options, Console& console) {
       continue;
     }
     const MappedFile file(path);
-    const std::string lower = path.string();
-    if (io::may_be_nifti(file.text()) && (lower.ends_with(".nii") || lower.ends_with(".nii.gz"))) {
+    const std::string ending = lower(path.filename().string());
+    if (io::may_be_nifti(file.text()) && (ending.ends_with(".nii") || ending.ends_with(".nii.gz"))) {
       used.axis = used.spacing = used.threshold = true;
       const io::NiftiVolume read = io::read_nifti(file.text(), path.string());
       for (const std::string& oddity : read.oddities) console.warn(path.string() + ": " + oddity);
       stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false, console));
       continue;
     }
-    if (lower.ends_with(".png")) throw Error(lower + ": is one section; give the folder of all");
+    if (ending.ends_with(".png")) throw Error(path.string() + ": is one section; give the folder of all");
     used.axis = used.spacing = true;
     surfaces.push_back(io::read_surface(file.text(), path.string()));
     surface_files.push_back(path);

@@ -15,6 +15,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/lower.h"
 #include "forest/io/format.h"
 #include "forest/repository/names.h"
 
@@ -24,11 +25,7 @@ namespace forest::cli {
 namespace fs = std::filesystem;
 namespace {
 
-std::string extension_of(const fs::path& path) {
-  std::string extension = path.extension().string();
-  for (char& c : extension) c = char(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
+std::string extension_of(const fs::path& path) { return lower(path.extension().string()); }
 
 // Whether it takes bytes and no file: a pipe, a terminal, what leads to an open file (/dev/stdout).
 bool is_stream(const fs::path& place) {

@@ -2,12 +2,12 @@
 #include "apps/cli/grammars.h"
 
 #include <algorithm>
-#include <charconv>
 #include <filesystem>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/console.h"
@@ -63,11 +63,8 @@ repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
 Reference reference_of(const std::string& text) {
   const std::size_t at = text.rfind('@');
   if (at == text.npos || at == 0) return {text};
-  int version = 0;
-  const char* const end = text.data() + text.size();
-  const auto [rest, error] = std::from_chars(text.data() + at + 1, end, version);
-  return error == std::errc() && rest == end && version > 0 ? Reference{text.substr(0, at), version}
-                                                            : Reference{text};
+  const auto version = number_of<int>(std::string_view(text).substr(at + 1));
+  return version && *version > 0 ? Reference{text.substr(0, at), *version} : Reference{text};
 }
 
 repository::ModelRow find_model(const repository::Repository& repository, const std::string& reference) {

@@ -2,13 +2,13 @@
 #include "apps/cli/neurons.h"
 
 #include <algorithm>
-#include <charconv>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/repository/names.h"
 
 namespace forest::cli {
@@ -18,10 +18,8 @@ using namespace repository;
 namespace {
 
 std::optional<NeuronId> id_of(const std::string& text) {
-  std::uint32_t id = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), id);
-  if (error != std::errc() || end != text.data() + text.size() || id == 0) return std::nullopt;
-  return NeuronId(id);
+  const auto id = number_of<std::uint32_t>(text);
+  return id && *id ? std::optional(NeuronId(*id)) : std::nullopt;
 }
 
 NeuronRow pick(const Repository& repository, const std::string& name, const std::string& population) {

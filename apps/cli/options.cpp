@@ -1,13 +1,13 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "apps/cli/options.h"
 
-#include <charconv>
 #include <limits>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/artist.h"
@@ -17,10 +17,8 @@ namespace forest::cli {
 
 void must_be_whole(CLI::Option& option, std::uint64_t low, std::uint64_t high) {
   option.check([low, high](const std::string& text) {
-    std::uint64_t value = 0;
-    const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, value);
-    return error == std::errc() && rest == end && value >= low && value <= high
+    const auto value = number_of<std::uint64_t>(text);
+    return value && *value >= low && *value <= high
                ? std::string()
                : fmt::format("{} is no whole number from {} to {}", repository::shown(text), low, high);
   });
@@ -33,10 +31,8 @@ void add_whole(CLI::App& command, const char* name, std::uint32_t& value, const 
 
 void must_be_within(CLI::Option& option, double low, double high) {
   option.check([low, high](const std::string& text) {
-    double value = 0.;
-    const char* const end = text.data() + text.size();
-    const auto [rest, error] = std::from_chars(text.data(), end, value);
-    return error == std::errc() && rest == end && value >= low && value <= high  // no NaN is
+    const auto value = number_of<double>(text);
+    return value && *value >= low && *value <= high  // no NaN is
                ? std::string()
                : fmt::format("{} is no number from {:g} to {:g}", repository::shown(text), low, high);
   });

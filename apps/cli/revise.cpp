@@ -5,7 +5,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <fstream>
 #include <limits>
@@ -22,6 +21,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/number.h"
 #include "forest/io/workbook.h"
 #include "forest/morphology/measure.h"
 #include "forest/morphology/validate.h"
@@ -104,12 +104,9 @@ constexpr std::array<float Point::*, 3> axes{&Point::x, &Point::y, &Point::z};
 /// A number of a workbook, or of a CSV file that writes one with a decimal point.
 std::optional<double> number_in(const ReadCell& cell) {
   if (cell.kind == Kind::number) return cell.number;
-  double number = 0.;
   if (cell.kind != Kind::word) return std::nullopt;
-  const char* const end = cell.text.data() + cell.text.size();
-  const auto [rest, error] = std::from_chars(cell.text.data(), end, number);
-  if (error != std::errc() || rest != end || !std::isfinite(number)) return std::nullopt;
-  return number;
+  const auto number = number_of<double>(cell.text);
+  return number && std::isfinite(*number) ? number : std::nullopt;
 }
 
 std::optional<std::int64_t> whole_in(const ReadCell& cell) {

@@ -11,6 +11,7 @@
 #include "forest/core/error.h"
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
+#include "forest/core/pattern.h"
 #include "forest/io/workbook.h"
 #include "forest/repository/names.h"
 #include "forest/repository/repository.h"
@@ -169,7 +170,7 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
 }
 
 void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression) {
-  const std::regex pattern(expression);
+  const std::regex pattern = linear_pattern(expression);
   bool matched = false;
   for (statistics::FeatureTable* table : tables) {
     table->slices.clear();
@@ -202,7 +203,7 @@ void add_slices(CLI::App& command, std::string& expression) {
       ->type_name("REGEX")
       ->check([](const std::string& text) -> std::string {
         try {
-          std::regex pattern(text);
+          linear_pattern(text);
           return {};
         } catch (const std::regex_error&) {
           return "--slices is no regular expression; an example is '^[A-Z]+[0-9]+'";

@@ -8,6 +8,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 
 #include "apps/cli/console.h"
 #include "apps/cli/options.h"
@@ -26,13 +27,9 @@ std::string map_names() {
 // "low:high"
 std::pair<float, float> parse_range(const std::string& text) {
   const std::size_t colon = text.find(':');
-  const auto number = [&](const std::string& part) {
-    char* end = nullptr;
-    const float value = std::strtof(part.c_str(), &end);
-    return part.empty() || *end ? NAN : value;
-  };
-  const float low = number(text.substr(0, colon)),
-              high = colon == text.npos ? NAN : number(text.substr(colon + 1));
+  const auto number = [](std::string_view part) { return number_of<float>(part).value_or(NAN); };
+  const float low = number(std::string_view(text).substr(0, colon)),
+              high = colon == text.npos ? NAN : number(std::string_view(text).substr(colon + 1));
   if (!(std::isfinite(low) && std::isfinite(high) && low < high))
     throw Error(
         fmt::format("'{}' is no range; give the values at both ends of the colour map, the lower one "

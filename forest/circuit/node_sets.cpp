@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <cctype>
-#include <charconv>
 #include <cmath>
 #include <map>
 #include <numeric>
@@ -14,12 +13,15 @@
 #include <fmt/ranges.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
+#include "forest/core/number.h"
+#include "forest/core/pattern.h"
 
 namespace forest::circuit {
 namespace {
 
-constexpr std::size_t deepest = 64;            // sets within sets, parentheses within parentheses
-constexpr std::size_t longest_pattern = 1000;  // characters
+constexpr std::size_t deepest = 64;         // sets within sets, parentheses within parentheses
+constexpr std::size_t longest_word = 1000;  // characters of it that are searched
 constexpr std::size_t longest_expression = 100'000;
 
 Members united(const Members& a, const Members& b) {
@@ -39,12 +41,6 @@ Members all(std::size_t count) {
   Members result(count);
   std::iota(result.begin(), result.end(), 0u);
   return result;
-}
-
-std::optional<double> number_in(const std::string& word) {
-  double value = 0.;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  return error == std::errc() && end == word.data() + word.size() ? std::optional(value) : std::nullopt;
 }
 
 // Text for a sentence: one line, not endless.
@@ -114,11 +110,11 @@ class Resolver {
     if (clause.test == Clause::Test::any_of) {
       std::vector<double> numbers = clause.numbers;
       for (const std::string& word : clause.words)
-        if (const auto number = number_in(word); number && !words) numbers.push_back(*number);
+        if (const auto number = number_of<double>(word); number && !words) numbers.push_back(*number);
       std::ranges::sort(numbers);
       for (std::size_t i = 0; i < holds.size(); ++i)
         if (words) {
-          const auto number = number_in(attribute.words[i]);
+          const auto number = number_of<double>(attribute.words[i]);
           holds[i] = std::ranges::find(clause.words, attribute.words[i]) != clause.words.end() ||
                      (number && std::ranges::binary_search(numbers, *number));
         } else {
@@ -135,13 +131,9 @@ class Resolver {
                   "\"$lte\""));
     if (words) {
       try {
-        if (clause.words.at(0).size() > longest_pattern)
-          throw std::regex_error(std::regex_constants::error_space);
-        // Without backtracking: no pattern takes longer than pattern × word.
-        const std::regex pattern(clause.words.at(0),
-                                 std::regex::ECMAScript | std::regex_constants::__polynomial);
+        const std::regex pattern = linear_pattern(clause.words.at(0));
         for (std::size_t i = 0; i < holds.size(); ++i)
-          holds[i] = std::regex_search(attribute.words[i].substr(0, longest_pattern), pattern);
+          holds[i] = std::regex_search(attribute.words[i].substr(0, longest_word), pattern);
       } catch (const std::regex_error&) {
         refuse(fmt::format("the node set {} has a pattern that cannot be used, {}; correct it",
                            quoted(set.name), quoted(clause.words.at(0))));
@@ -230,9 +222,7 @@ class Reader {
     static constexpr std::array<std::pair<std::string_view, What>, 3> words{
         {{"and", And}, {"or", Or}, {"not", Not}}};
     for (const auto& [known, what] : words)
-      if (std::ranges::equal(word, known, {},
-                             [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); }))
-        return what;
+      if (lower(word) == known) return what;
     return std::nullopt;
   }
   std::string_view plain_word(std::size_t at) const {

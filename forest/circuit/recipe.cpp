@@ -2,7 +2,6 @@
 #include "forest/circuit/recipe.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <numeric>
 #include <unordered_set>
@@ -12,6 +11,7 @@
 #include "forest/circuit/toml_node.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/number.h"
 
 namespace forest::circuit {
 namespace {
@@ -142,15 +142,13 @@ Recipe read_recipe(const std::filesystem::path& path) {
 
 SliceCorrection parse_slice_correction(std::string_view words) {
   if (words == "measured") return {.measured = true};
-  float factor = 0.f;
-  const char* const end = words.data() + words.size();
-  if (const auto [at, error] = std::from_chars(words.data(), end, factor);
-      error != std::errc() || at != end || !(factor >= 1.f && factor <= SliceCorrection::most))
+  const auto factor = number_of<float>(words);
+  if (!factor || !(*factor >= 1.f && *factor <= SliceCorrection::most))
     throw Error(fmt::format(
         "'{}' corrects no slice; give \"measured\", or how many times neurons are stretched along z, 1 to "
         "{:g}",
         words, SliceCorrection::most));
-  return {.factor = factor};
+  return {.factor = *factor};
 }
 
 const Recipe::Source& source_of(const Recipe& recipe, std::size_t type) {

@@ -8,6 +8,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 
 namespace forest::fetch {
 namespace {
@@ -55,9 +56,7 @@ std::string joined(const std::vector<std::string>& texts) {
 
 bool is_layer(const std::string& region) {
   constexpr std::string_view word = "layer";
-  return region.size() > word.size() &&
-         std::ranges::equal(word, region.substr(0, word.size()), {}, {},
-                            [](char c) { return char(std::tolower(static_cast<unsigned char>(c))); });
+  return region.size() > word.size() && lower(region.substr(0, word.size())) == word;
 }
 
 std::size_t count_of(const Json* value) {

@@ -9,6 +9,7 @@
 #include <queue>
 #include <tuple>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/core/progress.h"
 #include "forest/geometry/triangle_tree.h"
@@ -154,8 +155,7 @@ class Piece {
     for (const auto list : {own, still})
       for (const std::uint32_t t : list)
         vertices_.insert(vertices_.end(), state.mesh.triangles[t].begin(), state.mesh.triangles[t].end());
-    std::ranges::sort(vertices_);
-    vertices_.erase(std::unique(vertices_.begin(), vertices_.end()), vertices_.end());
+    vertices_ = distinct(std::move(vertices_));
     places_.reserve(vertices_.size());
     for (const std::uint32_t v : vertices_) places_.push_back(state.mesh.positions[v].cast<double>());
     Box all{Point::Constant(HUGE_VAL), Point::Constant(-HUGE_VAL)};

@@ -5,8 +5,9 @@
 #include <cassert>
 #include <cmath>
 #include <map>
-#include <numeric>
 #include <utility>
+
+#include "forest/core/unions.h"
 
 namespace forest {
 
@@ -51,17 +52,12 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh) {
 bool is_closed(const Mesh& mesh) { return !open_edge(mesh); }
 
 std::size_t count_pieces(const Mesh& mesh) {
-  std::vector<std::uint32_t> of(mesh.positions.size());
-  std::iota(of.begin(), of.end(), 0u);
-  const auto root = [&](std::uint32_t v) {
-    while (of[v] != v) v = of[v] = of[of[v]];
-    return v;
-  };
-  std::vector<bool> used(of.size());
+  Unions together(mesh.positions.size());
+  std::vector<bool> used(mesh.positions.size());
   for (const Triangle& t : mesh.triangles)
-    for (const std::uint32_t v : t) used[v] = true, of[root(v)] = root(t[0]);
+    for (const std::uint32_t v : t) used[v] = true, together.join(t[0], v);
   std::size_t pieces = 0;
-  for (std::uint32_t v = 0; v < of.size(); ++v) pieces += used[v] && of[v] == v;
+  for (std::uint32_t v = 0; v < used.size(); ++v) pieces += used[v] && together.root(v) == v;
   return pieces;
 }
 

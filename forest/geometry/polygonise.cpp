@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/bounds.h"
+#include "forest/core/distinct.h"
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 
@@ -325,10 +326,7 @@ Field field_of(const std::vector<BranchCone>& cones, const std::vector<Joint>& j
           if (signed_distance(joint.centre, field.cones[cone].shape) < joint.reach + band)
             field.note(cone, band, joint.centre, joint.reach);
   }
-  for (auto* list : {&field.near_cones, &field.near_joints}) {
-    std::ranges::sort(*list);
-    list->erase(std::unique(list->begin(), list->end()), list->end());
-  }
+  for (auto* list : {&field.near_cones, &field.near_joints}) *list = distinct(std::move(*list));
   return field;
 }
 

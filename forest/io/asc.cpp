@@ -14,6 +14,7 @@
 
 #include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
@@ -915,10 +916,9 @@ SpineShape spine_shape(std::string_view text) {
        {"mushroom", SpineShape::mushroom},
        {"filopodi", SpineShape::filopodium},
        {"branched", SpineShape::branched}}};
-  std::string lower(text);
-  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  const std::string words = lower(text);
   for (const auto& [word, shape] : shapes)
-    if (lower.find(word) != lower.npos) return shape;
+    if (words.find(word) != words.npos) return shape;
   return SpineShape::unknown;
 }
 

@@ -2,13 +2,13 @@
 #include "forest/io/border_file.h"
 
 #include <algorithm>
-#include <charconv>
 #include <cmath>
 #include <pugixml.hpp>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/surface.h"
 
@@ -27,12 +27,11 @@ class Reader {
     constexpr std::string_view blanks = " \t\r\n";
     for (std::size_t at = text.find_first_not_of(blanks); at != text.npos;) {
       const std::size_t end = std::min(text.find_first_of(blanks, at), text.size());
-      Number value{};
-      const auto [stopped, error] = std::from_chars(text.data() + at, text.data() + end, value);
-      if (error != std::errc() || stopped != text.data() + end)
-        refuse(fmt::format("{} hold '{}', which is no number; get the whole file", what,
-                           printable(text.substr(at, end - at))));
-      result.push_back(value);
+      const std::string_view word = text.substr(at, end - at);
+      const auto value = number_of<Number>(word);
+      if (!value)
+        refuse(fmt::format("{} hold '{}', which is no number; get the whole file", what, printable(word)));
+      result.push_back(*value);
       at = text.find_first_not_of(blanks, end);
     }
     return result;

@@ -12,6 +12,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/words.h"
 
@@ -246,11 +247,10 @@ ReadContours read_slc(std::string_view text, const std::string& name, double uni
     points.clear();
   };
   const auto real = [&](std::string_view word) {
-    double value = 0.;
-    const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-    if (error != std::errc() || end != word.data() + word.size() || !(std::abs(value) < 1e12))
+    const auto value = number_of<double>(word);
+    if (!value || !(std::abs(*value) < 1e12))
       fail(fmt::format("'{}' is no number; give x and y", shown(word)));
-    return value;
+    return *value;
   };
   while (!text.empty()) {
     ++line_number;
@@ -538,7 +538,7 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     throw InputError(name, 0, fmt::format("its data-axis is {}; write x, y or z", shown(axis_name, 20)));
   stack.axis = Axis(axis - axis_names.begin());
   Section& section = stack.sections.emplace_back();
-  const auto real = [&](std::string_view word) {
+  const auto real = [](std::string_view word) {  // a unit may follow
     double value = NAN;
     std::from_chars(word.data(), word.data() + word.size(), value);
     return value;

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <deque>
 #include <limits>
@@ -15,6 +14,7 @@
 
 #include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/genesis_names.h"
 #include "forest/io/oddity.h"
 #include "forest/io/own_file.h"
@@ -148,18 +148,6 @@ std::vector<std::string_view> words_of(std::string_view text) {
     begin = text.find_first_not_of(blanks, end);
   }
   return words;
-}
-
-std::optional<double> number(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  double value = 0.;
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error == std::errc::result_out_of_range && end == word.data() + word.size())
-    return word.find("e-") != word.npos || word.find("E-") != word.npos
-               ? 0.
-               : std::numeric_limits<double>::infinity();
-  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
-  return value;
 }
 
 template <class Visit>  // of each line, with its number; stops where it returns false
@@ -328,7 +316,7 @@ class Scanner {
   }
 
   double coordinate(const std::vector<std::string_view>& words, std::size_t column) const {
-    const std::optional<double> value = number(words[column]);
+    const std::optional<double> value = number_of<double>(words[column]);
     if (!value || !std::isfinite(*value))
       throw InputError(
           name_, line_,
@@ -377,7 +365,7 @@ class Scanner {
     c.to = place(words, two_ends_ ? 5 : 2, origin);
     c.sphere = spherical_ || (!scan_.ours && c.from == c.to);
     c.soma = c.name.soma;
-    double diameter = number(words[needed - 1]).value_or(-1.);
+    double diameter = number_of<double>(words[needed - 1]).value_or(-1.);
     if (!(diameter >= 0. && (std::isfinite(diameter) || ends_))) {
       oddities_.add(Odd::unknown_diameter, line_,
                     [&] { return fmt::format("the diameter is \"{}\"", shown(words[needed - 1])); });
@@ -415,9 +403,8 @@ class Scanner {
     const auto words = words_of(text);
     if (words.size() < 2) return;
     const auto radius = [](std::string_view word) {
-      float value = -1.f;
-      const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-      return error == std::errc() && end == word.data() + word.size() && std::isfinite(value) ? value : -1.f;
+      const auto value = number_of<float>(word);
+      return value && std::isfinite(*value) ? *value : -1.f;
     };
     const float a = radius(words[0]), b = radius(words[1]);
     if (!(a >= 0.f && b >= 0.f)) return;
@@ -432,7 +419,8 @@ class Scanner {
       c.radius_from = a, c.radius_to = b;
     }
     if (words.size() > 2)
-      if (const auto at = number(words[2]); at && *at >= 0. && *at < 1e9) c.soma_point = std::int32_t(*at);
+      if (const auto at = number_of<double>(words[2]); at && *at >= 0. && *at < 1e9)
+        c.soma_point = std::int32_t(*at);
   }
 
   const std::string& name_;
@@ -668,8 +656,9 @@ bool recognises_genesis(std::string_view bytes) {
     if (text.empty() || text.starts_with("//")) return true;
     const auto words = words_of(text);
     found = words[0][0] == '*' ? option_of(words[0]).has_value()
-                               : words.size() >= 6 && !number(words[0]) && number(words[2]) &&
-                                     number(words[3]) && number(words[4]) && number(words[5]);
+                               : words.size() >= 6 && !number_of<double>(words[0]) &&
+                                     number_of<double>(words[2]) && number_of<double>(words[3]) &&
+                                     number_of<double>(words[4]) && number_of<double>(words[5]);
     return false;
   });
   return found;

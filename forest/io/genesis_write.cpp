@@ -6,6 +6,8 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/lower.h"
+#include "forest/core/number.h"
 #include "forest/io/genesis.h"
 #include "forest/io/genesis_names.h"
 #include "forest/io/own_file.h"
@@ -40,12 +42,6 @@ constexpr std::array<std::pair<std::string_view, SectionKind>, 6> own_words{{
     {"unspecified", SectionKind::unspecified},
     {"glia", SectionKind::glia},
 }};
-
-template <class Number>
-bool whole(std::string_view text, Number& number) {
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  return error == std::errc() && end == text.data() + text.size();
-}
 
 template <class Number>
 void add_number(std::string& text, Number value) {
@@ -131,15 +127,14 @@ class Writer {
 }  // namespace
 
 GenesisName genesis_name(std::string_view name) {
-  std::string lower(name);
-  for (char& c : lower) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
+  const std::string text = lower(name);
   GenesisName found;
-  if (lower.starts_with("soma")) {
+  if (text.starts_with("soma")) {
     found.soma = found.known = true;
     return found;
   }
   for (const Word& word : foreign_words)
-    if (word.begins ? lower.starts_with(word.part) : lower.find(word.part) != lower.npos) {
+    if (word.begins ? text.starts_with(word.part) : text.find(word.part) != text.npos) {
       found.kind = word.kind;
       found.tag = std::int32_t(word.kind);
       found.known = true;
@@ -166,17 +161,21 @@ GenesisName own_genesis_name(std::string_view name) {
   }
   const std::size_t number = std::min(name.size(), kind.size() + 1),
                     end = std::min(name.find('_', number), name.size());
-  if (!whole(name.substr(number, end - number), found.section)) return genesis_name(name);
-  std::int32_t type = 0;
+  const auto section = number_of<std::uint32_t>(name.substr(number, end - number));
+  if (!section) return genesis_name(name);
+  found.section = *section;
   const bool below = kind.starts_with("customm");
   if (const auto word = std::ranges::find(own_words, kind, &decltype(own_words)::value_type::first);
       word != own_words.end()) {
     found.kind = word->second;
     found.tag = std::int32_t(word->second);
     found.known = true;
-  } else if (kind.starts_with("custom") && whole(kind.substr(below ? 7 : 6), type) && type >= 0) {
+  } else if (const auto type = kind.starts_with("custom")
+                                   ? number_of<std::int32_t>(kind.substr(below ? 7 : 6))
+                                   : std::nullopt;
+             type && *type >= 0) {
     found.kind = SectionKind::custom;
-    found.tag = below ? -type : type;
+    found.tag = below ? -*type : *type;
     found.known = true;
   } else {
     return genesis_name(name);

@@ -3,9 +3,10 @@
 #pragma once
 
 #include <algorithm>
-#include <charconv>
 #include <optional>
 #include <string_view>
+
+#include "forest/core/number.h"
 
 namespace forest::io {
 
@@ -24,16 +25,6 @@ inline std::string_view next_line(std::string_view& text) {
   const std::string_view line = text.substr(0, text.find('\n'));
   text.remove_prefix(std::min(line.size() + 1, text.size()));
   return line;
-}
-
-/// The number that a word is, wholly; none otherwise.
-template <class Number>
-std::optional<Number> number_of(std::string_view word) {
-  if (word.starts_with('+')) word.remove_prefix(1);
-  Number value{};
-  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
-  if (error != std::errc() || end != word.data() + word.size()) return {};
-  return value;
 }
 
 }  // namespace forest::io

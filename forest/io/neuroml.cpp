@@ -14,7 +14,10 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/distinct.h"
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
+#include "forest/core/number.h"
 #include "forest/io/neuroml_names.h"
 #include "forest/io/oddity.h"
 #include "forest/io/plain_text.h"
@@ -129,12 +132,6 @@ constexpr std::array name_beginnings{
     GroupWord{"basal", Meaning::basal},  GroupWord{"dend", Meaning::dendrite},
 };
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-  return result;
-}
-
 /// The part of an element's name after its namespace's prefix.
 std::string_view local(const xml_node& node) {
   const std::string_view name = node.name();
@@ -145,21 +142,9 @@ std::string_view attribute(const xml_node& node, const char* name) { return node
 
 template <class T>
 bool parse(std::string_view text, T& value) {
-  text = trimmed(text, xml_blanks);
-  if (text.starts_with('+')) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (end != text.data() + text.size() || text.empty()) return false;
-  if constexpr (std::is_floating_point_v<T>)
-    if (error == std::errc::result_out_of_range) {
-      double wide = 0.;
-      const auto again = std::from_chars(text.data(), text.data() + text.size(), wide);
-      const bool small = again.ec == std::errc()
-                             ? std::abs(wide) < 1.
-                             : text.find("e-") != text.npos || text.find("E-") != text.npos;
-      value = small ? T(0) : std::numeric_limits<T>::infinity();
-      return true;
-    }
-  return error == std::errc();
+  const auto found = number_of<T>(trimmed(text, xml_blanks));
+  if (found) value = *found;
+  return found.has_value();
 }
 
 std::string decoded(std::string_view text) {
@@ -662,10 +647,7 @@ class Assembler {
     }
   }
 
-  static void sort_splits(Segment& s) {
-    std::ranges::sort(s.splits);
-    s.splits.erase(std::unique(s.splits.begin(), s.splits.end()), s.splits.end());
-  }
+  static void sort_splits(Segment& s) { s.splits = distinct(std::move(s.splits)); }
 
   /// The soma point that a child of the soma hangs on.
   std::int32_t soma_point_of(const Segment& child) const {

@@ -16,6 +16,8 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
+#include "forest/core/number.h"
 #include "forest/io/asc_words.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
@@ -83,12 +85,6 @@ constexpr std::array<std::string_view, 9> known_elements{"filefacts", "thumbnail
                                                          "zsmear",    "resolution", "description"};
 constexpr int circle_points = 16;
 
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result) c = c >= 'A' && c <= 'Z' ? char(c - 'A' + 'a') : c;
-  return result;
-}
-
 std::string_view name_of(const pugi::xml_node& element) { return element.name(); }
 
 /// Takes the prefixes of name spaces from the names of all elements.
@@ -134,17 +130,10 @@ struct LeftOut : pugi::xml_tree_walker {
   }
 };
 
-/// The decimal number; an infinity for the words NaN, INF and for numbers out of range.
+/// The decimal number; an infinity for the words NaN, INF and for numbers too large.
 std::optional<float> number(std::string_view text) {
-  text = trimmed(text, xml_blanks);
-  if (text.starts_with('+')) text.remove_prefix(1);
-  float value = 0.f;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || end != text.data() + text.size() || error == std::errc::invalid_argument)
-    return std::nullopt;
-  if (error == std::errc::result_out_of_range || !std::isfinite(value))
-    return std::numeric_limits<float>::infinity();
-  return value;
+  const auto value = number_of<float>(trimmed(text, xml_blanks));
+  return value && !std::isfinite(*value) ? std::numeric_limits<float>::infinity() : value;
 }
 
 /// In ASC a text stands between quotation marks and has no sign for one.

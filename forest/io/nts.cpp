@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <cstdint>
 #include <optional>
@@ -13,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/nts_words.h"
 #include "forest/io/numbers.h"
 #include "forest/io/oddity.h"
@@ -78,9 +78,9 @@ constexpr std::string_view layout =
 
 template <class Number>
 bool parse(std::string_view text, Number& value) {
-  if (text.starts_with('+')) text.remove_prefix(1);
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  return error == std::errc() && end == text.data() + text.size() && !text.empty();
+  const auto found = number_of<Number>(text);
+  if (found) value = *found;
+  return found.has_value();
 }
 
 bool same_place(const Point& a, const Point& b) { return a.x == b.x && a.y == b.y && a.z == b.z; }

@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/sonata_nodes.h"
 
-#include <charconv>
 #include <limits>
 #include <set>
 #include <unordered_map>
@@ -9,17 +8,10 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 
 namespace forest::io {
 namespace {
-
-template <class Number>
-std::optional<Number> number(std::string_view text) {
-  Number value{};
-  const auto [end, failure] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (failure != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  return value;
-}
 
 bool absent(std::string_view text) {
   return text.empty() || text == "NULL" || text == "NONE" || text == "None";
@@ -91,7 +83,7 @@ NodePopulation::NodePopulation(const hdf5::File& file, const std::string& name, 
     const auto& cells = types->rows[row];
     if (population_column && !absent(cells[*population_column]) && cells[*population_column] != name)
       continue;
-    const auto id = number<std::int64_t>(cells[*id_column]);
+    const auto id = number_of<std::int64_t>(cells[*id_column]);
     if (!id)
       throw InputError(
           types_file, types->lines[row],
@@ -159,7 +151,7 @@ std::optional<std::vector<float>> NodePopulation::reals(const std::string& attri
     if (const auto& group = of_group[group_of_[i]]; !group.empty()) {
       values[i] = group[index_in_group_[i]];
     } else if (const std::string* text = cell(i, column); text && !absent(*text)) {
-      const auto value = number<float>(*text);
+      const auto value = number_of<float>(*text);
       if (!value)
         throw InputError(types_file_, types_->lines[row_of_[i]],
                          fmt::format("{} is \"{}\", not a number; correct it", attribute, *text));
@@ -198,7 +190,7 @@ std::optional<std::vector<double>> NodePopulation::numbers(const std::string& at
     if (const auto& group = of_group[group_of_[i]]; !group.empty()) {
       values[i] = group[index_in_group_[i]];
     } else if (const std::string* text = cell(i, column); text && !absent(*text)) {
-      const auto value = number<double>(*text);
+      const auto value = number_of<double>(*text);
       if (!value) return std::nullopt;
       values[i] = *value;
     }

@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/distinct.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/parallel.h"
@@ -435,8 +436,7 @@ class Assembler {
   void place_not_centred() {
     std::vector<std::uint32_t> asked;  // morphologies
     for (const std::uint32_t i : not_centred_) asked.push_back(circuit_.instances[i].morphology);
-    std::ranges::sort(asked);
-    asked.erase(std::unique(asked.begin(), asked.end()), asked.end());
+    asked = distinct(std::move(asked));
     std::vector<Vec3> centres(files_.size());
     parallel_for(asked.size(), 1,
                  [&](std::size_t i) { centres[asked[i]] = centre(io::read(files_[asked[i]]).morphology); });

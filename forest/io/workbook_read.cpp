@@ -15,6 +15,7 @@
 
 #include "forest/core/byte_order_mark.h"
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/words.h"
 #include "forest/io/workbook.h"
 
@@ -61,17 +62,9 @@ std::optional<std::size_t> column_of(std::string_view reference) {
 }
 
 template <class Number>
-std::optional<Number> number_of(std::string_view text) {
-  const std::size_t first = text.find_first_not_of(" \t\r\n");
-  if (first == std::string_view::npos) return std::nullopt;
-  text = text.substr(first, text.find_last_not_of(" \t\r\n") + 1 - first);
-  if (text[0] == '+') text.remove_prefix(1);
-  Number number{};
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
-  if (error != std::errc() || end != text.data() + text.size()) return std::nullopt;
-  if constexpr (std::is_floating_point_v<Number>)
-    if (!std::isfinite(number)) return std::nullopt;
-  return number;
+std::optional<Number> number_in(std::string_view text) {
+  const auto number = number_of<Number>(trimmed(text, xml_blanks));
+  return number && std::isfinite(double(*number)) ? number : std::nullopt;
 }
 
 /// Characters that XML has none for are written _xHHHH_ (ECMA-376, part 1, 22.9.2.19).
@@ -313,7 +306,7 @@ class SheetReader {
  private:
   void row(pugi::xml_node node) {
     const pugi::xml_attribute r = attribute(node, "r");
-    const auto number = r ? number_of<std::uint32_t>(r.value()) : row_ + 1;
+    const auto number = r ? number_in<std::uint32_t>(r.value()) : row_ + 1;
     if (!number || *number <= row_ || *number > most_rows + 1)
       archive_.fail("a row of the sheet {} is numbered '{}' after row {}; save it again with a spreadsheet",
                     sheet_.name, r.value(), row_);
@@ -362,7 +355,7 @@ class SheetReader {
       return {Kind::formula, 0., keep(fmt::format("={}", formula.child_value()))};
     }
     if (type == "s") {
-      const auto index = number_of<std::uint32_t>(value);
+      const auto index = number_in<std::uint32_t>(value);
       if (!index || *index >= shared_)
         archive_.fail("{}!{}{} shows text {}, which is not in the workbook; save it again with a spreadsheet",
                       sheet_.name, letters(column), row_, value);
@@ -372,7 +365,7 @@ class SheetReader {
     if (type == "b") return {Kind::boolean, 0., value == "1" || value == "true" ? "TRUE" : "FALSE"};
     if (type == "e") return {Kind::error, 0., keep(std::string(value))};
     if (type == "d") return {Kind::text, 0., keep(std::string(value))};
-    if (const auto number = number_of<double>(value)) return {Kind::number, *number, {}};
+    if (const auto number = number_in<double>(value)) return {Kind::number, *number, {}};
     return {Kind::error, 0., keep(std::string(value))};
   }
 

@@ -11,6 +11,7 @@
 #include <soci/postgresql/soci-postgresql.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/repository/database.h"
 #include "forest/repository/insert.h"
 #include "forest/repository/schema.h"
@@ -281,7 +282,7 @@ class Postgresql final : public Database {
           case 700:  // float4, float8, numeric
           case 701:
           case 1700:
-            row.emplace_back(std::strtod(text.c_str(), nullptr));
+            row.emplace_back(number_of<double>(text).value_or(NAN));
             break;
           default:
             row.emplace_back(text);

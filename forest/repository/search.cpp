@@ -9,6 +9,7 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/lower.h"
 #include "forest/repository/impl.h"
 #include "forest/repository/names.h"
 #include "forest/statistics/metric.h"
@@ -148,13 +149,6 @@ Condition condition_of(std::string_view text, const std::map<std::string, int, s
     }
   }
   return condition;
-}
-
-std::string lower(std::string_view text) {
-  std::string result(text);
-  for (char& c : result)
-    if (c >= 'A' && c <= 'Z') c = char(c | 32);
-  return result;
 }
 
 }  // namespace

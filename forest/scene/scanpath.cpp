@@ -3,12 +3,12 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 
 namespace forest::scene {
 namespace {
@@ -29,12 +29,9 @@ std::vector<std::string_view> cells_of(std::string_view line) {
   return cells;
 }
 
-std::optional<double> number_of(std::string_view cell) {
-  double value = 0.;
-  const auto [rest, error] = std::from_chars(cell.data(), cell.data() + cell.size(), value);
-  return error == std::errc() && rest == cell.data() + cell.size() && std::isfinite(value)
-             ? std::optional(value)
-             : std::nullopt;
+std::optional<double> number_in(std::string_view cell) {
+  const auto value = number_of<double>(cell);
+  return value && std::isfinite(*value) ? value : std::nullopt;
 }
 
 bool nothing(std::string_view cell) { return cell.empty() || cell == "nan" || cell == "NaN" || cell == "NA"; }
@@ -73,8 +70,8 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
       if (!word.starts_with("size ")) continue;
       const std::string_view numbers = trimmed(word.substr(5));
       const std::size_t cross = std::min(numbers.find('x'), numbers.size());
-      const auto width = number_of(numbers.substr(0, cross)),
-                 height = number_of(numbers.substr(std::min(cross + 1, numbers.size())));
+      const auto width = number_in(numbers.substr(0, cross)),
+                 height = number_in(numbers.substr(std::min(cross + 1, numbers.size())));
       if (!width || !height || !(*width >= 1.) || !(*height >= 1.))
         refuse(fmt::format("'{}' is no size of a picture; write for example # size 1920x1080", numbers));
       size = Vec2(float(*width), float(*height));
@@ -92,7 +89,7 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
     }
     begun = true;
     if (cells.size() != 3) refuse(fmt::format("has {} columns instead of three: time, x, y", cells.size()));
-    const auto time = number_of(cells[0]);
+    const auto time = number_in(cells[0]);
     if (!time) refuse(fmt::format("'{}' is no time in ms", cells[0]));
     if (!samples.empty() && *time < samples.back().time)
       refuse(fmt::format("{} ms is earlier than the sample before; sort the lines by time", cells[0]));
@@ -100,7 +97,7 @@ Scanpath parse_scanpath(std::string_view text, const std::string& name) {
       if (!samples.empty()) samples.push_back({*time, samples.back().place});
       continue;
     }
-    const auto x = number_of(cells[1]), y = number_of(cells[2]);
+    const auto x = number_in(cells[1]), y = number_in(cells[2]);
     if (!x || !y)
       refuse(
           fmt::format("'{}, {}' is no place of the gaze; leave both empty in a blink", cells[1], cells[2]));
