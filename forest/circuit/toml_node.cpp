@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <cstddef>
+#include <string>
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -15,16 +16,37 @@ namespace {
 
 std::size_t line(const toml::node& node) { return node.source().begin.line; }
 
-// The parser bounds how deep brackets nest, and not how many tables a dotted key opens; letting go of them recurses.
+// The parser bounds how deep brackets nest, and not how many tables a dotted key opens; letting go of them recurses. In texts and
+// comments dots are dots.
 void refuse_deep_keys(std::string_view text, const std::string& file) {
   constexpr int deepest = 256;
   int dots = 0;
   std::size_t line = 1;
+  std::string_view open;  // the quotation mark, or three of them, that ends the text around i
   for (std::size_t i = 0; i < text.size(); ++i) {
-    if (text[i] == '\n') ++line;
-    if (text[i] == '\n' || text[i] == ',' || text[i] == '=') dots = 0;
-    if (text[i] == '.' && (i == 0 || text[i - 1] != '.') && ++dots > deepest)
+    const char c = text[i];
+    if (c == '\n') {
+      ++line, dots = 0;
+      if (open.size() == 1) open = {};  // which is no TOML
+    } else if (!open.empty()) {
+      if (c == '\\' && open[0] == '"' && text.substr(i + 1, 1) != "\n")
+        ++i;
+      else if (text.substr(i).starts_with(open)) {
+        i += open.size() - 1;
+        for (int more = 0; open.size() == 3 && more < 2 && text.substr(i + 1, 1) == open.substr(0, 1); ++more)
+          ++i;  // of four or five marks in a row the first belong to the text
+        open = {};
+      }
+    } else if (c == '"' || c == '\'') {
+      open = text.substr(i, text.substr(i, 3) == std::string(3, c) ? 3 : 1);
+      i += open.size() - 1;
+    } else if (c == '#') {
+      i = std::min(text.find('\n', i), text.size()) - 1;
+    } else if (c == ',' || c == '=') {
+      dots = 0;
+    } else if (c == '.' && (i == 0 || text[i - 1] != '.') && ++dots > deepest) {
       throw InputError(file, line, "a key has too many parts; take dots out of it");
+    }
   }
 }
 
