@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include "forest/fitting/burke.h"
 #include "forest/fitting/hillman.h"
 #include "forest/io/format.h"
 #include "forest/lsystem/grow.h"

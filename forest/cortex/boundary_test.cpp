@@ -86,7 +86,7 @@ TEST(WCurves, MeetSurfacesAtRightAnglesEvenInAGrooveOnceNormalsAreSeenOverADisc)
     const double height = -700. + 7. * i;
     const auto curve = curves.through(Place(7900., 311., height), Place(-1., 0., 0.));
     ASSERT_TRUE(curve && curve->arrived) << height;
-    angles.push_back(end_angles(*curve, outer.tree(), inner.tree()).outer);
+    angles.push_back(end_angles(*curve, {outer.tree(), inner.tree()}).outer);
     const Place in = curve->at_length(1. - 150. / curve->length()) - curve->points.back();
     lean.push_back(degrees_between(in, curve->points.back()));
     order.emplace_back(curve->points.front().z(), curve->points.back().z());

@@ -12,8 +12,10 @@
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/cortex/check_surfaces.h"
 #include "forest/cortex/fit_faces.h"
 #include "forest/cortex/gaps.h"
+#include "forest/cortex/report.h"
 
 #include "tests/effort.h"
 
@@ -251,14 +253,15 @@ TEST_F(Shell, AHeapThatCannotBeMendedDoesNotKeepOthersFromBeginningAnew) {
   const std::vector<Depths> before = elements.curves;
   const auto tangled = uncertified(elements);
   ASSERT_GT(tangled.size(), 3u);
-  begin_anew(elements, TriangleTree(outer), tree, {.volume = wanted}, .2, Progress::none());
+  const TriangleTree outer_tree(outer);
+  begin_anew(elements, {outer_tree, tree}, {.volume = wanted}, .2, Progress::none());
   EXPECT_EQ(uncertified(elements), std::vector<std::uint32_t>{hopeless});
   std::size_t moved = 0;
   for (std::size_t c = 0; c < before.size(); ++c) moved += elements.curves[c] != before[c];
   EXPECT_LT(moved, before.size() / 3);
 
   Elements well = made().cortex.elements;
-  begin_anew(well, TriangleTree(outer), tree, {.volume = wanted}, .2, Progress::none());
+  begin_anew(well, {outer_tree, tree}, {.volume = wanted}, .2, Progress::none());
   EXPECT_EQ(well.curves, made().cortex.elements.curves);
 }
 
@@ -287,9 +290,9 @@ TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
   const auto folded = uncertified(wavy);  // by the waves
   ASSERT_LE(folded.size(), 3u);
   Elements as_a_whole = wavy;
-  fit_faces(as_a_whole, outer_tree, tree, Fit::mean);
+  fit_faces(as_a_whole, {outer_tree, tree}, Fit::mean);
   for (std::size_t c = 0; c < wavy.corners; ++c) EXPECT_EQ(as_a_whole.curves[c], wavy.curves[c]);
-  fit_faces(wavy, outer_tree, tree, Fit::places);
+  fit_faces(wavy, {outer_tree, tree}, Fit::places);
   EXPECT_LT(farthest(wavy).first, 10.);
   EXPECT_LT(farthest(wavy).second, 10.);
   EXPECT_TRUE(std::ranges::includes(folded, uncertified(wavy)));
@@ -315,7 +318,7 @@ TEST_F(Shell, GapsAreTheVolumeThatElementsLackAndFacesTakeIt) {
   EXPECT_NEAR(above + below, before, .03 * before);
   const ThreadLimit one(1);
   EXPECT_EQ(sum_of(gaps(thin, 0, outer_tree)), above);
-  fit_faces(thin, outer_tree, tree, Fit::volume);
+  fit_faces(thin, {outer_tree, tree}, Fit::volume);
   EXPECT_LT(std::abs(missing()), .03 * before);
   EXPECT_TRUE(uncertified(thin).empty());
 }

@@ -10,6 +10,9 @@
 #include <tuple>
 #include <utility>
 
+#include "forest/core/distinct.h"
+#include "forest/core/unions.h"
+
 namespace forest::cortex {
 namespace {
 
@@ -18,21 +21,16 @@ struct Collapsing {
   std::vector<Triangle> triangles;             // of roots
   std::vector<std::uint8_t> alive;             // triangles
   std::vector<std::vector<std::uint32_t>> of;  // triangles around a root
-  std::vector<std::uint32_t> parent;
+  Unions joined;
   std::vector<std::uint8_t> border;
 
-  std::uint32_t root(std::uint32_t v) {
-    while (parent[v] != v) parent[v] = parent[parent[v]], v = parent[v];
-    return v;
-  }
+  std::uint32_t root(std::uint32_t v) { return joined.root(v); }
   std::vector<std::uint32_t> around(std::uint32_t v) const {
     std::vector<std::uint32_t> list;
     for (const std::uint32_t t : of[v])
       for (const std::uint32_t w : triangles[t])
         if (w != v) list.push_back(w);
-    std::sort(list.begin(), list.end());
-    list.erase(std::unique(list.begin(), list.end()), list.end());
-    return list;
+    return distinct(std::move(list));
   }
   std::vector<std::uint32_t> shared(std::uint32_t a, std::uint32_t b) const {
     std::vector<std::uint32_t> list;
@@ -62,7 +60,7 @@ struct Collapsing {
         of[a].push_back(t);
       }
     of[b].clear();
-    parent[b] = a;
+    joined.join(a, b);
     border[a] |= border[b];
     return true;
   }
@@ -73,10 +71,9 @@ Faces extract(const Level& level, std::vector<Triangle> triangles) {
   Collapsing mesh{std::move(triangles),
                   {},
                   std::vector<std::vector<std::uint32_t>>(n),
-                  std::vector<std::uint32_t>(n),
+                  Unions(n),
                   std::vector<std::uint8_t>(n, 0)};
   mesh.alive.assign(mesh.triangles.size(), 1);
-  std::iota(mesh.parent.begin(), mesh.parent.end(), 0u);
   for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
     for (const std::uint32_t v : mesh.triangles[t]) mesh.of[v].push_back(t);
   std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> zeros;

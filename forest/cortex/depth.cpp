@@ -8,6 +8,7 @@
 
 #include <Eigen/LU>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/elements.h"
 #include "forest/cortex/gauss.h"

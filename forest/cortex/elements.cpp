@@ -7,6 +7,7 @@
 #include <numeric>
 #include <utility>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/neighbourhood.h"
 

@@ -98,13 +98,14 @@ constexpr double good = .5;  // scaled Jacobian
 
 }  // namespace
 
-void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit) {
+void fit_faces(Elements& elements, const SurfaceTrees& surfaces, Fit fit) {
   const int rounds = fit == Fit::places ? 3 : 2;
   const Shares by_place = shares(fit);
   const std::vector<double> keep = to_keep(elements, good);
   const std::vector<Depths> before = elements.curves;
   std::vector<Moves> moves(elements.size());
-  for (const auto& [depth, surface] : {std::pair{std::size_t(0), &outer}, {std::size_t(3), &inner}})
+  for (const auto& [depth, surface] :
+       {std::pair{std::size_t(0), &surfaces.outer}, {std::size_t(3), &surfaces.inner}})
     for (int round = 0; round < rounds; ++round) {
       std::vector<double> gap;
       if (fit == Fit::volume) gap = gaps(elements, depth, *surface);

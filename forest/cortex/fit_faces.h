@@ -15,7 +15,7 @@ enum class Fit {
 
 /// Moves the faces on both surfaces towards these, along the surface's normals. What would cost an element its validity
 /// or a good shape goes half of its way, a quarter, … or stays.
-void fit_faces(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Fit fit);
+void fit_faces(Elements& elements, const SurfaceTrees& surfaces, Fit fit);
 
 /// What all elements together lack of a volume (or have beyond it), spread over all faces as a height that is the same everywhere,
 /// along the curves: of all ways to have that volume the one that moves faces least, by least squares. No face goes farther than 25 µm,

@@ -5,6 +5,7 @@
 #include <iterator>
 #include <utility>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/gauge.h"
 

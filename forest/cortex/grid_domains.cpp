@@ -64,9 +64,8 @@ Place airfoil(double u, double v, double) {
   return sides(
       u, v,
       [&](double s) {
-        if (s < 1. / 3.) return Place(3. * s - 1., 0., 0.);
-        if (s > 2. / 3.) return Place(3. * s - 1., 0., 0.);
-        return Place(3. * s - 1., thickness(3. * s - 1.), 0.);
+        const double x = 3. * s - 1.;  // the wing from 0 to 1
+        return Place(x, s < 1. / 3. || s > 2. / 3. ? 0. : thickness(x), 0.);
       },
       [](double s) { return Place(.5 - 1.5 * std::cos(pi * s), std::sin(pi * s) + .5, 0.); },
       [](double t) { return Place(-1., .5 * t, 0.); }, [](double t) { return Place(2., .5 * t, 0.); });

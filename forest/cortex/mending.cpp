@@ -6,8 +6,10 @@
 #include <numeric>
 #include <utility>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/core/unions.h"
 #include "forest/cortex/gauge.h"
 #include "forest/cortex/go.h"
 #include "forest/cortex/neighbourhood.h"
@@ -37,19 +39,14 @@ struct Faults {
 // What moved since `before` is pieces: elements that share a curve that moved. Each that did not gain goes back.
 void keep_gains(Elements& elements, std::vector<Depths> before, double least) {
   const auto moved = [&](std::uint32_t c) { return elements.curves[c] != before[c]; };
-  std::vector<std::uint32_t> piece(before.size());  // of a curve: another one of it, or itself
-  std::iota(piece.begin(), piece.end(), 0u);
-  const auto root = [&](std::uint32_t c) {
-    while (piece[c] != c) c = piece[c] = piece[piece[c]];
-    return c;
-  };
+  Unions pieces(before.size());                // of curves
   std::vector<std::uint32_t> changed, curves;  // elements, and a curve that moved of each
   for (std::uint32_t e = 0; e < elements.size(); ++e) {
     const auto& own = elements.elements[e];
     const auto first = std::ranges::find_if(own, moved);
     if (first == own.end()) continue;
     for (const std::uint32_t c : own)
-      if (moved(c)) piece[root(c)] = root(*first);
+      if (moved(c)) pieces.join(*first, c);
     changed.push_back(e), curves.push_back(*first);
   }
   const Faults now(elements, changed, least);
@@ -57,14 +54,15 @@ void keep_gains(Elements& elements, std::vector<Depths> before, double least) {
   const Faults then(elements, changed, least);
   elements.curves.swap(before);
   std::vector<double> gain(before.size(), 0.);
-  for (std::size_t i = 0; i < changed.size(); ++i) gain[root(curves[i])] += then.how[i] - now.how[i];
+  for (std::size_t i = 0; i < changed.size(); ++i) gain[pieces.root(curves[i])] += then.how[i] - now.how[i];
   for (std::uint32_t c = 0; c < before.size(); ++c)
-    if (!(gain[root(c)] > 0.)) elements.curves[c] = before[c];
+    if (!(gain[pieces.root(c)] > 0.)) elements.curves[c] = before[c];
 }
 
 }  // namespace
 
-Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress) {
+Mending mend(Elements& elements, const SurfaceTrees& surfaces, Progress& progress) {
+  const auto& [outer, inner] = surfaces;
   constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
   constexpr double farthest_way = 1e3;  // µm
   Mending result;
@@ -118,10 +116,10 @@ Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& 
   // What is left is few: corners look for a better place each, as long as the worst element around them gains.
   const std::vector<std::uint8_t> rim = by_the_wall(elements);
   const double mean_volume = [&] {
-    double sum = 0.;
-    for (std::uint32_t e = 0; e < elements.size(); e += 1 + std::uint32_t(elements.size() / 1000))
+    double sum = 0., count = 0.;
+    for (std::size_t e = 0; e < elements.size(); e += 1 + elements.size() / 1000, ++count)
       sum += elements.hexahedron(e).volume();
-    return sum / std::min<double>(double(elements.size()), 1000.);
+    return sum / count;
   }();
   const auto worth = [&](std::span<const std::uint32_t> star) {
     double least = 1e300;
@@ -263,8 +261,8 @@ void even_out(Elements& elements, std::span<const std::uint32_t> heap, int rings
   }
 }
 
-void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                const Shaping& shaping, double least, Progress& progress, Rings rings) {
+void begin_anew(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping, double least,
+                Progress& progress, Rings rings) {
   struct Try {
     int evened, room;  // rings: that are evened out, and around these that move, too
     bool modest = false;
@@ -291,7 +289,7 @@ void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTre
     if (evened > 0) even_out(elements, heaps, evened);
     Shaping asked = is_modest ? modest : wide;
     asked.room = room;
-    improve_shapes(elements, outer, inner, asked, progress, widened(elements, stars, heaps, evened + room));
+    improve_shapes(elements, surfaces, asked, progress, widened(elements, stars, heaps, evened + room));
     keep_gains(elements, before, least);
     go(elements, before, to_keep(elements, shaping.enough));  // back, what need not have left
   }

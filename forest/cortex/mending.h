@@ -15,7 +15,7 @@ struct Mending {
 };
 /// Makes elements valid that are not, by straightening their sides first and then moving their corners towards the middle
 /// of those around; what lies on a surface stays on it.
-Mending mend(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, Progress& progress);
+Mending mend(Elements& elements, const SurfaceTrees& surfaces, Progress& progress);
 
 /// Within so many rings of elements around those that are given every corner goes to the middle of its neighbours, off the
 /// surfaces, and sides are straight; the rim stays. A start for shaping.
@@ -26,8 +26,8 @@ enum class Rings : unsigned char { few, many };  // many leave the surfaces fart
 /// Heaps of elements that are not valid, or whose scaled Jacobian is less than `least` somewhere, begin anew: they are shaped with
 /// what is around them, from where they are and from even_out over ever other rings. Each heap keeps of every try what leaves fewer
 /// elements of it not valid, or as many and the rest better shaped.
-void begin_anew(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                const Shaping& shaping, double least, Progress& progress, Rings rings = Rings::few);
+void begin_anew(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping, double least,
+                Progress& progress, Rings rings = Rings::few);
 
 struct LeftOut {
   std::size_t elements = 0;

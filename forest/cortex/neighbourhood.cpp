@@ -5,6 +5,8 @@
 #include <map>
 #include <numeric>
 
+#include "forest/core/distinct.h"
+
 namespace forest::cortex {
 
 Patch face_of(const Elements& elements, std::size_t element, std::size_t depth) {
@@ -21,12 +23,6 @@ Stars::Stars(const Elements& elements) : starts_(elements.curves.size() + 1) {
   std::vector<std::uint32_t> next(starts_.begin(), starts_.end() - 1);
   for (std::uint32_t e = 0; e < elements.size(); ++e)
     for (const std::uint32_t c : elements.elements[e]) list_[next[c]++] = e;
-}
-
-std::vector<std::uint32_t> distinct(std::vector<std::uint32_t> list) {
-  std::sort(list.begin(), list.end());
-  list.erase(std::unique(list.begin(), list.end()), list.end());
-  return list;
 }
 
 std::vector<std::uint32_t> widened(const Elements& elements, const Stars& stars,

@@ -36,9 +36,6 @@ class Stars {
   std::vector<std::uint32_t> starts_, list_;
 };
 
-/// In order, each once.
-std::vector<std::uint32_t> distinct(std::vector<std::uint32_t> list);
-
 /// Some elements, with all that share a corner with them, so many times.
 std::vector<std::uint32_t> widened(const Elements& elements, const Stars& stars,
                                    std::span<const std::uint32_t> list, int rings = 1);

@@ -11,8 +11,10 @@
 
 #include <fmt/format.h>
 
+#include "forest/core/distinct.h"
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/core/unions.h"
 #include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
@@ -29,22 +31,17 @@ double area_of(const std::vector<Place>& at, const Triangle& t) {
 // Marks what no elements can be laid over: pieces of cortex within the wall that are smaller than a wall has to be. The largest one stays.
 void close_islands(const Ribbon& ribbon, std::span<const double> areas, double least,
                    std::vector<std::uint8_t>& wall) {
-  std::vector<std::uint32_t> first(ribbon.size());  // of each piece, by way of others
-  std::iota(first.begin(), first.end(), 0u);
-  const auto piece_of = [&](std::uint32_t v) {
-    while (first[v] != v) v = first[v] = first[first[v]];
-    return v;
-  };
+  Unions pieces(ribbon.size());
   for (const Triangle& t : ribbon.triangles) {
     if (wall[t[0]] || wall[t[1]] || wall[t[2]]) continue;
-    for (const std::size_t k : {1u, 2u}) first[piece_of(t[k])] = piece_of(t[0]);
+    for (const std::size_t k : {1u, 2u}) pieces.join(t[0], t[k]);
   }
   std::vector<double> area(ribbon.size(), 0.);
   for (std::uint32_t v = 0; v < ribbon.size(); ++v)
-    if (!wall[v]) area[piece_of(v)] += areas[v];
+    if (!wall[v]) area[pieces.root(v)] += areas[v];
   const double enough = area.empty() ? 0. : std::min(least, *std::max_element(area.begin(), area.end()));
   for (std::uint32_t v = 0; v < ribbon.size(); ++v)
-    if (!wall[v] && area[piece_of(v)] < enough) wall[v] = 1;
+    if (!wall[v] && area[pieces.root(v)] < enough) wall[v] = 1;
 }
 
 // Thin places that hang together over an area are a wall.
@@ -101,8 +98,7 @@ Mesh halved(const Mesh& mesh) {
   edges.reserve(mesh.triangles.size() * 3);
   for (const Triangle& t : mesh.triangles)
     for (std::size_t e = 0; e < 3; ++e) edges.push_back(edge_of(t, e));
-  std::sort(edges.begin(), edges.end());
-  edges.erase(std::unique(edges.begin(), edges.end()), edges.end());
+  edges = distinct(std::move(edges));
   Mesh fine{mesh.positions, mesh.labels, {}};
   const auto old = std::uint32_t(mesh.positions.size());
   for (const auto& [a, b] : edges) fine.positions.push_back(.5f * (mesh.positions[a] + mesh.positions[b]));

@@ -9,6 +9,7 @@
 #include <span>
 #include <utility>
 
+#include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
 #include "forest/cortex/gauge.h"
 #include "forest/cortex/minimise.h"
@@ -49,12 +50,10 @@ std::vector<std::vector<Patch>> patches(const Elements& elements, const Stars& s
         for (const std::uint32_t e : stars.of(c))
           if (bad[e] && own.size() < most) bad[e] = 0, own.push_back(e);
       }
-    std::sort(patch.curves.begin(), patch.curves.end());
-    patch.curves.erase(std::unique(patch.curves.begin(), patch.curves.end()), patch.curves.end());
+    patch.curves = distinct(std::move(patch.curves));
     for (const std::uint32_t c : patch.curves)
       for (const std::uint32_t e : stars.of(c)) patch.seen.push_back(e);
-    std::sort(patch.seen.begin(), patch.seen.end());
-    patch.seen.erase(std::unique(patch.seen.begin(), patch.seen.end()), patch.seen.end());
+    patch.seen = distinct(std::move(patch.seen));
     std::size_t turn = 0;
     while (turn < turns.size() &&
            std::ranges::any_of(patch.seen, [&](std::uint32_t e) { return taken[turn][e] != 0; }))
@@ -239,8 +238,8 @@ class Work {
 
 class Shaper {
  public:
-  Shaper(Elements& elements, const TriangleTree& outer, const TriangleTree& inner, const Shaping& shaping)
-      : elements_(elements), outer_(outer), inner_(inner), shaping_(shaping) {}
+  Shaper(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping)
+      : elements_(elements), surfaces_(surfaces), shaping_(shaping) {}
 
   void operator()(const Patch& patch) const {
     List worst;  // curves
@@ -266,7 +265,7 @@ class Shaper {
     const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
     Anchor result{curve[d], small * Matrix<3>::Identity()};
     if (d == 1 || d == 2) return result;
-    const TriangleTree& surface = d == 0 ? outer_ : inner_;
+    const TriangleTree& surface = d == 0 ? surfaces_.outer : surfaces_.inner;
     const auto hit = surface.nearest(curve[d], reach);
     if (!hit) return result;
     const Place n = surface.normal(hit->triangle);
@@ -277,16 +276,16 @@ class Shaper {
   }
 
   Elements& elements_;
-  const TriangleTree &outer_, &inner_;
+  const SurfaceTrees& surfaces_;
   const Shaping& shaping_;
 };
 
 }  // namespace
 
-void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                    const Shaping& shaping, Progress& progress, std::span<const std::uint32_t> among) {
+void improve_shapes(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping,
+                    Progress& progress, std::span<const std::uint32_t> among) {
   const Stars stars(elements);
-  const Shaper shape(elements, outer, inner, shaping);
+  const Shaper shape(elements, surfaces, shaping);
   List looked_at(among.begin(), among.end());
   if (among.empty()) {
     looked_at.resize(elements.size());

@@ -2,11 +2,13 @@
 // Elements whose parameters are nearly in one direction somewhere, or even turned inside out, get a better shape: all places of
 // their curves move, those on a surface along it, until
 //
-//     Σ max(0, wanted − s)²  +  small · Σ (way from the place before)²  +  Σ (distance from the surface)²
+//     Σ max(0, wanted − s)² / χ(s)  +  even · Σ (volume beyond least … most)²  +  Σ (way / along)² / 100  +  Σ (distance / off)² / 100
 //
-// is least, where s is the scaled Jacobian at every one of 5×5×5 places of an element (Knupp 2000, "Achieving finite element mesh
-// quality via optimization of the Jacobian matrix norm and associated quantities. Part I", Int J Numer Meth Eng 48:401, of whose
-// measures this one is bounded and so can begin at folded elements). What is well shaped stays where it is.
+// is least. The first sum is over 5×5×5 places of each element, s is the scaled Jacobian there (Knupp 2000, "Achieving finite element
+// mesh quality via optimization of the Jacobian matrix norm and associated quantities. Part I", Int J Numer Meth Eng 48:401, of whose
+// measures this one is bounded and so can begin at folded elements), and χ(s) is s well above 0 and never 0, so that what is
+// nearly folded counts by far the most (gauge.h). The second is over elements, in wanted volumes; the third over places, and how far they
+// went; the last over places on a surface, and how far they are from it. What is well shaped stays where it is.
 #pragma once
 
 #include <span>
@@ -20,7 +22,7 @@ struct Shaping {
   double wanted = .65;             // of others
   double volume = 1e9;             // µm³
   double least = .85, most = 1.2;  // of it
-  double even = 4.;
+  double even = 4.;                // what (a volume beyond these)² counts, in wanted volumes
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
   double off = 25.;         // µm, likewise from a surface
@@ -34,7 +36,7 @@ struct Shaping {
 };
 
 /// @param among  elements that are looked at; none: all of them
-void improve_shapes(Elements& elements, const TriangleTree& outer, const TriangleTree& inner,
-                    const Shaping& shaping, Progress& progress, std::span<const std::uint32_t> among = {});
+void improve_shapes(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping,
+                    Progress& progress, std::span<const std::uint32_t> among = {});
 
 }  // namespace forest::cortex

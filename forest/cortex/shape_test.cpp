@@ -37,7 +37,7 @@ struct Shapes : ::testing::Test {
 TEST_F(Shapes, ABadCornerIsMendedAndItsFacesStayOnTheSurfaces) {
   push_middle(Place(400., 330., 0.));
   ASSERT_LT(least(slab), .1);
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_GT(least(slab), .5);
   EXPECT_TRUE(uncertified(slab).empty());
   for (const Depths& curve : slab.curves) {
@@ -49,7 +49,7 @@ TEST_F(Shapes, ABadCornerIsMendedAndItsFacesStayOnTheSurfaces) {
 TEST_F(Shapes, WhatIsFoldedUnfolds) {
   push_middle(Place(560., 30., 0.));
   ASSERT_FALSE(uncertified(slab).empty());
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_TRUE(uncertified(slab).empty());
 }
 
@@ -68,7 +68,7 @@ TEST_F(Shapes, WhatFoldsBetweenFivePlacesUnfoldsWhereNineAreLookedAt) {
     unseen = scaled_jacobian(h, 4) > 0. && !certify(h).positive();
   }
   ASSERT_TRUE(unseen);
-  improve_shapes(slab, outer, inner, {.volume = 5e8, .finely = true}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8, .finely = true}, Progress::none());
   EXPECT_TRUE(uncertified(slab).empty());
   double finest = 1.;
   for (std::size_t e = 0; e < slab.size(); ++e)
@@ -78,11 +78,11 @@ TEST_F(Shapes, WhatFoldsBetweenFivePlacesUnfoldsWhereNineAreLookedAt) {
 
 TEST_F(Shapes, WhatIsWellShapedStaysBitForBit) {
   const auto before = slab.curves;
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_EQ(slab.curves, before);
   // And far from a bad corner, too.
   push_middle(Place(400., 330., 0.));
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_EQ(slab.curves[slab_corner(6, 0, 0)], before[slab_corner(6, 0, 0)]);
   EXPECT_NE(slab.curves[slab_corner(6, 3, 3)], before[slab_corner(6, 3, 3)]);
 }
@@ -90,9 +90,9 @@ TEST_F(Shapes, WhatIsWellShapedStaysBitForBit) {
 TEST_F(Shapes, TheSameAtAnyNumberOfThreads) {
   push_middle(Place(400., 330., 0.));
   Elements again = slab;
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   const ThreadLimit one(1);
-  improve_shapes(again, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(again, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_EQ(slab.curves, again.curves);
 }
 
@@ -100,7 +100,7 @@ TEST_F(Shapes, AnElementTooLargeGivesToItsNeighbours) {
   push_middle(Place(-160., -160., 0.));
   const double before = slab.hexahedron(2 + 6 * 3).volume();
   ASSERT_GT(before, 1.3 * 5e8);
-  improve_shapes(slab, outer, inner, {.volume = 5e8}, Progress::none());
+  improve_shapes(slab, {outer, inner}, {.volume = 5e8}, Progress::none());
   EXPECT_LT(slab.hexahedron(2 + 6 * 3).volume(), 1.25 * 5e8);
 }
 

@@ -9,6 +9,7 @@
 #include <set>
 
 #include "forest/core/parallel.h"
+#include "forest/core/unions.h"
 
 namespace forest::cortex {
 namespace {
@@ -142,40 +143,31 @@ class Relief {
   // By how much each pass lies below the lower of the two crowns that join there as the surface is flooded from its crowns; 0
   // for all others.
   std::vector<double> below_crowns() const {
-    std::vector<Vertex> parent(order_.size()), crown(order_.size());
-    std::iota(parent.begin(), parent.end(), 0u);
+    Unions flooded(order_.size());
+    std::vector<Vertex> crown(order_.size());
     std::iota(crown.begin(), crown.end(), 0u);
-    const auto find = [&](Vertex v) {
-      while (parent[v] != v) v = parent[v] = parent[parent[v]];
-      return v;
-    };
     std::vector<double> result(order_.size(), 0.);
     for (const Vertex v : order_)
       for (const Vertex u : near_.of(v)) {
         if (rank_[u] > rank_[v]) continue;
-        Vertex a = find(v), b = find(u);
+        Vertex a = flooded.root(v), b = flooded.root(u);
         if (a == b) continue;
         if (rank_[crown[a]] > rank_[crown[b]]) std::swap(a, b);  // the higher crown stays
         if (crown[b] != v) result[v] = std::max(result[v], depth_[v] - depth_[crown[b]]);
-        parent[b] = a;
+        flooded.join(a, b);
       }
     return result;
   }
   // Passes at which two pits join that were apart, as the surface is flooded from its pits.
   std::vector<std::uint8_t> joins_pits() const {
-    std::vector<Vertex> parent(order_.size());
-    std::iota(parent.begin(), parent.end(), 0u);
-    const auto find = [&](Vertex v) {
-      while (parent[v] != v) v = parent[v] = parent[parent[v]];
-      return v;
-    };
+    Unions flooded(order_.size());
     std::vector<std::uint8_t> result(order_.size(), 0);
     for (auto at = order_.rbegin(); at != order_.rend(); ++at) {
       int joined = 0;
       for (const Vertex u : near_.of(*at)) {
         if (rank_[u] < rank_[*at]) continue;
-        const Vertex a = find(*at), b = find(u);
-        if (a != b) parent[b] = a, ++joined;
+        const Vertex a = flooded.root(*at), b = flooded.root(u);
+        if (a != b) flooded.join(a, b), ++joined;
       }
       result[*at] = joined > 1;
     }

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <map>
 #include <numbers>
+#include <numeric>
 #include <optional>
 #include <utility>
 
@@ -352,7 +353,8 @@ Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const S
   std::vector<std::vector<std::vector<Cell>>> stretches;
   std::vector<std::uint8_t> taken(elements.size(), 0);
   const std::size_t n = elements.size();
-  const auto stride = std::size_t(double(n) * .6180339887) | 1;
+  std::size_t stride = std::size_t(double(n) * .6180339887) | 1;
+  while (std::gcd(stride, n) > 1) stride += 2;  // or else it comes to some of them only
   for (std::size_t k = 0, e = 0; k < n && stretches.size() < options.stretches; ++k, e = (e + stride) % n) {
     Cell cell{elements.elements[e], std::uint32_t(e), 0};
     const auto corner = [&](std::size_t c) -> Place {  // half way down

@@ -6,6 +6,8 @@
 #include <span>
 #include <utility>
 
+#include "forest/core/distinct.h"
+
 namespace forest::cortex {
 namespace {
 
@@ -116,8 +118,7 @@ class Evener {
     for (const auto& [of, near] : {std::pair{a, &near_a}, std::pair{c, &near_c}}) {
       for (const std::uint32_t f : of_[of])
         for (const Vertex v : quads_.quads[f]) near->push_back(v);
-      std::sort(near->begin(), near->end());
-      near->erase(std::unique(near->begin(), near->end()), near->end());
+      *near = distinct(std::move(*near));
     }
     std::set_intersection(near_a.begin(), near_a.end(), near_c.begin(), near_c.end(),
                           std::back_inserter(common));

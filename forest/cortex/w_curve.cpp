@@ -65,7 +65,7 @@ Place WCurve::at_length(double share) const {
   return points.back();
 }
 
-EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const TriangleTree& inner) {
+EndAngles end_angles(const WCurve& curve, const SurfaceTrees& surfaces) {
   constexpr double piece = 150.;  // µm
   const auto between = [](const TriangleTree& surface, const Place& end, const Place& outwards) {
     return degrees_between(outwards, normal_around(surface, *surface.nearest(end), outwards));
@@ -74,8 +74,8 @@ EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const Trian
   const double length = curve.length();
   if (length == 0.) return {};
   const double share = length > 2. * piece ? piece / length : .5;
-  return {between(outer, start, start - curve.at_length(share)),
-          between(inner, end, curve.at_length(1. - share) - end)};
+  return {between(surfaces.outer, start, start - curve.at_length(share)),
+          between(surfaces.inner, end, curve.at_length(1. - share) - end)};
 }
 
 double WCurves::straight_way(const Place& from) const {

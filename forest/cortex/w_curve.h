@@ -32,11 +32,16 @@ struct WCurve {
   Place at_length(double share) const;
 };
 
+/// Both surfaces of a cortex, on which places are looked up.
+struct SurfaceTrees {
+  const TriangleTree &outer, &inner;
+};
+
 /// Between the last .15 mm of a curve and the surfaces' normals where it ends, degrees.
 struct EndAngles {
   double outer = 0., inner = 0.;
 };
-EndAngles end_angles(const WCurve& curve, const TriangleTree& outer, const TriangleTree& inner);
+EndAngles end_angles(const WCurve& curve, const SurfaceTrees& surfaces);
 
 /// Drops curves; the field and the surfaces must outlive it.
 class WCurves {

@@ -140,7 +140,7 @@ told distance.json 'len(d) == 4 and d[0]["from"] == "outer" and d[1]["to"] == "o
 told distance.json 'all(0 < r["median"] < r["mean"] * 2 < .5 and r["p95"] <= r["greatest"] for r in d)'
 $BRAINFOREST cortex distance outer outer --json >self.json
 told self.json 'all(r["greatest"] < 1e-6 for r in d)'
-[ "$(wc -l <away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
+[ "$(grep -vc '^#' away.txt)" = "$(python3 -c 'import json;print(json.load(open("distance.json"))[2]["count"])')" ]
 refuses 'already' $BRAINFOREST cortex distance outer inner --values away.txt
 refuses 'no_such' $BRAINFOREST cortex distance outer no_such
 refuses 'check that both are in mm' $BRAINFOREST cortex distance outer small
@@ -150,7 +150,8 @@ refuses 'nan: has a vertex that is nowhere' $BRAINFOREST cortex distance nan inn
 # w-curves alone: between balls two millimetres apart, but for the dent, which both have.
 $BRAINFOREST cortex curves outer inner -o middle --values thick.txt --json >curves.json
 told curves.json 'd["curves"] == d["reached"] > 500 and 1.8 < d["thickness"] < 2.2 and d["w_angle"]["median"] < 3 and d["w_angle"]["p99"] < 15'
-[ "$(wc -l <thick.txt)" = "$(python3 -c 'import json;print(json.load(open("curves.json"))["curves"])')" ]
+head -1 thick.txt | grep -qx '# thickness (mm)'
+[ "$(grep -vc '^#' thick.txt)" = "$(python3 -c 'import json;print(json.load(open("curves.json"))["curves"])')" ]
 for by in volume length; do
   $BRAINFOREST cortex curves outer inner -o $by.gii --by $by --depth .5 >said.txt
   grep -q 'reach the inner surface' said.txt

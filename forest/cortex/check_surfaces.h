@@ -1,0 +1,18 @@
+// SPDX-License-Identifier: Apache-2.0
+// Whether two surfaces can be those of a cortex, before any work is done on them.
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "forest/geometry/mesh.h"
+
+namespace forest::cortex {
+
+/// Throws Error, a sentence with a place, when a pair of surfaces cannot be that of a cortex: one is empty, has coordinates
+/// that are no numbers, is open, in pieces, has handles, faces inwards, cuts itself at more than one triangle of 200; its
+/// size is no hemisphere's in mm; the inner one is larger or lies outside. Returns what is odd, in sentences: triangles that cut
+/// one another but are few.
+std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner);
+
+}  // namespace forest::cortex
