@@ -29,7 +29,7 @@ struct Options {
   ElementOptions elements;
 };
 
-nlohmann::ordered_json json_of(const Spread& s) {
+nlohmann::ordered_json json_of(const circuit::Spread& s) {
   return {{"min", s.least}, {"p1", s.p1}, {"median", s.median}, {"p99", s.p99}, {"max", s.most}};
 }
 
@@ -45,7 +45,7 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
                               {"seconds", all.seconds},
                               {"bending", nullptr}};
   if (all.bending) {
-    const Bending& b = *all.bending;
+    const circuit::Bending& b = *all.bending;
     json["bending"] = {{"length", b.length},
                        {"length_ratio", b.length_ratio},
                        {"neuron_length_ratio", json_of(b.ratio)},
@@ -59,7 +59,7 @@ nlohmann::ordered_json json_of(const PlantedElements& all) {
   return json;
 }
 
-std::string sentence_of(const Bending& b) {
+std::string sentence_of(const circuit::Bending& b) {
   const auto change = [](double ratio) { return fmt::format("{:+.1f}", 100. * (ratio - 1.)); };
   const double longer = 100. * (b.length_ratio - 1.);
   return fmt::format(

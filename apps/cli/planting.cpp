@@ -254,6 +254,15 @@ void mark_glia(Planted& planted) {
     if (cells[t] && cells[t] == of_glia[t]) planted.circuit.types[t].glia = true;
 }
 
+std::vector<Morphology> planted_of(const Stock& stock, const circuit::Circuit& circuit) {
+  std::vector<Morphology> planted;
+  for (std::size_t i = 0; i < stock.candidates.size(); ++i)  // the circuit keeps their order
+    if (planted.size() < circuit.morphologies.size() &&
+        circuit.morphologies[planted.size()] == stock.candidates[i].name)
+      planted.push_back(stock.neurons[i]);
+  return planted;
+}
+
 Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& repo, std::uint64_t seed,
                               Progress& progress) {
   const auto seedlings = seedlings_of(recipe, seed);
@@ -261,26 +270,23 @@ Planted plant_from_repository(const circuit::Recipe& recipe, const std::string& 
   for (const auto& layer : circuit::counts(recipe))
     for (std::size_t type = 0; type < wanted.size(); ++type)
       if (layer[type]) wanted[type] = true;
-  auto [candidates, neurons, unflattened] = stock_of(recipe, wanted, repo, progress);
+  Stock stock = stock_of(recipe, wanted, repo, progress);
 
   // A candidate for all seedlings of a type; its population is one that no repository has.
   circuit::Recipe planted_by = recipe;
   for (std::size_t type = 0; type < seedlings.size(); ++type)
     if (seedlings[type] && !seedlings[type]->radii.empty()) {
       planted_by.types[type].population = "\n" + recipe.types[type].name;
-      neurons.emplace_back();
-      candidates.push_back({planted_by.types[type].population, planted_by.types[type].population,
-                            std::ranges::max(seedlings[type]->radii), 0.f});
+      stock.neurons.emplace_back();
+      stock.candidates.push_back({planted_by.types[type].population, planted_by.types[type].population,
+                                  std::ranges::max(seedlings[type]->radii), 0.f});
     }
-  Planted planted{circuit::plant(planted_by, candidates, seed, progress),
+  Planted planted{circuit::plant(planted_by, stock.candidates, seed, progress),
                   {},
-                  circuit::too_tall(planted_by, candidates),
-                  std::move(unflattened)};
+                  circuit::too_tall(planted_by, stock.candidates),
+                  std::move(stock.unflattened)};
   planted.circuit.types = recipe.types;
-  for (std::size_t i = 0; i < candidates.size(); ++i)  // the circuit keeps their order
-    if (planted.morphologies.size() < planted.circuit.morphologies.size() &&
-        planted.circuit.morphologies[planted.morphologies.size()] == candidates[i].name)
-      planted.morphologies.push_back(neurons[i]);
+  planted.morphologies = planted_of(stock, planted.circuit);
   if (std::ranges::any_of(seedlings, [](const auto& s) { return s.has_value(); }))
     grow_in_place(planted, recipe, seedlings, seed, progress);
   mark_glia(planted);

@@ -36,6 +36,9 @@ struct Stock {
 Stock stock_of(const circuit::Recipe& recipe, const std::vector<bool>& wanted, const std::string& repo,
                Progress& progress);
 
+/// Those of the stock that the circuit has planted, in its order.
+std::vector<Morphology> planted_of(const Stock& stock, const circuit::Circuit& circuit);
+
 struct Planted {
   circuit::Circuit circuit;
   std::vector<Morphology> morphologies;  // one for each of circuit.morphologies, centre at the origin

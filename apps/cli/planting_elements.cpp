@@ -19,10 +19,10 @@
 #include "forest/cortex/borders.h"
 #include "forest/cortex/locate.h"
 #include "forest/cortex/outline.h"
+#include "forest/cortex/region.h"
 #include "forest/cortex/warp.h"
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
-#include "forest/morphology/transform.h"
 #include "forest/repository/names.h"
 
 #include "apps/cli/clock.h"
@@ -35,36 +35,11 @@ namespace {
 
 using Place = Eigen::Vector3d;
 
-// As many elements in a row, across the fold, with the given one in the middle; fewer where the sheet ends or the row would
-// meet itself.
-std::vector<std::uint32_t> row_through(const cortex::Sheet& sheet, std::uint32_t middle,
-                                       std::uint32_t count) {
-  std::vector<std::uint32_t> row{middle};
-  std::set<std::uint32_t> taken{middle};
-  const auto walk = [&](std::uint32_t element, cortex::Face out, std::size_t length) {
-    std::vector<std::uint32_t> way;
-    while (way.size() < length) {
-      const cortex::Junction next = sheet.junctions[element][std::size_t(out)];
-      if (next.element == cortex::Junction::nothing || !taken.insert(next.element).second) break;
-      way.push_back(element = next.element);
-      out = cortex::Face(int(next.face) ^ 1);  // out by the opposite face
-    }
-    return way;
-  };
-  auto before = walk(middle, cortex::Face::u0, (count - 1) / 2);
-  const auto after = walk(middle, cortex::Face::u1, count - 1 - before.size());
-  std::ranges::reverse(before);
-  row.insert(row.begin(), before.begin(), before.end());
-  row.insert(row.end(), after.begin(), after.end());
-  return row;
-}
-
 std::vector<std::uint32_t> choose(const ElementOptions& options,
                                   std::span<const cortex::Hexahedron> elements) {
   if (!options.elements.empty()) return parse_elements(options.elements, options.file, elements.size());
   std::vector<std::uint32_t> chosen;
-  std::vector<Place> middles(elements.size());
-  parallel_for(elements.size(), 256, [&](std::size_t e) { middles[e] = elements[e].at(.5, .5, .5); });
+  const std::vector<Place> middles = cortex::middles_of(elements);
   if (!options.near.empty()) {
     const Place near(options.near[0], options.near[1], options.near[2]);
     if (!near.allFinite()) throw Error("--near must be three numbers, µm");
@@ -106,107 +81,26 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
   return chosen;
 }
 
-Spread spread(std::vector<double> values) {
-  if (values.empty()) return {};
-  std::ranges::sort(values);
-  const auto at = [&](double share) {
-    return values[std::size_t(std::lround(share * double(values.size() - 1)))];
-  };
-  return {at(0.), at(.01), at(.5), at(.99), at(1.)};
-}
-
-// A neuron as warp wants it. The first point of a section repeats its parent's last; what follows is joined to that.
-struct Tree {
-  std::vector<Place> points;
-  std::vector<std::int32_t> parents;
-  double height = 0., length = 0.;  // µm above the soma, of all branches
-
-  explicit Tree(const Morphology& m) {
-    for (const Section& s : m.sections()) {
-      const std::int32_t above =
-          s.parent.valid()
-              ? std::int32_t(m.section(s.parent).first_point + m.section(s.parent).point_count) - 1
-              : -1;
-      for (std::uint32_t i = 0; i < s.point_count; ++i) {
-        points.push_back(m.points()[s.first_point + i].position().cast<double>());
-        parents.push_back(i > 1 || (i == 1 && above < 0) ? std::int32_t(points.size()) - 2 : above);
-        height = std::max(height, points.back().y());
-        if (parents.back() >= 0) length += (points.back() - points[std::size_t(parents.back())]).norm();
-      }
-    }
-  }
-};
-
-// Each neuron becomes a shape of its own, in the tissue's axes.
-Bending bend(PlantedElements& all, const std::vector<circuit::Rooted>& rooted, const cortex::Sheet& sheet,
-             Progress& progress) {
+// Each neuron becomes a shape of its own.
+void bend(PlantedElements& all, std::span<const circuit::Rooted> rooted, const cortex::Sheet& sheet,
+          Progress& progress) {
   circuit::Circuit& circuit = all.planted.circuit;
-  const std::size_t count = circuit.instances.size();
-  std::vector<Tree> trees;
-  for (const Morphology& m : all.planted.morphologies) trees.emplace_back(m);
-  std::vector<std::size_t> group(count);  // the element of each, in all.elements
+  std::vector<cortex::Seat> seats;
+  std::vector<std::string> names;
   for (std::size_t e = 0; e < all.elements.size(); ++e)
-    std::fill(group.begin() + std::ptrdiff_t(all.first[e]), group.begin() + std::ptrdiff_t(all.first[e + 1]),
-              e);
-  std::vector<Morphology> bent(count);
-  std::vector<std::string> names(count);
-  std::vector<cortex::Distortion> distortions(count);
-  std::vector<double> pressed(count);
-  std::vector<char> shortened(count);
-  progress.begin("bending", count);
-  parallel_for(count, 16, [&](std::size_t i) {
-    circuit::Instance& instance = circuit.instances[i];
-    const Tree& tree = trees[instance.morphology];
-    const cortex::Seat seat{all.elements[group[i]], rooted[i].uvw, rooted[i].turn};
-    // What is taller than the tissue above the soma gets shorter in its upper part, by a half at most; what passes the pia all the
-    // same lies on it.
-    const Place down = sheet.elements[seat.element].jacobian(seat.uvw).col(2);
-    std::vector<Place> straight = tree.points;
-    if (const double room = seat.uvw[2] * down.norm(); tree.height > room) {
-      const double share = std::max(.5, room / tree.height);
-      shortened[i] = 1;
-      for (Place& p : straight)
-        if (p.y() > 0.) p.y() *= share;
+    for (std::size_t i = all.first[e]; i < all.first[e + 1]; ++i) {
+      seats.push_back({all.elements[e], rooted[i].uvw, rooted[i].turn});
+      names.push_back(
+          repository::file_name(fmt::format("e{}-{:05}-{}", all.elements[e], i - all.first[e],
+                                            circuit.morphologies[circuit.instances[i].morphology])));
     }
-    cortex::Warped warped = cortex::warp(sheet, seat, straight, tree.parents);
-    if (warped.distortion.beyond_pia > 0.) {
-      pressed[i] = warped.distortion.beyond_pia;
-      warped = cortex::warp(sheet, seat, straight, tree.parents, {.below_pia = true});
-    }
-    warped.distortion.straight_length = tree.length;
-    distortions[i] = warped.distortion;
-    const Place soma = sheet.elements[seat.element].at(seat.uvw);
-    std::vector<Vec3> points;
-    points.reserve(warped.points.size());
-    for (const Place& p : warped.points) points.push_back((p - soma).cast<float>());
-    bent[i] = reshaped(all.planted.morphologies[instance.morphology], points, instance.orientation);
-    names[i] = repository::file_name(fmt::format("e{}-{:05}-{}", seat.element, i - all.first[group[i]],
-                                                 circuit.morphologies[instance.morphology]));
-    progress.advance();
-  });
-  progress.end();
-  for (std::size_t i = 0; i < count; ++i) {
+  auto [neurons, bending] = circuit::bend(circuit, all.planted.morphologies, seats, sheet, progress);
+  for (std::size_t i = 0; i < circuit.instances.size(); ++i) {
     circuit.instances[i].morphology = std::uint32_t(i);
     circuit.instances[i].orientation = Quat::Identity();
   }
-  circuit.morphologies = std::move(names), all.planted.morphologies = std::move(bent);
-
-  Bending b;
-  double after = 0.;
-  std::vector<double> ratios, turns;
-  for (std::size_t i = 0; i < count; ++i) {
-    const cortex::Distortion& d = distortions[i];
-    b.length += d.straight_length, after += d.length;
-    b.beyond_pia += d.beyond_pia, b.pressed += pressed[i], b.beyond_white += d.beyond_white,
-        b.beside += d.beside;
-    if (d.straight_length > 0.) ratios.push_back(d.length / d.straight_length), turns.push_back(d.mean_turn);
-  }
-  if (after > 0.)
-    b.length_ratio = after / b.length, b.beyond_pia /= after, b.beyond_white /= after, b.beside /= after,
-    b.pressed /= after;
-  b.shortened = std::size_t(std::ranges::count(shortened, 1));
-  b.ratio = spread(std::move(ratios)), b.turn = spread(std::move(turns));
-  return b;
+  circuit.morphologies = std::move(names), all.planted.morphologies = std::move(neurons);
+  all.bending = bending;
 }
 
 // The measured ends of the recipe's layers; nothing where no maps are given.
@@ -228,16 +122,6 @@ void refuse_too_many(std::size_t elements, double neurons, bool bent, double lee
         "{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
         "or lower --scale",
         elements, neurons, bent ? most_bent : most, bent ? " of distinct shapes (--bend grid)" : ""));
-}
-
-// Towards the pia, in the mean over some elements; y where they cancel out.
-Vec3 up_of(std::span<const cortex::Hexahedron> elements, std::span<const std::uint32_t> chosen) {
-  Place sum = Place::Zero();
-  for (const std::uint32_t e : chosen)
-    sum -= elements[e].jacobian(Place::Constant(.5)).col(2).stableNormalized();
-  constexpr double least = .1;  // of a whole hemisphere little is left
-  if (!(sum.norm() > least * double(chosen.size()))) return Vec3::UnitY();
-  return sum.normalized().cast<float>();
 }
 
 }  // namespace
@@ -300,7 +184,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
     if (all.elements.size() != 1)
       throw Error(
           fmt::format("a row goes through one element, and {} are chosen; choose one", all.elements.size()));
-    all.elements = row_through(sheet, all.elements.front(), options.row);
+    all.elements = cortex::row_through(sheet, all.elements.front(), options.row);
   }
   const std::size_t asked = std::max(options.row, options.near.empty() ? 1u : options.count);
   if (all.elements.size() < asked)
@@ -377,32 +261,11 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   all.seconds = seconds_since(start);
 
   circuit::Circuit& circuit = all.planted.circuit;
-  circuit.name = recipe.name, circuit.types = recipe.types;
-  for (const auto& layer : recipe.layers) circuit.layers.push_back({layer.name, 0.f, 0.f});
-  std::vector<std::uint32_t> number(stock.candidates.size());
-  for (const circuit::Rooted& r : rooted) number[r.candidate] = 1;
-  for (std::size_t c = 0; c < number.size(); ++c)
-    if (number[c]) {
-      number[c] = std::uint32_t(circuit.morphologies.size());
-      circuit.morphologies.push_back(stock.candidates[c].name);
-      all.planted.morphologies.push_back(stock.neurons[c]);
-    }
-  std::vector<std::pair<float, float>> reach(circuit.layers.size(), {INFINITY, -INFINITY});
-  for (const circuit::Rooted& r : rooted) {
-    circuit.instances.push_back({r.position, r.orientation, number[r.candidate], r.type, r.layer});
-    auto& [low, high] = reach[r.layer];
-    low = std::min(low, r.position.y()), high = std::max(high, r.position.y());
-  }
-  for (std::size_t e = 0; e < all.elements.size(); ++e)
-    for (std::size_t i = all.first[e]; i < all.first[e + 1]; ++i)
-      circuit.in_elements.push_back({all.elements[e], rooted[i].uvw.cast<float>(), rooted[i].depth});
-  for (std::size_t l = 0; l < reach.size();
-       ++l)  // layers are curved; a circuit says how far their somata reach
-    if (reach[l].first <= reach[l].second)
-      circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
+  circuit = circuit::circuit_of(recipe, stock.candidates, all.elements, all.first, rooted);
+  all.planted.morphologies = planted_of(stock, circuit);
   circuit.outline = cortex::outline(sheet, all.elements, borders_of);
-  circuit.up = up_of(elements, all.elements);
-  if (bent) all.bending = bend(all, rooted, sheet, progress);
+  circuit.up = cortex::towards_pia(elements, all.elements);
+  if (bent) bend(all, rooted, sheet, progress);
   mark_glia(all.planted);
   return all;
 }

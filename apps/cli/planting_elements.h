@@ -8,6 +8,7 @@
 #include <string>
 #include <vector>
 
+#include "forest/circuit/bend.h"
 #include "forest/circuit/recipe.h"
 
 #include "apps/cli/planting.h"
@@ -35,22 +36,6 @@ struct ElementOptions {
 /// @return the first, for options that it excludes
 CLI::Option* add_elements(CLI::App& command, ElementOptions& options);
 
-/// Least, median and largest of a number, and where all but one in a hundred are.
-struct Spread {
-  double least = 0., p1 = 0., median = 0., p99 = 0., most = 0.;
-};
-
-/// What bending did to all neurons together.
-struct Bending {
-  double length = 0.;         // µm of branches, before
-  double length_ratio = 1.;   // after over before, of all branches together
-  Spread ratio;               // … of single neurons
-  std::size_t shortened = 0;  // neurons that were taller than the tissue above their soma
-  Spread turn;                // degrees by which angles between segments changed, mean of each neuron
-  // Shares of length: above the pia; at the pia, where it would have passed; in the white matter; off the rim.
-  double beyond_pia = 0., pressed = 0., beyond_white = 0., beside = 0.;
-};
-
 struct PlantedElements {
   Planted planted;
   std::vector<std::uint32_t> elements;
@@ -58,7 +43,7 @@ struct PlantedElements {
   double volume = 0.;                 // µm³ of all elements
   std::vector<double> layer_volumes;  // of it
   double seconds = 0.;                // for places and orientations
-  std::optional<Bending> bending;
+  std::optional<circuit::Bending> bending;
   std::vector<std::string>
       left_out;  // sentences on neurons that were not planted in a layer, and layers that were not measured
   bool measured = false;  // layers end where they were measured

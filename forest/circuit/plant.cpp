@@ -185,7 +185,8 @@ void place(const Recipe& recipe, const cortex::Column& column, std::span<const f
   progress.end();
 }
 
-/// Leaves out the candidates that were not planted.
+}  // namespace
+
 void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates) {
   std::vector<std::uint32_t> number(candidates.size(), 0);
   for (const Instance& instance : circuit.instances) number[instance.morphology] = 1;
@@ -195,8 +196,6 @@ void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates) 
       circuit.morphologies.push_back(candidates[i].name);
   for (Instance& instance : circuit.instances) instance.morphology = number[instance.morphology];
 }
-
-}  // namespace
 
 std::vector<std::vector<std::uint32_t>> candidates_of(
     const Recipe& recipe, std::span<const Candidate> candidates,

@@ -45,6 +45,9 @@ struct TooTall {
 };
 std::vector<TooTall> too_tall(const Recipe& recipe, std::span<const Candidate> candidates);
 
+/// Names the candidates that instances have, in their order; Instance::morphology becomes the number among these.
+void name_morphologies(Circuit& circuit, std::span<const Candidate> candidates);
+
 /// Circuit::morphologies holds the candidates that were planted, in their order; instances are in the order
 /// of layers, then types. Each instance has a candidate of its type's population and stands where that does not reach
 /// above the pia: the chance of a candidate is the share of the layer's depth in which it fits. Where none fits at all

@@ -238,4 +238,26 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
   return rooted;
 }
 
+Circuit circuit_of(const Recipe& recipe, std::span<const Candidate> candidates,
+                   std::span<const std::uint32_t> elements, std::span<const std::size_t> first,
+                   std::span<const Rooted> rooted) {
+  Circuit circuit;
+  circuit.name = recipe.name, circuit.types = recipe.types;
+  for (const auto& layer : recipe.layers) circuit.layers.push_back({layer.name, 0.f, 0.f});
+  std::vector<std::pair<float, float>> reach(circuit.layers.size(), {INFINITY, -INFINITY});
+  for (const Rooted& r : rooted) {
+    circuit.instances.push_back({r.position, r.orientation, r.candidate, r.type, r.layer});
+    auto& [low, high] = reach[r.layer];
+    low = std::min(low, r.position.y()), high = std::max(high, r.position.y());
+  }
+  name_morphologies(circuit, candidates);
+  for (std::size_t e = 0; e < elements.size(); ++e)
+    for (std::size_t i = first[e]; i < first[e + 1]; ++i)
+      circuit.in_elements.push_back({elements[e], rooted[i].uvw.cast<float>(), rooted[i].depth});
+  for (std::size_t l = 0; l < reach.size(); ++l)
+    if (reach[l].first <= reach[l].second)
+      circuit.layers[l].bottom = reach[l].first, circuit.layers[l].top = reach[l].second;
+  return circuit;
+}
+
 }  // namespace forest::circuit

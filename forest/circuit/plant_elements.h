@@ -103,4 +103,13 @@ class ElementPlanter {
   std::vector<std::vector<std::uint32_t>> sparser_;       // of layers: those that they leave room for
 };
 
+/// The neurons of some elements as one circuit, in their order. Layers are curved; they reach from where their lowest soma is to
+/// where their highest one is.
+/// @param elements  their numbers
+/// @param first     the first neuron of each among `rooted`, and how many there are in all
+/// @param candidates, rooted  those of an ElementPlanter, and what it planted
+Circuit circuit_of(const Recipe& recipe, std::span<const Candidate> candidates,
+                   std::span<const std::uint32_t> elements, std::span<const std::size_t> first,
+                   std::span<const Rooted> rooted);
+
 }  // namespace forest::circuit
