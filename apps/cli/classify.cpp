@@ -13,6 +13,7 @@
 #include "forest/statistics/clusters.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/estimates.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
@@ -179,12 +180,7 @@ std::string report_of(const Types& t, const Sample& sample, const FeatureTable& 
     for (std::size_t k = 0; k < t.traits.size(); ++k)
       for (std::size_t i = 0; i < std::min<std::size_t>(t.traits[k].size(), 6); ++i) {
         const Trait& trait = t.traits[k][i];
-        rows.push_back({.label = trait.feature.name,
-                        .value = trait.delta.value,
-                        .lower = trait.delta.lower,
-                        .upper = trait.delta.upper,
-                        .note = fmt::format("type {}", k + 1),
-                        .colour = k});
+        rows.push_back(interval_row(trait.feature.name, trait.delta, k, fmt::format("type {}", k + 1)));
         const auto column = std::ranges::find(table.features, trait.feature) - table.features.begin();
         if (i > 2 || panels.size() == 9 || std::size_t(column) == table.features.size() ||
             std::ranges::count(panels, trait.feature.name, &StripPanel::title))

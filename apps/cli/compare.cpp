@@ -15,6 +15,7 @@
 #include "forest/statistics/projection.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/estimates.h"
 #include "apps/cli/files.h"
 #include "apps/cli/options.h"
 #include "apps/cli/plots.h"
@@ -37,10 +38,8 @@ struct Options {
   bool force = false;
 };
 
-Json json_of(const Estimate& e) { return {{"value", e.value}, {"lower", e.lower}, {"upper", e.upper}}; }
-
 Json json_of(const Discrimination& d) {
-  Json out = json_of(d.auc);
+  Json out = interval_of(d.auc);
   if (!d.null.empty()) out["p"] = d.p;
   return out;
 }
@@ -53,7 +52,7 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
                        {"diameters", d.feature.diameters},
                        {"a", {{"mean", d.mean_a}, {"sd", d.sd_a}}},
                        {"b", {{"mean", d.mean_b}, {"sd", d.sd_b}}},
-                       {"cliffs_delta", json_of(d.delta)},
+                       {"cliffs_delta", interval_of(d.delta)},
                        {"cohens_d", d.cohens_d},
                        {"ks", d.ks.statistic},
                        {"p", d.ks.p},
@@ -80,9 +79,6 @@ Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const
 
 std::string shown(double x) { return std::isnan(x) ? "-" : fmt::format("{:.4g}", x); }
 std::string shown_p(double p) { return p < 1e-4 ? fmt::format("{:.0e}", p) : fmt::format("{:.4f}", p); }
-std::string shown(const Estimate& e) {
-  return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.lower, e.upper);
-}
 
 std::string named(const Feature& f) { return f.unit.empty() ? f.name : f.name + " (" + f.unit + ")"; }
 
@@ -111,9 +107,9 @@ std::vector<const Difference*> telling(const Comparison& c, const FeatureTable& 
 }
 
 std::vector<std::vector<std::string>> rows_of_tests(const Comparison& c) {
-  return {{"random forest, all features", shown(c.forest.auc), shown_p(c.forest.p)},
-          {"random forest, structure", shown(c.structure.auc), "-"},
-          {"logistic regression, all features", shown(c.logistic.auc), shown_p(c.logistic.p)},
+  return {{"random forest, all features", with_interval(c.forest.auc), shown_p(c.forest.p)},
+          {"random forest, structure", with_interval(c.structure.auc), "-"},
+          {"logistic regression, all features", with_interval(c.logistic.auc), shown_p(c.logistic.p)},
           {"energy distance", shown(c.energy.distance), shown_p(c.energy.p)},
           {"maximum mean discrepancy", shown(c.mmd.distance), shown_p(c.mmd.p)},
           {"persistence images", shown(c.barcodes.distance), shown_p(c.barcodes.p)},
@@ -146,14 +142,11 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
 
   report.heading("By what?");
   std::vector<IntervalRow> rows;
-  for (const Difference* d : telling(c, whole, 24))
-    rows.push_back({.label = d->feature.name,
-                    .value = d->delta.value,
-                    .lower = d->delta.lower,
-                    .upper = d->delta.upper,
-                    .note = "p " + shown_p(d->p_holm),
-                    .colour = d->delta.value > 0. ? 1u : 0u,
-                    .faint = d->p_holm > .05});
+  for (const Difference* d : telling(c, whole, 24)) {
+    rows.push_back(
+        interval_row(d->feature.name, d->delta, d->delta.value > 0. ? 1 : 0, "p " + shown_p(d->p_holm)));
+    rows.back().faint = d->p_holm > .05;
+  }
   report.plot(interval_plot(rows, {.low = -1.,
                                    .high = 1.,
                                    .marks = {0.},
@@ -165,15 +158,8 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
               "difference after Holm's correction over all features.");
   std::vector<StripPanel> panels;
   for (const Difference* d : telling(c, whole, 24)) {
-    const auto column = std::ranges::find(all.features, d->feature) - all.features.begin();
-    if (std::size_t(column) == all.features.size() || panels.size() == 9)
-      continue;  // "… is defined" is no measure
-    StripPanel panel{.title = d->feature.name, .unit = d->feature.unit, .samples = {}};
-    for (const FeatureTable& t : tables) {
-      const auto values = t.values.col(column);
-      panel.samples.emplace_back(values.begin(), values.end());
-    }
-    panels.push_back(std::move(panel));
+    if (panels.size() < 9 && std::ranges::count(all.features, d->feature))  // "… is defined" is no measure
+      panels.push_back(panel_of(d->feature, std::array{&tables[0], &tables[1]}));
   }
   report.plot(strip_plots(panels, names),
               "Every dot is a cell; density above, median and quartiles on the line.");

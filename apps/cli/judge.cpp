@@ -19,6 +19,7 @@
 #include "forest/statistics/protocol.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/estimates.h"
 #include "apps/cli/files.h"
 #include "apps/cli/grammars.h"
 #include "apps/cli/judging.h"
@@ -34,12 +35,6 @@ using namespace statistics;
 using Json = nlohmann::ordered_json;
 
 namespace {
-
-Json interval_of(const Estimate& e) { return {{"value", e.value}, {"lower", e.lower}, {"upper", e.upper}}; }
-
-std::string shown(const Estimate& e) {
-  return fmt::format("{:.3f} ({:.3f}–{:.3f})", e.value, e.lower, e.upper);
-}
 
 std::string verdict(const Judgement& j) {
   const auto failed = std::ranges::count(j.criteria, false, &Criterion::pass);
@@ -120,7 +115,8 @@ Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
   }
   Json criteria = Json::array();
   for (const Criterion& c : j.criteria)
-    criteria.push_back({{"name", c.name}, {"pass", c.pass}, {"reason", c.reason}});
+    criteria.push_back(
+        {{"name", c.name}, {"pass", c.pass}, {"value", c.value}, {"limit", c.limit}, {"reason", c.reason}});
   Json auc{{"structure", interval_of(j.auc.structure)},
            {"diameters", interval_of(j.auc.diameters)},
            {"slopes", interval_of(j.auc.slopes)},
@@ -168,7 +164,7 @@ void tell_judgement(const Judgement& j, Console& console) {
   console.table({"", "criterion", "why"}, lines);
   console.say("");
   console.say(averaged(j) + fmt::format("Power: {}. Logistic regression, for comparison: AUC {}.",
-                                        power_of(j), shown(j.auc.logistic)));
+                                        power_of(j), with_interval(j.auc.logistic)));
 }
 
 std::string report_of(const Judged& judged, const Riddle& riddle, const std::string& title) {
@@ -184,21 +180,20 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   report.heading("Told from held-out cells by a random forest");
   std::vector<IntervalRow> rows;
   const auto add = [&](std::string label, const Estimate& e, std::size_t colour, std::string note = {}) {
-    rows.push_back({.label = std::move(label),
-                    .value = e.value,
-                    .lower = e.lower,
-                    .upper = e.upper,
-                    .note = std::move(note),
-                    .colour = colour});
+    rows.push_back(interval_row(std::move(label), e, colour, std::move(note)));
   };
-  add("grown, structure", j.auc.structure, 1, "≤ 0.60");
-  add("grown, with diameters", j.auc.diameters, 1, "≤ 0.65");
+  const auto limit = [&](const std::string& name) {
+    return std::ranges::find(j.criteria, name, &Criterion::name)->limit;
+  };
+  add("grown, structure", j.auc.structure, 1, fmt::format("≤ {:.3f}", limit("auc.structure")));
+  add("grown, with diameters", j.auc.diameters, 1, fmt::format("≤ {:.3f}", limit("auc.diameters")));
   add("grown, slopes in the slice", j.auc.slopes, 1, "not asked");
   add("real training cells, structure", j.auc.real_control, 0);
   add("real training cells, with diameters", j.auc.real_control_diameters, 0);
   add("real training cells, slopes", j.auc.real_control_slopes, 0);
   for (const Judgement::Alone& a : j.alone) {
-    add("grown, more " + a.name + " alone", a.grown, 1, "within 0.05 of training cells");
+    add("grown, more " + a.name + " alone", a.grown, 1,
+        fmt::format("within {:.3f} of training cells", limit("auc." + a.name)));
     add("real training cells, more " + a.name, a.real, 0);
   }
   for (const ControlResult& c : j.controls)
@@ -242,14 +237,8 @@ std::string report_of(const Judged& judged, const Riddle& riddle, const std::str
   std::ranges::stable_sort(order, std::greater(), [&](std::size_t f) { return surely[f]; });
   std::vector<StripPanel> panels;
   for (const std::size_t f : unlike(whole, order, 9)) {
-    const Feature& feature = whole.features[f];
-    const auto column = std::ranges::find(all.features, feature) - all.features.begin();
-    StripPanel panel{.title = feature.name, .unit = feature.unit, .samples = {}};
-    for (const FeatureTable* t : {&judged.train, &judged.held_out, &judged.grown.front()}) {
-      const auto values = t->values.col(column);
-      panel.samples.emplace_back(values.begin(), values.end());
-    }
-    panels.push_back(std::move(panel));
+    const std::array<const FeatureTable*, 3> three{&judged.train, &judged.held_out, &judged.grown.front()};
+    panels.push_back(panel_of(whole.features[f], three));
   }
   report.plot(strip_plots(panels, std::array<std::string, 3>{"training", "held out", "grown"}),
               "The features by which grown and held-out cells are most surely apart (Cliff's delta), none "

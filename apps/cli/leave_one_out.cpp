@@ -12,6 +12,7 @@
 #include "forest/lsystem/grammar.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/estimates.h"
 #include "apps/cli/files.h"
 #include "apps/cli/judging.h"
 #include "apps/cli/plots.h"
@@ -33,8 +34,6 @@ std::vector<Morphology> without(const Sample& traced, std::span<const std::strin
       others.push_back(traced.neurons[i]);
   return others;
 }
-
-Json interval_of(const Estimate& e) { return {{"value", e.value}, {"lower", e.lower}, {"upper", e.upper}}; }
 
 Json json_of(const LeaveOneOut& r, const LeftOutTrial& trial, std::optional<std::size_t> longest_run) {
   Json cells = Json::array(), features = Json::array();
@@ -107,17 +106,11 @@ std::string html_of(const LeaveOneOut& r, const FeatureTable& traced, std::span<
   report.heading("Left-out cells among those grown without them");
   report.table(head_of_cells, rows_of_cells(r));
   report.heading("Features in all pairs");
+  const FeatureTable others = stacked(grown);
   std::vector<StripPanel> panels;
   for (const PairedFeature& f : r.features) {
     if (panels.size() == 9) break;
-    const auto column = std::ranges::find(traced.features, f.feature) - traced.features.begin();
-    StripPanel panel{.title = f.feature.name, .unit = f.feature.unit, .samples = {}};
-    const auto values = traced.values.col(column);
-    panel.samples.emplace_back(values.begin(), values.end());
-    auto& others = panel.samples.emplace_back();
-    for (const FeatureTable& g : grown)
-      others.insert(others.end(), g.values.col(column).begin(), g.values.col(column).end());
-    panels.push_back(std::move(panel));
+    panels.push_back(panel_of(f.feature, std::array{&traced, &others}));
   }
   report.plot(strip_plots(panels, std::array<std::string, 2>{"traced", "grown"}),
               "The features whose ranks lie most surely to one side; every dot is a cell.");

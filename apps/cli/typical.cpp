@@ -14,6 +14,7 @@
 #include "forest/repository/repository.h"
 
 #include "apps/cli/console.h"
+#include "apps/cli/estimates.h"
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
@@ -165,13 +166,9 @@ void run(const Options& options, Console& console) {
     std::vector<StripPanel> panels;
     std::vector<std::vector<std::string>> lines;
     for (const Oddity* o : telling(t, known, 40)) {
-      const auto column = std::ranges::find(known.features, o->feature) - known.features.begin();
-      if (std::size_t(column) < known.features.size() && panels.size() < 12) {
-        const auto values = known.values.col(column);
-        panels.push_back({.title = o->feature.name,
-                          .unit = o->feature.unit,
-                          .samples = {std::vector<double>(values.begin(), values.end())},
-                          .marked = o->value});
+      if (panels.size() < 12 && std::ranges::count(known.features, o->feature)) {
+        panels.push_back(panel_of(o->feature, std::array{&known}));
+        panels.back().marked = o->value;
       }
       lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
                        fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),

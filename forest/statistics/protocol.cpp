@@ -216,14 +216,19 @@ double nearest(const Eigen::MatrixXd& cells, const Eigen::MatrixXd& train) {
   return quantile(std::span(least.data(), std::size_t(least.size())), .5);
 }
 
-void ask(Judgement& j, std::string name, bool pass, std::string reason) {
-  j.criteria.push_back({std::move(name), pass, std::move(reason)});
+enum class Asked : std::uint8_t { at_most, at_least, more_than };
+
+void ask(Judgement& j, std::string name, double value, Asked asked, double limit, std::string reason) {
+  const bool pass = asked == Asked::at_most    ? value <= limit
+                    : asked == Asked::at_least ? value >= limit
+                                               : value > limit;
+  j.criteria.push_back({std::move(name), pass, value, limit, std::move(reason)});
 }
 
 void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& auc, const Estimate& control,
              double most) {
   const double beside = std::max(.5, control.value) + most_beside_control;
-  ask(j, name, auc.value <= std::min(most, beside),
+  ask(j, name, auc.value, Asked::at_most, std::min(most, beside),
       fmt::format(
           "{} grown from held-out cells with AUC {:.3f} ({:.3f}–{:.3f}); at most {:.2f} is asked, and "
           "{:.3f} where real training cells are told with {:.3f}",
@@ -248,7 +253,7 @@ void ask_of_each_alone(Judgement& j, const std::array<FeatureTable, 3>& tables, 
         };
     const Judgement::Alone& found = j.alone.emplace_back(
         Judgement::Alone{std::string(feature.alone), above(tables[2]), above(tables[0])});
-    ask(j, "auc." + found.name, std::abs(found.grown.value - found.real.value) <= limit,
+    ask(j, "auc." + found.name, std::abs(found.grown.value - found.real.value), Asked::at_most, limit,
         fmt::format("by '{}' alone, grown cells have more than held-out ones with AUC {:.3f}, training cells "
                     "with {:.3f}; at most {:.3f} between the two is asked",
                     feature.name, found.grown.value, found.real.value, limit));
@@ -319,42 +324,42 @@ Judgement judge_one(const FeatureTable& train, const FeatureTable& held_out, con
   progress.end();
 
   j.energy_p = middle(found, true, [](const Found& f) { return f.energy_p; }).energy_p;
-  ask(j, "energy_p", j.energy_p > least_p,
+  ask(j, "energy_p", j.energy_p, Asked::more_than, least_p,
       fmt::format("energy distance of grown and held-out cells: p = {:.4f}; more than {} is asked",
                   j.energy_p, least_p));
   j.mmd_p = middle(found, true, [](const Found& f) { return f.mmd_p; }).mmd_p;
-  ask(j, "mmd_p", j.mmd_p > least_p,
+  ask(j, "mmd_p", j.mmd_p, Asked::more_than, least_p,
       fmt::format("maximum mean discrepancy: p = {:.4f}; more than {} is asked", j.mmd_p, least_p));
   j.ks_rejections = middle(found, false, [](const Found& f) { return f.ks_rejections.size(); }).ks_rejections;
-  ask(j, "ks_rejections", j.ks_rejections.empty(),
+  ask(j, "ks_rejections", double(j.ks_rejections.size()), Asked::at_most, 0.,
       fmt::format("Kolmogorov–Smirnov rejects {} of {} features after Holm's correction{}",
                   j.ks_rejections.size(), j.features,
                   j.ks_rejections.empty() ? "" : ", the first: " + j.ks_rejections.front()));
   j.mvs_median = middle(found, false, [](const Found& f) { return f.mvs_median; }).mvs_median;
-  ask(j, "mvs_median", j.mvs_median <= most_mvs,
+  ask(j, "mvs_median", j.mvs_median, Asked::at_most, most_mvs,
       fmt::format("median visible spread of half of the features is at most {:.3f}; {} is asked",
                   j.mvs_median, most_mvs));
   const Found& spread = middle(found, false, [](const Found& f) { return f.mvs_ratio; });
   j.mvs_ratio = spread.mvs_ratio, j.mvs_max = spread.mvs_max, j.mvs_feature = spread.mvs_feature;
-  ask(j, "mvs_max", j.mvs_ratio <= j.mvs_limit,
+  ask(j, "mvs_max", j.mvs_ratio, Asked::at_most, j.mvs_limit,
       fmt::format("the worst feature, {}, has {:.2f} times the spread that real samples stay below in 95 "
                   "of 100; the "
                   "worst of real samples has up to {:.2f} times",
                   j.mvs_feature.empty() ? "none" : j.mvs_feature, j.mvs_ratio, j.mvs_limit));
   j.sholl_inside = middle(found, true, [](const Found& f) { return f.sholl_inside; }).sholl_inside;
-  ask(j, "sholl_inside", j.sholl_inside >= least_inside,
+  ask(j, "sholl_inside", j.sholl_inside, Asked::at_least, least_inside,
       fmt::format("the mean of Sholl's crossings is in the band of real cells at {:.1f} % of radii; {:.0f} % "
                   "is asked",
                   100. * j.sholl_inside, 100. * least_inside));
   if (!full) return j;
 
   j.neighbour_ratio = middle(found, true, [](const Found& f) { return f.neighbour_ratio; }).neighbour_ratio;
-  ask(j, "copying.neighbour_ratio", j.neighbour_ratio >= least_neighbour_ratio,
+  ask(j, "copying.neighbour_ratio", j.neighbour_ratio, Asked::at_least, least_neighbour_ratio,
       fmt::format("the nearest training cell is {:.3f} times as far from grown as from held-out cells; at "
                   "least {} is asked",
                   j.neighbour_ratio, least_neighbour_ratio));
   if (j.longest_run)
-    ask(j, "copying.longest_run", *j.longest_run <= most_run,
+    ask(j, "copying.longest_run", double(*j.longest_run), Asked::at_most, double(most_run),
         fmt::format("at most {} consecutive branches come from one traced cell; {} are allowed",
                     *j.longest_run, most_run));
   return j;
@@ -386,7 +391,7 @@ Judgement judge(const FeatureTable& train, const FeatureTable& held_out, std::sp
     std::vector<std::string_view> names;
     for (const Criterion& criterion : result.missed) names.push_back(criterion.name);
     result.rejected = !result.missed.empty();
-    ask(j, "controls." + control.name, result.rejected,
+    ask(j, "controls." + control.name, double(result.missed.size()), Asked::at_least, 1.,
         result.rejected
             ? fmt::format("the control '{}' is rejected, as it must be, by {} (on structure AUC {:.3f})",
                           control.name, fmt::join(names, ", "), result.auc.value)

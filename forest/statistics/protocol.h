@@ -36,7 +36,9 @@ struct ProtocolOptions {
 struct Criterion {
   std::string name;  // "auc.structure"
   bool pass = false;
-  std::string reason;  // a sentence with the value and the limit
+  double value = 0.,
+         limit = 0.;   // what was found, and what it is compared with; of a control, criteria that it misses
+  std::string reason;  // a sentence with both
 };
 
 /// Cells that are known to be wrong, which the protocol must tell from real ones.
