@@ -123,10 +123,9 @@ void run(const Options& options, Console& console) {
     console.warn(fmt::format("{} of {} {} no section of these kinds and {} left out", without,
                              counted(neurons.size(), "neuron"), without == 1 ? "has" : "have",
                              without == 1 ? "is" : "are"));
-  constexpr std::size_t enough = 12;  // of which a taste can be learned
-  if (options.calibrate && neurons.size() < enough)
-    console.warn(
-        fmt::format("--calibrate learns nothing of fewer than {} neurons, so there is no taste", enough));
+  if (options.calibrate && neurons.size() < calibration.least)
+    console.warn(fmt::format("--calibrate learns nothing of fewer than {} neurons, so there is no taste",
+                             calibration.least));
   const std::string title = fmt::format("neurons like those of {}", of);
   fitting::Calibrated fitted;
   if (options.form.empty())

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -79,22 +80,18 @@ Rate rate_of(std::span<const Exposure> exposure, double Exposure::*events) {
   return rate(cost(one) - cost(two) > std::log(happened) ? two : one);
 }
 
-struct KindModel {
-  const Form* form = nullptr;
-  Stems stems;
-  Angles angles;
+struct BurkeModel : KindModel {
   Values girths;
-  double finest = 0., thickest = 0., extent = 0.;
-  std::size_t most_abreast = 0, sections = 0;
+  double finest = 0., thickest = 0.;
   Rate fork, end;
   std::string loss, trend;  // rows of tables by diameter: of µm a µm; of the ratio over its mean
   double anticorrelation = 0., ratio_mean = 1., ratio_sd = 0.;
-  Correction correction;  // of the chance to fork
+  // `correction` is of the chance to fork.
 };
 
 /// Thick parents have relatively thinner daughters. Burke's daughters are r + a s and s + a r of one distribution, here
 /// times that trend: its mean, spread and a give back mean, variance and covariance of the ratios.
-void fit_ratios(const Values& parents, const std::vector<std::array<double, 2>>& ratios, KindModel& model) {
+void fit_ratios(const Values& parents, const std::vector<std::array<double, 2>>& ratios, BurkeModel& model) {
   model.trend = "1: 1";
   if (ratios.empty()) return;
   const Values edges = bin_edges(parents, {.least = 40, .most = 8});
@@ -125,7 +122,7 @@ void fit_ratios(const Values& parents, const std::vector<std::array<double, 2>>&
 }
 
 /// What happens along the branches, by diameter.
-void fit_rates(const std::vector<Exposure>& pieces, KindModel& model) {
+void fit_rates(const std::vector<Exposure>& pieces, BurkeModel& model) {
   Values diameters;
   for (const Exposure& p : pieces) diameters.push_back(p.diameter);
   const Values edges = bin_edges(diameters, {.least = 1, .most = 200});
@@ -150,8 +147,8 @@ void fit_rates(const std::vector<Exposure>& pieces, KindModel& model) {
   }
 }
 
-KindModel measured(std::span<const Morphology> cells, const Form& form, double step) {
-  KindModel model;
+std::optional<BurkeModel> measured(std::span<const Morphology> cells, const Form& form, double step) {
+  BurkeModel model;
   model.form = &form, model.correction.kind = form.kind;
   model.stems = stems_of(cells, form.kind), model.angles = angles_of(cells, form.kind, step);
   std::vector<Exposure> pieces;
@@ -188,17 +185,17 @@ KindModel measured(std::span<const Morphology> cells, const Form& form, double s
     model.correction.tips += double(tips) / double(cells.size());
     model.most_abreast = std::max(model.most_abreast, abreast(arbors));
   }
-  if (model.sections == 0) return model;
+  if (model.sections == 0 || model.girths.empty()) return std::nullopt;
   model.extent = std::min(model.extent, 1e5);  // 10 cm: a stray point must not make growth endless
   std::ranges::sort(model.girths);
-  if (!model.girths.empty()) model.finest = std::max(0.05, model.girths[model.girths.size() / 100]);
+  model.finest = std::max(0.05, model.girths[model.girths.size() / 100]);
   model.thickest = std::max(model.finest, *std::ranges::max_element(model.stems.diameters));
   fit_ratios(parents, ratios, model);
   fit_rates(pieces, model);
   return model;
 }
 
-std::string text_of(const KindModel& m) {
+std::string text_of(const BurkeModel& m) {
   const std::string k(m.form->suffix);
   std::string t = fmt::format("\n# {}: {} sections of {} cells\n", k, m.sections, m.stems.counts.size());
   t += drawn_as("spread_" + k, m.angles.spreads, {"truncnormal", "normal"});
@@ -238,10 +235,10 @@ std::string text_of(const KindModel& m) {
   return t + text_of(m.stems, *m.form, fmt::format("Tip_{}(d, 0)", k));
 }
 
-std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, std::size_t cells,
+std::string text_of(const std::vector<BurkeModel>& kinds, const Cells& shared, std::size_t cells,
                     const std::string& name) {
   std::vector<Part> parts;
-  for (const KindModel& m : kinds)
+  for (const BurkeModel& m : kinds)
     parts.push_back({*m.form, m.stems, m.most_abreast, m.extent / shared.step + 3., text_of(m)});
   return assembled(fmt::format("# Estimated from {} traced cells: what a branch does next depends on its "
                                "diameter alone, after Burke, Marks &\n"
@@ -255,21 +252,8 @@ std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, st
 }  // namespace
 
 std::string burke_grammar(std::span<const Morphology> cells, const std::string& name,
-                          const BurkeOptions& options) {
-  const Cells shared = cells_of(cells, options.kinds, name);
-  std::vector<KindModel> kinds;
-  for (const Form& form : forms()) {
-    if (!options.kinds.contains(form.kind)) continue;
-    KindModel model = measured(cells, form, shared.step);
-    if (model.sections > 0 && !model.girths.empty()) kinds.push_back(std::move(model));
-  }
-  const auto text = [&] { return text_of(kinds, shared, cells.size(), name); };
-  std::vector<Correction*> corrections;
-  for (KindModel& m : kinds) corrections.push_back(&m.correction);
-  correct(corrections, text, options.rounds, options.seed);
-  for (const Correction* c : corrections)
-    if (options.tell && c->grown > 0.) options.tell({c->kind, c->tips, c->grown});
-  return text();
+                          const ParametricOptions& options) {
+  return corrected_grammar(cells, name, options, measured, text_of);
 }
 
 }  // namespace forest::fitting

@@ -4,28 +4,13 @@
 // estimated from cells; the yardstick that finer models are held to, as it forgets order, place and cell.
 #pragma once
 
-#include <functional>
 #include <span>
 #include <string>
 
+#include "forest/fitting/parametric_options.h"
 #include "forest/morphology/morphology.h"
-#include "forest/statistics/arbors.h"
 
 namespace forest::fitting {
-
-/// What came of correcting the chance to fork: tips of a kind, in the mean of cells.
-struct Corrected {
-  SectionKind kind;
-  double traced, grown;
-};
-
-struct BurkeOptions {
-  statistics::KindSet kinds = statistics::KindSet::all();  // each kind gets numbers of its own
-  int rounds =
-      10;  // of growing cells and correcting the chance to fork until they have as many tips; 0: as measured
-  std::uint64_t seed = 1;
-  std::function<void(const Corrected&)> tell = {};  // of each kind
-};
 
 /// The text of a grammar (docs/lsystem/notation.md): soma, number and diameter and direction of stems, taper, chances to fork
 /// and to end by diameter (exponentials by maximum likelihood), ratios of diameters with Burke's anticorrelation, angles,
@@ -34,6 +19,6 @@ struct BurkeOptions {
 /// @param name  for its title
 /// Throws Error when the cells have no section of these kinds.
 std::string burke_grammar(std::span<const Morphology> cells, const std::string& name,
-                          const BurkeOptions& options = {});
+                          const ParametricOptions& options = {});
 
 }  // namespace forest::fitting

@@ -221,7 +221,7 @@ Calibrated calibrated_grammar(std::span<const Morphology> neurons, std::span<con
   std::vector<double> gaps(options.rounds + 1, 0.);
   for (int held = 0; held < 3; ++held) {
     const Neurons fitted = of_third(neurons, third, held, false), back = of_third(neurons, third, held, true);
-    if (fitted.size() < 4 || back.size() < 2) continue;
+    if (fitted.size() < 4 || back.size() < 2 || !can_be_resampled(fitted, resampling.kinds)) continue;
     const MatrixXd traced = features_of(fitted, few);
     const std::vector<Scale> scales = scales_of(traced);
     const MatrixXd candidates = seen(

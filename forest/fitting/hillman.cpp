@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 #include <vector>
 
 #include <fmt/format.h>
@@ -16,21 +17,16 @@ namespace {
 using namespace statistics;
 using Values = std::vector<double>;
 
-struct KindModel {
-  const Form* form = nullptr;
-  Stems stems;
+struct HillmanModel : KindModel {
   Values forking, ending;         // lengths
   Values tapers, tapered;         // … of branches of these diameters
   Values daughters, pk, parents;  // at forks of parents of these diameters
   Values thresholds, girths;
-  Angles angles;
-  double extent = 0.;
-  std::size_t most_abreast = 0, sections = 0;
-  Correction correction;  // of the threshold: divides it
+  // `correction` is of the threshold, and divides it.
 };
 
-KindModel measured(std::span<const Morphology> cells, const Form& form, double step) {
-  KindModel model;
+std::optional<HillmanModel> measured(std::span<const Morphology> cells, const Form& form, double step) {
+  HillmanModel model;
   model.form = &form, model.correction.kind = form.kind;
   model.stems = stems_of(cells, form.kind), model.angles = angles_of(cells, form.kind, step);
   for (const Morphology& cell : cells) {
@@ -65,10 +61,11 @@ KindModel measured(std::span<const Morphology> cells, const Form& form, double s
   }
   model.extent = std::min(model.extent, 1e5);  // 10 cm: a stray point must not make growth endless
   std::ranges::sort(model.girths);
+  if (model.sections == 0 || (model.forking.empty() && model.ending.empty())) return std::nullopt;
   return model;
 }
 
-std::string text_of(const KindModel& m) {
+std::string text_of(const HillmanModel& m) {
   const std::string k(m.form->suffix);
   const double finest = std::max(0.05, m.girths[m.girths.size() / 100]);
   const double thickest = std::max({finest, m.girths.back(), *std::ranges::max_element(m.stems.diameters)});
@@ -109,10 +106,10 @@ std::string text_of(const KindModel& m) {
   return t + text_of(m.stems, *m.form, fmt::format("Branch_{}(d, 0)", k));
 }
 
-std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, std::size_t cells,
+std::string text_of(const std::vector<HillmanModel>& kinds, const Cells& shared, std::size_t cells,
                     const std::string& name) {
   std::vector<Part> parts;
-  for (const KindModel& m : kinds)
+  for (const HillmanModel& m : kinds)
     parts.push_back({*m.form, m.stems, m.most_abreast, 3. * m.extent / shared.step + 200., text_of(m)});
   return assembled(fmt::format("# Estimated from {} traced cells in the parameters of Hillman (1979), as "
                                "L-Neuron grows by them (Ascoli & Krichmar,\n"
@@ -126,22 +123,8 @@ std::string text_of(const std::vector<KindModel>& kinds, const Cells& shared, st
 }  // namespace
 
 std::string hillman_grammar(std::span<const Morphology> cells, const std::string& name,
-                            const BurkeOptions& options) {
-  const Cells shared = cells_of(cells, options.kinds, name);
-  std::vector<KindModel> kinds;
-  for (const Form& form : forms()) {
-    if (!options.kinds.contains(form.kind)) continue;
-    KindModel model = measured(cells, form, shared.step);
-    if (model.sections > 0 && !(model.forking.empty() && model.ending.empty()))
-      kinds.push_back(std::move(model));
-  }
-  const auto text = [&] { return text_of(kinds, shared, cells.size(), name); };
-  std::vector<Correction*> corrections;
-  for (KindModel& m : kinds) corrections.push_back(&m.correction);
-  correct(corrections, text, options.rounds, options.seed);
-  for (const Correction* c : corrections)
-    if (options.tell && c->grown > 0.) options.tell({c->kind, c->tips, c->grown});
-  return text();
+                            const ParametricOptions& options) {
+  return corrected_grammar(cells, name, options, measured, text_of);
 }
 
 }  // namespace forest::fitting

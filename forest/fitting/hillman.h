@@ -7,7 +7,8 @@
 #include <span>
 #include <string>
 
-#include "forest/fitting/burke.h"
+#include "forest/fitting/parametric_options.h"
+#include "forest/morphology/morphology.h"
 
 namespace forest::fitting {
 
@@ -16,6 +17,6 @@ namespace forest::fitting {
 /// daughter ratio and Pk (of the power 3/2), from which the daughters' diameters follow; amplitudes, tortuosity. What is
 /// corrected is the threshold. Otherwise as burke_grammar, errors too.
 std::string hillman_grammar(std::span<const Morphology> cells, const std::string& name,
-                            const BurkeOptions& options = {});
+                            const ParametricOptions& options = {});
 
 }  // namespace forest::fitting

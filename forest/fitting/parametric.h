@@ -4,11 +4,14 @@
 #pragma once
 
 #include <functional>
+#include <optional>
 #include <span>
 #include <string>
 #include <string_view>
+#include <utility>
 #include <vector>
 
+#include "forest/fitting/parametric_options.h"
 #include "forest/morphology/morphology.h"
 #include "forest/statistics/arbors.h"
 
@@ -86,5 +89,39 @@ struct Correction {
 /// is much.
 void correct(std::span<Correction*> kinds, const std::function<std::string()>& text, int rounds,
              std::uint64_t seed);
+
+/// What every form knows of a kind.
+struct KindModel {
+  const Form* form = nullptr;
+  Stems stems;
+  Angles angles;
+  double extent = 0.;  // µm, of the farthest point along branches
+  std::size_t most_abreast = 0, sections = 0;
+  Correction correction;
+};
+
+/// The grammar of the kinds that were measured, corrected.
+/// @param measured  of one kind; nothing where there is too little of it
+/// @param text_of   of all kinds and what they share
+template <class Model>
+std::string corrected_grammar(std::span<const Morphology> cells, const std::string& name,
+                              const ParametricOptions& options,
+                              std::optional<Model> (*measured)(std::span<const Morphology>, const Form&,
+                                                               double step),
+                              std::string (*text_of)(const std::vector<Model>&, const Cells&,
+                                                     std::size_t cells, const std::string& name)) {
+  const Cells shared = cells_of(cells, options.kinds, name);
+  std::vector<Model> kinds;
+  for (const Form& form : forms())
+    if (options.kinds.contains(form.kind))
+      if (auto model = measured(cells, form, shared.step)) kinds.push_back(std::move(*model));
+  const auto text = [&] { return text_of(kinds, shared, cells.size(), name); };
+  std::vector<Correction*> corrections;
+  for (Model& m : kinds) corrections.push_back(&m.correction);
+  correct(corrections, text, options.rounds, options.seed);
+  for (const Correction* c : corrections)
+    if (options.tell && c->grown > 0.) options.tell({c->kind, c->tips, c->grown});
+  return text();
+}
 
 }  // namespace forest::fitting

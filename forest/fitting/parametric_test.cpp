@@ -93,7 +93,9 @@ TEST(ParametricModels, AreWrittenForWhateverHasABranch) {
 TEST(Burke, DoesNotRunAway) {
   const std::vector<Morphology> cells{zoo_parts::binary_tree(9)};
   const std::string text = burke_grammar(cells, "bush", {.rounds = 0});
-  const auto at = text.find("#define more_basal ") + 19;
+  const std::string define = "#define more_basal ";
+  const std::size_t found = text.find(define), at = found + define.size();
+  ASSERT_NE(found, text.npos);
   const std::string wild = text.substr(0, at) + "1000" + text.substr(text.find(' ', at));
   for (const Morphology& m : lsystem::grow_population(lsystem::parse(wild, "wild"), 4, 1))
     EXPECT_LT(m.sections().size(), 100000u);

@@ -18,6 +18,7 @@
 #include "forest/core/error.h"
 #include "forest/fitting/evening.h"
 #include "forest/fitting/mixing.h"
+#include "forest/fitting/parametric.h"
 #include "forest/fitting/ring.h"
 #include "forest/fitting/traced.h"
 #include "forest/fitting/tuning.h"
@@ -244,7 +245,7 @@ class Writer {
     productions();
     const std::string body = std::exchange(text_, {});
     put("# Resampled from {} traced neurons with {} forks.\ntitle: {}\nsteps: 1000\nlimit: 1000000\n",
-        traced.cells.size(), traced.forks.size(), title);
+        traced.cells.size(), traced.forks.size(), title_of(title));
     settings();
     text_ += body;
   }
@@ -698,12 +699,18 @@ function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
   std::string kernels_, text_;
 };
 
+bool suffices(const Traced& traced) { return traced.cells.size() >= 2 && !traced.forks.empty(); }
+
 }  // namespace
+
+bool can_be_resampled(std::span<const Morphology> neurons, statistics::KindSet kinds) {
+  return suffices(learn(neurons, kinds));
+}
 
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
                                const Resampling& options, Progress& progress) {
   const Traced traced = learn(neurons, options.kinds);
-  if (traced.cells.size() < 2 || traced.forks.empty())
+  if (!suffices(traced))
     throw Error(
         traced.cells.size() < 2
             ? fmt::format("{} of {} neurons have stems of these kinds; a model needs two such neurons, name "

@@ -66,8 +66,11 @@ struct Resampling {
 /// @param neurons  at least two with such sections; others are passed over. Neurons without a soma begin at their first root, as
 ///                 insects' do whose arbors all leave one fibre. What changes its kind on the way (an axon on a dendrite) is a
 ///                 stem of its own, which begins where it began.
-/// Throws Error when there are too few.
+/// Throws Error where they cannot be resampled.
 std::string resampling_grammar(std::span<const Morphology> neurons, const std::string& title,
                                const Resampling& options = {}, Progress& progress = Progress::none());
+
+/// Whether two neurons or more have sections of these kinds, and any of these a fork.
+bool can_be_resampled(std::span<const Morphology> neurons, statistics::KindSet kinds);
 
 }  // namespace forest::fitting
