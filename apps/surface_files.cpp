@@ -31,7 +31,9 @@ void add_overlay(scene::Surfaces& surfaces, const std::filesystem::path& file) {
     if (std::ranges::none_of(read.values, [](float v) { return std::isfinite(v); }))
       throw InputError(name, 0, "has no value that is a number; give another overlay");
     if (read.labels.empty()) {
-      surfaces.title += (surfaces.title.empty() ? "" : ", ") + file.filename().string();
+      const std::string title = read.title.empty() ? file.filename().string() : read.title;
+      if (surfaces.title != title)  // of both hemispheres, often
+        surfaces.title += (surfaces.title.empty() ? "" : ", ") + title;
       return surfaces.colour(read.values);
     }
     std::vector<scene::AreaColour> areas;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
@@ -17,6 +18,7 @@
 #include "forest/core/file.h"
 #include "forest/cortex/bok.h"
 #include "forest/cortex/build.h"
+#include "forest/cortex/report.h"
 #include "forest/cortex/sulci.h"
 #include "forest/cortex/symmetry.h"
 #include "forest/io/border_file.h"
@@ -142,10 +144,15 @@ void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& i
         between / 1e9, cortex.between / 1e9));
 }
 
-// What is measured, in one list for people and for machines.
-void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& deeper, double volume,
-          double seconds, Console& console) {
-  const cortex::Symmetry& s = deeper.symmetry;
+// What is measured, for people and for machines.
+struct Figure {
+  const char* key;  // in JSON; null where one before it says it, too
+  Json value;
+  const char* label = nullptr;  // in the table; null: not there
+  std::string shown = {}, what = {};
+};
+
+std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Report& r, double volume) {
   const auto in_mm = [](const std::optional<double>& um) { return um ? Json(*um / 1e3) : Json(); };
   const auto shown = [](const std::optional<double>& um) {
     return um ? fmt::format("{:.3f}", *um / 1e3) : std::string("-");
@@ -155,89 +162,113 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
   for (const auto& [name, kind] :
        {std::pair{"crests", Kind::crest}, {"valleys", Kind::valley}, {"sulci", Kind::sulcus}})
     lengths[name] = length_of(cortex.lines, kind) / 1e3;
-  Json json{
-      {"elements", r.elements},
-      {"uncertified", r.uncertified},
-      {"volume_error", r.volume_error},
-      {"volume_mean", r.volume_mean / 1e9},
-      {"volume_within", r.volume_within},
-      {"w_angle", {{"median", cortex.w_angle.median}, {"p99", cortex.w_angle.p99}}},
-      {"w_reached", cortex.w_reached},
-      {"equivolume_error", r.equivolume_error},
+  return {
+      {"elements", r.elements, "elements", std::to_string(r.elements)},
+      {"uncertified", r.uncertified, "uncertified", std::to_string(r.uncertified),
+       "not proven to have a positive Jacobian everywhere"},
+      {"volume_error", r.volume_error, "volume error", fmt::format("{:.5f}", r.volume_error),
+       "of all, as a share of what lies between the surfaces"},
+      {"volume_mean", r.volume_mean / 1e9, "volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"},
+      {"volume_within", r.volume_within, "volume within", fmt::format("{:.4f}", r.volume_within),
+       fmt::format("share of elements of {:.2f}–{:.2f} mm³", cortex::least_volume * volume / 1e9,
+                   cortex::most_volume * volume / 1e9)},
+      {"w_angle",
+       {{"median", cortex.w_angle.median}, {"p99", cortex.w_angle.p99}},
+       "w angle",
+       fmt::format("{:.2f} / {:.2f}", cortex.w_angle.median, cortex.w_angle.p99),
+       "degrees from the normals of both surfaces, median / 99th percentile"},
+      {"w_reached", cortex.w_reached, "w reached", fmt::format("{:.6f}", cortex.w_reached),
+       "share of curves that reach the inner surface"},
+      {"equivolume_error", r.equivolume_error, "equivolume error",
+       fmt::format("{:.4f} / {:.4f}", r.equivolume_p99, r.equivolume_error),
+       "|V(0 → w) / V − w|, 99th percentile / largest"},
       {"equivolume_p99", r.equivolume_p99},
-      {"scaled_jacobian", {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}}},
-      {"crest_angle", {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}}},
-      {"face_distance_p99", {{"outer", in_mm(r.outer_distance_p99)}, {"inner", in_mm(r.inner_distance_p99)}}},
-      {"lines_mm", lengths},
-      {"border_within_2mm", nullptr},
-      {"symmetry", {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}}},
-      {"bok", json_of(deeper.bok)},
-      {"seconds", seconds},
-      {"peak_bytes", peak_bytes()}};
-  if (deeper.layers) {
-    json["bok"]["measured"] = json_of(deeper.layers->measured);
-    json["bok"]["of_volume"] = json_of(deeper.layers->of_volume);
+      {"scaled_jacobian",
+       {{"min", r.jacobian_least}, {"p1", r.jacobian_p1}},
+       "scaled Jacobian",
+       fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
+       "least / 1st percentile"},
+      {"crest_angle",
+       {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}},
+       "crest angle",
+       fmt::format("{:.2f}", r.crest_angle.median),
+       "degrees between v-isolines and the right angle to crests, median"},
+      {"face_distance_p99",
+       {{"outer", in_mm(r.outer_distance_p99)}, {"inner", in_mm(r.inner_distance_p99)}},
+       "faces",
+       fmt::format("{} / {}", shown(r.outer_distance_p99), shown(r.inner_distance_p99)),
+       "mm from the outer / inner surface, 99th percentile; - where it is not given"},
+      {"lines_mm", lengths, "lines",
+       fmt::format("{:.0f} / {:.0f} / {:.0f}", lengths["crests"].get<double>(),
+                   lengths["valleys"].get<double>(), lengths["sulci"].get<double>()),
+       "mm of crests / valleys / floors of sulci"}};
+}
+
+std::vector<Figure> figures_of(const Deeper& deeper) {
+  const cortex::Symmetry& s = deeper.symmetry;
+  std::vector<Figure> all;
+  if (deeper.borders.empty()) {
+    all.push_back({"border_within_2mm", nullptr});
+  } else {
+    const Deeper::Border& together = deeper.borders.back();
+    Json each;
+    for (const auto& b : deeper.borders)
+      if (&b != &together) each[b.name] = b.share();
+    all.push_back({"border_within_2mm", together.share()});
+    all.push_back({"border_half_way", together.share_half_way()});
+    all.push_back({"borders", each});
+    for (const auto& b : deeper.borders)
+      all.push_back({nullptr,
+                     {},
+                     "border",
+                     fmt::format("{:.2f} / {:.2f}", b.share(), b.share_half_way()),
+                     fmt::format("share of the {} points of {} within 2 mm of a sulcus' floor on the outer "
+                                 "surface / of a valley half way down",
+                                 b.points, b.name)});
+    all.push_back({"border_by_chance", deeper.by_chance, "by chance", fmt::format("{:.2f}", deeper.by_chance),
+                   "share of the outer surface within 2 mm of a sulcus' floor"});
   }
-  if (!deeper.borders.empty()) {
-    json["border_within_2mm"] = deeper.borders.back().share();
-    json["border_by_chance"] = deeper.by_chance;
-    json["border_half_way"] = deeper.borders.back().share_half_way();
-    for (const auto& b : deeper.borders) json["borders"][b.name] = b.share();
-    json["borders"].erase("all");
+  all.push_back({"symmetry",
+                 {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}},
+                 "symmetry",
+                 fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
+                 fmt::format("difference of successive v-sections / of the best planar ones, over {} "
+                             "stretches",
+                             s.stretches)});
+  const auto ratios = [](const cortex::Bok& bok) { return fmt::format("{:.2f} / {:.2f}", bok.l1, bok.l6); };
+  Json bok = json_of(deeper.bok);
+  if (deeper.layers)
+    bok["measured"] = json_of(deeper.layers->measured), bok["of_volume"] = json_of(deeper.layers->of_volume);
+  all.push_back({"bok", bok, "Bok", ratios(deeper.bok),
+                 "share of thickness on crowns over that in fundi, layer 1 / layer 6, of the elements"});
+  if (deeper.layers) {
+    all.push_back({nullptr,
+                   {},
+                   "Bok, measured",
+                   ratios(deeper.layers->measured),
+                   fmt::format("of the layers given, at {} vertices", deeper.layers->vertices)});
+    all.push_back({nullptr,
+                   {},
+                   "Bok, by volume",
+                   ratios(deeper.layers->of_volume),
+                   "of layers of constant volume there, folds seen at 6 mm"});
+  }
+  return all;
+}
+
+void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& deeper, double volume,
+          double seconds, Console& console) {
+  std::vector<Figure> figures = figures_of(cortex, r, volume);
+  std::ranges::move(figures_of(deeper), std::back_inserter(figures));
+  figures.push_back({"seconds", seconds});
+  figures.push_back({"peak_bytes", peak_bytes()});
+  Json json;
+  std::vector<std::vector<std::string>> rows;
+  for (Figure& f : figures) {
+    if (f.key) json[f.key] = std::move(f.value);
+    if (f.label) rows.push_back({f.label, f.shown, f.what});
   }
   console.print(json);
-  const auto row = [](const char* what, const std::string& value, const char* how) {
-    return std::vector<std::string>{what, value, how};
-  };
-  std::vector<std::vector<std::string>> rows{
-      row("elements", std::to_string(r.elements), ""),
-      row("uncertified", std::to_string(r.uncertified), "not proven to have a positive Jacobian everywhere"),
-      row("volume error", fmt::format("{:.5f}", r.volume_error),
-          "of all, as a share of what lies between the surfaces"),
-      row("volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"),
-      row("volume within", fmt::format("{:.4f}", r.volume_within),
-          fmt::format("share of elements of {:.2f}–{:.2f} mm³", .8 * volume / 1e9, 1.25 * volume / 1e9)
-              .c_str()),
-      row("w angle", fmt::format("{:.2f} / {:.2f}", cortex.w_angle.median, cortex.w_angle.p99),
-          "degrees from the normals of both surfaces, median / 99th percentile"),
-      row("w reached", fmt::format("{:.6f}", cortex.w_reached),
-          "share of curves that reach the inner surface"),
-      row("equivolume error", fmt::format("{:.4f} / {:.4f}", r.equivolume_p99, r.equivolume_error),
-          "|V(0 → w) / V − w|, 99th percentile / largest"),
-      row("scaled Jacobian", fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
-          "least / 1st percentile"),
-      row("crest angle", fmt::format("{:.2f}", r.crest_angle.median),
-          "degrees between v-isolines and the right angle to crests, median"),
-      row("faces", fmt::format("{} / {}", shown(r.outer_distance_p99), shown(r.inner_distance_p99)),
-          "mm from the outer / inner surface, 99th percentile; - where it is not given")};
-  rows.push_back(
-      row("symmetry", fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
-          fmt::format("difference of successive v-sections / of the best planar ones, over {} stretches",
-                      s.stretches)
-              .c_str()));
-  const auto ratios = [](const cortex::Bok& bok) { return fmt::format("{:.2f} / {:.2f}", bok.l1, bok.l6); };
-  rows.push_back(row("Bok", ratios(deeper.bok),
-                     "share of thickness on crowns over that in fundi, layer 1 / layer 6, of the elements"));
-  if (deeper.layers) {
-    rows.push_back(row("Bok, measured", ratios(deeper.layers->measured),
-                       fmt::format("of the layers given, at {} vertices", deeper.layers->vertices).c_str()));
-    rows.push_back(row("Bok, by volume", ratios(deeper.layers->of_volume),
-                       "of layers of constant volume there, folds seen at 6 mm"));
-  }
-  rows.push_back(row("lines",
-                     fmt::format("{:.0f} / {:.0f} / {:.0f}", lengths["crests"].get<double>(),
-                                 lengths["valleys"].get<double>(), lengths["sulci"].get<double>()),
-                     "mm of crests / valleys / floors of sulci"));
-  for (const auto& b : deeper.borders)
-    rows.push_back(
-        row("border", fmt::format("{:.2f} / {:.2f}", b.share(), b.share_half_way()),
-            fmt::format("share of the {} points of {} within 2 mm of a sulcus' floor on the outer surface / "
-                        "of a valley half way down",
-                        b.points, b.name)
-                .c_str()));
-  if (!deeper.borders.empty())
-    rows.push_back(row("by chance", fmt::format("{:.2f}", deeper.by_chance),
-                       "share of the outer surface within 2 mm of a sulcus' floor"));
   console.table({"measure", "value", "what it is"}, rows);
 }
 

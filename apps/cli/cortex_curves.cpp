@@ -13,7 +13,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/parallel.h"
-#include "forest/cortex/build.h"
+#include "forest/cortex/check_surfaces.h"
 #include "forest/cortex/w_curve.h"
 #include "forest/io/surface.h"
 #include "forest/statistics/two_samples.h"
@@ -41,16 +41,17 @@ struct Dropped {
 struct Measure {
   const char* name;
   const char* what;
+  const char* title;  // above colours
   double (*of)(const Dropped&);
 };
 
 constexpr Measure measures[] = {
-    {"thickness", "along the curve, mm", [](const Dropped& d) { return d.length; }},
-    {"straight", "to the nearest place of the inner surface, mm",
+    {"thickness", "along the curve, mm", "thickness (mm)", [](const Dropped& d) { return d.length; }},
+    {"straight", "to the nearest place of the inner surface, mm", "distance (mm)",
      [](const Dropped& d) { return d.straight; }},
-    {"outer-angle", "to the outer surface's normal, degrees",
+    {"outer-angle", "to the outer surface's normal, degrees", "angle to the normal (°)",
      [](const Dropped& d) { return d.angles.outer; }},
-    {"inner-angle", "to the inner surface's normal, degrees",
+    {"inner-angle", "to the inner surface's normal, degrees", "angle to the normal (°)",
      [](const Dropped& d) { return d.angles.inner; }},
 };
 
@@ -73,7 +74,7 @@ std::vector<Dropped> drop_all(const Options& o, const Mesh& outer, const Mesh& i
       const cortex::Place start = outer.positions[v].cast<double>();
       const cortex::WCurve curve = curves.drop(start, -normals[v].cast<double>());
       all[v] = {o.by == "volume" ? curve.at(o.depth) : curve.at_length(o.depth), curve.length() / 1e3,
-                curves.straight_way(start) / 1e3, end_angles(curve, above.tree(), below.tree()),
+                curves.straight_way(start) / 1e3, end_angles(curve, {above.tree(), below.tree()}),
                 curve.arrived};
     }
     progress.advance(end - begin);
@@ -93,23 +94,22 @@ void run(const Options& o, Console& console) {
   const std::vector<Dropped> all = drop_all(o, outer, inner, console.progress());
 
   const auto measure = std::ranges::find(measures, o.measure, &Measure::name);
-  std::string text;
-  std::vector<double> lengths, angles;
+  std::vector<double> values, lengths, angles;
   std::size_t arrived = 0;
   for (std::size_t v = 0; v < all.size(); ++v) {
     const Dropped& d = all[v];
     outer.positions[v] = d.at.cast<float>();
-    text += fmt::format("{:.6g}\n", measure->of(d));
+    values.push_back(measure->of(d));
     arrived += d.arrived;
     if (d.length >= no_tissue)
       lengths.push_back(d.length), angles.insert(angles.end(), {d.angles.outer, d.angles.inner});
   }
   std::vector<std::pair<fs::path, std::string>> files{{o.out, io::write_surface(outer, o.out.string())}};
-  if (!o.values.empty()) files.emplace_back(o.values, std::move(text));
+  if (!o.values.empty()) files.emplace_back(o.values, io::write_surface_values(measure->title, values));
   write_unless_there(files, o.force);
 
-  const auto quantile = [](const std::vector<double>& values, double share) {
-    return values.empty() ? 0. : statistics::quantile(values, share);
+  const auto quantile = [](const std::vector<double>& of, double share) {
+    return of.empty() ? 0. : statistics::quantile(of, share);
   };
   const double thickness = quantile(lengths, .5), usual = quantile(angles, .5), far = quantile(angles, .99);
   console.say(

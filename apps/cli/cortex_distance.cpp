@@ -66,9 +66,9 @@ void run(const Options& o, Console& console) {
       const auto places = vertices ? at_vertices(meshes[from]) : evenly_on(meshes[from]);
       const Distances d = distances(places, trees[to]);
       if (vertices && from == 0 && !o.values.empty()) {
-        std::string text;
-        for (const double each : d.each) text += fmt::format("{:.6g}\n", each / 1e3);
-        write_file(o.values, text);
+        std::vector<double> mm;
+        for (const double each : d.each) mm.push_back(each / 1e3);
+        write_file(o.values, io::write_surface_values("distance (mm)", mm));
       }
       const auto mm = [](double um) { return fmt::format("{:.3f}", um / 1e3); };
       out.push_back({{"from", names[from]},

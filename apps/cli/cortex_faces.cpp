@@ -33,21 +33,23 @@ namespace fs = std::filesystem;
 struct Measure {
   const char* name;
   const char* what;
+  const char* title;  // above colours
   double (*of)(const cortex::Elements&, std::size_t element);
 };
 
 using cortex::Elements;
 
 constexpr Measure measures[] = {
-    {"volume", "mm³", [](const Elements& all, std::size_t e) { return all.hexahedron(e).volume() / 1e9; }},
-    {"thickness", "mm, from face to face in the middle",
+    {"volume", "mm³", "volume (mm³)",
+     [](const Elements& all, std::size_t e) { return all.hexahedron(e).volume() / 1e9; }},
+    {"thickness", "mm, from face to face in the middle", "thickness (mm)",
      [](const Elements& all, std::size_t e) {
        const cortex::Hexahedron h = all.hexahedron(e);
        return (h.at(.5, .5, 0.) - h.at(.5, .5, 1.)).norm() / 1e3;
      }},
-    {"jacobian", "scaled Jacobian, the least",
+    {"jacobian", "scaled Jacobian, the least", "scaled Jacobian",
      [](const Elements& all, std::size_t e) { return cortex::scaled_jacobian(all.hexahedron(e)); }},
-    {"equivolume", "largest |V(0 → depth)/V − depth|", cortex::depth_error},
+    {"equivolume", "largest |V(0 → depth)/V − depth|", "equivolume error", cortex::depth_error},
 };
 
 struct Options {
@@ -130,11 +132,12 @@ void run(const Options& o, Console& console) {
     mesh.positions[first + 4] = at(.5, .5);
   });
   mesh.labels.assign(mesh.positions.size(), 0);
-  std::string text;
-  for (const double value : values)
-    for (int k = 0; k < 5; ++k) text += fmt::format("{:.6g}\n", value);
   std::vector<std::pair<fs::path, std::string>> files{{o.out, io::write_surface(mesh, o.out.string())}};
-  if (!o.values.empty()) files.emplace_back(o.values, std::move(text));
+  if (!o.values.empty()) {
+    std::vector<double> each;  // vertex
+    for (const double value : values) each.insert(each.end(), 5, value);
+    files.emplace_back(o.values, io::write_surface_values(measure->title, each));
+  }
   write_unless_there(files, o.force);
   const auto [least, most] = std::ranges::minmax(values);
   console.say(fmt::format("{} at depth {} in {}; {} ({}) from {:.4g} to {:.4g}{}",

@@ -42,8 +42,12 @@ struct Options {
   cortex::GridPicture picture;
 };
 
-std::array<int, 3> steps_of(const Options& options, const cortex::Domain& domain) {
-  const int n = options.steps ? options.steps : domain.plane ? 20 : 10;
+std::array<int, 3> steps_of(const Options& options, bool plane) {
+  constexpr int most_in_space = 200;  // eight million cells, some of which are smoothed a thousand times
+  if (!plane && options.steps > most_in_space)
+    throw Error(fmt::format("--steps {0} in space would be {0} x {0} x {0} cells; give {1} at most",
+                            options.steps, most_in_space));
+  const int n = options.steps ? options.steps : plane ? 20 : 10;
   return {n, n, n};
 }
 
@@ -83,7 +87,7 @@ void compare(const Options& options, Console& console) {
   for (const cortex::Domain& domain : cortex::domains()) {
     console.progress().advance();
     if (options.dimensions && options.dimensions != (domain.plane ? 2 : 3)) continue;
-    const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain));
+    const cortex::Grid boundary = cortex::boundary(domain, steps_of(options, domain.plane));
     std::vector<std::string> line{domain.name};
     nlohmann::ordered_json told{{"domain", domain.name}, {"dimensions", boundary.dimensions()}};
     for (const cortex::Generator& row : cortex::generators()) {
@@ -120,7 +124,7 @@ struct Block {
 Block block(const Options& options) {
   if (options.elements.empty()) {
     const cortex::Domain& domain = cortex::domain(options.domain);
-    return {domain.name, cortex::boundary(domain, steps_of(options, domain))};
+    return {domain.name, cortex::boundary(domain, steps_of(options, domain.plane))};
   }
   if (!options.domain.empty())
     throw Error(fmt::format("the block is to be '{}' and an element; give one of them", options.domain));
@@ -128,9 +132,9 @@ Block block(const Options& options) {
   if (options.element >= elements.size())
     throw Error(fmt::format("{} has elements 0 to {}, and no {}", options.elements.string(),
                             elements.size() - 1, options.element));
-  const int n = 1 + (options.steps ? options.steps : 10);
+  const auto [u, v, w] = steps_of(options, false);
   return {fmt::format("element {}", options.element),
-          cortex::sample(elements.hexahedron(options.element), {n, n, n})};
+          cortex::sample(elements.hexahedron(options.element), {u + 1, v + 1, w + 1})};
 }
 
 // Before the work.
@@ -212,8 +216,9 @@ std::function<void()> cortex_grid(CLI::App& command, Console& console) {
       ->check(CLI::IsMember(generators))
       ->capture_default_str();
   command
-      .add_option("--steps", options->steps,
-                  "Cells along each direction; by default 20 in the plane, 10 in space")
+      .add_option(
+          "--steps", options->steps,
+          "Cells along each direction; by default 20 in the plane, 10 in space, where 200 are the most")
       ->check(CLI::Range(1, 1000));
   command.add_option("--dimensions", options->dimensions, "Only the blocks of the plane (2) or of space (3)")
       ->check(CLI::IsMember({2, 3}));

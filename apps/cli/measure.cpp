@@ -28,6 +28,7 @@
 #include "apps/cli/files.h"
 #include "apps/cli/neurons.h"
 #include "apps/cli/options.h"
+#include "apps/cli/samples.h"
 #include "apps/cli/verb.h"
 
 namespace forest::cli {
@@ -129,15 +130,63 @@ Picks pick(const Options& options) {
   return picks;
 }
 
+// What tells the rows of a neuron apart.
+struct Keys {
+  std::string_view level;
+  std::vector<Column> columns;
+  std::vector<Row> (*rows)(const Arbors&);
+};
+
+Cell kind(const Arbors& arbors, const Branch& b) {
+  return std::string(name_of(arbors.neuron().section(b.id).kind));
+}
+Cell number(const Branch& b) { return double(b.id.value()); }
+
+std::vector<Row> of_arbors(const Arbors& arbors) {
+  std::vector<Row> rows;
+  for (std::size_t i = 0; i < arbors.stems().size(); ++i)
+    rows.push_back({double(i), kind(arbors, arbors.section(arbors.stems()[i]))});
+  return rows;
+}
+std::vector<Row> of_sections(const Arbors& arbors) {
+  std::vector<Row> rows;
+  for (const Branch& b : arbors.sections()) rows.push_back({number(b), kind(arbors, b)});
+  return rows;
+}
+std::vector<Row> of_bifurcations(const Arbors& arbors) {
+  std::vector<Row> rows;
+  for (const Bifurcation& b : arbors.bifurcations()) rows.push_back({number(arbors.section(b.parent))});
+  return rows;
+}
+std::vector<Row> of_points(const Arbors& arbors) {
+  std::vector<Row> rows;
+  for (const Branch& b : arbors.sections())
+    for (std::uint32_t i = 1; i < b.row_count; ++i) rows.push_back({number(b), double(i)});
+  return rows;
+}
+std::vector<Row> of_bars(const Arbors& arbors) {
+  std::vector<Row> rows;
+  const Barcodes barcodes(arbors, Filtration::path);
+  for (std::size_t i = 0; i < barcodes.size(); ++i)
+    for (std::size_t k = 0; k < barcodes.of_arbor(i).size(); ++k) rows.push_back({double(i), double(k)});
+  return rows;
+}
+std::vector<Row> as_measured(const Arbors&) { return {}; }  // how many there are the metrics say
+
+const Keys& keys_of(std::string_view level) {
+  static const std::array<Keys, 7> all{{{"neuron", {}, as_measured},
+                                        {"arbor", {{"arbor", ""}, {"kind", ""}}, of_arbors},
+                                        {"section", {{"section", ""}, {"kind", ""}}, of_sections},
+                                        {"bifurcation", {{"section", ""}}, of_bifurcations},
+                                        {"point", {{"section", ""}, {"point", ""}}, of_points},
+                                        {"shell", {{"radius", "µm"}}, as_measured},
+                                        {"bar", {{"arbor", ""}, {"bar", ""}}, of_bars}}};
+  return *std::ranges::find(all, level, &Keys::level);
+}
+
 std::vector<Column> columns(const Options& options, const Picks& picks) {
   std::vector<Column> columns{{"neuron", "", true}};
-  const auto add = [&](auto... names) { (columns.push_back({names, "", true}), ...); };
-  if (options.level == "arbor") add("arbor", "kind");
-  if (options.level == "section") add("section", "kind");
-  if (options.level == "bifurcation") add("section");
-  if (options.level == "point") add("section", "point");
-  if (options.level == "shell") columns.push_back({"radius", "µm", true});
-  if (options.level == "bar") add("arbor", "bar");
+  for (const Column& key : keys_of(options.level).columns) columns.push_back(key);
   for (const Metric* m : picks) {
     const bool brief =
         !options.metrics.empty() || options.level != "neuron" || std::ranges::count(headline, m->name);
@@ -167,23 +216,9 @@ std::vector<Row> rows(const Options& options, const Picks& picks, const std::str
     return {row};
   }
   std::vector<Row> rows;
-  const auto kind = [&](const Branch& b) { return std::string(name_of(arbors.neuron().section(b.id).kind)); };
-  if (options.level == "arbor") {
-    for (std::size_t i = 0; i < arbors.stems().size(); ++i)
-      rows.push_back({name, double(i), kind(arbors.section(arbors.stems()[i]))});
-  } else if (options.level == "section") {
-    for (const Branch& b : arbors.sections()) rows.push_back({name, double(b.id.value()), kind(b)});
-  } else if (options.level == "bifurcation") {
-    for (const Bifurcation& b : arbors.bifurcations())
-      rows.push_back({name, double(arbors.section(b.parent).id.value())});
-  } else if (options.level == "point") {
-    for (const Branch& b : arbors.sections())
-      for (std::uint32_t i = 1; i < b.row_count; ++i) rows.push_back({name, double(b.id.value()), double(i)});
-  } else if (options.level == "bar") {
-    const Barcodes barcodes(arbors, Filtration::path);
-    for (std::size_t i = 0; i < barcodes.size(); ++i)
-      for (std::size_t k = 0; k < barcodes.of_arbor(i).size(); ++k)
-        rows.push_back({name, double(i), double(k)});
+  for (const Row& keys : keys_of(options.level).rows(arbors)) {
+    rows.push_back({name});
+    rows.back().insert(rows.back().end(), keys.begin(), keys.end());
   }
   for (const Metric* m : picks) {
     const std::vector<double> values = m->values(arbors);
@@ -502,17 +537,7 @@ std::function<void()> measure(CLI::App& command, Console& console) {
       ->delimiter(',')
       ->check(
           [](const std::string& name) { return find_metric(name) ? std::string() : no_such_metric(name); });
-  command.add_option("--kind", options->kind, "Sections to measure: all, dendrite, axon, basal, apical, …")
-      ->type_name("KIND")
-      ->capture_default_str()
-      ->check([](const std::string& word) -> std::string {
-        try {
-          kind_set(word);
-          return {};
-        } catch (const Error& error) {
-          return error.what();
-        }
-      });
+  add_kind(command, options->kind);
   command
       .add_option(
           "--level", options->level,

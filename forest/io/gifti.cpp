@@ -4,7 +4,6 @@
 #include <algorithm>
 #include <array>
 #include <bit>
-#include <charconv>
 #include <cmath>
 #include <cstring>
 #include <optional>
@@ -14,6 +13,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/inflate.h"
 #include "forest/io/plain_text.h"
 
@@ -37,14 +37,10 @@ struct Array {
   std::string_view intent;
   std::size_t rows = 0, columns = 1;
   std::vector<double> numbers;  // row by row
+  std::string_view name = {};   // what its metadata call it
 };
 
-std::optional<std::uint64_t> whole(std::string_view text) {
-  std::uint64_t value = 0;
-  const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), value);
-  if (text.empty() || error != std::errc() || end != text.data() + text.size()) return {};
-  return value;
-}
+constexpr auto whole = number_of<std::uint64_t>;
 
 bool blank(char c) { return c == ' ' || c == '\t' || c == '\n' || c == '\r'; }
 
@@ -171,22 +167,23 @@ class Reader {
           rows[r * array.columns + c] = array.numbers[c * array.rows + r];
       array.numbers = std::move(rows);
     }
+    for (const pugi::xml_node& about : element.child("MetaData").children("MD"))
+      if (std::string_view(about.child_value("Name")) == "Name") array.name = about.child_value("Value");
     return array;
   }
 
   std::vector<double> numbers_of(std::string_view text, std::uint64_t count, std::string_view intent) const {
     std::vector<double> numbers;
     numbers.reserve(std::min<std::uint64_t>(count, text.size() / 2 + 1));
-    std::string word;
     for (std::size_t at = 0; at < text.size();) {
       while (at < text.size() && blank(text[at])) ++at;
       const std::size_t begin = at;
       while (at < text.size() && !blank(text[at])) ++at;
       if (at == begin) break;
-      word.assign(text.substr(begin, at - begin));
-      char* end = nullptr;
-      numbers.push_back(std::strtod(word.c_str(), &end));  // NaN and infinities, too
-      if (*end) fail(intent, fmt::format("'{}' is no number", printable(word)));
+      const std::string_view word = text.substr(begin, at - begin);
+      const auto number = number_of<double>(word);  // NaN and infinities, too
+      if (!number) fail(intent, fmt::format("'{}' is no number", printable(word)));
+      numbers.push_back(*number);
       if (numbers.size() > count) break;
     }
     if (numbers.size() != count)
@@ -286,6 +283,7 @@ SurfaceValues read_gifti_values(std::string_view text, const std::string& name) 
                                  array->columns));
   SurfaceValues result;
   result.values.assign(array->numbers.begin(), array->numbers.end());
+  result.title = array->name;
   if (array->intent == "NIFTI_INTENT_LABEL") result.labels = reader.labels();
   return result;
 }

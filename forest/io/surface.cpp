@@ -2,20 +2,26 @@
 #include "forest/io/surface.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 #include <limits>
 #include <optional>
+#include <utility>
 
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/number.h"
 #include "forest/io/freesurfer.h"
 #include "forest/io/gifti.h"
 #include "forest/io/inflate.h"
+#include "forest/io/mesh_words.h"
 #include "forest/io/obj.h"
 #include "forest/io/plain_text.h"
 #include "forest/io/ply.h"
 #include "forest/io/stl.h"
+#include "forest/io/words.h"
 
 namespace forest::io {
 namespace {
@@ -33,26 +39,25 @@ std::string_view unpacked(std::string_view bytes, std::string& place, const std:
 
 bool is_gifti(std::string_view bytes) { return first_element(bytes) == "GIFTI"; }
 
-std::optional<float> number(std::string_view word) {
-  std::string text(word);
-  char* end = nullptr;
-  const float value = std::strtof(text.c_str(), &end);
-  if (text.empty() || *end != 0) return {};
-  return value;
+// Without what a picture cannot show, and not endless.
+std::string title_in(std::string_view text) {
+  constexpr std::size_t longest = 80;
+  std::string title(trimmed(text, between_words).substr(0, longest));
+  while (title.size() == longest && (title.back() & 0xc0) == 0x80) title.pop_back();  // part of a letter
+  for (char& c : title)
+    if (static_cast<unsigned char>(c) < ' ') c = ' ';
+  return title;
 }
 
-// One number a line; empty lines are none.
+// One number a line; empty lines are none, and what stands behind # is a title where it is the first.
 SurfaceValues read_lines(std::string_view text, const std::string& name) {
   SurfaceValues result;
   for (std::size_t line = 1; !text.empty(); ++line) {
-    const std::size_t end = std::min(text.find('\n'), text.size());
-    std::string_view word = text.substr(0, end);
-    text.remove_prefix(std::min(end + 1, text.size()));
-    const auto blank = [](char c) { return c == ' ' || c == '\t' || c == '\r'; };
-    while (!word.empty() && blank(word.back())) word.remove_suffix(1);
-    while (!word.empty() && blank(word.front())) word.remove_prefix(1);
-    if (word.empty()) continue;
-    const auto value = number(word);
+    const std::string_view word = trimmed(next_line(text), between_words);
+    if (word.starts_with('#') && result.title.empty() && result.values.empty())
+      result.title = title_in(word.substr(1));
+    if (word.empty() || word.starts_with('#')) continue;
+    const auto value = number_of<float>(word);
     if (!value)
       throw InputError(name, line,
                        fmt::format("'{}' is no number; give a GIFTI or FreeSurfer file of values, or one "
@@ -61,6 +66,19 @@ SurfaceValues read_lines(std::string_view text, const std::string& name) {
     result.values.push_back(*value);
   }
   return result;
+}
+
+// FreeSurfer's files of values are called by what they hold, whose units its documentation tells.
+std::string title_of(const std::string& name) {
+  constexpr std::array<std::pair<std::string_view, std::string_view>, 5> known{
+      {{".thickness", "thickness (mm)"},
+       {".curv", "curvature (1/mm)"},
+       {".area", "area (mm²)"},
+       {".volume", "volume (mm³)"},
+       {".sulc", "sulcal depth"}}};
+  for (const auto& [ending, title] : known)
+    if (name.ends_with(ending)) return std::string(title);
+  return {};
 }
 
 }  // namespace
@@ -91,9 +109,9 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
   const std::string_view content = unpacked(bytes, place, name);
   SurfaceValues result;
   if (is_freesurfer_values(content))
-    result.values = read_freesurfer_values(content, name);
+    result = {.values = read_freesurfer_values(content, name), .title = title_of(name), .labels = {}};
   else if (is_gifti(content))
-    result = read_gifti_values(content, name);
+    result = read_gifti_values(content, name), result.title = title_in(result.title);
   else
     result = read_lines(content, name);
   if (result.values.empty())
@@ -101,6 +119,12 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
   for (float& value : result.values)
     if (!std::isfinite(value)) value = std::numeric_limits<float>::quiet_NaN();
   return result;
+}
+
+std::string write_surface_values(std::string_view title, std::span<const double> values) {
+  std::string text = fmt::format("# {}\n", title);
+  for (const double value : values) fmt::format_to(std::back_inserter(text), "{:.6g}\n", value);
+  return text;
 }
 
 std::string printable(std::string_view word) {

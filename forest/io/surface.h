@@ -6,12 +6,13 @@
 //   OBJ (obj.h)               surfaces only, of Wavefront and of the Montreal Neurological Institute
 //   PLY (ply.h), STL (stl.h)  surfaces only, as text or as bytes
 //   FreeSurfer (freesurfer.h) lh.pial, lh.white, lh.inflated; lh.curv, lh.thickness, lh.sulc, lh.area
-//   text                      values only, one a line
+//   text                      values only, one a line; behind # what they are, such as "# thickness (mm)"
 //
 // All of them measure in mm, to the right, to the front and upwards; a Mesh of this project is in µm, along the same axes.
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -30,7 +31,8 @@ struct SurfaceLabel {
 
 /// One value a vertex.
 struct SurfaceValues {
-  std::vector<float> values;         // in the unit of the file, which none of the formats names; NaN: none
+  std::vector<float> values;         // in the unit of the file; NaN: none
+  std::string title = {};            // what they are, with their unit where the file says it; may be empty
   std::vector<SurfaceLabel> labels;  // not empty: the values are keys of them
 };
 
@@ -44,6 +46,10 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
 
 /// The bytes of a file: GIFTI where the name ends in .gii, else FreeSurfer's. Coordinates are rounded to floats of mm.
 std::string write_surface(const Mesh& mesh, std::string_view file_name);
+
+/// The text of such a file.
+/// @param title  "thickness (mm)"
+std::string write_surface_values(std::string_view title, std::span<const double> values);
 
 // What readers of these formats share.
 

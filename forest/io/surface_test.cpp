@@ -355,6 +355,28 @@ TEST(Surface, ValuesAreReadFromEveryFormat) {
   EXPECT_EQ(labels.labels[0].alpha, 0.f);
 }
 
+TEST(Surface, ValuesSayWhatTheyAreWhereTheirFileDoes) {
+  const auto title = [](const std::string& bytes, const std::string& name) {
+    const SurfaceValues read = read_surface_values(bytes, name);
+    EXPECT_EQ(read.values.size(), 2u) << name;
+    return read.title;
+  };
+  EXPECT_EQ(title(write_surface_values("area (mm²)", std::array{1., 2.}), "t.txt"), "area (mm²)");
+  EXPECT_EQ(title("1\n2\n", "t.txt"), "");
+  EXPECT_EQ(title("#\n#\t depth \r\n# twice\n1\n# between\n2\n", "t.txt"), "depth");
+  EXPECT_EQ(title("1\n# late\n2\n", "t.txt"), "");
+  EXPECT_EQ(title("# a\x1b[31mb\n1\n2\n", "t.txt"), "a [31mb");
+  EXPECT_EQ(title("# " + std::string(200, 'x') + "\n1\n2\n", "t.txt"), std::string(80, 'x'));
+  EXPECT_EQ(title(freesurfer_values({1.f, 2.f}), "at/lh.thickness"), "thickness (mm)");
+  EXPECT_EQ(title(freesurfer_values({1.f, 2.f}), "lh.other"), "");
+  std::string named = gifti(array("SHAPE", "FLOAT32", "Dimensionality=\"1\" Dim0=\"2\"", "ASCII", "1 2"));
+  const std::string none = "<MetaData/>";
+  named.replace(named.find(none), none.size(),
+                "<MetaData><MD><Name>Other</Name><Value>no</Value></MD>"
+                "<MD><Name>Name</Name><Value><![CDATA[MyelinMap]]></Value></MD></MetaData>");
+  EXPECT_EQ(title(named, "g.shape.gii"), "MyelinMap");
+}
+
 TEST(Surface, EveryFileThatIsCutOffIsAnErrorOrWhole) {
   for (const std::string& whole :
        {freesurfer_surface(), gzipped(freesurfer_surface()), gifti_surface("Base64Binary"),
