@@ -66,130 +66,168 @@ struct Collapsing {
   }
 };
 
-Faces extract(const Level& level, std::vector<Triangle> triangles) {
-  const std::size_t n = level.sites.size();
-  Collapsing mesh{std::move(triangles),
-                  {},
-                  std::vector<std::vector<std::uint32_t>>(n),
-                  Unions(n),
-                  std::vector<std::uint8_t>(n, 0)};
-  mesh.alive.assign(mesh.triangles.size(), 1);
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    for (const std::uint32_t v : mesh.triangles[t]) mesh.of[v].push_back(t);
-  std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> zeros;
-  for (std::uint32_t i = 0; i < n; ++i)
-    for (std::uint32_t e = level.starts[i]; e < level.starts[i + 1]; ++e) {
-      const std::uint32_t j = level.list[e];
-      if (j < i) continue;
-      if (mesh.shared(i, j).size() == 1) mesh.border[i] = mesh.border[j] = 1;
-      const LatticeSite &a = level.sites[i], &b = level.sites[j];
-      if (step_between(a, b).isZero()) zeros.emplace_back((a.point - b.point).norm() / a.spacing, i, j);
-    }
-  std::sort(zeros.begin(), zeros.end());
-  for (int pass = 0; pass < 3; ++pass)
-    for (const auto& [distance, i, j] : zeros)
-      if (const std::uint32_t a = mesh.root(i), b = mesh.root(j); a != b) mesh.join(a, b);
+// Clusters of vertices that see the same point of their lattice, and what becomes of them.
+class Clusters {
+ public:
+  Clusters(const Level& level, std::vector<Triangle> triangles)
+      : level_(level),
+        n_(level.sites.size()),
+        mesh_{std::move(triangles),
+              {},
+              std::vector<std::vector<std::uint32_t>>(n_),
+              Unions(n_),
+              std::vector<std::uint8_t>(n_, 0)} {
+    mesh_.alive.assign(mesh_.triangles.size(), 1);
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      for (const std::uint32_t v : mesh_.triangles[t]) mesh_.of[v].push_back(t);
+  }
+
+  // Vertices whose lattices agree that no step lies between them.
+  void join_alike() {
+    std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> zeros;
+    for (std::uint32_t i = 0; i < n_; ++i)
+      for (std::uint32_t e = level_.starts[i]; e < level_.starts[i + 1]; ++e) {
+        const std::uint32_t j = level_.list[e];
+        if (j < i) continue;
+        if (mesh_.shared(i, j).size() == 1) mesh_.border[i] = mesh_.border[j] = 1;
+        const LatticeSite &a = level_.sites[i], &b = level_.sites[j];
+        if (step_between(a, b).isZero()) zeros.emplace_back((a.point - b.point).norm() / a.spacing, i, j);
+      }
+    std::sort(zeros.begin(), zeros.end());
+    for (int pass = 0; pass < 3; ++pass)
+      for (const auto& [distance, i, j] : zeros)
+        if (const std::uint32_t a = mesh_.root(i), b = mesh_.root(j); a != b) mesh_.join(a, b);
+  }
 
   // Where the vertices of a cluster see their common point, the nearer the more.
-  std::vector<Place> places(n, Place::Zero()), normals(n, Place::Zero()), arms(n, Place::Zero());
-  std::vector<double> weights(n, 0.), spacings(n, 0.);
-  std::vector<double> nearest(n, 1e300);
-  std::vector<std::optional<Pass>> valley(n);
-  for (std::uint32_t i = 0; i < n; ++i) {
-    const LatticeSite& s = level.sites[i];
-    const std::uint32_t r = mesh.root(i);
-    const double d = (s.point - s.at).norm() / s.spacing,
-                 w = (s.area + 1.) * std::exp(-9. * std::min(d * d, 4.));
-    places[r] += w * s.point, normals[r] += w * s.normal, spacings[r] += w * s.spacing, weights[r] += w;
-    if (d < nearest[r]) nearest[r] = d, arms[r] = s.along;
-    if (s.line && s.line->kind == Line::Kind::valley &&
-        (!valley[r] || (s.line->at - s.point).norm() < (valley[r]->at - places[r] / weights[r]).norm()))
-      valley[r] = s.line;
+  void place() {
+    places_.assign(n_, Place::Zero()), normals_ = arms_ = places_;
+    weights_.assign(n_, 0.), spacings_.assign(n_, 0.), valley_.assign(n_, std::nullopt);
+    std::vector<double> nearest(n_, 1e300);
+    for (std::uint32_t i = 0; i < n_; ++i) {
+      const LatticeSite& s = level_.sites[i];
+      const std::uint32_t r = mesh_.root(i);
+      const double d = (s.point - s.at).norm() / s.spacing,
+                   w = (s.area + 1.) * std::exp(-9. * std::min(d * d, 4.));
+      places_[r] += w * s.point, normals_[r] += w * s.normal, spacings_[r] += w * s.spacing, weights_[r] += w;
+      if (d < nearest[r]) nearest[r] = d, arms_[r] = s.along;
+      if (s.line && s.line->kind == Line::Kind::valley &&
+          (!valley_[r] || (s.line->at - s.point).norm() < (valley_[r]->at - places_[r] / weights_[r]).norm()))
+        valley_[r] = s.line;
+    }
+    for (std::uint32_t r = 0; r < n_; ++r)
+      if (weights_[r] > 0.) places_[r] /= weights_[r], spacings_[r] /= weights_[r], normals_[r].normalize();
   }
-  for (std::uint32_t r = 0; r < n; ++r)
-    if (weights[r] > 0.) places[r] /= weights[r], spacings[r] /= weights[r], normals[r].normalize();
 
   // What the lattices could not agree on: vertices far too near to one another.
-  std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> shorts;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    if (mesh.alive[t])
-      for (std::size_t e = 0; e < 3; ++e) {
-        const std::uint32_t a = mesh.triangles[t][e], b = mesh.triangles[t][(e + 1) % 3];
-        const double share = (places[a] - places[b]).norm() / (.5 * (spacings[a] + spacings[b]));
-        if (a < b && share < .5) shorts.emplace_back(share, a, b);
-      }
-  std::sort(shorts.begin(), shorts.end());
-  constexpr std::size_t most_around = 8;  // triangles of a vertex
-  for (const auto& [share, i, j] : shorts) {
-    const std::uint32_t a = mesh.root(i), b = mesh.root(j);
-    if (a == b) continue;
-    if ((places[a] - places[b]).norm() > .6 * (.5 * (spacings[a] + spacings[b]))) continue;
-    const Place middle = (weights[a] * places[a] + weights[b] * places[b]) / (weights[a] + weights[b]);
-    if (mesh.of[a].size() + mesh.of[b].size() > most_around + 4) continue;
-    if (!mesh.join(a, b)) continue;
-    places[a] = middle, weights[a] += weights[b];
-    if (!valley[a]) valley[a] = valley[b];
+  void join_near() {
+    std::vector<std::tuple<double, std::uint32_t, std::uint32_t>> shorts;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      if (mesh_.alive[t])
+        for (std::size_t e = 0; e < 3; ++e) {
+          const std::uint32_t a = mesh_.triangles[t][e], b = mesh_.triangles[t][(e + 1) % 3];
+          const double share = (places_[a] - places_[b]).norm() / (.5 * (spacings_[a] + spacings_[b]));
+          if (a < b && share < .5) shorts.emplace_back(share, a, b);
+        }
+    std::sort(shorts.begin(), shorts.end());
+    constexpr std::size_t most_around = 8;  // triangles of a vertex
+    for (const auto& [share, i, j] : shorts) {
+      const std::uint32_t a = mesh_.root(i), b = mesh_.root(j);
+      if (a == b) continue;
+      if ((places_[a] - places_[b]).norm() > .6 * (.5 * (spacings_[a] + spacings_[b]))) continue;
+      const Place middle =
+          (weights_[a] * places_[a] + weights_[b] * places_[b]) / (weights_[a] + weights_[b]);
+      if (mesh_.of[a].size() + mesh_.of[b].size() > most_around + 4) continue;
+      if (!mesh_.join(a, b)) continue;
+      places_[a] = middle, weights_[a] += weights_[b];
+      if (!valley_[a]) valley_[a] = valley_[b];
+    }
   }
 
-  // Pairs of triangles across the edges that run most diagonally through the lattice.
+  // Two triangles each become a quadrilateral, the best first.
+  Faces paired() {
+    Faces result;
+    std::vector<std::uint32_t> number(n_, ~0u);
+    const auto vertex = [&](std::uint32_t v) {
+      if (number[v] == ~0u) {
+        number[v] = std::uint32_t(result.places.size());
+        Place at = places_[v];
+        const bool on = valley_[v] && (valley_[v]->at - at).norm() < .4 * spacings_[v];
+        if (on) at = valley_[v]->at + valley_[v]->along * valley_[v]->along.dot(at - valley_[v]->at);
+        result.places.push_back(at), result.on_valley.push_back(on);
+      }
+      return number[v];
+    };
+    for (const Pair& p : pairs())
+      if (mesh_.alive[p.one] && mesh_.alive[p.other]) {
+        mesh_.alive[p.one] = mesh_.alive[p.other] = 0;
+        result.faces.push_back({vertex(p.a), vertex(p.b), vertex(p.c), vertex(p.d)});
+      }
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t)
+      if (mesh_.alive[t])
+        result.faces.push_back(
+            {vertex(mesh_.triangles[t][0]), vertex(mesh_.triangles[t][1]), vertex(mesh_.triangles[t][2])});
+    return result;
+  }
+
+ private:
   struct Pair {
     double score;
     std::uint32_t one, other, a, b, c, d;  // a–c is the edge that goes, a b c d the quadrilateral
   };
-  std::vector<Pair> pairs;
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t) {
-    if (!mesh.alive[t]) continue;
-    for (std::size_t e = 0; e < 3; ++e) {
-      const std::uint32_t c = mesh.triangles[t][e], a = mesh.triangles[t][(e + 1) % 3],
-                          b = mesh.triangles[t][(e + 2) % 3];
-      const auto both = mesh.shared(a, c);
-      if (both.size() != 2) continue;
-      const std::uint32_t other = both[0] == t ? both[1] : both[0];
-      if (other < t) continue;
-      std::uint32_t d = 0;
-      for (const std::uint32_t v : mesh.triangles[other])
-        if (v != a && v != c) d = v;
-      if (d == b) continue;
-      const Place normal = (normals[a] + normals[b] + normals[c] + normals[d]).normalized();
-      const auto diagonal = [&](std::uint32_t v) {
-        const Place way = places[c] - places[a], up = normals[v].cross(arms[v]);
-        return std::abs(std::sin(2. * std::atan2(way.dot(up), way.dot(arms[v]))));
-      };
-      double worst = 1.;
-      const std::array<std::uint32_t, 4> corners{a, b, c, d};
-      for (std::size_t k = 0; k < 4; ++k) {
-        const Place in = (places[corners[k]] - places[corners[(k + 3) % 4]]).normalized();
-        const Place out = (places[corners[(k + 1) % 4]] - places[corners[k]]).normalized();
-        worst = std::min(worst, in.cross(out).dot(normal));
+
+  // Pairs of triangles across the edges that run most diagonally through the lattice.
+  std::vector<Pair> pairs() const {
+    std::vector<Pair> pairs;
+    for (std::uint32_t t = 0; t < mesh_.triangles.size(); ++t) {
+      if (!mesh_.alive[t]) continue;
+      for (std::size_t e = 0; e < 3; ++e) {
+        const std::uint32_t c = mesh_.triangles[t][e], a = mesh_.triangles[t][(e + 1) % 3],
+                            b = mesh_.triangles[t][(e + 2) % 3];
+        const auto both = mesh_.shared(a, c);
+        if (both.size() != 2) continue;
+        const std::uint32_t other = both[0] == t ? both[1] : both[0];
+        if (other < t) continue;
+        std::uint32_t d = 0;
+        for (const std::uint32_t v : mesh_.triangles[other])
+          if (v != a && v != c) d = v;
+        if (d == b) continue;
+        const Place normal = (normals_[a] + normals_[b] + normals_[c] + normals_[d]).normalized();
+        const auto diagonal = [&](std::uint32_t v) {
+          const Place way = places_[c] - places_[a], up = normals_[v].cross(arms_[v]);
+          return std::abs(std::sin(2. * std::atan2(way.dot(up), way.dot(arms_[v]))));
+        };
+        double worst = 1.;
+        const std::array<std::uint32_t, 4> corners{a, b, c, d};
+        for (std::size_t k = 0; k < 4; ++k) {
+          const Place in = (places_[corners[k]] - places_[corners[(k + 3) % 4]]).normalized();
+          const Place out = (places_[corners[(k + 1) % 4]] - places_[corners[k]]).normalized();
+          worst = std::min(worst, in.cross(out).dot(normal));
+        }
+        if (worst > .25) pairs.push_back({worst * (.2 + diagonal(a) + diagonal(c)), t, other, a, b, c, d});
       }
-      if (worst > .25) pairs.push_back({worst * (.2 + diagonal(a) + diagonal(c)), t, other, a, b, c, d});
     }
+    std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) {
+      return std::tuple(-p.score, p.one, p.other) < std::tuple(-q.score, q.one, q.other);
+    });
+    return pairs;
   }
-  std::sort(pairs.begin(), pairs.end(), [](const Pair& p, const Pair& q) {
-    return std::tuple(-p.score, p.one, p.other) < std::tuple(-q.score, q.one, q.other);
-  });
-  Faces result;
-  std::vector<std::uint32_t> number(n, ~0u);
-  const auto vertex = [&](std::uint32_t v) {
-    if (number[v] == ~0u) {
-      number[v] = std::uint32_t(result.places.size());
-      Place at = places[v];
-      const bool on = valley[v] && (valley[v]->at - at).norm() < .4 * spacings[v];
-      if (on) at = valley[v]->at + valley[v]->along * valley[v]->along.dot(at - valley[v]->at);
-      result.places.push_back(at), result.on_valley.push_back(on);
-    }
-    return number[v];
-  };
-  for (const Pair& p : pairs)
-    if (mesh.alive[p.one] && mesh.alive[p.other]) {
-      mesh.alive[p.one] = mesh.alive[p.other] = 0;
-      result.faces.push_back({vertex(p.a), vertex(p.b), vertex(p.c), vertex(p.d)});
-    }
-  for (std::uint32_t t = 0; t < mesh.triangles.size(); ++t)
-    if (mesh.alive[t])
-      result.faces.push_back(
-          {vertex(mesh.triangles[t][0]), vertex(mesh.triangles[t][1]), vertex(mesh.triangles[t][2])});
-  return result;
+
+  const Level& level_;
+  const std::size_t n_;
+  Collapsing mesh_;
+  // Of clusters, by their root:
+  std::vector<Place> places_, normals_, arms_;
+  std::vector<double> weights_, spacings_;
+  std::vector<std::optional<Pass>> valley_;
+};
+
+Faces extract(const Level& level, std::vector<Triangle> triangles) {
+  Clusters clusters(level, std::move(triangles));
+  clusters.join_alike();
+  clusters.place();
+  clusters.join_near();
+  return clusters.paired();
 }
 
 // Vertices within, around which there are only two faces, go, and the faces become one: no such quadrilateral can be convex.

@@ -145,8 +145,31 @@ std::optional<std::uint32_t> Laplace::node(int i, int j, int k) const {
   return index < 0 ? std::nullopt : std::optional(std::uint32_t(index));
 }
 
+// Those between the surfaces, the even ones first and then the odd ones: what is even is surrounded by what is odd.
+struct Laplace::Nodes {
+  std::vector<std::array<std::uint16_t, 3>> places;
+  std::array<std::size_t, 3> colours{0, 0, 0};  // where each kind begins, and the last ends
+
+  std::size_t size() const { return places.size(); }
+  std::array<int, 3> at(std::size_t n) const { return {places[n][0], places[n][1], places[n][2]}; }
+};
+
 Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, Progress& progress)
     : spacing_(options.spacing) {
+  lay(outer, inner);
+  progress.begin("laying the lattice", 0);
+  Crossings crossings;
+  for (int axis = 0; axis < 3; ++axis)
+    crossings.along[std::size_t(axis)] = lines_along(axis, outer, inner, origin_, spacing_, counts_);
+  const Nodes nodes = number(crossings);
+  progress.end();
+  if (nodes.size() == 0)
+    throw Error("no tissue lies between the surfaces; check that the outer one encloses the inner one");
+  find_slopes(nodes, crossings, solve(nodes, crossings, options, progress));
+}
+
+// Around both surfaces.
+void Laplace::lay(const Mesh& outer, const Mesh& inner) {
   Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const Mesh* mesh : {&outer, &inner})
     for (const Vec3& p : mesh->positions)
@@ -159,19 +182,16 @@ Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, P
   for (int k = 0; k < 3; ++k) {
     const double count = std::ceil((high[k] - origin_[k]) / spacing_) + 2.;
     nodes *= count;
-    if (!(nodes < 2147483647.))
+    if (!(nodes < 2147483647.) || count > double(std::numeric_limits<std::uint16_t>::max()))
       throw Error(
           fmt::format("a lattice of {} mm would have too many nodes for surfaces of this size; give a larger "
                       "spacing, or check that the surfaces are in mm",
                       spacing_ / 1e3));
     counts_[std::size_t(k)] = int(count);
   }
+}
 
-  progress.begin("laying the lattice", 0);
-  Crossings crossings;
-  for (int axis = 0; axis < 3; ++axis)
-    crossings.along[std::size_t(axis)] = lines_along(axis, outer, inner, origin_, spacing_, counts_);
-
+Laplace::Nodes Laplace::number(const Crossings& crossings) {
   // Which nodes lie between the surfaces, by the lines along x.
   const std::size_t nx = std::size_t(counts_[0]), ny = std::size_t(counts_[1]), nz = std::size_t(counts_[2]);
   index_.assign(nx * ny * nz, -1);
@@ -185,45 +205,43 @@ Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, P
       if (within[outer_surface] > 0 && within[inner_surface] <= 0) index_[row * nx + i] = 0;
     }
   });
-  // Even nodes first, then odd ones: what is even is surrounded by what is odd.
-  std::vector<std::array<std::uint16_t, 3>> places;
-  std::array<std::size_t, 3> colours{0, 0, 0};
+  Nodes nodes;
   for (const std::size_t parity : {0u, 1u}) {
     for (std::size_t k = 0; k < nz; ++k)
       for (std::size_t j = 0; j < ny; ++j)
         for (std::size_t i = (parity + j + k) % 2; i < nx; i += 2) {
           std::int32_t& index = index_[(k * ny + j) * nx + i];
           if (index < 0) continue;
-          index = std::int32_t(places.size());
-          places.push_back({std::uint16_t(i), std::uint16_t(j), std::uint16_t(k)});
+          index = std::int32_t(nodes.size());
+          nodes.places.push_back({std::uint16_t(i), std::uint16_t(j), std::uint16_t(k)});
         }
-    colours[parity + 1] = places.size();
+    nodes.colours[parity + 1] = nodes.size();
   }
-  progress.end();
-  if (places.empty())
-    throw Error("no tissue lies between the surfaces; check that the outer one encloses the inner one");
+  return nodes;
+}
 
+// Of every node, and behind them of a surface.
+std::vector<float> Laplace::solve(const Nodes& nodes, const Crossings& crossings, const Options& options,
+                                  Progress& progress) {
   struct Row {
     std::array<std::int32_t, 6> nodes;
     std::array<float, 6> weights;  // 0 for what is a surface, whose part is in `constant`
     float constant;
   };
-  std::vector<Row> rows(places.size());
-  std::vector<float> values(places.size() + 1, .5f);
-  const auto at = [&](std::size_t n) { return std::array<int, 3>{places[n][0], places[n][1], places[n][2]}; };
-  parallel_for(places.size(), 4096, [&](std::size_t n) {
+  std::vector<Row> rows(nodes.size());
+  parallel_for(nodes.size(), 4096, [&](std::size_t n) {
     Row& row = rows[n];
     double diagonal = 0., constant = 0.;
     std::array<double, 6> weights{};
     for (std::size_t axis = 0; axis < 3; ++axis) {
-      const std::array<Link, 2> links{crossings.link(*this, at(n), int(axis), -1),
-                                      crossings.link(*this, at(n), int(axis), 1)};
+      const std::array<Link, 2> links{crossings.link(*this, nodes.at(n), int(axis), -1),
+                                      crossings.link(*this, nodes.at(n), int(axis), 1)};
       const double a = double(links[0].distance), b = double(links[1].distance);
       diagonal += 2. / (a * b);
       for (std::size_t side = 0; side < 2; ++side) {
         const double weight = 2. / ((a + b) * (side == 0 ? a : b));
         const std::size_t slot = 2 * axis + side;
-        row.nodes[slot] = links[side].node < 0 ? std::int32_t(places.size()) : links[side].node;
+        row.nodes[slot] = links[side].node < 0 ? std::int32_t(nodes.size()) : links[side].node;
         weights[slot] = links[side].node < 0 ? 0. : weight;
         if (links[side].node < 0) constant += weight * double(links[side].value);
       }
@@ -236,10 +254,11 @@ Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, P
   progress.begin("solving the field", 0);
   constexpr float over = 1.8f;
   constexpr std::size_t grain = 16384;
+  std::vector<float> values(nodes.size() + 1, .5f);
   for (rounds_ = 1; rounds_ <= options.most_rounds; ++rounds_) {
     float change = 0.f;
     for (const std::size_t parity : {0u, 1u}) {
-      const std::size_t begin = colours[parity], count = colours[parity + 1] - begin;
+      const std::size_t begin = nodes.colours[parity], count = nodes.colours[parity + 1] - begin;
       std::vector<float> changes(count / grain + 1, 0.f);
       parallel_for((count + grain - 1) / grain, 1, [&](std::size_t block) {
         float most = 0.f;
@@ -260,12 +279,15 @@ Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, P
     if (double(change) < options.tolerance) break;
   }
   progress.end();
+  return values;
+}
 
-  gradients_.resize(places.size());
-  parallel_for(places.size(), 4096, [&](std::size_t n) {
+void Laplace::find_slopes(const Nodes& nodes, const Crossings& crossings, const std::vector<float>& values) {
+  gradients_.resize(nodes.size());
+  parallel_for(nodes.size(), 4096, [&](std::size_t n) {
     for (int axis = 0; axis < 3; ++axis) {
-      const Link before = crossings.link(*this, at(n), axis, -1),
-                 behind = crossings.link(*this, at(n), axis, 1);
+      const Link before = crossings.link(*this, nodes.at(n), axis, -1),
+                 behind = crossings.link(*this, nodes.at(n), axis, 1);
       const auto value = [&](const Link& link) {
         return double(link.node < 0 ? link.value : values[std::size_t(link.node)]);
       };

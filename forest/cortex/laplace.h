@@ -32,7 +32,7 @@ class Laplace {
   };
 
   /// Both surfaces closed, triangles facing outwards, the inner one within the outer one.
-  /// Throws Error when nothing lies between them, or the lattice would have over 2³¹ nodes.
+  /// Throws Error when nothing lies between them, or the lattice would have over 2³¹ nodes, or 65,535 along an axis.
   Laplace(const Mesh& outer, const Mesh& inner, const Options& options,
           Progress& progress = Progress::none());
 
@@ -46,7 +46,13 @@ class Laplace {
 
  private:
   struct Crossings;
+  struct Nodes;
   std::optional<std::uint32_t> node(int i, int j, int k) const;
+  void lay(const Mesh& outer, const Mesh& inner);
+  Nodes number(const Crossings& crossings);
+  std::vector<float> solve(const Nodes& nodes, const Crossings& crossings, const Options& options,
+                           Progress& progress);
+  void find_slopes(const Nodes& nodes, const Crossings& crossings, const std::vector<float>& values);
 
   double spacing_;
   int rounds_ = 0;

@@ -59,151 +59,183 @@ void keep_gains(Elements& elements, std::vector<Depths> before, double least) {
     if (!(gain[pieces.root(c)] > 0.)) elements.curves[c] = before[c];
 }
 
-}  // namespace
+// The work of mend.
+class Mender {
+ public:
+  Mender(Elements& elements, const SurfaceTrees& surfaces)
+      : elements_(elements),
+        surfaces_(surfaces),
+        stars_(elements),
+        before_(elements.curves),
+        times_(elements.size(), 0),
+        rim_(by_the_wall(elements)) {}
 
-Mending mend(Elements& elements, const SurfaceTrees& surfaces, Progress& progress) {
-  const auto& [outer, inner] = surfaces;
-  constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
-  constexpr double farthest_way = 1e3;  // µm
-  Mending result;
-  const Stars stars(elements);
-  const std::vector<Depths> before = elements.curves;
-  progress.begin("untangling", 0);
-  std::vector<std::uint32_t> bad = uncertified(elements);
-  result.before = bad.size();
+  const Stars& stars() const { return stars_; }
 
-  // Not to the other bank of a sulcus or a gyrus: near, and facing the same way.
-  const auto keep_on_surface = [&](Depths& curve) {
-    constexpr double reach = 500.;
-    const Place outwards = curve[0] - curve[3];
-    if (const auto hit = outer.nearest(curve[0], reach);
-        hit && outer.normal(hit->triangle).dot(outwards) > 0.)
-      curve[0] = hit->at;
-    if (const auto hit = inner.nearest(curve[3], reach);
-        hit && inner.normal(hit->triangle).dot(outwards) > 0.)
-      curve[3] = hit->at;
-  };
   // Half way to straight sides, three quarters, … and wholly.
-  std::vector<std::uint8_t> times(elements.size(), 0);
-  const auto straighten = [&](std::uint32_t element) {
-    const double much = ++times[element] < 4 ? .5 : 1.;
-    const auto& e = elements.elements[element];
+  void straighten(std::uint32_t element) {
+    const double much = ++times_[element] < 4 ? .5 : 1.;
+    const auto& e = elements_.elements[element];
+    const auto at = [&](std::size_t k, std::size_t d) -> Place& { return elements_.curves[e[k]][d]; };
     for (const auto& side : sides)
       for (std::size_t k = 1; k < 3; ++k) {
         const double share = double(k) / 3.;
         for (std::size_t d = 0; d < 4; ++d)
-          towards(elements.curves[e[side[k]]][d], much,
-                  (1. - share) * elements.curves[e[side[0]]][d] + share * elements.curves[e[side[3]]][d]);
+          towards(at(side[k], d), much, (1. - share) * at(side[0], d) + share * at(side[3], d));
       }
     for (int j = 1; j < 3; ++j)
       for (int i = 1; i < 3; ++i) {
         const double u = i / 3., v = j / 3.;
         for (std::size_t d = 0; d < 4; ++d)
-          towards(elements.curves[e[slot(i, j)]][d], much,
-                  (1. - u) * (1. - v) * elements.curves[e[slot(0, 0)]][d] +
-                      u * (1. - v) * elements.curves[e[slot(3, 0)]][d] +
-                      (1. - u) * v * elements.curves[e[slot(0, 3)]][d] +
-                      u * v * elements.curves[e[slot(3, 3)]][d]);
+          towards(at(slot(i, j), d), much,
+                  (1. - u) * (1. - v) * at(slot(0, 0), d) + u * (1. - v) * at(slot(3, 0), d) +
+                      (1. - u) * v * at(slot(0, 3), d) + u * v * at(slot(3, 3), d));
       }
+  }
+
+  // From now on corners are moved, and worth is told in this volume.
+  void measure() {
+    double sum = 0., count = 0.;
+    for (std::size_t e = 0; e < elements_.size(); e += 1 + elements_.size() / 1000, ++count)
+      sum += elements_.hexahedron(e).volume();
+    mean_volume_ = sum / count;
+  }
+
+  // Looks for a better place of a corner: one from which the worst element around it gains.
+  void move(std::uint32_t corner, int round) {
+    const auto star = stars_.of(corner);
+    std::vector<std::uint32_t> own;  // all curves that a move of this corner may change
+    for (const std::uint32_t e : star)
+      own.insert(own.end(), elements_.elements[e].begin(), elements_.elements[e].end());
+    own = distinct(std::move(own));
+    std::vector<Depths> kept, better;
+    for (const std::uint32_t k : own) kept.push_back(elements_.curves[k]);
+    const Depths start = elements_.curves[corner], mean = mean_around(corner);
+    const double reach = (mean[1] - start[1]).norm() + .1 * (start[0] - start[3]).norm();
+    double best = worth(star);
+    Random random(1, corner, std::uint32_t(round));
+    constexpr int tries = 40;
+    for (int t = 0; t < tries; ++t) {
+      Depths next = trial(t, start, mean, rim_[corner] != 0, reach, random);
+      keep_on_surfaces(next);
+      if (!near(next, before_[corner])) continue;
+      elements_.curves[corner] = next;
+      for (const std::uint32_t e : star) times_[e] = 4, straighten(e);
+      if (const double now = worth(star); now > best) {
+        best = now, better.clear();
+        for (const std::uint32_t k : own) better.push_back(elements_.curves[k]);
+      }
+      for (std::size_t k = 0; k < own.size(); ++k) elements_.curves[own[k]] = kept[k];
+    }
+    for (std::size_t k = 0; k < better.size(); ++k) elements_.curves[own[k]] = better[k];
+  }
+
+ private:
+  // Of the corners beside it.
+  Depths mean_around(std::uint32_t corner) const {
+    Depths mean{Place::Zero(), Place::Zero(), Place::Zero(), Place::Zero()};
+    double count = 0.;
+    for (const std::uint32_t e : stars_.of(corner)) {
+      const auto at = elements_.corners_of(e);
+      const std::size_t k = std::size_t(std::find(at.begin(), at.end(), corner) - at.begin());
+      for (const std::size_t other : {k ^ 1u, k ^ 2u}) {
+        for (std::size_t d = 0; d < 4; ++d) mean[d] += elements_.curves[at[other]][d];
+        count += 1.;
+      }
+    }
+    for (std::size_t d = 0; d < 4; ++d) mean[d] /= count;
+    return mean;
+  }
+
+  // First towards the mean (but on the rim), then less bent from depth to depth, then by chance.
+  static Depths trial(int t, const Depths& start, const Depths& mean, bool on_rim, double reach,
+                      Random& random) {
+    Depths next = start;
+    if (t < 4 && !on_rim) {
+      for (std::size_t d = 0; d < 4; ++d) towards(next[d], .25 * double(t + 1), mean[d]);
+    } else if (t < 7) {
+      const Place one = (2. * next[0] + next[3]) / 3., two = (next[0] + 2. * next[3]) / 3.;
+      if (t == 4) calm(next[0], next[1], next[2], next[3]);
+      const double much = t == 5 ? .5 : t == 6 ? 1. : 0.;
+      towards(next[1], much, one), towards(next[2], much, two);
+    } else {
+      const Place way(random.normal(), random.normal(), random.normal());
+      const Place turn(random.normal(), random.normal(), random.normal());
+      // All depths alike and turned, or only some: those near one surface, or a single one.
+      const std::size_t first = t % 3 == 0 ? 0 : std::size_t(random.below(4));
+      const std::size_t last = t % 3 == 0 ? 3 : t % 3 == 1 ? first : first < 2 ? 1 : 3;
+      const double size = (t & 1) ? .15 : .04;
+      for (std::size_t d = std::min(first, last); d <= last; ++d)
+        next[d] += size * reach * (way + (double(d) / 1.5 - 1.) * turn);
+    }
+    return next;
+  }
+
+  // Not on the other bank of a sulcus or a gyrus: near, and facing the same way.
+  void keep_on_surfaces(Depths& curve) const {
+    constexpr double reach = 500.;
+    const Place outwards = curve[0] - curve[3];
+    for (const auto& [surface, end] :
+         {std::pair{&surfaces_.outer, std::size_t(0)}, {&surfaces_.inner, std::size_t(3)}})
+      if (const auto hit = surface->nearest(curve[end], reach);
+          hit && surface->normal(hit->triangle).dot(outwards) > 0.)
+        curve[end] = hit->at;
+  }
+
+  static bool near(const Depths& one, const Depths& other) {
+    constexpr double farthest_way = 1e3;  // µm
+    for (std::size_t d = 0; d < 4; ++d)
+      if (!((one[d] - other[d]).norm() < farthest_way)) return false;
+    return true;
+  }
+
+  double worth(std::span<const std::uint32_t> star) const {
+    double least = 1e300;
+    for (const std::uint32_t e : star) {
+      const Hexahedron h = elements_.hexahedron(e);
+      const Coefficients c = determinant(h);
+      least = std::min(
+          least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume_));
+    }
+    return least;
+  }
+
+  Elements& elements_;
+  const SurfaceTrees& surfaces_;
+  const Stars stars_;
+  const std::vector<Depths> before_;
+  std::vector<std::uint8_t> times_;  // that each element was straightened
+  const std::vector<std::uint8_t> rim_;
+  double mean_volume_ = 0.;
+};
+
+}  // namespace
+
+Mending mend(Elements& elements, const SurfaceTrees& surfaces, Progress& progress) {
+  constexpr int rounds_of_sides = 6, rounds_of_corners = 80;
+  progress.begin("untangling", 0);
+  Mender mender(elements, surfaces);
+  const auto spread = [&](std::span<const std::uint32_t> list) {
+    return widened(elements, mender.stars(), list);
   };
-  const auto spread = [&](std::span<const std::uint32_t> list) { return widened(elements, stars, list); };
+  std::vector<std::uint32_t> bad = uncertified(elements);
+  Mending result;
+  result.before = bad.size();
   for (int round = 0; round < rounds_of_sides && !bad.empty(); ++round) {
-    for (const std::uint32_t e : bad) straighten(e);
+    for (const std::uint32_t e : bad) mender.straighten(e);
     bad = uncertified(elements, spread(bad));
     progress.advance();
   }
-
-  // What is left is few: corners look for a better place each, as long as the worst element around them gains.
-  const std::vector<std::uint8_t> rim = by_the_wall(elements);
-  const double mean_volume = [&] {
-    double sum = 0., count = 0.;
-    for (std::size_t e = 0; e < elements.size(); e += 1 + elements.size() / 1000, ++count)
-      sum += elements.hexahedron(e).volume();
-    return sum / count;
-  }();
-  const auto worth = [&](std::span<const std::uint32_t> star) {
-    double least = 1e300;
-    for (const std::uint32_t e : star) {
-      const Hexahedron h = elements.hexahedron(e);
-      const Coefficients c = determinant(h);
-      least = std::min(
-          least, *std::min_element(c.begin(), c.end()) / std::max(std::abs(h.volume()), .1 * mean_volume));
-    }
-    return least;
-  };
+  // What is left is few: corners look for a better place each.
+  mender.measure();
   for (int round = 0; round < rounds_of_corners && !bad.empty(); ++round) {
     for (const std::uint32_t e : bad)
-      straighten(e);  // a neighbour's sides became straight, and its own inside is not
+      mender.straighten(e);  // a neighbour's sides became straight, and its own inside is not
     bad = uncertified(elements, spread(bad));
     std::vector<std::uint32_t> corners;
     for (const std::uint32_t e : bad)
       for (const std::uint32_t c : elements.corners_of(e)) corners.push_back(c);
-    for (const std::uint32_t c : distinct(std::move(corners))) {
-      const auto star = stars.of(c);
-      std::vector<std::uint32_t> own;  // all curves that a move of this corner may change
-      for (const std::uint32_t e : star)
-        own.insert(own.end(), elements.elements[e].begin(), elements.elements[e].end());
-      own = distinct(std::move(own));
-      std::vector<Depths> kept;
-      for (const std::uint32_t k : own) kept.push_back(elements.curves[k]);
-      const Depths start = elements.curves[c];
-      double best = worth(star);
-      Depths mean{Place::Zero(), Place::Zero(), Place::Zero(), Place::Zero()};
-      double count = 0.;
-      for (const std::uint32_t e : star) {
-        const auto at = elements.corners_of(e);
-        const std::size_t k = std::size_t(std::find(at.begin(), at.end(), c) - at.begin());
-        for (const std::size_t other : {k ^ 1u, k ^ 2u}) {
-          for (std::size_t d = 0; d < 4; ++d) mean[d] += elements.curves[at[other]][d];
-          count += 1.;
-        }
-      }
-      for (std::size_t d = 0; d < 4; ++d) mean[d] /= count;
-      const double reach = (mean[1] - start[1]).norm() + .1 * (start[0] - start[3]).norm();
-      Random random(1, c, std::uint32_t(round));
-      std::vector<Depths> better;
-      constexpr int tries = 40;
-      for (int t = 0; t < tries; ++t) {
-        Depths next = start;
-        if (t < 4 && !rim[c])
-          for (std::size_t d = 0; d < 4; ++d) towards(next[d], .25 * double(t + 1), mean[d]);
-        else if (t < 7) {  // less bent from depth to depth
-          const Place one = (2. * next[0] + next[3]) / 3., two = (next[0] + 2. * next[3]) / 3.;
-          if (t == 4) calm(next[0], next[1], next[2], next[3]);
-          towards(next[1],
-                  t == 5   ? .5
-                  : t == 6 ? 1.
-                           : 0.,
-                  one),
-              towards(next[2],
-                      t == 5   ? .5
-                      : t == 6 ? 1.
-                               : 0.,
-                      two);
-        } else {
-          const Place way(random.normal(), random.normal(), random.normal());
-          const Place turn(random.normal(), random.normal(), random.normal());
-          // All depths alike and turned, or only some: those near one surface, or a single one.
-          const std::size_t first = t % 3 == 0 ? 0 : std::size_t(random.below(4));
-          const std::size_t last = t % 3 == 0 ? 3 : t % 3 == 1 ? first : first < 2 ? 1 : 3;
-          const double size = (t & 1) ? .15 : .04;
-          for (std::size_t d = std::min(first, last); d <= last; ++d)
-            next[d] += size * reach * (way + (double(d) / 1.5 - 1.) * turn);
-        }
-        keep_on_surface(next);
-        bool near = true;
-        for (std::size_t d = 0; d < 4; ++d) near = near && (next[d] - before[c][d]).norm() < farthest_way;
-        if (!near) continue;
-        elements.curves[c] = next;
-        for (const std::uint32_t e : star) times[e] = 4, straighten(e);
-        if (const double now = worth(star); now > best) {
-          best = now, better.clear();
-          for (const std::uint32_t k : own) better.push_back(elements.curves[k]);
-        }
-        for (std::size_t k = 0; k < own.size(); ++k) elements.curves[own[k]] = kept[k];
-      }
-      for (std::size_t k = 0; k < better.size(); ++k) elements.curves[own[k]] = better[k];
-    }
+    for (const std::uint32_t c : distinct(std::move(corners))) mender.move(c, round);
     bad = uncertified(elements, spread(spread(bad)));  // sides of the stars' rims changed, too
     progress.advance();
   }
