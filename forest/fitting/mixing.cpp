@@ -136,8 +136,8 @@ double apart(const Cell& one, const Cell& other) {
   double sum = 0.;
   for (const auto& [kind, of] : one.kinds) {
     const auto found = other.kinds.find(kind);
-    for (std::size_t s = 0; s < styles; ++s)
-      if (s < slope || s > kinks)
+    for (std::size_t s = 0; s < trait::count; ++s)
+      if (s < trait::slope || s > trait::kinks)
         sum += std::pow(of.style[s] - (found == other.kinds.end() ? 0. : found->second.style[s]), 2);
   }
   return sum;
@@ -160,7 +160,7 @@ std::vector<std::size_t> most_alike(const std::vector<Cell>& cells, std::size_t 
 double deeper(const Cell& one, const Cell& other) {
   for (const auto& [kind, of] : one.kinds)
     if (const auto found = other.kinds.find(kind); found != other.kinds.end())
-      return of.style[depth] - found->second.style[depth];
+      return of.style[trait::depth] - found->second.style[trait::depth];
   return 0.;
 }
 

@@ -225,13 +225,13 @@ class Writer {
          const Resampling& options, const Seldom& seldom, const Tuning& tuning)
       : traced_(traced), options_(options), seldom_(seldom), tuning_(tuning), mixed_(mixed) {
     // How finely a neuron was traced is the same all over it; how unevenly steep its steps are no factor makes up for.
-    for (std::size_t s = 0; s < styles; ++s)
+    for (std::size_t s = 0; s < trait::count; ++s)
       kernels_ += fmt::format(", {} ~ {:.2g}", style_names[s],
-                              s == grain    ? .2 * options.style
-                              : s == stairs ? .25 * habits_of_many(options.tracer, traced.cells.size())
-                              : s == kinks  ? habits_of_many(options.tracer, traced.cells.size())
-                              : habit(s)    ? options.tracer
-                                            : options.style);
+                              s == trait::grain    ? .2 * options.style
+                              : s == trait::stairs ? .25 * habits_of_many(options.tracer, traced.cells.size())
+                              : s == trait::kinks  ? habits_of_many(options.tracer, traced.cells.size())
+                              : habit(s)           ? options.tracer
+                                                   : options.style);
     cells();
     gauges();
     styles_of_cells();
@@ -378,7 +378,7 @@ sample alike(cell =, rank = -> cell) =)");
   void differ(const Cell& one, const Cell& other) {
     for (const auto& [kind, of] : one.kinds)
       if (const auto found = other.kinds.find(kind); found != other.kinds.end())
-        for (std::size_t s = 0; s < styles; ++s, differences_ += 1.)
+        for (std::size_t s = 0; s < trait::count; ++s, differences_ += 1.)
           squares_ += std::pow(of.style[s] - found->second.style[s], 2);
   }
   double stray() const {
@@ -558,18 +558,20 @@ cell thin_as = cells.thin_as(me)
 function own(mine, one_s, other_s) = kept * (mine + stray * (one_s - other_s))
 )",
         traced_.cells.size());
-    for (const auto& [name, style] :
-         {std::pair{"forks", number}, {"extent", extent}, {"girth", girth}, {"slope", slope}}) {
+    for (const auto& [name, style] : {std::pair{"forks", trait::forks},
+                                      {"extent", trait::extent},
+                                      {"girth", trait::girth},
+                                      {"slope", trait::slope}}) {
       const std::size_t of = style;
       table(fmt::format("sd_{}", name), traced_.deviations,
             [&](const Style& sd) { return std::min(sd[of], most_deviation); });
     }
-    table("mean_slope", traced_.means, [](const Style& mean) { return mean[slope]; });
+    table("mean_slope", traced_.means, [](const Style& mean) { return mean[trait::slope]; });
     std::string style;
-    for (std::size_t i = 0; i < styles; ++i)
+    for (std::size_t i = 0; i < trait::count; ++i)
       style += fmt::format(
-          fmt::runtime(i == girth || i == thinning ? "{1}{0} = styles.{0}(u)"
-                       : of_dealt(i)               ? "{1}{0} = styles.{0}(t)"
+          fmt::runtime(i == trait::girth || i == trait::thinning ? "{1}{0} = styles.{0}(u)"
+                       : of_dealt(i)                             ? "{1}{0} = styles.{0}(t)"
                                      : "{1}{0} = own(styles.{0}(s), styles.{0}(u), styles.{0}(v))"),
           style_names[i],
           !i      ? ""

@@ -24,8 +24,8 @@ std::vector<double> description(const Traced& traced, std::span<const Mixed> mix
   std::vector<double> all;
   for (const auto& [kind, unused] : traced.deviations) {
     const std::size_t stems_of = kind == int(SectionKind::basal) ? of.basal_as : of.others_as;
-    for (std::size_t s = 0; s < styles; ++s) {
-      const bool thickness = s == girth || s == thinning;
+    for (std::size_t s = 0; s < trait::count; ++s) {
+      const bool thickness = s == trait::girth || s == trait::thinning;
       const auto& kinds = traced.cells[of_dealt(s) ? neuron : thickness ? of.thin_as : stems_of].kinds;
       const auto found = kinds.find(kind);
       all.push_back(found == kinds.end() ? 0. : found->second.style[s]);

@@ -244,7 +244,7 @@ struct Learner {
 
   std::map<int, Manner> manners() const {
     struct Sums {
-      std::array<std::vector<double>, styles> values;
+      std::array<std::vector<double>, trait::count> values;
       double farthest = 0., sections = 0., thinnest = INFINITY, widest = 0.;
     };
     std::map<int, Sums> by_kind;
@@ -264,7 +264,7 @@ struct Learner {
       const auto mean_of = [&](std::size_t s) {
         return of.values[s].empty() ? 0. : statistics::mean(of.values[s]);
       };
-      std::vector<double> elevations = of.values[stairs];
+      std::vector<double> elevations = of.values[trait::stairs];
       constexpr double as_level = 1e-4, flat = .02;  // radians
       const auto level = std::ranges::remove_if(elevations, [](double e) { return e < as_level; });
       if (!elevations.empty()) manner.level = double(level.size()) / double(elevations.size());
@@ -273,20 +273,21 @@ struct Learner {
         const statistics::Summary climbs = statistics::summarize(elevations);
         manner.stairs = std::max(manner.stairs, climbs.sd / std::max(flat, climbs.mean));
       }
-      if (of.values[slope].size() > 1) {
-        const statistics::Summary slopes = statistics::summarize(of.values[slope]);
+      if (of.values[trait::slope].size() > 1) {
+        const statistics::Summary slopes = statistics::summarize(of.values[trait::slope]);
         manner.uneven = std::max(manner.uneven, slopes.sd / std::max(flat, slopes.mean));
       }
-      const double turn = std::max(manner.turn, mean_of(kinks));
-      for (const std::size_t s : {stairs, kinks})  // not their mean: how much they differ
+      const double turn = std::max(manner.turn, mean_of(trait::kinks));
+      for (const std::size_t s : {trait::stairs, trait::kinks})  // not their mean: how much they differ
         of.values[s] = {of.values[s].size() > 1 ? statistics::summarize(of.values[s]).sd : 0.};
-      of.values[extent] = {std::log(1. + of.farthest)}, of.values[number] = {std::log(of.sections)};
-      for (std::size_t s = 0; s < styles; ++s) manner.style[s] = mean_of(s);
+      of.values[trait::extent] = {std::log(1. + of.farthest)},
+      of.values[trait::forks] = {std::log(of.sections)};
+      for (std::size_t s = 0; s < trait::count; ++s) manner.style[s] = mean_of(s);
       manner.thinnest = of.widest > 0. ? of.thinnest : 0.;  // without diameters: none
       manner.farthest = of.farthest;
-      manner.winding = std::max(.01, manner.style[wander]);
+      manner.winding = std::max(.01, manner.style[trait::wander]);
       manner.turn = turn;
-      manner.kinks = std::max(manner.kinks, manner.style[kinks] / turn);
+      manner.kinks = std::max(manner.kinks, manner.style[trait::kinks] / turn);
       manner.spines = spines_of(kind);
     }
     return manners;
@@ -313,28 +314,28 @@ struct Learner {
             .spread = logarithms.size() > 1 ? statistics::summarize(logarithms).sd : 0.};
   }
 
-  void measure(std::uint32_t i, std::array<std::vector<double>, styles>& values) const {
+  void measure(std::uint32_t i, std::array<std::vector<double>, trait::count>& values) const {
     constexpr double straight = 10.;  // µm: shorter ones tell nothing of how they wind
     const Branch& b = all[i];
     const Vec3 chord = points(i).back().position() - points(i).front().position();
     const double across = double(chord.norm());
-    values[reach].push_back(std::log(b.length));
-    if (b.length > straight && across > 0.) values[wander].push_back(std::log(b.length / across));
-    values[girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
-    values[grain].push_back(std::log(b.length / double(points(i).size() - 1)));
-    values[slope].push_back(slope_of(points(i)));
-    add_elevations(points(i), values[stairs]);
-    const std::size_t known = values[kinks].size();
-    add_turns(points(i), values[kinks]);
-    if (const auto turns = std::span(values[kinks]).subspan(known); !turns.empty())
-      values[kink].push_back(statistics::mean(turns));
-    values[depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
+    values[trait::reach].push_back(std::log(b.length));
+    if (b.length > straight && across > 0.) values[trait::wander].push_back(std::log(b.length / across));
+    values[trait::girth].push_back(std::log(diameter_of(points(i)[points(i).size() / 2])));
+    values[trait::grain].push_back(std::log(b.length / double(points(i).size() - 1)));
+    values[trait::slope].push_back(slope_of(points(i)));
+    add_elevations(points(i), values[trait::stairs]);
+    const std::size_t known = values[trait::kinks].size();
+    add_turns(points(i), values[trait::kinks]);
+    if (const auto turns = std::span(values[trait::kinks]).subspan(known); !turns.empty())
+      values[trait::kink].push_back(statistics::mean(turns));
+    values[trait::depth].push_back(std::log(1. + std::abs(double(points(i).back().z - soma.z()))));
     if (above(i) < 0) return;
     const auto before = points(std::uint32_t(above(i)));
     if (across > 0.)
-      values[spread].push_back(
+      values[trait::spread].push_back(
           std::acos(std::clamp(double(end_heading(before).dot(chord)) / across, -1., 1.)));
-    values[thinning].push_back(std::log(diameter_of(points(i)[1]) / diameter_of(before.back())));
+    values[trait::thinning].push_back(std::log(diameter_of(points(i)[1]) / diameter_of(before.back())));
   }
 };
 // In standard deviations from the mean of all neurons.
@@ -343,7 +344,7 @@ void standardise(Traced& traced) {
   for (Cell& c : traced.cells)
     for (auto& [kind, of] : c.kinds) by_kind[kind].push_back(&of.style);
   for (const auto& [kind, of] : by_kind)
-    for (std::size_t s = 0; s < styles; ++s) {
+    for (std::size_t s = 0; s < trait::count; ++s) {
       std::vector<double> values;
       for (const Style* style : of) values.push_back((*style)[s]);
       const double mean = statistics::mean(values), measured = statistics::summarize(values).sd;

@@ -21,7 +21,8 @@ namespace forest::fitting {
 
 // What sets the branches of one neuron apart from those of another, and the names that the grammar gives it. Stairs and kinks are how
 // much its segments differ in how steep they are, and the angles between them.
-enum {
+namespace trait {
+enum : std::size_t {
   reach,
   wander,
   girth,
@@ -34,17 +35,18 @@ enum {
   spread,
   thinning,
   extent,
-  number,
-  styles
+  forks,
+  count
 };
-inline constexpr std::array<const char*, styles> style_names{"reach",    "wander", "girth", "grain", "slope",
-                                                             "kink",     "stairs", "kinks", "depth", "spread",
-                                                             "thinning", "extent", "forks"};
+}
+inline constexpr std::array<const char*, trait::count> style_names{
+    "reach", "wander", "girth",  "grain",    "slope",  "kink", "stairs",
+    "kinks", "depth",  "spread", "thinning", "extent", "forks"};
 // What is a tracer's habit rather than a neuron's.
-constexpr bool habit(std::size_t style) { return style >= grain && style <= kinks; }
+constexpr bool habit(std::size_t style) { return style >= trait::grain && style <= trait::kinks; }
 // What a grown neuron has of the neuron that was dealt, whose soma and tracer it has, and not of the mate or the third.
-constexpr bool of_dealt(std::size_t style) { return style == wander || habit(style); }
-using Style = std::array<double, styles>;
+constexpr bool of_dealt(std::size_t style) { return style == trait::wander || habit(style); }
+using Style = std::array<double, trait::count>;
 
 inline constexpr double least_diameter = .05;  // µm: where none was measured
 inline constexpr double least_length = .05;    // µm: so that none has a logarithm

@@ -24,12 +24,13 @@ struct Knob {
   const char* says;
 };
 inline constexpr std::array knobs{
-    Knob{"wide", spread, 1., .35, "how far the middle of a fork's tips stands beside the branch before"},
-    Knob{"straighter", wander, .95, .15, "how far they bend from their chord"},
-    Knob{"kinked", kink, 1., .2, "how large the angles between steps are"},
-    Knob{"rugged", stairs, 1., .4, "how unevenly steep steps are"},
-    Knob{"climb", slope, 1., .3, "how steep they are"},
-    Knob{"deep", depth, 1., .4, "how far along z from the soma the middle of their tips is sought"},
+    Knob{"wide", trait::spread, 1., .35,
+         "how far the middle of a fork's tips stands beside the branch before"},
+    Knob{"straighter", trait::wander, .95, .15, "how far they bend from their chord"},
+    Knob{"kinked", trait::kink, 1., .2, "how large the angles between steps are"},
+    Knob{"rugged", trait::stairs, 1., .4, "how unevenly steep steps are"},
+    Knob{"climb", trait::slope, 1., .3, "how steep they are"},
+    Knob{"deep", trait::depth, 1., .4, "how far along z from the soma the middle of their tips is sought"},
 };
 
 /// By kind, in the order of `knobs`.
