@@ -229,7 +229,7 @@ void run(const Options& options, Console& console) {
   const std::vector<Group> groups = groups_of(options.kind);
   std::array<FeatureTable, 2> tables{measured(samples[0], groups, console),
                                      measured(samples[1], groups, console)};
-  if (!options.slices.empty()) set_slices(std::array{&tables[0], &tables[1]}, options.slices);
+  if (!options.slices.empty()) set_slices(std::array{&tables[0], &tables[1]}, options.slices, console);
   std::array<std::string, 2> names{samples[0].name, samples[1].name};
   if (names[0] == names[1] && !stored) names = {options.samples[0], options.samples[1]};
   if (names[0] == names[1]) names[1] += " (again)";  // tables and plots tell them apart by their names

@@ -92,6 +92,9 @@ Surroundings::Surroundings(const EnvironmentOptions& options, Console& console) 
                        "there is no layer, hence no pia to count a depth from; say where with --at");
     site_.at.y() = float(*pia - *options.depth);
   }
+  if (environment_.pia() && !environment_.stratum(site_.at.cast<double>()).layer)
+    console.warn(fmt::format("the soma at {:g} {:g} {:g} µm lies in no layer of {}", site_.at.x(),
+                             site_.at.y(), site_.at.z(), options.file));
 }
 
 }  // namespace forest::cli

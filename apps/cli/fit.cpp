@@ -35,26 +35,19 @@ struct Options {
   bool force = false, calibrate = false;
 };
 
-std::vector<std::uint32_t> slices_of(const Sample& sample, const std::string& expression) {
+std::vector<std::uint32_t> slices_of(const Sample& sample, const std::string& expression, Console& console) {
   statistics::FeatureTable names;
   names.cells = sample.cells;
-  if (!expression.empty()) set_slices(std::array{&names}, expression);
+  if (!expression.empty()) set_slices(std::array{&names}, expression, console);
   return statistics::numbered(names.slices);
 }
 
 // What is so far from all else that a model of it would grow it again: a slip of a tracer or of a file.
 void look_for_slips(const Sample& sample, statistics::KindSet kinds, Console& console) {
-  constexpr float farthest = 1e7f;  // µm: no neurite of any animal is longer
   std::size_t with = 0;
   std::string first;
   for (std::size_t i = 0; i < sample.neurons.size(); ++i) {
     const Morphology& neuron = sample.neurons[i];
-    for (const Point& p : neuron.points())
-      if (!(p.position().cwiseAbs().maxCoeff() <= farthest))
-        throw Error(fmt::format(
-            "{} has a point at {:g} {:g} {:g} µm, farther away than any neuron reaches; mend it, or "
-            "leave this neuron out",
-            repository::escaped(sample.cells[i]), p.x, p.y, p.z));
     const auto findings = validate(neuron);
     const auto slip = std::ranges::find_if(findings, [&](const Finding& f) {
       return f.code == "jump" && f.section.valid() && kinds.contains(neuron.section(f.section).kind);
@@ -129,8 +122,8 @@ void run(const Options& options, Console& console) {
   const std::string title = fmt::format("neurons like those of {}", of);
   fitting::Calibrated fitted;
   if (options.form.empty())
-    fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices), title, resampling,
-                                         calibration, console.progress());
+    fitted = fitting::calibrated_grammar(neurons, slices_of(sample, options.slices, console), title,
+                                         resampling, calibration, console.progress());
   else
     fitted.text = parametric_grammar(options.form, neurons, title, resampling.kinds, 1, console);
   const std::string text = provenance(options, sample) + fitted.text;

@@ -231,8 +231,8 @@ void report(const Options& options, const lsystem::Grammar& grammar, const io::C
   const double count = double(options.count);
   console.table(
       {"grammar", "neurons", "segments each", "length each (µm)"},
-      {{grammar.name, fmt::format("{}", options.count), fmt::format("{:.0f}", double(total.segments) / count),
-        fmt::format("{:.0f}", total.length / count)}});
+      {{repository::escaped(grammar.name), fmt::format("{}", options.count),
+        fmt::format("{:.0f}", double(total.segments) / count), fmt::format("{:.0f}", total.length / count)}});
 }
 
 void run_into_cells(const Options& options, Console& console) {

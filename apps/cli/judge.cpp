@@ -36,6 +36,12 @@ using Json = nlohmann::ordered_json;
 
 namespace {
 
+const char* word_of(Criterion::Asked asked) {
+  return asked == Criterion::Asked::at_most    ? "at most"
+         : asked == Criterion::Asked::at_least ? "at least"
+                                               : "more than";
+}
+
 std::string verdict(const Judgement& j) {
   const auto failed = std::ranges::count(j.criteria, false, &Criterion::pass);
   const std::string cells =
@@ -87,7 +93,7 @@ Judged judge_samples(const Sample& train, const Sample& held_out, std::span<cons
     return jittered(train.neurons[i], 10.f, options.seed, i);
   }));
   if (!slices.empty()) {
-    set_slices(std::array{&judged.train, &judged.held_out}, slices);
+    set_slices(std::array{&judged.train, &judged.held_out}, slices, console);
     const auto each_its_own = [](FeatureTable& table, const std::string& name) {
       for (std::size_t i = 0; i < table.size(); ++i) table.slices.push_back(fmt::format("{} {}", name, i));
     };
@@ -115,8 +121,12 @@ Json json_of(const Judgement& j, std::span<const std::uint64_t> seeds) {
   }
   Json criteria = Json::array();
   for (const Criterion& c : j.criteria)
-    criteria.push_back(
-        {{"name", c.name}, {"pass", c.pass}, {"value", c.value}, {"limit", c.limit}, {"reason", c.reason}});
+    criteria.push_back({{"name", c.name},
+                        {"pass", c.pass},
+                        {"value", c.value},
+                        {"asked", word_of(c.asked)},
+                        {"limit", c.limit},
+                        {"reason", c.reason}});
   Json auc{{"structure", interval_of(j.auc.structure)},
            {"diameters", interval_of(j.auc.diameters)},
            {"slopes", interval_of(j.auc.slopes)},
@@ -344,6 +354,11 @@ void run(const Options& options, Console& console) {
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
+  if (options.model.empty())
+    for (const Sample* known : {&train, &held_out}) warn_of_shared(grown.front(), *known, console);
+  if (options.count > train.neurons.size())
+    console.warn(fmt::format("there are {}, and no more neurons are judged of a population",
+                             counted(train.neurons.size(), "training cell")));
   if (!options.features.empty()) {
     std::vector<FeatureTable> tables{judged.train, judged.held_out};
     std::vector<std::string> names{"train", "held_out"};

@@ -124,8 +124,9 @@ void judge_leaving_out(const LeftOutTrial& trial, Console& console) {
   const std::vector<Group> groups = groups_of(trial.kind);
   const Sample& traced = trial.traced;
   statistics::must_be_enough(traced.neurons.size());
+  if (trial.grown) warn_of_shared(*trial.grown, traced, console);
   FeatureTable known = measured(traced, groups, console);
-  if (!trial.slices.empty()) set_slices(std::array{&known}, trial.slices);
+  if (!trial.slices.empty()) set_slices(std::array{&known}, trial.slices, console);
   std::vector<FeatureTable> grown;
   std::optional<std::size_t> longest_run;
   for (std::size_t i = 0; i < traced.neurons.size(); ++i) {

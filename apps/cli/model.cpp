@@ -187,6 +187,9 @@ void import_models(const Options& options, Console& console) {
 }
 
 void export_models(const Options& options, Console& console) {
+  if (options.out.extension() == ".lsys" && !fs::is_directory(options.out))
+    throw Error(fmt::format("{} is to be a folder, for a file NAME.lsys of each model; give a folder",
+                            options.out.string()));
   const Repository repository = Repository::open(options.repo, Access::read);
   std::vector<ModelRow> models;
   std::map<std::string, int> count;

@@ -75,8 +75,9 @@ Sample of_files(const std::vector<std::string>& words, Console& console) {
     sample.neurons.push_back(std::move(read[i].neuron));
   }
   if (failed)  // a comparison of some of the cells would look like one of all
-    throw Error(
-        fmt::format("{} of {} neurons could not be read; mend them or leave them out", failed, files.size()));
+    throw Error(fmt::format("{} of {} could not be read; mend {} or leave {} out", failed,
+                            counted(files.size(), "neuron"), failed == 1 ? "it" : "them",
+                            failed == 1 ? "it" : "them"));
   return sample;
 }
 
@@ -91,6 +92,21 @@ Sample of_repository(const std::string& population, const std::string& place) {
     sample.neurons.push_back(open.morphology(row.id));
   }
   return sample;
+}
+
+}  // namespace
+
+namespace {
+
+void must_be_near(const Sample& sample) {
+  constexpr float farthest = 1e7f;  // µm: no neurite of any animal is longer
+  for (std::size_t i = 0; i < sample.neurons.size(); ++i)
+    for (const Point& p : sample.neurons[i].points())
+      if (!(p.position().cwiseAbs().maxCoeff() <= farthest))
+        throw Error(fmt::format(
+            "{} has a point at {:g} {:g} {:g} µm, farther away than any neuron reaches; mend it, or "
+            "leave this neuron out",
+            repository::escaped(sample.cells[i]), p.x, p.y, p.z));
 }
 
 }  // namespace
@@ -113,6 +129,7 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
     }
   }
   if (sample.neurons.empty()) throw Error(fmt::format("{} holds no neuron; name another", sample.name));
+  must_be_near(sample);
   return sample;
 }
 
@@ -169,16 +186,19 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
   return io::csv_of(sheet);
 }
 
-void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression) {
+void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression,
+                Console& console) {
   const std::regex pattern = linear_pattern(expression);
-  bool matched = false;
+  std::size_t matched = 0, cells = 0;
+  std::string without;
   for (statistics::FeatureTable* table : tables) {
     table->slices.clear();
     for (const std::string& cell : table->cells) {
       std::smatch found;
       const bool any = std::regex_search(cell, found, pattern) && found.length() > 0;
       table->slices.push_back(any ? found.str() : "only " + cell);
-      matched |= any;
+      matched += any, ++cells;
+      if (!any && without.empty()) without = cell;
     }
   }
   for (const statistics::FeatureTable* table : tables)
@@ -192,6 +212,10 @@ void set_slices(std::span<statistics::FeatureTable* const> tables, const std::st
   if (!matched && !tables.front()->cells.empty())
     throw Error(fmt::format("--slices '{}' finds nothing in any name, such as {}; give another expression",
                             expression, repository::escaped(tables.front()->cells.front())));
+  if (matched && matched < cells)
+    console.warn(fmt::format(
+        "--slices '{}' finds nothing in {} of {}, such as {}: each of these is a slice of its own",
+        expression, cells - matched, counted(cells, "name"), repository::escaped(without)));
 }
 
 void add_slices(CLI::App& command, std::string& expression) {
@@ -206,7 +230,10 @@ void add_slices(CLI::App& command, std::string& expression) {
           linear_pattern(text);
           return {};
         } catch (const std::regex_error&) {
-          return "--slices is no regular expression; an example is '^[A-Z]+[0-9]+'";
+          return text.size() > longest_pattern
+                     ? fmt::format("an expression has at most {} characters", longest_pattern)
+                     : fmt::format("{} is no regular expression; an example is '^[A-Z]+[0-9]+'",
+                                   repository::shown(text));
         }
       });
 }

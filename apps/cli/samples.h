@@ -27,7 +27,7 @@ struct Sample {
 };
 
 /// @param words  files or folders; populations when there is a repository ("" for all of its neurons)
-/// What cannot be read is told and left out. Throws Error when nothing is left.
+/// Throws Error when one cannot be read, has a point farther away than any neuron reaches, or there is none.
 Sample read_sample(const std::vector<std::string>& words, const std::string& repo, Console& console);
 
 /// Throws Error when no neuron has a section of the kind, a word of --kind.
@@ -46,7 +46,9 @@ std::string features_csv(std::span<const statistics::FeatureTable> tables,
 
 /// Names the slice of each cell: what the regular expression finds in its name, or the cell itself where it finds nothing.
 /// Throws Error when it finds nothing in any, or the same in all of a table.
-void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression);
+/// Says how many it finds nothing in.
+void set_slices(std::span<statistics::FeatureTable* const> tables, const std::string& expression,
+                Console& console);
 
 /// --slices, a regular expression.
 void add_slices(CLI::App& command, std::string& expression);

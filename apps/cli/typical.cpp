@@ -47,11 +47,13 @@ Sample cells_of(const Options& options, Console& console) {
   if (!names.empty()) {
     using namespace repository;
     Repository open = Repository::open(options.repo, Access::read);
-    for (const NeuronRow& row :
-         pick_neurons(open, names, options.population.size() == 1 ? options.population[0] : "")) {
+    for (const std::string& name : names) {  // of the population, or of another
+      const std::string of = options.population.size() == 1 ? options.population[0] : "";
+      const NeuronRow row = pick_neurons(open, {name}, open.find(name, of).empty() ? "" : of).front();
       sample.cells.push_back(row.name);
       sample.neurons.push_back(open.morphology(row.id));
     }
+    if (sample.name.empty()) sample.name = names.front();
   }
   return sample;
 }
@@ -109,9 +111,10 @@ Json json_of(const std::string& cell, const Typicality& t, const std::string& po
           {"metrics", metrics}};
 }
 
-/// The strangest metrics, none nearly the same (in the population) as one before it.
-std::vector<const Oddity*> telling(const Typicality& t, const FeatureTable& population, std::size_t count) {
-  const FeatureTable full = completed(population);
+/// The strangest metrics, none nearly the same as one before it.
+/// @param cells  the population, and the cell: what is the same in all others may be what sets it apart
+std::vector<const Oddity*> telling(const Typicality& t, const FeatureTable& cells, std::size_t count) {
+  const FeatureTable full = completed(cells);
   std::vector<std::size_t> order;
   for (const Oddity& o : t.oddities)
     if (const auto at = std::ranges::find(full.features, o.feature); at != full.features.end())
@@ -126,7 +129,7 @@ void run(const Options& options, Console& console) {
   must_take_files({options.report}, true);
   const Sample cells = cells_of(options, console),
                population = read_sample(options.population, options.repo, console);
-  must_have_sections(population, options.kind);
+  for (const Sample* sample : {&cells, &population}) must_have_sections(*sample, options.kind);
   const std::vector<Group> groups = groups_of(options.kind);
   const FeatureTable known = measured(population, groups, console), asked = measured(cells, groups, console);
   std::vector<Typicality> answers;
@@ -141,7 +144,7 @@ void run(const Options& options, Console& console) {
     if (answers.size() > 1) continue;
     console.say("");
     std::vector<std::vector<std::string>> lines;
-    for (const Oddity* o : telling(t, known, 12))
+    for (const Oddity* o : telling(t, stacked(std::array{known, asked}), 12))
       lines.push_back({o->feature.name, o->feature.unit, fmt::format("{:.4g}", o->value),
                        fmt::format("{:.4g}", o->median), fmt::format("{:.4g}–{:.4g}", o->low, o->high),
                        fmt::format("{:.3f}", o->p), o->abnormal ? "abnormal" : ""});
@@ -165,7 +168,8 @@ void run(const Options& options, Console& console) {
                     {"cells it stands beside", fmt::format("{}", t.cells)}});
     std::vector<StripPanel> panels;
     std::vector<std::vector<std::string>> lines;
-    for (const Oddity* o : telling(t, known, 40)) {
+    const FeatureTable both = stacked(std::array{known, rows_of(asked, std::array<std::size_t, 1>{i})});
+    for (const Oddity* o : telling(t, both, 40)) {
       if (panels.size() < 12 && std::ranges::count(known.features, o->feature)) {
         panels.push_back(panel_of(o->feature, std::array{&known}));
         panels.back().marked = o->value;

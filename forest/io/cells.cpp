@@ -325,8 +325,8 @@ std::string end_of(const std::vector<std::uint64_t>& begins, std::uint64_t end, 
 }
 
 constexpr std::string_view not_whole =
-    "is not whole: it was cut off, or is still being written; copy it again, or start the command again that "
-    "grows it, which goes on where it stopped";
+    "is not whole: it was cut off, or is still being written; copy it again, or delete it and start the "
+    "command again that grows it, which goes on where it stopped";
 
 /// What is different in another head: "its seed is 3, not 4".
 std::string difference(const CellsHead& there, const CellsHead& wanted) {

@@ -101,8 +101,8 @@ class Reader {
     std::vector<SurfaceLabel> result;
     for (const pugi::xml_node& label : root_.child("LabelTable").children("Label")) {
       const auto share = [&](const char* of, float otherwise) {
-        const float value = label.attribute(of).as_float(otherwise);
-        return std::isfinite(value) ? std::clamp(value, 0.f, 1.f) : otherwise;
+        const auto value = number_of<float>(label.attribute(of).value());
+        return value && std::isfinite(*value) ? std::clamp(*value, 0.f, 1.f) : otherwise;
       };
       const pugi::xml_attribute key =
           label.attribute("Key") ? label.attribute("Key") : label.attribute("Index");

@@ -351,7 +351,7 @@ TEST(Surface, ValuesAreReadFromEveryFormat) {
   ASSERT_EQ(labels.labels.size(), 2u);
   EXPECT_EQ(labels.labels[1].name, "V1 & V2");
   EXPECT_EQ(labels.labels[1].key, 7);
-  EXPECT_EQ(labels.labels[1].colour, Vec3(.5f, 0.f, 0.f));
+  EXPECT_EQ(labels.labels[1].colour, Vec3(.5f, 0.f, .7f));  // "x" is none
   EXPECT_EQ(labels.labels[0].alpha, 0.f);
 }
 

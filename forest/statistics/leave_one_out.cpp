@@ -135,7 +135,12 @@ std::vector<PairedFeature> ranked_features(const FeatureTable& traced, std::span
     feature.auc = above / double(feature.cells);
     feature.p = chance_of(sum, feature.cells, most);
   });
-  std::erase_if(out, [](const PairedFeature& f) { return f.cells == 0; });
+  std::vector<FeatureTable> all{traced};  // what repeats another, or is the same in all, is not asked
+  all.insert(all.end(), grown.begin(), grown.end());
+  const std::vector<Feature> told = distinct(stacked(all)).features;
+  std::erase_if(out, [&](const PairedFeature& f) {
+    return f.cells == 0 || std::ranges::find(told, f.feature) == told.end();
+  });
   std::vector<double> p;
   for (const PairedFeature& f : out) p.push_back(f.p);
   const std::vector<double> adjusted = holm(p);
@@ -234,19 +239,18 @@ std::string sentence(const LeaveOneOut& r) {
       "cases, from an AUC of {:.2f} on. ",
       r.traced, r.detectable_auc);
   out += r.told_apart() ? "Even so they are told apart: " : "They are not told apart, which says little: ";
-  out += r.grown < ranked_at_level
-             ? fmt::format("a cell could only be strange among {} grown ones, not among {}", ranked_at_level,
-                           r.grown)
-             : fmt::format(
-                   "{} of {} cells {} strange among {} grown without them ({:.2g} would be by chance)",
-                   r.strange, r.traced, r.strange == 1 ? "is" : "are", r.grown, level * double(r.traced));
   out += fmt::format(
-      ", in all pairs of a left-out and a grown cell a random forest knows which is which with AUC {:.2f} "
-      "({:.2f}–{:.2f}) by "
-      "structure, and {} of {} features lie to one side",
-      r.structure.value, r.structure.lower, r.structure.upper, r.rejections, r.features.size());
-  if (r.rejections) out += ", above all " + r.features.front().feature.name;
-  return out + ".";
+      "in all pairs of a left-out and a grown cell a random forest knows which is which with AUC {:.2f} "
+      "({:.2f}–{:.2f}) by structure, {} of {} features lie to one side{}, and ",
+      r.structure.value, r.structure.lower, r.structure.upper, r.rejections, r.features.size(),
+      r.rejections ? ", above all " + r.features.front().feature.name : "");
+  return out +
+         (r.grown < ranked_at_level
+              ? fmt::format("whether a cell is strange could be told among {} grown ones, not among {}.",
+                            ranked_at_level, r.grown)
+              : fmt::format(
+                    "{} of {} cells {} strange among {} grown without them ({:.2g} would be by chance).",
+                    r.strange, r.traced, r.strange == 1 ? "is" : "are", r.grown, level * double(r.traced)));
 }
 
 }  // namespace forest::statistics

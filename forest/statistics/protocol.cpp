@@ -216,13 +216,13 @@ double nearest(const Eigen::MatrixXd& cells, const Eigen::MatrixXd& train) {
   return quantile(std::span(least.data(), std::size_t(least.size())), .5);
 }
 
-enum class Asked : std::uint8_t { at_most, at_least, more_than };
+using Asked = Criterion::Asked;
 
 void ask(Judgement& j, std::string name, double value, Asked asked, double limit, std::string reason) {
   const bool pass = asked == Asked::at_most    ? value <= limit
                     : asked == Asked::at_least ? value >= limit
                                                : value > limit;
-  j.criteria.push_back({std::move(name), pass, value, limit, std::move(reason)});
+  j.criteria.push_back({std::move(name), pass, value, asked, limit, std::move(reason)});
 }
 
 void ask_auc(Judgement& j, const char* name, const char* what, const Estimate& auc, const Estimate& control,
@@ -396,7 +396,7 @@ Judgement judge(const FeatureTable& train, const FeatureTable& held_out, std::sp
             ? fmt::format("the control '{}' is rejected, as it must be, by {} (on structure AUC {:.3f})",
                           control.name, fmt::join(names, ", "), result.auc.value)
             : fmt::format("the control '{}' is not told from real cells (AUC {:.3f}): these "
-                          "cells are too few to judge by",
+                          "cells are too few to judge by, or nothing in them is changed by it",
                           control.name, result.auc.value));
     j.controls.push_back(std::move(result));
   }

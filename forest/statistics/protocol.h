@@ -34,11 +34,14 @@ struct ProtocolOptions {
 
 /// One thing that is asked of the grown cells.
 struct Criterion {
+  enum class Asked : std::uint8_t { at_most, at_least, more_than };
+
   std::string name;  // "auc.structure"
   bool pass = false;
-  double value = 0.,
-         limit = 0.;   // what was found, and what it is compared with; of a control, criteria that it misses
-  std::string reason;  // a sentence with both
+  double value = 0.;  // what was found; of a control, how many criteria it misses
+  Asked asked = Asked::at_most;
+  double limit = 0.;
+  std::string reason;  // a sentence with the value and the limit
 };
 
 /// Cells that are known to be wrong, which the protocol must tell from real ones.

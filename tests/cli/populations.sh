@@ -74,6 +74,9 @@ $BRAINFOREST compare --repo self.db --population pyramidal --with pyramidal $qui
 told self.json 'not d["told_apart"] and d["a"]["name"] != d["b"]["name"]'
 refuses 'has a section of kind glia' $BRAINFOREST judge --model pyramidal --train one --held-out two --kind glia
 fails_with 2 'no regular expression' $BRAINFOREST compare one two --slices '(['
+fails_with 2 'at most 1000 characters' $BRAINFOREST compare one two --slices "$(printf 'a%.0s' {1..1001})"
+$BRAINFOREST compare one two $quick --slices '(a+)+[!]|-1-0000.' >/dev/null 2>part.txt  # no pattern takes for ever
+grep -q 'finds nothing in 14 of 24 names' part.txt
 
 refuses 'fewer than four' $BRAINFOREST compare one all/*-00000.swc
 $BRAINFOREST compare one one $quick >/dev/null 2>own.txt  # the same cells on both sides
@@ -140,7 +143,9 @@ assert [groups.count(g) for g in ("train", "held_out", "grown")] == [12, 12, 12]
 PY
 $BRAINFOREST judge --train one --held-out two --grown three --burke purkinje --repeats 3 --json >alike.json
 told alike.json 'd["auc"]["structure"]["value"] < .85 and d["controls"]["burke"]["rejected"] and d["mmd_p"] > .01'
-$BRAINFOREST judge --train one --held-out two --grown one --repeats 3 >copied.txt
+$BRAINFOREST judge --train one --held-out two --grown one --repeats 3 >copied.txt 2>warned.txt
 grep -q 'FAIL *copying.neighbour_ratio' copied.txt
+grep -q '12 cells of one are in one, too' warned.txt
+told judged.json 'all(c["pass"] == {"at most": c["value"] <= c["limit"], "at least": c["value"] >= c["limit"], "more than": c["value"] > c["limit"]}[c["asked"]] for c in d["criteria"])'
 fails_with 2 'grown' $BRAINFOREST judge --train one --held-out two
 fails_with 2 'populations' $BRAINFOREST judge --train one --held-out two --grown three --populations 3
