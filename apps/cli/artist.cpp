@@ -114,8 +114,13 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
   if (marks.legend && dressing_.surfaces.has_values()) {
     const auto [low, high] = dressing_.surfaces.shown_range();
-    bars.push_back(
-        {.map = dressing_.surfaces.map, .low = low, .high = high, .title = dressing_.surfaces.title});
+    const auto [below, above] = dressing_.surfaces.beyond_range();
+    bars.push_back({.map = dressing_.surfaces.map,
+                    .low = low,
+                    .high = high,
+                    .below = below,
+                    .above = above,
+                    .title = dressing_.surfaces.title});
   }
   const bool barred = scene::paint(image, bars, view.background);
   std::vector<scene::LegendEntry> names;

@@ -30,7 +30,7 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
   if (!fs::is_directory(path)) return read(path);
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(path))
-    if (entry.path().extension() == ".svg") files.push_back(entry.path());
+    if (extension_of(entry.path()) == ".svg") files.push_back(entry.path());
   std::ranges::sort(files);
   if (files.empty()) throw InputError(path.string(), 0, "has no .svg file; give a folder of drawn sections");
   std::vector<cortex::ContourStack> drawings;
@@ -38,24 +38,35 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
   return io::gathered(drawings);
 }
 
+namespace {
+
+// What is there and may be replaced.
+void must_be_drawings(const fs::path& path) {
+  if (!fs::is_directory(path))
+    throw Error(path.string() + ": is there and no folder for drawings; give another name");
+  for (const auto& entry : fs::directory_iterator(path))
+    if (const std::string name = entry.path().filename().string();
+        !(name.starts_with("section_") && name.ends_with(".svg")))
+      throw Error(fmt::format(
+          "{}: holds more than drawings of sections ({}), and would be replaced; give another folder",
+          path.string(), name));
+}
+
+}  // namespace
+
 void must_take_contours(const fs::path& path, bool force) {
-  if (path.extension() == ".contours") return must_take_files({path}, force);
+  if (extension_of(path) == ".contours") return must_take_files({path}, force);
   if (path.has_extension())
     throw Error(path.string() + ": is neither FILE.contours nor a folder for drawings; give one of them");
   must_have_folder(path);
+  if (fs::exists(path)) must_be_drawings(path);
   if (!force) refuse_existing({path});
 }
 
 void write_contour_files(const cortex::ContourStack& stack, const fs::path& path, bool overlay) {
-  if (path.extension() == ".contours") return write_file(path, io::write_contours(stack));
+  if (extension_of(path) == ".contours") return write_file(path, io::write_contours(stack));
   // All drawings or none, and none of earlier sections between them.
-  if (fs::is_directory(path))
-    for (const auto& entry : fs::directory_iterator(path))
-      if (const std::string name = entry.path().filename().string();
-          !(name.starts_with("section_") && name.ends_with(".svg")))
-        throw Error(fmt::format(
-            "{}: holds more than drawings of sections ({}), and would be replaced; give another folder",
-            path.string(), name));
+  if (fs::exists(path)) must_be_drawings(path);
   io::NewFolder drawings(path);
   for (std::size_t i = 0; i < stack.sections.size(); ++i)
     drawings.write(fmt::format("section_{:04}.svg", i + 1),

@@ -191,8 +191,8 @@ std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Repor
       {"crest_angle",
        {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}},
        "crest angle",
-       fmt::format("{:.2f}", r.crest_angle.median),
-       "degrees between v-isolines and the right angle to crests, median"},
+       fmt::format("{:.2f} / {:.1f}", r.crest_angle.median, r.crest_angle.p99),
+       "degrees between v-isolines and the right angle to crests, median / 99th percentile"},
       {"face_distance_p99",
        {{"outer", in_mm(r.outer_distance_p99)}, {"inner", in_mm(r.inner_distance_p99)}},
        "faces",
@@ -295,7 +295,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
                  .1, 20.);
   add_force(command, o->force);
   return [o, &console] {
-    if (o->out.extension() != ".h5")
+    if (extension_of(o->out) != ".h5")
       throw Error(o->out.string() + ": elements are kept as HDF5; give a name that ends in .h5");
     must_take_files({o->out}, o->force);
     const auto begin = Clock::now();
@@ -311,6 +311,12 @@ std::function<void()> build(CLI::App& command, Console& console) {
     Deeper deeper;
     deeper.symmetry = cortex::symmetry(built.elements, built.lines);
     deeper.bok = cortex::bok(built.elements);
+    constexpr double hardly_any = .5;
+    if (r.volume_within < hardly_any)
+      console.warn(fmt::format(
+          "only {:.1f} % of the elements have about the wanted volume; look at them by 'brainforest "
+          "cortex faces --measure volume', and at the surfaces",
+          100. * r.volume_within));
     tell(built, r, deeper, o->volume * 1e9, seconds_since(begin), console);
   };
 }

@@ -68,7 +68,7 @@ bool before(const fs::path& one, const fs::path& other) {
 std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (lower(entry.path().extension().string()) == extension) files.push_back(entry.path());
+    if (extension_of(entry.path()) == extension) files.push_back(entry.path());
   std::ranges::sort(files, before);
   return files;
 }
@@ -344,9 +344,9 @@ void run(const Options& options, Console& console) {
         continue;
       }
     }
-    if (fs::is_directory(path) || path.extension() == ".contours" || path.extension() == ".svg" ||
-        path.extension() == ".jser" || path.extension() == ".slc") {
-      used.unit |= path.extension() == ".slc";
+    if (fs::is_directory(path) || extension_of(path) == ".contours" || extension_of(path) == ".svg" ||
+        extension_of(path) == ".jser" || extension_of(path) == ".slc") {
+      used.unit |= extension_of(path) == ".slc";
       stacks.push_back(read_contour_files(path, 1e3 * options.unit, console));
       continue;
     }
@@ -479,8 +479,12 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
                  1e3);
   add_force(command, o->force);
   return [o, &command, &console] {
+    if (extension_of(o->svg) == ".contours")
+      throw Error(o->svg.string() + ": is to be a folder of drawings; give one");
     if (!o->svg.empty()) must_take_contours(o->svg, o->force);
-    must_be_used(command, {{"--unit", "of an .slc file, and none is given", o->file.extension() == ".slc"}});
+    must_not_be_read("--svg", o->svg, {o->file});
+    must_be_used(command,
+                 {{"--unit", "of an .slc file, and none is given", extension_of(o->file) == ".slc"}});
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     if (stack.sections.size() < 2)
       throw Error(fmt::format("{}: has {}; two are compared", o->file.string(),

@@ -70,8 +70,8 @@ double least_scaled_jacobian(const cortex::Grid& grid) {
 
 void write(const Options& options, std::span<const cortex::GridPanel> panels) {
   write_unless_there(options.out,
-                     options.out.extension() == ".svg" ? cortex::to_svg(panels, options.picture)
-                                                       : cortex::to_obj(*panels.front().grid),
+                     extension_of(options.out) == ".svg" ? cortex::to_svg(panels, options.picture)
+                                                         : cortex::to_obj(*panels.front().grid),
                      options.force);
 }
 
@@ -141,7 +141,7 @@ Block block(const Options& options) {
 void check_out(const Options& options) {
   if (options.out.empty()) return;
   const bool many = options.domain.empty() && options.elements.empty();
-  const std::string ending = options.out.extension().string();
+  const std::string ending = extension_of(options.out);
   if (ending != ".svg" && (many || ending != ".obj"))
     throw Error(fmt::format("'{}' has no ending that can be written; give {}", options.out.string(),
                             many ? ".svg" : ".svg or .obj"));
@@ -150,7 +150,7 @@ void check_out(const Options& options) {
 
 // What says nothing of the block that was given was meant for another.
 void refuse_unused(const Options& options, bool one, bool in_space) {
-  const bool drawn = options.out.extension() == ".svg";
+  const bool drawn = extension_of(options.out) == ".svg";
   must_be_used(*options.command, {{"--dimensions", "of all blocks together, and one is given", !one},
                                   {"--generator", "of one block, and none is given", one},
                                   {"--up", "of drawings (.svg) of blocks in space", drawn && in_space},
@@ -163,6 +163,12 @@ void run(const Options& options, Console& console) {
     refuse_unused(options, false, options.dimensions != 2);
     return compare(options, console);
   }
+  constexpr int most_of_all = 100;
+  if (options.generator == "best" && options.steps > most_of_all)
+    throw Error(
+        fmt::format("--generator best tries all that there are, which takes minutes for more than {} steps; "
+                    "name one of them",
+                    most_of_all));
   const auto [name, boundary] = block(options);
   refuse_unused(options, true, boundary.dimensions() == 3);
   const Filled filled = fill(options.generator, boundary);

@@ -70,7 +70,8 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
       throw Error(fmt::format(
           "'{}' is to be both boundaries; name the outer one by --outer, the inner one by --inner",
           o->outer));
-    must_be_used(command, {{"--unit", "of an .slc file, and none is given", o->file.extension() == ".slc"}});
+    must_be_used(command,
+                 {{"--unit", "of an .slc file, and none is given", extension_of(o->file) == ".slc"}});
     const cortex::ContourStack stack = read_contour_files(o->file, 1e3 * o->unit, console);
     // Coarser than the sections are apart, what they show is lost.
     if (const std::size_t sections = stack.sections.size(); sections > 1) {

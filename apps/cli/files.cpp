@@ -23,9 +23,10 @@
 
 namespace forest::cli {
 namespace fs = std::filesystem;
-namespace {
 
 std::string extension_of(const fs::path& path) { return lower(path.extension().string()); }
+
+namespace {
 
 // Whether it takes bytes and no file: a pipe, a terminal, what leads to an open file (/dev/stdout).
 bool is_stream(const fs::path& place) {

@@ -53,6 +53,9 @@ void write_unless_there(const std::filesystem::path& to, std::string_view bytes,
 /// Several files, all or none; those without a name are not wanted.
 void write_unless_there(const std::vector<std::pair<std::filesystem::path, std::string>>& files, bool force);
 
+/// ".gii" of "lh.GII".
+std::string extension_of(const std::filesystem::path& path);
+
 /// Throws Error when what is made over minutes could not be put there in the end: two of the places are one, a folder is missing
 /// or cannot be written, a folder is there, or a file, unless `force` is given. Streams may be named as often as one likes, empty
 /// paths are not wanted.

@@ -187,7 +187,7 @@ void import_models(const Options& options, Console& console) {
 }
 
 void export_models(const Options& options, Console& console) {
-  if (options.out.extension() == ".lsys" && !fs::is_directory(options.out))
+  if (extension_of(options.out) == ".lsys" && !fs::is_directory(options.out))
     throw Error(fmt::format("{} is to be a folder, for a file NAME.lsys of each model; give a folder",
                             options.out.string()));
   const Repository repository = Repository::open(options.repo, Access::read);

@@ -103,6 +103,21 @@ void bend(PlantedElements& all, std::span<const circuit::Rooted> rooted, const c
   all.bending = bending;
 }
 
+// What is only turned upright may be taller than the tissue above its soma.
+void tell_too_tall(std::span<const circuit::Rooted> rooted, std::span<const circuit::Candidate> candidates,
+                   std::vector<std::string>& sentences) {
+  std::size_t count = 0;
+  float most = 0.f;  // µm
+  for (const circuit::Rooted& r : rooted)
+    if (const float above = candidates[r.candidate].height - r.depth; above > circuit::pia_slack)
+      ++count, most = std::max(most, above);
+  if (count)
+    sentences.push_back(fmt::format(
+        "{} of {} end above the pia, by up to {:.2f} mm: the tissue above them is thinner than they are "
+        "tall; --bend grid bends and shortens them",
+        count, counted(rooted.size(), "neuron"), most / 1e3f));
+}
+
 // The measured ends of the recipe's layers; nothing where no maps are given.
 std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& options,
                                                         const circuit::Recipe& recipe,
@@ -118,10 +133,11 @@ std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& op
 void refuse_too_many(std::size_t elements, double neurons, bool bent, double leeway = 1.) {
   constexpr double most = 50e6, most_bent = 200'000;
   if (neurons > leeway * (bent ? most_bent : most))
-    throw Error(fmt::format(
-        "{} elements would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
-        "or lower --scale",
-        elements, neurons, bent ? most_bent : most, bent ? " of distinct shapes (--bend grid)" : ""));
+    throw Error(
+        fmt::format("{} would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
+                    "or lower --scale",
+                    counted(elements, "element"), neurons, bent ? most_bent : most,
+                    bent ? " of distinct shapes (--bend grid)" : ""));
 }
 
 }  // namespace
@@ -259,6 +275,7 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   progress.end();
   all.first.push_back(rooted.size());
   all.seconds = seconds_since(start);
+  if (!bent) tell_too_tall(rooted, stock.candidates, all.left_out);
 
   circuit::Circuit& circuit = all.planted.circuit;
   circuit = circuit::circuit_of(recipe, stock.candidates, all.elements, all.first, rooted);

@@ -444,6 +444,11 @@ TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {
   ASSERT_EQ(oddities.size(), 1u);
   EXPECT_THAT(oddities[0], HasSubstr("triangles of the inner surface cut others of it, first"));
   EXPECT_THAT(oddities[0], HasSubstr(" mm"));
+  Mesh spike = outer;  // through all of the inner one, to the other side of it
+  spike.positions[20] *= -1.f;
+  const auto through = check_surfaces(spike, inner);
+  ASSERT_EQ(through.size(), 1u);
+  EXPECT_THAT(through[0], HasSubstr("of its triangles reach there between theirs, the farthest by 7.8"));
   Mesh noisy = outer;
   Random random(3);
   for (Vec3& p : noisy.positions)

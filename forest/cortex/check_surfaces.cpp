@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/cortex/check_surfaces.h"
 
+#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -19,6 +20,49 @@ using Place = Eigen::Vector3d;
 
 std::string place_text(const Place& p) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
+}
+
+// What lies on the wrong side of another surface, by more than a tenth of a millimetre: by the medial wall averaged surfaces touch
+// and cross one another a little.
+struct Strays {
+  std::size_t vertices = 0, triangles = 0;  // triangles: that only reach there between their corners
+  double farthest = 0.;                     // µm
+  Place where = Place::Zero();
+
+  void add(double depth, const Place& place, std::size_t& count) {
+    if (depth <= 0.) return;
+    ++count;
+    if (depth > farthest) farthest = depth, where = place;
+  }
+};
+Strays strays(const Mesh& mesh, const TriangleTree& other, bool belongs_inside) {
+  constexpr double near = 100.;  // µm
+  const auto wrong = [&](const Place& p, double distance) {
+    return distance > near && other.encloses(p) != belongs_inside ? distance : 0.;
+  };
+  const auto at = [&](std::uint32_t v) -> Place { return mesh.positions[v].cast<double>(); };
+  std::vector<double> distances(mesh.positions.size()), depths(mesh.positions.size());
+  parallel_for(depths.size(), 256, [&](std::size_t v) {
+    distances[v] = other.nearest(at(std::uint32_t(v)))->distance;
+    depths[v] = wrong(at(std::uint32_t(v)), distances[v]);
+  });
+  std::vector<std::pair<double, Place>> between(mesh.triangles.size(), {0., Place::Zero()});
+  parallel_for(between.size(), 256, [&](std::size_t i) {
+    const Triangle& t = mesh.triangles[i];
+    const std::array<Place, 3> p{at(t[0]), at(t[1]), at(t[2])};
+    const double longest = std::max({(p[1] - p[0]).norm(), (p[2] - p[1]).norm(), (p[0] - p[2]).norm()});
+    if (longest < std::min({distances[t[0]], distances[t[1]], distances[t[2]]}) || depths[t[0]] > 0. ||
+        depths[t[1]] > 0. || depths[t[2]] > 0.)
+      return;
+    for (const Place& place : {Place((p[0] + p[1]) / 2.), Place((p[1] + p[2]) / 2.),
+                               Place((p[2] + p[0]) / 2.), Place((p[0] + p[1] + p[2]) / 3.)})
+      if (const double depth = wrong(place, other.nearest(place)->distance); depth > between[i].first)
+        between[i] = {depth, place};
+  });
+  Strays found;
+  for (std::uint32_t v = 0; v < depths.size(); ++v) found.add(depths[v], at(v), found.vertices);
+  for (const auto& [depth, place] : between) found.add(depth, place, found.triangles);
+  return found;
 }
 
 }  // namespace
@@ -68,9 +112,11 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
   }
   if (volume(inner) > volume(outer))
     throw Error(
-        fmt::format("the inner surface encloses {:.3g} mm³, more than the outer one with {:.3g}; were they "
-                    "swapped?",
-                    volume(inner) / 1e9, cubic_mm));
+        volume(inner) < 1.001 * volume(outer)
+            ? fmt::format("both surfaces enclose {:.4g} mm³; give the outer and the inner one", cubic_mm)
+            : fmt::format("the inner surface encloses {:.4g} mm³, more than the outer one with {:.4g}; "
+                          "were they swapped?",
+                          volume(inner) / 1e9, cubic_mm));
   if (volume(inner) < .005 * volume(outer))
     throw Error(
         fmt::format("the inner surface encloses {:.3g} mm³ and the outer one {:.3g}; check that both are in "
@@ -88,27 +134,21 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
                   "; give one that does not cut itself, such as FreeSurfer's or one of 'cortex surfaces'");
     oddities.push_back(what + "; elements by it may be mended or left out");
   }
-  // Inner vertices outside of the outer surface, and pieces of one that cut the other, are told by the first of them.
-  const TriangleTree tree(outer);
-  std::size_t outside = 0;
-  Place where = Place::Zero();
-  double farthest = 0.;
-  std::vector<double> depths(inner.positions.size());
-  parallel_for(depths.size(), 256, [&](std::size_t i) {
-    const Place p = inner.positions[i].cast<double>();
-    const auto hit = tree.nearest(p);
-    depths[i] = hit->distance > 100. && !tree.encloses(p) ? hit->distance : 0.;
-  });
-  for (std::size_t i = 0; i < depths.size(); ++i) {
-    if (depths[i] <= 100.) continue;
-    ++outside;
-    if (depths[i] > farthest) farthest = depths[i], where = inner.positions[i].cast<double>();
+  const TriangleTree trees[] = {TriangleTree(outer), TriangleTree(inner)};
+  for (const std::size_t k : {1u, 0u}) {
+    const auto& [mesh, name] = both[k];
+    const Strays found = strays(*mesh, trees[1 - k], k == 1);
+    constexpr double wall = 500.;  // µm: what is as thin becomes wall
+    const bool many = found.vertices * 33 > mesh->positions.size();
+    if (!many && found.farthest <= wall) continue;
+    const std::string where = fmt::format(
+        "{} of {} vertices of the {} surface lie {} the {} one, and {} of its triangles reach there "
+        "between theirs, the farthest by {:.2f} mm at {}",
+        found.vertices, mesh->positions.size(), name, k == 1 ? "outside of" : "within", both[1 - k].second,
+        found.triangles, found.farthest / 1e3, place_text(found.where));
+    if (many) throw Error(where + "; check that both are of one hemisphere and that they were not swapped");
+    oddities.push_back(where + "; elements there may be mended or left out");
   }
-  if (outside * 33 > depths.size())  // by the medial wall averaged surfaces cross one another a little
-    throw Error(fmt::format(
-        "{} of {} vertices of the inner surface lie outside of the outer one, the farthest by {:.2f} mm "
-        "at {}; check that both are of one hemisphere and that they were not swapped",
-        outside, depths.size(), farthest / 1e3, place_text(where)));
   return oddities;
 }
 

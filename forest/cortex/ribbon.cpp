@@ -207,13 +207,16 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
   });
   progress.end();
   ribbon.wall = find_wall(ribbon, options);
-  std::size_t lost = 0;
-  for (std::size_t v = 0; v < n; ++v) lost += !arrived[v] && !ribbon.wall[v];
-  if (lost * 100 > n)
-    throw Error(
-        fmt::format("{} of {} w-curves do not reach the inner surface; check that both surfaces are of one "
-                    "hemisphere and in the same coordinates",
-                    lost, n));
+  std::vector<std::size_t> lost;
+  for (std::size_t v = 0; v < n; ++v)
+    if (!arrived[v] && !ribbon.wall[v]) lost.push_back(v);
+  if (lost.size() * 100 > n) {
+    const Place& first = ribbon.outer[lost.front()];
+    throw Error(fmt::format(
+        "{} of {} w-curves do not reach the inner surface, the first from ({:.1f}, {:.1f}, {:.1f}) "
+        "mm; check that both surfaces are of one hemisphere and in the same coordinates",
+        lost.size(), n, first[0] / 1e3, first[1] / 1e3, first[2] / 1e3));
+  }
   return ribbon;
 }
 

@@ -217,7 +217,8 @@ NiftiVolume read_nifti(std::string_view packed, const std::string& name) {
             float(slope * header.number_at(from, type->size, type->read) + inter);
     }
   if (const auto odd = std::ranges::count_if(volume.values, [](float v) { return std::isnan(v); }))
-    result.oddities.push_back(fmt::format("has {} voxels that are no number; they count as outside", odd));
+    result.oddities.push_back(fmt::format("has {} voxel{} no number; what is none counts as outside", odd,
+                                          odd == 1 ? " that is" : "s that are"));
   return result;
 }
 

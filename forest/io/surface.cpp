@@ -12,6 +12,7 @@
 #include <fmt/format.h>
 
 #include "forest/core/error.h"
+#include "forest/core/lower.h"
 #include "forest/core/number.h"
 #include "forest/io/freesurfer.h"
 #include "forest/io/gifti.h"
@@ -97,7 +98,7 @@ Mesh read_surface(std::string_view bytes, const std::string& name) {
   if (is_ply(content)) return read_ply_surface(content, name);
   if (is_stl(content)) return read_stl_surface(content, name);
   if (is_obj(content)) return read_obj_surface(content, name);
-  if (name.ends_with(".stl") || name.ends_with(".stl.gz"))
+  if (const std::string ending = lower(name); ending.ends_with(".stl") || ending.ends_with(".stl.gz"))
     throw InputError(name, 0, "is not as long as an STL file of its triangles must be; get the whole file");
   throw InputError(name, 0,
                    "is no surface that is known; give a GIFTI file (.surf.gii), FreeSurfer's triangles "
@@ -154,7 +155,7 @@ void check_corners(const Mesh& mesh, const std::string& name) {
 }
 
 std::string write_surface(const Mesh& mesh, std::string_view file_name) {
-  return file_name.ends_with(".gii") ? write_gifti_surface(mesh) : write_freesurfer_surface(mesh);
+  return lower(file_name).ends_with(".gii") ? write_gifti_surface(mesh) : write_freesurfer_surface(mesh);
 }
 
 }  // namespace forest::io

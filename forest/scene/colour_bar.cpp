@@ -32,7 +32,10 @@ std::string note_of(const ActivityView& activity) {
 std::pair<std::string, std::string> ends_of(const ColourBar& bar) {
   for (int digits = 4;; ++digits) {
     std::pair ends(fmt::format("{:.{}g}", bar.low, digits), fmt::format("{:.{}g}", bar.high, digits));
-    if (ends.first != ends.second || digits == 9) return ends;
+    if (ends.first == ends.second && digits < 9) continue;
+    if (bar.below) ends.first = "≤ " + ends.first;
+    if (bar.above) ends.second = "≥ " + ends.second;
+    return ends;
   }
 }
 // The text, or as much of its beginning as has room.
@@ -59,8 +62,8 @@ Writing writing_in(const frame::Image& image, Background background) {
 }
 
 Vec3 ColourBar::at(float t) const {
-  const bool below = threshold && low + t * (high - low) < *threshold;
-  if (below) return screen_of(below_threshold(branches.value_or(Background::dark)));
+  const bool is_less = threshold && low + t * (high - low) < *threshold;
+  if (is_less) return screen_of(below_threshold(branches.value_or(Background::dark)));
   return branches ? screen_of(on_branches(*map, t, *branches)) : map->screen(t);
 }
 

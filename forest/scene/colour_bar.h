@@ -27,6 +27,7 @@ struct ColourBar {
   const ColourMap* map = &colour_maps().front();  // null: no bar
   std::vector<Vec3> marks{};                      // sRGB 0–1, of dots before the note
   float low = 0.f, high = 1.f;                    // values at its ends
+  bool below = false, above = false;              // whether values lie beyond these, too
   std::string units{};                            // of them; may be empty
   std::optional<float> threshold{};               // what is less is grey
   std::string title{}, note{};                    // above and below; may be empty

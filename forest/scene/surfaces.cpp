@@ -184,18 +184,31 @@ bool zero_means_none(std::span<const float> values) {
          std::ranges::any_of(values, [](float value) { return value > 0.f; });
 }
 
-std::pair<float, float> Surfaces::shown_range() const {
-  if (range) return *range;
+std::vector<float> Surfaces::values() const {
   std::vector<float> values;
   for (const One& one : list_) {
     const bool without_zero = zero_means_none(one.values);
     for (const float value : one.values)
       if (std::isfinite(value) && !(without_zero && value == 0.f)) values.push_back(value);
   }
-  if (values.empty()) return {0.f, 1.f};
+  return values;
+}
+
+std::pair<bool, bool> Surfaces::beyond_range() const {
+  const auto [low, high] = shown_range();
+  const std::vector<float> all = values();
+  if (all.empty()) return {false, false};
+  const auto [least, most] = std::ranges::minmax(all);
+  return {least<low, most> high};
+}
+
+std::pair<float, float> Surfaces::shown_range() const {
+  if (range) return *range;
+  std::vector<float> all = values();
+  if (all.empty()) return {0.f, 1.f};
   const auto at = [&](double share) {
-    const auto place = values.begin() + std::ptrdiff_t(share * double(values.size() - 1));
-    std::ranges::nth_element(values, place);
+    const auto place = all.begin() + std::ptrdiff_t(share * double(all.size() - 1));
+    std::ranges::nth_element(all, place);
     return *place;
   };
   const float low = at(.02), high = at(.98);

@@ -66,6 +66,8 @@ class Surfaces {
   /// (zero_means_none).
   std::optional<std::pair<float, float>> range;
   std::pair<float, float> shown_range() const;
+  /// Whether there are values below and above that range.
+  std::pair<bool, bool> beyond_range() const;
   std::string title;  // of the values, above their colour bar; may be empty
 
   /// Adds them to a frame, in palette entries that the neurons do not use. The frame must not outlive this object, or a
@@ -74,6 +76,8 @@ class Surfaces {
   void show(frame::Frame& frame, const Colouring& colouring, bool playing);
 
  private:
+  std::vector<float> values() const;  // of all, that are some
+
   struct One {
     Mesh mesh;
     std::vector<Vec3> normals;
