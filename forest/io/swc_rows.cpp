@@ -249,7 +249,8 @@ class Scanner {
 
   [[noreturn]] void refuse_words(std::size_t line, std::string_view text) {
     throw InputError(name_, line,
-                     fmt::format("\"{}\" has {} of 7 columns; {}", shown(text), split(text).size(), layout));
+                     fmt::format("\"{}\" has {} of 7 columns; {}; complete it, or get the whole file",
+                                 shown(text), split(text).size(), layout));
   }
 
   void odd_row(std::string_view text) {
