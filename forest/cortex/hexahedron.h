@@ -37,7 +37,9 @@ struct Hexahedron {
   std::array<Eigen::Vector3d, 64>
       points;  // control points, µm; i of u runs fastest, then j of v, then k of w
 
-  static constexpr std::size_t index(int i, int j, int k) { return std::size_t(i + 4 * (j + 4 * k)); }
+  static constexpr std::size_t index(int i, int j, int k) {
+    return std::size_t(i) + 4 * (std::size_t(j) + 4 * std::size_t(k));
+  }
   const Eigen::Vector3d& point(int i, int j, int k) const { return points[index(i, j, k)]; }
   Eigen::Vector3d& point(int i, int j, int k) { return points[index(i, j, k)]; }
   /// c = 0…7: bit 0 is u, bit 1 is v, bit 2 is w.

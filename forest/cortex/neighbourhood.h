@@ -13,7 +13,7 @@
 namespace forest::cortex {
 
 /// Where the curve stands that is the i-th along u and the j-th along v.
-constexpr std::size_t slot(int i, int j) { return std::size_t(i + 4 * j); }
+constexpr std::size_t slot(int i, int j) { return std::size_t(i) + 4 * std::size_t(j); }
 /// The slots of the four sides, each from its first corner to its last.
 inline constexpr std::array<std::array<std::size_t, 4>, 4> sides{
     {{slot(0, 0), slot(1, 0), slot(2, 0), slot(3, 0)},

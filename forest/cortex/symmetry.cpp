@@ -15,6 +15,7 @@
 #include "forest/core/parallel.h"
 #include "forest/cortex/depth.h"
 #include "forest/cortex/human_layers.h"
+#include "forest/cortex/neighbourhood.h"
 
 namespace forest::cortex {
 namespace {
@@ -28,8 +29,6 @@ double depth(int k) {
   const auto layer = std::size_t(k / 2);
   return k % 2 ? .5 * (layer_top(layer) + layer_top(layer + 1)) : layer_top(layer);
 }
-
-constexpr std::size_t slot(int i, int j) { return std::size_t(i + 4 * j); }
 
 // An element as it is seen in a stretch: its curves, turned so that s runs where u did, and t where v did, after some quarters.
 struct Cell {
