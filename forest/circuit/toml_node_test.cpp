@@ -6,7 +6,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "forest/core/error.h"
+#include "tests/refused.h"
 
 namespace forest::circuit {
 namespace {
@@ -20,12 +20,7 @@ std::string dots(int count) {
 }
 
 std::string told(const std::string& text) {
-  try {
-    parse_toml(text, "recipe.toml");
-  } catch (const InputError& error) {
-    return error.what();
-  }
-  return "";
+  return refused<InputError>([&] { parse_toml(text, "recipe.toml"); });
 }
 
 TEST(Toml, RefusesKeysThatNestWithoutEnd) {

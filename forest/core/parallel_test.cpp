@@ -9,29 +9,19 @@
 
 #include <gtest/gtest.h>
 
-#include "forest/core/error.h"
+#include "tests/refused.h"
 
 namespace forest {
 namespace {
 
 using namespace std::chrono_literals;
 
-template <class Run>
-std::string told(Run&& run) {
-  try {
-    run();
-  } catch (const Error& error) {
-    return error.what();
-  }
-  return "nothing";
-}
-
 TEST(Parallel, TellsOfTheFirstThatThrows) {
   for (const unsigned threads : {1u, 2u, 7u}) {
     const ThreadLimit limit(threads);
     for (int repeat = 0; repeat < 20; ++repeat) {
       std::vector<std::atomic<int>> done(1000);
-      EXPECT_EQ(told([&] {
+      EXPECT_EQ(refused([&] {
                   parallel_for(done.size(), 1, [&](std::size_t i) {
                     if (i == 300) std::this_thread::sleep_for(1ms);  // long after those that follow threw
                     if (i == 300 || i > 500) throw Error(std::to_string(i));
@@ -49,7 +39,7 @@ TEST(Parallel, InOrderTakesAllBeforeTheFirstThatThrows) {
   for (const unsigned threads : {1u, 2u, 7u}) {
     const ThreadLimit limit(threads);
     std::vector<std::size_t> taken;
-    EXPECT_EQ(told([&] {
+    EXPECT_EQ(refused([&] {
                 parallel_in_order(
                     1000,
                     [](std::size_t i) {
