@@ -238,9 +238,10 @@ void fair(std::vector<Place>& points, bool closed, int rounds) {
   }
 }
 
-// A line that is found triangle by triangle zigzags by as much as they are wide: even steps along it, smooth over `scale`,
-// and back on the ribbon.
-Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator, double scale) {
+}  // namespace
+
+Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator, double scale,
+            const std::vector<Place>& level) {
   double length = 0.;
   for (std::size_t i = 1; i < line.points.size(); ++i) length += (line.points[i] - line.points[i - 1]).norm();
   const auto pieces = std::size_t(std::max(4., std::round(length / 200.)));
@@ -257,14 +258,16 @@ Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator
   }
   result.points.push_back(line.points.back());
   fair(result.points, line.closed, int(std::lround(2. * scale * scale / (step * step))));
-  for (Place& point : result.points) point = on(ribbon.middle, ribbon, locator.nearest(point));
-  if (line.closed) result.points.back() = result.points.front();
-  for (std::size_t i = 1; i < result.points.size(); ++i)
-    result.triangles.push_back(locator.nearest(.5 * (result.points[i - 1] + result.points[i])).triangle);
+  std::vector<Place> middle;
+  for (Place& point : result.points) {
+    const RibbonPoint found = locator.nearest(point);
+    middle.push_back(on(ribbon.middle, ribbon, found)), point = on(level, ribbon, found);
+  }
+  if (line.closed) middle.back() = middle.front(), result.points.back() = result.points.front();
+  for (std::size_t i = 1; i < middle.size(); ++i)
+    result.triangles.push_back(locator.nearest(.5 * (middle[i - 1] + middle[i])).triangle);
   return result;
 }
-
-}  // namespace
 
 std::vector<Line> borders(const Ribbon& ribbon) {
   using Edge = std::pair<std::uint32_t, std::uint32_t>;
@@ -319,8 +322,9 @@ std::vector<Line> crests_and_valleys(const Ribbon& ribbon, std::span<const Curva
                    [](const Line& one, const Line& two) { return one.strength > two.strength; });
   constexpr double smooth = 2. / 3.;
   const RibbonLocator locator(ribbon);
-  parallel_for(lines.size(), 4,
-               [&](std::size_t i) { lines[i] = faired(lines[i], ribbon, locator, smooth * options.scale); });
+  parallel_for(lines.size(), 4, [&](std::size_t i) {
+    lines[i] = faired(lines[i], ribbon, locator, smooth * options.scale, ribbon.middle);
+  });
   return lines;
 }
 

@@ -41,6 +41,13 @@ struct Line {
   Place direction(std::size_t piece, double reach = 1500.) const;
 };
 
+/// A line that is found triangle by triangle zigzags by as much as they are wide: even steps along it, smooth over `scale` (µm, the
+/// standard deviation), and back on the ribbon. Ends stay where they are.
+/// @param line   on the middle of the ribbon
+/// @param level  of the ribbon: where the line is then, above or below where it runs along the middle
+Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator, double scale,
+            const std::vector<Place>& level);
+
 struct LineOptions {
   double scale = 1500.;        // µm
   double least_strength = 2.;  // radians

@@ -276,12 +276,6 @@ std::vector<Line> sulci(const Ribbon& ribbon, const SulcusOptions& options) {
   }
   prune(graph, ribbon.outer, depth, options);
 
-  std::map<std::pair<Vertex, Vertex>, std::uint32_t> triangle_of;  // of each side in the graph
-  for (std::uint32_t i = 0; i < ribbon.triangles.size(); ++i)
-    for (std::size_t e = 0; e < 3; ++e) {
-      const Vertex a = ribbon.triangles[i][e], b = ribbon.triangles[i][(e + 1) % 3];
-      if (graph.contains(a) && graph.contains(b)) triangle_of[std::minmax(a, b)] = i;
-    }
   std::vector<Line> lines;
   std::set<std::pair<Vertex, Vertex>> used;
   const auto add = [&](Vertex from, Vertex to) {
@@ -291,21 +285,11 @@ std::vector<Line> sulci(const Ribbon& ribbon, const SulcusOptions& options) {
     for (const Vertex v : vertices) deepest = std::max(deepest, depth[v] - level);
     Line line{.kind = Line::Kind::sulcus, .points = {}, .triangles = {}, .strength = 0., .closed = false};
     for (const Vertex v : vertices)
-      line.points.push_back(ribbon.outer[v]), line.strength += depth[v] / double(vertices.size());
-    for (std::size_t i = 1; i < vertices.size(); ++i) {
-      const std::pair<Vertex, Vertex> side = std::minmax(vertices[i - 1], vertices[i]);
-      used.insert(side), line.triangles.push_back(triangle_of.at(side));
-    }
-    line.closed = vertices.front() == vertices.back();
+      line.points.push_back(ribbon.middle[v]), line.strength += depth[v] / double(vertices.size());
+    for (std::size_t i = 1; i < vertices.size(); ++i) used.insert(std::minmax(vertices[i - 1], vertices[i]));
+    // A ring that hangs at a node stays there.
+    line.closed = vertices.front() == vertices.back() && graph.at(vertices.front()).size() == 2;
     if (deepest < options.persistence) return;
-    // The steps of the triangles are no bends of the line.
-    constexpr int rounds = 10;
-    for (int round = 0; round < rounds; ++round) {
-      std::vector<Place> even = line.points;
-      for (std::size_t i = 1; i + 1 < even.size(); ++i)
-        even[i] = .5 * line.points[i] + .25 * (line.points[i - 1] + line.points[i + 1]);
-      line.points = std::move(even);
-    }
     lines.push_back(std::move(line));
   };
   for (const auto& [v, next] : graph)
@@ -315,6 +299,10 @@ std::vector<Line> sulci(const Ribbon& ribbon, const SulcusOptions& options) {
     if (next.size() == 2) add(v, *next.begin());
   std::stable_sort(lines.begin(), lines.end(),
                    [](const Line& one, const Line& two) { return one.strength > two.strength; });
+  const RibbonLocator locator(ribbon);
+  parallel_for(lines.size(), 4, [&](std::size_t i) {
+    lines[i] = faired(lines[i], ribbon, locator, options.smooth, ribbon.outer);
+  });
   return lines;
 }
 

@@ -69,6 +69,21 @@ TEST(Sulci, TheGraphRunsOnceAroundTheFloorOfAFurrowAndNowhereElse) {
   EXPECT_LT(length_of(lines), 1.15 * around);
 }
 
+TEST(Sulci, LinesDoNotTurnWithTheTriangles) {
+  const Ribbon ribbon = ribbon_of(furrowed);
+  SulcusOptions rough = small;
+  rough.smooth = 0.;
+  const auto beside = [](const std::vector<Line>& lines) {  // rms, of the circle that is the floor
+    double sum = 0., points = 0.;
+    for (const Line& line : lines)
+      for (const Place& p : line.points) sum += p.z() * p.z(), ++points;
+    return std::sqrt(sum / points);
+  };
+  const auto lines = sulci(ribbon, small), zigzag = sulci(ribbon, rough);
+  EXPECT_LT(length_of(lines), length_of(zigzag));
+  EXPECT_LT(beside(lines), .8 * beside(zigzag));
+}
+
 TEST(Sulci, TheWallHasNone) {
   Ribbon ribbon = ribbon_of(furrowed);
   const double whole = length_of(sulci(ribbon, small));
