@@ -13,6 +13,11 @@
 
 namespace forest::scene {
 
+float reach_along(const Forest& forest, const Vec3& direction) {
+  constexpr float deviations = 3.f, branches = 250.f;  // µm: of branches beyond the somata
+  return deviations * std::sqrt(std::max(0.f, direction.dot(forest.soma_spread() * direction))) + branches;
+}
+
 // It begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
 Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
   constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
@@ -21,7 +26,7 @@ Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
   const float extent = .5f * bounds.extent().norm() + 100.f;
   const float depth = -camera.axes().col(2).dot(bounds.centre() - camera.eye);
   const Vec3 level = bounds.extent() - bounds.extent().cwiseProduct(forest.circuit().up.cwiseAbs());
-  const float size = .5f * level.norm() + 50.f;
+  const float size = std::min(.5f * level.norm() + 50.f, reach_along(forest, camera.axes().col(2)));
   // Within the forest one sees a hundred micrometres or two, whatever its size.
   const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
   const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);

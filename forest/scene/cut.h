@@ -76,6 +76,9 @@ class NeuronsInSight {
   std::uint32_t count_ = 0;
 };
 
+/// µm from the middle of a forest to its end along a unit direction, with room: of somata even all through it nearly twice as
+/// far as they lie, so that a column is as deep as it is wide and only a slab is less.
+float reach_along(const Forest& forest, const Vec3& direction);
 /// The depth cue of a picture.
 /// @param strength  as Detail::fog
 Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength);

@@ -87,6 +87,7 @@ struct Forest::Data {
   circuit::Circuit circuit;
   circuit::NodeNames nodes;
   Bounds soma_bounds;
+  Mat3 soma_spread = Mat3::Zero();
   std::vector<Sphere> spheres;
   Groves groves;
   std::vector<Standing> standing;
@@ -132,6 +133,7 @@ std::span<const std::uint32_t> Forest::layers() const { return data_->as<std::ui
 const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
 const circuit::NodeNames& Forest::nodes() const { return data_->nodes; }
 const Bounds& Forest::soma_bounds() const { return data_->soma_bounds; }
+const Mat3& Forest::soma_spread() const { return data_->soma_spread; }
 std::vector<circuit::Layer> Forest::layers_in_place() const {
   std::vector<circuit::Layer> layers = circuit().layers;
   if (circuit().up != circuit::Circuit().up) layers.clear();  // they are curved
@@ -338,6 +340,17 @@ void Forest::Data::take_instances(const Refuse& refuse) {
                   std::isfinite(instance.qx + instance.qy + instance.qz + instance.qw));
     soma_bounds.add({instance.x, instance.y, instance.z});
     segment_total += neurons[instance.morphology].original_count;
+  }
+  if (!instances.empty()) {
+    const Eigen::Vector3d centre = soma_bounds.centre().cast<double>();
+    Eigen::Vector3d sum = Eigen::Vector3d::Zero();
+    Eigen::Matrix3d squares = Eigen::Matrix3d::Zero();
+    for (const frame::Instance& instance : instances) {
+      const Eigen::Vector3d from = Vec3(instance.x, instance.y, instance.z).cast<double>() - centre;
+      sum += from, squares += from * from.transpose();
+    }
+    const auto n = double(instances.size());
+    soma_spread = ((squares - sum * sum.transpose() / n) / n).cast<float>();
   }
   spheres.resize(instances.size());
   parallel_for(instances.size(), 1024, [&](std::size_t i) {

@@ -96,6 +96,7 @@ class Forest {
   const circuit::Circuit& circuit() const;
   const circuit::NodeNames& nodes() const;  // of all instances, in their order
   const Bounds& soma_bounds() const;        // of all soma centres
+  const Mat3& soma_spread() const;          // their covariance, µm²
   /// circuit()'s layers that have a height, where the somata lie among them: in curved tissue they do not.
   std::vector<circuit::Layer> layers_in_place() const;
   std::span<const Sphere> spheres() const;  // of every instance: around all that belongs to it

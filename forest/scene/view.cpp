@@ -12,6 +12,7 @@
 #include <string>
 #include <utility>
 
+#include <Eigen/Eigenvalues>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -579,7 +580,18 @@ float height_of(const Bounds& box, const Vec3& up) { return box.extent().dot(up.
 Mat3 standing(const Forest& forest) {
   const Vec3& up = forest.circuit().up;
   if (up == Vec3::UnitY()) return Mat3::Identity();
-  return Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
+  Mat3 stands = Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
+  // A row of elements shows its face: in front is where somata spread least.
+  constexpr float flat = .7f;  // of the deviations the other way
+  Eigen::Matrix<float, 3, 2> level;
+  level << stands.col(0), stands.col(2);
+  const Eigen::SelfAdjointEigenSolver<Eigen::Matrix2f> spread(level.transpose() * forest.soma_spread() *
+                                                              level);
+  if (spread.eigenvalues()[0] >= flat * flat * spread.eigenvalues()[1]) return stands;
+  Vec3 front = level * spread.eigenvectors().col(0);
+  if (front.dot(stands.col(2)) < 0.f) front = -front;
+  stands.col(0) = stands.col(1).cross(front), stands.col(2) = front;
+  return stands;
 }
 
 View parse_view(std::string_view text, const std::string& name, const Vec3& up) {
@@ -644,12 +656,12 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   const float slope = std::tan(.5f * radians(view.camera.field_of_view));
   Enclosing enclosing(looking.axes(), slope * aspect, slope);
 
-  Bounds bounds;
+  Bounds bounds;  // as the forest stands; layers lie in place only where it stands along y
   bool all = true;
   for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
-    const frame::Instance& at = forest.instances()[i];
+    const Vec3 at(forest.instances()[i].x, forest.instances()[i].y, forest.instances()[i].z);
     if (seen(i))
-      bounds.add({at.x, at.y, at.z}), enclosing.add({at.x, at.y, at.z});
+      bounds.add(stands.transpose() * at), enclosing.add(at);
     else
       all = false;
   }
@@ -669,11 +681,12 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   if (!all) view.fog = std::clamp(bounds.extent().norm() / forest.soma_bounds().extent().norm(), least, 1.f);
   const Places branches = places_on_branches(forest, seen);
   enclosing.add_most(branches.places, !branches.all);
-  // The near side of a wide forest shall not hide what lies behind it.
-  const float wide = std::max(radius, .25f * bounds.extent().norm()),
-              high = std::max(height_of(bounds, stands.col(1)), wide) + 120.f;
+  // The near side of a wide forest shall not hide what lies behind it; a slab has none.
+  const float wide = std::max(radius,
+                              std::min(.25f * bounds.extent().norm(), reach_along(forest, stands.col(2)))),
+              high = std::max(bounds.extent().y(), wide) + 120.f;
   const auto [eye, middle] =
-      enclosing.camera(bounds.centre(), 1.08f * std::max(.5f * high, wide) / slope + wide);
+      enclosing.camera(stands * bounds.centre(), 1.08f * std::max(.5f * high, wide) / slope + wide);
   view.camera.eye = eye, view.camera.target = middle;
   return view;
 }

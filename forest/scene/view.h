@@ -129,7 +129,8 @@ std::uint32_t still_samples(const View& view, const Colouring& colouring, bool m
 /// Pixels that the thinnest lines of its picture measure (Detail::thinnest).
 float thinnest_of(const View& view);
 
-/// Turns y, which is up in a column, to the forest's way up (circuit::Circuit::up).
+/// Turns y, which is up in a column, to the forest's way up (circuit::Circuit::up), and z, which is in front, to where somata that lie
+/// in a slab spread least.
 Mat3 standing(const Forest& forest);
 /// Which way the pia lies: as the circuit says, or along y where neurons stand along it. Nothing where they stand in all directions.
 std::optional<Vec3> towards_pia(const Forest& forest);

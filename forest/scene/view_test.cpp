@@ -11,6 +11,8 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/random.h"
+#include "forest/scene/cut.h"
 #include "forest/scene/pick.h"
 
 #include "tests/sample_forest.h"
@@ -248,6 +250,52 @@ TEST(View, WhatStandsAnotherWayUpIsSeenAsIfItDidNot) {
   const auto after = seen(circuit);
   for (std::size_t i = 0; i < before.size(); ++i)
     EXPECT_LT((before[i] - after[i]).head<2>().norm(), 90.f) << i;  // of 600; their boxes differ a little
+}
+
+// A row of elements: 6 mm wide, 2 mm high, .4 mm thick, and turned about the way up and over.
+Forest row_of_elements(const Quat& turn) {
+  circuit::Circuit circuit = testing::sample_circuit(400);
+  circuit.radius = 0.f, circuit.layers.resize(1), circuit.up = turn * Vec3::UnitY();
+  Random random(3);
+  for (circuit::Instance& i : circuit.instances) {
+    i.layer = 0;
+    i.position = turn * Vec3(float(random.uniform(-3e3, 3e3)), float(random.uniform(-1e3, 1e3)),
+                             float(random.uniform(-200., 200.)));
+  }
+  return Forest::from_bytes(pack(circuit, testing::sample_neurons()));
+}
+
+TEST(View, ARowOfElementsShowsItsFaceAndIsNotLostInFog) {
+  for (const Vec3& turned : {Vec3(0.f, .3f, .2f), Vec3(1.f, 2.f, -.4f), Vec3(-2.f, 1.2f, .9f)}) {
+    const Quat turn = Quat(Eigen::AngleAxisf(turned.x(), Vec3::UnitX())) *
+                      Quat(Eigen::AngleAxisf(turned.z(), Vec3::UnitZ())) *
+                      Quat(Eigen::AngleAxisf(turned.y(), Vec3::UnitY()));
+    const Forest forest = row_of_elements(turn);
+    const Mat3 stands = standing(forest);
+    EXPECT_NEAR(stands.determinant(), 1.f, 1e-5f);
+    EXPECT_LT((stands.col(1) - turn * Vec3::UnitY()).norm(), 1e-5f);
+    EXPECT_GT(std::abs(stands.col(2).dot(turn * Vec3::UnitZ())), .99f);
+    const frame::Camera camera = overview(forest, 2.f).camera;
+    float farthest = 0.f;
+    for (const frame::Instance& i : forest.instances()) {
+      const Vec3 at = project(camera, {1200.f, 600.f}, {i.x, i.y, i.z});
+      farthest = std::max({farthest, std::abs(at.x() / 600.f - 1.f), std::abs(at.y() / 300.f - 1.f)});
+    }
+    EXPECT_GT(farthest, .8f);
+    // From 2.5 mm away much of the light of what lies in its middle arrives.
+    frame::Camera near = camera;
+    near.target = forest.soma_bounds().centre(), near.eye = near.target + 2500.f * stands.col(2);
+    const Fog fog = fog_of(forest, near, 1.f);
+    EXPECT_GT(std::exp(-(2500.f - fog.start) / fog.length), .4f);
+  }
+}
+
+TEST(View, AColumnIsAsDeepAsItIsWide) {
+  const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(2000), testing::sample_neurons()));
+  const float wide = .5f * std::hypot(forest.soma_bounds().extent().x(), forest.soma_bounds().extent().z());
+  for (const Vec3& way : {Vec3(1, 0, 0), Vec3(0, 0, -1), Vec3(.6f, 0, .8f)})
+    EXPECT_GT(reach_along(forest, way), wide + 50.f);
+  EXPECT_EQ(standing(forest), Mat3(Mat3::Identity()));
 }
 
 TEST(View, ElementsHaveTheirOutlineAndColumnsTheirs) {
