@@ -83,20 +83,29 @@ void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene:
                   const Ink& ink) {
   if (legend.empty()) return;
   const qreal line = painter.fontMetrics().height() + 5.;
-  qreal widest = 0;
-  for (const auto& entry : legend)
+  constexpr qreal dot = 10., step = 7.;  // one colour is a dot, several stand side by side
+  qreal widest = 0, indent = dot;
+  for (const auto& entry : legend) {
     widest =
         std::max(widest, qreal(painter.fontMetrics().horizontalAdvance(QString::fromStdString(entry.name))));
+    if (entry.colours.size() > 1) indent = std::max(indent, step * qreal(entry.colours.size()));
+  }
   const QPointF corner(area.left() + margin, area.top() + margin);
-  plate(painter, QRectF(corner, QSizeF(widest + 44, line * qreal(legend.size()) + 14)), ink);
+  plate(painter, QRectF(corner, QSizeF(widest + 34 + indent, line * qreal(legend.size()) + 14)), ink);
   for (std::size_t i = 0; i < legend.size(); ++i) {
-    const QPointF middle = corner + QPointF(18, 7 + line * (qreal(i) + .5));
+    const QPointF left = corner + QPointF(13, 7 + line * (qreal(i) + .5));
+    const auto& colours = legend[i].colours;
     painter.setPen(Qt::NoPen);
-    painter.setBrush(to_screen(legend[i].colour));
-    painter.drawEllipse(middle, 5, 5);
+    for (std::size_t k = 0; k < colours.size(); ++k) {
+      painter.setBrush(to_screen(colours[k]));
+      if (colours.size() == 1)
+        painter.drawEllipse(left + QPointF(dot / 2, 0), dot / 2, dot / 2);
+      else
+        painter.drawRect(QRectF(left + QPointF(step * qreal(k), -dot / 2), QSizeF(step, dot)));
+    }
     painter.setPen(ink.text);
-    painter.drawText(QRectF(middle + QPointF(13, -line / 2), QSizeF(widest + 4, line)), Qt::AlignVCenter,
-                     QString::fromStdString(legend[i].name));
+    painter.drawText(QRectF(left + QPointF(indent + 8, -line / 2), QSizeF(widest + 4, line)),
+                     Qt::AlignVCenter, QString::fromStdString(legend[i].name));
   }
 }
 

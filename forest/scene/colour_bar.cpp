@@ -21,6 +21,11 @@ std::size_t lines_of(const ColourBar& bar) {
   return (bar.map ? 1 : 0) + (!bar.title.empty() || !bar.units.empty()) + !bar.note.empty();
 }
 float mark_size(float letter) { return 1.1f * letter; }
+// Steps stand side by side, half as wide.
+float swatch_width(const LegendEntry& entry, float letter) {
+  const auto n = float(entry.colours.size());
+  return mark_size(letter) * (n > 1.f ? .5f * n : n);
+}
 float marks_width(const ColourBar& bar, float letter) {
   return bar.marks.empty() ? 0.f : (float(bar.marks.size()) + .7f) * mark_size(letter);
 }
@@ -158,7 +163,9 @@ bool paint(frame::Image& image, std::span<const ColourBar> bars, Background back
 
 bool paint(frame::Image& image, std::span<const LegendEntry> all, Background background, bool right) {
   const auto [letters, ground] = writing_in(image, background);
-  const float h = letters.height, dot = mark_size(h), indent = dot + .7f * h;
+  const float h = letters.height;
+  float indent = 0.f;
+  for (const LegendEntry& entry : all) indent = std::max(indent, swatch_width(entry, h) + .7f * h);
   // What has no room is shortened, and counted.
   const float room = share_at_most * float(image.width) - indent - (2.f * padding + margin) * h,
               rows = (share_at_most * float(image.height) / h - margin - 2.f * padding - 1.f) / line + 1.f;
@@ -168,7 +175,7 @@ bool paint(frame::Image& image, std::span<const LegendEntry> all, Background bac
   if (float(shown) > rows) {
     shown = std::size_t(rows) - 1;
     names.resize(shown);
-    names.push_back({fmt::format("… and {} more", all.size() - shown), Vec3::Zero()});
+    names.push_back({fmt::format("… and {} more", all.size() - shown), {}});
   }
   float widest = 0.f;
   for (LegendEntry& entry : names) {
@@ -182,8 +189,14 @@ bool paint(frame::Image& image, std::span<const LegendEntry> all, Background bac
   float base = top + h * (padding + 1.f);
   for (const LegendEntry& entry : names) {
     const float at = std::round(left + h * padding), foot = std::round(base);
-    if (&entry < names.data() + shown)
-      fill(image, {at, foot - std::round(dot), at + std::round(dot), foot}, screen_of(entry.colour));
+    const auto n = float(entry.colours.size());
+    for (float k = 0.f; k < n; k += 1.f) {
+      const float wide = swatch_width(entry, h) / n;
+      fill(image,
+           {at + std::round(k * wide), foot - std::round(mark_size(h)), at + std::round((k + 1.f) * wide),
+            foot},
+           screen_of(entry.colours[std::size_t(k)]));
+    }
     letters.write(image, entry.name, at + indent, base);
     base += h * line;
   }

@@ -69,7 +69,8 @@ TEST(ColourBar, BesideValuesSaysWhatFlashesAreWhereThereAreSome) {
 }
 
 TEST(ColourBar, NamesOfColoursStandAtEitherSideAndNotWhereTheyDoNotFit) {
-  const std::vector<LegendEntry> names{{"pyramidal cell", {0.f, 1.f, 0.f}}, {"basket cell", {1.f, 0.f, 0.f}}};
+  const std::vector<LegendEntry> names{{"pyramidal cell", {{0.f, 1.f, 0.f}}},
+                                       {"basket cell", {{1.f, 0.f, 0.f}}}};
   const auto greens = [](const frame::Image& image, std::uint32_t from, std::uint32_t to) {
     std::size_t count = 0;
     for (std::uint32_t y = 0; y < image.height; ++y)
@@ -92,7 +93,7 @@ TEST(ColourBar, NamesOfColoursStandAtEitherSideAndNotWhereTheyDoNotFit) {
 
 TEST(ColourBar, NamesThatHaveNoRoomAreShortenedAndCounted) {
   std::vector<LegendEntry> names;
-  for (int i = 0; i < 60; ++i) names.push_back({"type " + std::to_string(i), {0.f, 1.f, 0.f}});
+  for (int i = 0; i < 60; ++i) names.push_back({"type " + std::to_string(i), {{0.f, 1.f, 0.f}}});
   const auto green_rows = [](const frame::Image& image) {
     std::size_t rows = 0;
     for (std::uint32_t y = 0; y < image.height; ++y) {

@@ -65,8 +65,13 @@ Vec3 along(const std::array<std::uint32_t, 3>& ramp, float t) {
 
 // What a colour class shows, before it is known which class.
 struct Hue {
+  struct Name {
+    std::string name;
+    Vec3 colour;
+    std::string step = {};  // of several that have one name
+  };
   std::array<Vec3, 8> kinds;
-  std::vector<LegendEntry> legend;
+  std::vector<Name> legend;
 };
 using OpacityRow = std::array<std::uint8_t, 8>;
 
@@ -105,12 +110,13 @@ class Painter {
   using HueOf = std::function<std::uint16_t(std::uint32_t)>;
 
   /// @param flat  somata and axons have the same colour
-  std::uint16_t add_hue(const Vec3& base, const std::string& name, bool flat = false) {
+  std::uint16_t add_hue(const Vec3& base, const std::string& name, bool flat = false,
+                        const std::string& step = {}) {
     if (hues_.size() >= most_hues) return std::uint16_t(most_hues - 1);
     Hue hue{{}, {}};
     for (std::uint32_t kind = 0; kind < 8; ++kind)
       hue.kinds[kind] = flat ? base : of_kind(base, kind, light_ ? 0.f : 1.f);
-    if (!name.empty()) hue.legend.push_back({name, base});
+    if (!name.empty()) hue.legend.push_back({name, base, step});
     hues_.push_back(std::move(hue));
     return std::uint16_t(hues_.size() - 1);
   }
@@ -208,7 +214,7 @@ class Painter {
         if (met[type * layers + layer]) {
           hue_of[type * layers + layer] = add_hue(
               type_colour(type, steps > 1 ? float(step) / float(steps - 1) : .5f) * (light_ ? .6f : 1.f),
-              circuit.types[type].name + (steps > 1 ? ", " + circuit.layers[layer].name : ""));
+              circuit.types[type].name, false, steps > 1 ? circuit.layers[layer].name : "");
           ++step;
         }
     }
@@ -402,29 +408,52 @@ class Painter {
     return result;
   }
 
-  // Each colour that is seen by the first of those who have it, and how many others do.
+  // Each colour that is seen by the first of those who have it, and how many others do. Three steps of one thing or more are one
+  // entry, as colours that lie so near to one another are not told apart in a list.
   void explain(const std::vector<std::size_t>& used, const std::vector<std::size_t>& kept,
                const std::vector<std::uint8_t>& class_of, std::size_t rows,
                std::vector<LegendEntry>& legend) const {
-    std::vector<std::size_t> others;
+    struct Told {
+      Hue::Name first;
+      std::string last;  // step that has this colour
+      std::size_t others = 0;
+    };
+    std::vector<Told> all;
     std::vector<bool> told(hues_.size());
     for (const std::size_t i : used) {
       if (told[i / rows]) continue;
       told[i / rows] = true;
       const Hue &own = hues_[i / rows], &shown = hues_[kept[class_of[i]] / rows];
       for (std::size_t k = 0; k < own.legend.size(); ++k) {
-        const LegendEntry& as =
+        const Hue::Name& as =
             shown.legend.empty() ? own.legend[k] : shown.legend[std::min(k, shown.legend.size() - 1)];
         const auto same =
-            std::ranges::find_if(legend, [&](const LegendEntry& e) { return e.colour == as.colour; });
-        if (same != legend.end())
-          ++others[std::size_t(same - legend.begin())];
+            std::ranges::find_if(all, [&](const Told& t) { return t.first.colour == as.colour; });
+        if (same == all.end())
+          all.push_back({{own.legend[k].name, as.colour, own.legend[k].step}, own.legend[k].step});
+        else if (!own.legend[k].step.empty() && same->first.name == own.legend[k].name)
+          same->last = own.legend[k].step;
         else
-          legend.push_back({own.legend[k].name, as.colour}), others.push_back(0);
+          ++same->others;
       }
     }
-    for (std::size_t k = 0; k < legend.size(); ++k)
-      if (others[k]) legend[k].name += fmt::format(" and {} more", others[k]);
+    constexpr std::size_t few = 3;
+    for (std::size_t k = 0, end; k < all.size(); k = end) {
+      const auto of_one = [&](const Told& t) {
+        return !t.first.step.empty() && t.first.name == all[k].first.name;
+      };
+      end =
+          std::size_t(std::find_if_not(all.begin() + std::ptrdiff_t(k) + 1, all.end(), of_one) - all.begin());
+      if (end - k < few) end = k + 1;
+      const std::string &name = all[k].first.name, &from = all[k].first.step, &to = all[end - 1].last;
+      LegendEntry entry{
+          from.empty() ? name : fmt::format("{}, {}{}", name, from, to == from ? "" : " to " + to), {}};
+      std::size_t others = 0;
+      for (std::size_t i = k; i < end; ++i)
+        entry.colours.push_back(all[i].first.colour), others += all[i].others;
+      if (others) entry.name += fmt::format(" and {} more", others);
+      legend.push_back(std::move(entry));
+    }
   }
 
   // Of those kept, the one that looks most alike: what one sees through must stay so, the colour may differ.

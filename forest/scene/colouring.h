@@ -45,7 +45,7 @@ struct Appearance {
 
 struct LegendEntry {
   std::string name;
-  Vec3 colour;  // linear light
+  std::vector<Vec3> colours;  // linear light; several are the steps of one thing, such as a type's layers
 };
 
 /// Colours and states of all instances.

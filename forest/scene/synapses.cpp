@@ -573,7 +573,7 @@ void paint_synapses(frame::Palette& palette, Background background) {
 
 std::vector<LegendEntry> synapse_legend(Background background) {
   const auto colours = colours_on(background);
-  return {{"excitatory synapses", colours[1]}, {"inhibitory synapses", colours[2]}};
+  return {{"excitatory synapses", {colours[1]}}, {"inhibitory synapses", {colours[2]}}};
 }
 
 std::optional<SynapsePick> pick(const Synapses::Choice& choice, const frame::Camera& camera,

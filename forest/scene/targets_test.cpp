@@ -206,13 +206,33 @@ TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
   for (std::size_t i = 0; i < by_type.legend.size(); ++i) {
     const LegendEntry& entry = by_type.legend[i];
     const auto at = entry.name.find(" and ");
-    told += 1 + (at == std::string::npos ? 0 : std::stoul(entry.name.substr(at + 5)));
-    for (std::size_t k = 0; k < i; ++k) EXPECT_NE(entry.colour, by_type.legend[k].colour);
+    told += 1 + (at == std::string::npos ? 0 : std::stoul(entry.name.substr(at + 5))) +
+            (entry.name.find(" to ") != std::string::npos);  // of two layers
+    ASSERT_EQ(entry.colours.size(), 1u);
+    for (std::size_t k = 0; k < i; ++k) EXPECT_NE(entry.colours, by_type.legend[k].colours);
   }
   std::set<std::pair<std::uint32_t, std::uint32_t>> seen;  // type and layer
   for (std::size_t i = 0; i < f.instances().size(); ++i) seen.insert({f.types()[i], f.layers()[i]});
   EXPECT_EQ(told, seen.size());
   EXPECT_LE(by_type.legend.size(), 16u);
+}
+
+TEST(Appearance, LayersOfATypeAreOneEntryOfTheLegend) {
+  circuit::Circuit c = testing::sample_circuit(80);
+  c.layers.clear();
+  for (int i = 0; i < 8; ++i)
+    c.layers.push_back({"L" + std::to_string(i), 100.f - float(i), 101.f - float(i)});
+  for (std::size_t i = 0; i < c.instances.size(); ++i)
+    c.instances[i].type = i % 2, c.instances[i].layer = std::uint32_t(i % 2 ? 1 + i / 2 % 6 : 2);
+  const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
+  View view;
+  view.colour_by = ColourBy::type;
+  const Colouring by_type = colour(Targets(f), view);
+  ASSERT_EQ(by_type.legend.size(), 2u);
+  EXPECT_EQ(by_type.legend[0].name, "first");  // in one layer alone
+  EXPECT_EQ(by_type.legend[0].colours.size(), 1u);
+  EXPECT_EQ(by_type.legend[1].name, "second, L1 to L6");
+  EXPECT_EQ(by_type.legend[1].colours.size(), 6u);
 }
 
 TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
