@@ -19,12 +19,11 @@
 #include "forest/cortex/bok.h"
 #include "forest/cortex/build.h"
 #include "forest/cortex/report.h"
-#include "forest/cortex/sulci.h"
 #include "forest/cortex/symmetry.h"
-#include "forest/io/border_file.h"
 #include "forest/io/elements_file.h"
 #include "forest/io/surface.h"
 
+#include "apps/cli/borders.h"
 #include "apps/cli/clock.h"
 #include "apps/cli/console.h"
 #include "apps/cli/files.h"
@@ -46,72 +45,13 @@ using Json = nlohmann::ordered_json;
 
 // What is measured beside the report: of the elements alone, or with what else is given.
 struct Deeper {
-  struct Border {
-    std::string name;
-    std::size_t points = 0, within = 0, half_way = 0;
-
-    double share() const { return double(within) / double(points); }
-    double share_half_way() const { return double(half_way) / double(points); }
-  };
-  std::vector<Border> borders;  // the last one: all of them
-  double by_chance = 0.;        // what points anywhere on the outer surface would have within 2 mm
+  Borders borders;
   cortex::Symmetry symmetry;
   cortex::Bok bok;
   std::optional<cortex::MeasuredBok> layers;
 };
 
 Json json_of(const cortex::Bok& bok) { return {{"l1", bok.l1}, {"l6", bok.l6}}; }
-
-// How much of the borders lies within 2 mm of the floor of a sulcus, where they are put on the outer surface, and of a valley
-// half way between the two surfaces, on whose vertices they are drawn.
-void measure_borders(const std::vector<fs::path>& files, const Mesh& outer, const Mesh& inner,
-                     const cortex::Cortex& cortex, Deeper& found) {
-  using Kind = cortex::Line::Kind;
-  constexpr double near = 2000., thin = 500.;  // µm; where cortex is as thin is the wall
-  const TriangleTree floors(cortex::pieces(cortex.lines, Kind::sulcus)),
-      valleys(cortex::pieces(cortex.lines, Kind::valley));
-  std::vector<Deeper::Border>& result = found.borders;
-  Deeper::Border all{"all", 0, 0, 0};
-  for (const fs::path& path : files) {
-    const io::Borders read = io::read_borders(MappedFile(path).text(), path.string());
-    for (const Mesh* mesh : {&outer, &inner})
-      if (mesh->positions.size() != read.surface_vertices)
-        throw InputError(
-            path.string(), 0,
-            fmt::format("is drawn on {} vertices and a surface has {}; give the two surfaces of which it is",
-                        read.surface_vertices, mesh->positions.size()));
-    for (const io::Border& border : read.borders) {
-      auto row =
-          std::find_if(result.begin(), result.end(), [&](const auto& r) { return r.name == border.name; });
-      if (row == result.end()) row = result.insert(result.end(), {border.name, 0, 0, 0});
-      for (const io::BorderPoint& point : border.points) {
-        cortex::Place out = cortex::Place::Zero(), in = out;
-        for (std::size_t k = 0; k < 3; ++k) {
-          out += point.weights[k] * outer.positions[point.vertices[k]].cast<double>();
-          in += point.weights[k] * inner.positions[point.vertices[k]].cast<double>();
-        }
-        for (Deeper::Border* sum : {&*row, &all}) {
-          ++sum->points;
-          sum->within += floors.nearest(out, near).has_value();
-          sum->half_way += valleys.nearest(.5 * (out + in), near).has_value();
-        }
-      }
-    }
-  }
-  result.push_back(all);
-  std::vector<std::uint8_t> wall(outer.positions.size());
-  for (std::size_t v = 0; v < wall.size(); ++v)
-    wall[v] = double((outer.positions[v] - inner.positions[v]).norm()) < thin;
-  found.by_chance = cortex::share_near(outer, wall, floors, near);
-}
-
-double length_of(const std::vector<cortex::Line>& lines, cortex::Line::Kind kind) {
-  double sum = 0.;
-  for (const cortex::Line& line : lines)
-    for (std::size_t i = 1; line.kind == kind && i < line.points.size(); ++i)
-      sum += (line.points[i] - line.points[i - 1]).norm();
-  return sum;
-}
 
 // Layers as they were measured at the vertices of both surfaces.
 cortex::MeasuredBok measure_layers(const std::vector<fs::path>& files, const Mesh& outer, const Mesh& inner) {
@@ -144,24 +84,11 @@ void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& i
         between / 1e9, cortex.between / 1e9));
 }
 
-// What is measured, for people and for machines.
-struct Figure {
-  const char* key;  // in JSON; null where one before it says it, too
-  Json value;
-  const char* label = nullptr;  // in the table; null: not there
-  std::string shown = {}, what = {};
-};
-
 std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Report& r, double volume) {
   const auto in_mm = [](const std::optional<double>& um) { return um ? Json(*um / 1e3) : Json(); };
   const auto shown = [](const std::optional<double>& um) {
     return um ? fmt::format("{:.3f}", *um / 1e3) : std::string("-");
   };
-  using Kind = cortex::Line::Kind;
-  Json lengths;
-  for (const auto& [name, kind] :
-       {std::pair{"crests", Kind::crest}, {"valleys", Kind::valley}, {"sulci", Kind::sulcus}})
-    lengths[name] = length_of(cortex.lines, kind) / 1e3;
   return {
       {"elements", r.elements, "elements", std::to_string(r.elements)},
       {"uncertified", r.uncertified, "uncertified", std::to_string(r.uncertified),
@@ -198,36 +125,13 @@ std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Repor
        "faces",
        fmt::format("{} / {}", shown(r.outer_distance_p99), shown(r.inner_distance_p99)),
        "mm from the outer / inner surface, 99th percentile; - where it is not given"},
-      {"lines_mm", lengths, "lines",
-       fmt::format("{:.0f} / {:.0f} / {:.0f}", lengths["crests"].get<double>(),
-                   lengths["valleys"].get<double>(), lengths["sulci"].get<double>()),
-       "mm of crests / valleys / floors of sulci"}};
+      lengths_of(cortex.lines)};
 }
 
 std::vector<Figure> figures_of(const Deeper& deeper) {
   const cortex::Symmetry& s = deeper.symmetry;
   std::vector<Figure> all;
-  if (deeper.borders.empty()) {
-    all.push_back({"border_within_2mm", nullptr});
-  } else {
-    const Deeper::Border& together = deeper.borders.back();
-    Json each;
-    for (const auto& b : deeper.borders)
-      if (&b != &together) each[b.name] = b.share();
-    all.push_back({"border_within_2mm", together.share()});
-    all.push_back({"border_half_way", together.share_half_way()});
-    all.push_back({"borders", each});
-    for (const auto& b : deeper.borders)
-      all.push_back({nullptr,
-                     {},
-                     "border",
-                     fmt::format("{:.2f} / {:.2f}", b.share(), b.share_half_way()),
-                     fmt::format("share of the {} points of {} within 2 mm of a sulcus' floor on the outer "
-                                 "surface / of a valley half way down",
-                                 b.points, b.name)});
-    all.push_back({"border_by_chance", deeper.by_chance, "by chance", fmt::format("{:.2f}", deeper.by_chance),
-                   "share of the outer surface within 2 mm of a sulcus' floor"});
-  }
+  for (Figure& f : figures_of(deeper.borders)) all.push_back(std::move(f));
   all.push_back({"symmetry",
                  {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}},
                  "symmetry",
@@ -262,14 +166,7 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
   std::ranges::move(figures_of(deeper), std::back_inserter(figures));
   figures.push_back({"seconds", seconds});
   figures.push_back({"peak_bytes", peak_bytes()});
-  Json json;
-  std::vector<std::vector<std::string>> rows;
-  for (Figure& f : figures) {
-    if (f.key) json[f.key] = std::move(f.value);
-    if (f.label) rows.push_back({f.label, f.shown, f.what});
-  }
-  console.print(json);
-  console.table({"measure", "value", "what it is"}, rows);
+  print(std::move(figures), console);
 }
 
 std::function<void()> build(CLI::App& command, Console& console) {
@@ -355,7 +252,8 @@ std::function<void()> report(CLI::App& command, Console& console) {
     if (!o->outer.empty()) outer_mesh = read_mesh(o->outer), outer.emplace(outer_mesh);
     if (!o->inner.empty()) inner_mesh = read_mesh(o->inner), inner.emplace(inner_mesh);
     Deeper deeper;
-    if (!o->borders.empty()) measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex, deeper);
+    if (!o->borders.empty())
+      deeper.borders = measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex.lines);
     if (!o->layers.empty()) deeper.layers = measure_layers(o->layers, outer_mesh, inner_mesh);
     if (outer && inner) tell_foreign(file.cortex, outer_mesh, inner_mesh, console);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
@@ -381,6 +279,11 @@ constexpr Verb actions[] = {
      "brainforest cortex curves lh.pial lh.white -o lh.middle --depth .5 --values thickness.txt\n"
      "  brainforest render lh.middle --overlay thickness.txt -o thickness.png",
      cortex_curves},
+    {"lines", "Find crests, valleys and the floors of sulci",
+     "brainforest cortex lines lh.pial lh.white -o lh.lines.csv\n"
+     "  brainforest cortex lines lh.pial lh.white -o lh.border --sheet middle.gii --values lines.txt\n"
+     "  brainforest render middle.gii --overlay lines.txt -o lines.png",
+     cortex_lines},
     {"build", "Fill the space between two surfaces with certified elements",
      "brainforest cortex build lh.pial lh.white -o elements.h5", build},
     {"report", "Measure a file of elements",

@@ -33,6 +33,7 @@ std::function<void()> cortex_curves(CLI::App& command, Console& console);
 std::function<void()> cortex_distance(CLI::App& command, Console& console);
 std::function<void()> cortex_faces(CLI::App& command, Console& console);
 std::function<void()> cortex_grid(CLI::App& command, Console& console);
+std::function<void()> cortex_lines(CLI::App& command, Console& console);
 std::function<void()> cortex_surfaces(CLI::App& command, Console& console);
 
 }  // namespace forest::cli

@@ -5,8 +5,8 @@
 
 #include "forest/core/parallel.h"
 #include "forest/cortex/check_surfaces.h"
+#include "forest/cortex/folds.h"
 #include "forest/cortex/shape_all.h"
-#include "forest/cortex/sulci.h"
 
 namespace forest::cortex {
 namespace {
@@ -40,25 +40,18 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const Boundary outside(outer, progress), inside(inner, progress);
   const SurfaceTrees surfaces{outside.tree(), inside.tree()};
   const WCurves curves(field, outside, inside);
-  // Two triangles to a side of the lattice that elements are laid by, or more.
-  const double side = std::sqrt(options.volume / 2500.);
-  const Ribbon dropped = make_ribbon(outer, curves, {.edge = .75 * side}, progress);
+  const Ribbon dropped = make_ribbon(outer, curves, {.edge = ribbon_edge(options.volume)}, progress);
 
   Cortex cortex;
   cortex.oddities = oddities;
   cortex.between = volume(outer) - volume(inner);
   cortex.wall = under_wall(dropped, surfaces.inner);
-  const Ribbon ribbon = unfolded(dropped, curves, progress);
-  progress.begin("looking for crests and valleys", 0);
-  const auto bent = curvatures(ribbon.middle, ribbon.triangles, neighbours(ribbon.size(), ribbon.triangles),
-                               options.line_scale);
-  cortex.lines = crests_and_valleys(ribbon, bent, {.scale = options.line_scale});
-  progress.end();
-  const Quads quads = lay_quads(ribbon, bent, cortex.lines, {.volume = options.volume}, progress);
-  progress.begin("looking for the floors of sulci", 0);
-  for (Line& line : sulci(coarser(dropped), {})) cortex.lines.push_back(std::move(line));
-  progress.end();
-  cortex.elements = make_elements(ribbon, quads, bent, curves, progress);
+  Folds folds = find_folds(dropped, curves, options.line_scale, progress);
+  const Ribbon& ribbon = folds.ribbon;
+  const Quads quads = lay_quads(ribbon, folds.bent, folds.lines, {.volume = options.volume}, progress);
+  cortex.elements = make_elements(ribbon, quads, folds.bent, curves, progress);
+  cortex.lines = std::move(folds.lines);
+  cortex.lines.insert(cortex.lines.end(), folds.sulci.begin(), folds.sulci.end());
   cortex.w_reached = 1. - double(cortex.elements.not_arrived) / double(cortex.elements.curves.size());
 
   progress.begin("measuring w-curves", quads.points.size());

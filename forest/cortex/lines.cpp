@@ -193,10 +193,8 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
     return line;
   };
   const auto keep = [&](Line line) {
-    double length = 0.;
-    for (std::size_t i = 1; i < line.points.size(); ++i)
-      length += (line.points[i] - line.points[i - 1]).norm();
-    if (line.points.size() > 1 && length >= options.least_length && line.strength >= options.least_strength)
+    if (line.points.size() > 1 && line.length() >= options.least_length &&
+        line.strength >= options.least_strength)
       lines.push_back(std::move(line));
   };
   for (const auto& [edge, ways] : joins)
@@ -207,6 +205,12 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
 }
 
 }  // namespace
+
+double Line::length() const {
+  double sum = 0.;
+  for (std::size_t i = 1; i < points.size(); ++i) sum += (points[i] - points[i - 1]).norm();
+  return sum;
+}
 
 Place Line::direction(std::size_t piece, double reach) const {
   const Place middle = .5 * (points[piece] + points[piece + 1]);
@@ -242,8 +246,7 @@ void fair(std::vector<Place>& points, bool closed, int rounds) {
 
 Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator, double scale,
             const std::vector<Place>& level) {
-  double length = 0.;
-  for (std::size_t i = 1; i < line.points.size(); ++i) length += (line.points[i] - line.points[i - 1]).norm();
+  const double length = line.length();
   const auto pieces = std::size_t(std::max(4., std::round(length / 200.)));
   const double step = length / double(pieces);
   Line result{line.kind, {line.points.front()}, {}, line.strength, line.closed};

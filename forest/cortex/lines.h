@@ -37,6 +37,7 @@ struct Line {
   double strength = 0.;                  // the integral of the curvature along it: an angle in radians
   bool closed = false;                   // it ends where it begins
 
+  double length() const;  // µm
   /// Unit, of the line where piece i is, seen over `reach` µm to either side: single pieces turn with the triangles.
   Place direction(std::size_t piece, double reach = 1500.) const;
 };

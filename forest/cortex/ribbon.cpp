@@ -149,32 +149,29 @@ std::vector<std::uint32_t> outside_wall(const Ribbon& ribbon) {
   return list;
 }
 
-Mesh middle_of(const Ribbon& ribbon, std::span<const std::uint32_t> triangles) {
+Mesh level_of(const Ribbon& ribbon, const std::vector<Place>& level,
+              std::span<const std::uint32_t> triangles) {
   Mesh mesh;
   mesh.positions.reserve(ribbon.size());
-  for (const Place& p : ribbon.middle) mesh.positions.push_back(p.cast<float>());
+  for (const Place& p : level) mesh.positions.push_back(p.cast<float>());
   for (const std::uint32_t t : triangles) mesh.triangles.push_back(ribbon.triangles[t]);
   return mesh;
 }
 
 }  // namespace
 
-RibbonLocator::RibbonLocator(const Ribbon& ribbon)
-    : sheet_(ribbon), original_(outside_wall(ribbon)), tree_(middle_of(ribbon, original_)) {}
+RibbonLocator::RibbonLocator(const Ribbon& ribbon) : RibbonLocator(ribbon, ribbon.middle) {}
+
+RibbonLocator::RibbonLocator(const Ribbon& ribbon, const std::vector<Place>& level)
+    : ribbon_(ribbon),
+      level_(level),
+      original_(outside_wall(ribbon)),
+      tree_(level_of(ribbon, level, original_)) {}
 
 RibbonPoint RibbonLocator::nearest(const Place& to) const {
   const auto hit = tree_.nearest(to);
-  RibbonPoint point{original_[hit->triangle], Place(1., 0., 0.)};
-  const Triangle& t = sheet_.triangles[point.triangle];
-  const Place &a = sheet_.middle[t[0]], &b = sheet_.middle[t[1]], &c = sheet_.middle[t[2]];
-  const Place across = (b - a).cross(c - a);
-  if (const double square = across.squaredNorm(); square > 0.) {
-    Place w((b - hit->at).cross(c - hit->at).dot(across) / square,
-            (c - hit->at).cross(a - hit->at).dot(across) / square, 0.);
-    w = w.cwiseMax(0.), w[2] = std::max(0., 1. - w[0] - w[1]);
-    point.weights = w / w.sum();
-  }
-  return point;
+  const Triangle& t = ribbon_.triangles[original_[hit->triangle]];
+  return {original_[hit->triangle], barycentric(level_[t[0]], level_[t[1]], level_[t[2]], hit->at)};
 }
 
 Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions& options,

@@ -55,14 +55,16 @@ Place on(const std::vector<Place>& level, const Ribbon& ribbon, const RibbonPoin
 /// The curve through a place of the middle, or where that does not arrive at both surfaces the one from the outer surface.
 WCurve curve_at(const Ribbon& ribbon, const RibbonPoint& point, const WCurves& curves);
 
-/// Finds places on the middle of a ribbon, outside its wall.
+/// Finds places on a level of a ribbon, its middle unless told otherwise, outside its wall.
 class RibbonLocator {
  public:
   explicit RibbonLocator(const Ribbon& ribbon);
+  RibbonLocator(const Ribbon& ribbon, const std::vector<Place>& level);
   RibbonPoint nearest(const Place& to) const;
 
  private:
-  const Ribbon& sheet_;
+  const Ribbon& ribbon_;
+  const std::vector<Place>& level_;
   std::vector<std::uint32_t> original_;  // triangle of the ribbon for each of the tree
   TriangleTree tree_;
 };

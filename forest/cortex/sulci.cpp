@@ -202,9 +202,44 @@ double length_of(const std::vector<Place>& at, const std::vector<Vertex>& way) {
   return sum;
 }
 
-// Takes away ways that end freely and are short, or on which depth hardly changes.
-void prune(Graph& graph, const std::vector<Place>& at, std::span<const double> depth,
-           const SulcusOptions& options) {
+// µm²: of all edges.
+double mean_square_edge(const Ribbon& ribbon) {
+  double square = 0.;
+  for (const Triangle& t : ribbon.triangles)
+    for (std::size_t e = 0; e < 3; ++e)
+      square += (ribbon.middle[t[e]] - ribbon.middle[t[(e + 1) % 3]]).squaredNorm();
+  return square / (3. * double(ribbon.triangles.size()));
+}
+
+// By how much each vertex is deeper than what lies around it, seen over `reach` µm (a standard deviation).
+std::vector<double> below_surroundings(const Ribbon& ribbon, std::span<const double> depth, double reach) {
+  const Neighbours near = neighbours(ribbon.size(), ribbon.triangles);
+  // A round takes the mean of a vertex and its six neighbours or so.
+  const auto rounds = std::lround(7. / 3. * reach * reach / mean_square_edge(ribbon));
+  std::vector<double> mean(depth.begin(), depth.end()), next(depth.size());
+  for (long round = 0; round < rounds; ++round) {
+    parallel_for(mean.size(), 2048, [&](std::size_t v) {
+      const auto around = near.of(v);
+      double sum = mean[v];
+      for (const Vertex u : around) sum += mean[u];
+      next[v] = sum / double(around.size() + 1);
+    });
+    mean.swap(next);
+  }
+  for (std::size_t v = 0; v < mean.size(); ++v) mean[v] = depth[v] - mean[v];
+  return mean;
+}
+
+// Takes away ways that end freely and are short, on which depth hardly changes, or which go straight up a bank: half of their places
+// are no deeper than what lies around them.
+void prune(Graph& graph, const Ribbon& ribbon, std::span<const double> depth, const SulcusOptions& options) {
+  constexpr double around = 2e3;  // µm
+  const std::vector<Place>& at = ribbon.outer;
+  const std::vector<double> below = below_surroundings(ribbon, depth, around);
+  const auto on_bank = [&](const std::vector<Vertex>& spur) {
+    return 2 * std::ranges::count_if(spur, [&](Vertex v) { return below[v] <= 0.; }) >=
+           std::ptrdiff_t(spur.size());
+  };
   const auto faint = [&](const std::vector<Vertex>& spur) {
     const auto [least, most] = std::ranges::minmax(spur, {}, [&](Vertex v) { return depth[v]; });
     return depth[most] - depth[least] < options.persistence;
@@ -217,7 +252,7 @@ void prune(Graph& graph, const std::vector<Place>& at, std::span<const double> d
     for (const Vertex end : ends) {
       if (graph[end].size() != 1) continue;
       const auto spur = way(graph, end, *graph[end].begin());
-      if (length_of(at, spur) >= options.shortest_spur && !faint(spur)) continue;
+      if (length_of(at, spur) >= options.shortest_spur && !faint(spur) && !on_bank(spur)) continue;
       for (std::size_t i = 1; i < spur.size(); ++i)
         graph[spur[i]].erase(spur[i - 1]), graph[spur[i - 1]].erase(spur[i]);
       more = true;
@@ -228,14 +263,9 @@ void prune(Graph& graph, const std::vector<Place>& at, std::span<const double> d
 }  // namespace
 
 std::vector<double> sulcal_depth(const Ribbon& ribbon, double scale) {
-  double square = 0.;
-  for (const Triangle& t : ribbon.triangles)
-    for (std::size_t e = 0; e < 3; ++e)
-      square += (ribbon.middle[t[e]] - ribbon.middle[t[(e + 1) % 3]]).squaredNorm();
-  square /= 3. * double(ribbon.triangles.size());
   // In a unit of time a place spreads by half of the mean squared edge along either axis.
   constexpr int steps = 25;
-  const double time = 2. * scale * scale / square / steps;
+  const double time = 2. * scale * scale / mean_square_edge(ribbon) / steps;
   const Neighbours near = neighbours(ribbon.size(), ribbon.triangles);
   Drift drift(near);
   std::vector<Place> at = ribbon.middle;
@@ -274,7 +304,7 @@ std::vector<Line> sulci(const Ribbon& ribbon, const SulcusOptions& options) {
       }
     }
   }
-  prune(graph, ribbon.outer, depth, options);
+  prune(graph, ribbon, depth, options);
 
   std::vector<Line> lines;
   std::set<std::pair<Vertex, Vertex>> used;

@@ -27,8 +27,9 @@ struct SulcusOptions {
   double persistence = 300.;  // µm: a pass lies lower than both crowns that it parts by so much
   double shallowest =
       .4;  // share of the vertices outside the wall; a line ends where it is less deep than these
-  double shortest_spur = 4e3;  // µm: shorter ways that end freely are left out
-  double smooth = 3e3;         // µm, along the way from node to node: steepest ways turn with the triangles
+  double shortest_spur =
+      4e3;  // µm: shorter ways that end freely are left out, as are such that go straight up a bank
+  double smooth = 3e3;  // µm, along the way from node to node: steepest ways turn with the triangles
 };
 
 /// Lines of the kind `sulcus`, on the outer surface and from node to node of the graph; their strength is their mean depth, µm.

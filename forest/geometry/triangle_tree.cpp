@@ -57,6 +57,17 @@ double square_to_box(const Place& p, const Place& low, const Place& high) {
 
 }  // namespace
 
+Eigen::Vector3d barycentric(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                            const Eigen::Vector3d& at) {
+  const Eigen::Vector3d across = (b - a).cross(c - a);
+  const double square = across.squaredNorm();
+  if (!(square > 0.)) return {1., 0., 0.};
+  Eigen::Vector3d w((b - at).cross(c - at).dot(across) / square, (c - at).cross(a - at).dot(across) / square,
+                    0.);
+  w = w.cwiseMax(0.), w[2] = std::max(0., 1. - w[0] - w[1]);
+  return w / w.sum();
+}
+
 TriangleTree::TriangleTree(const Mesh& mesh) : triangles_(mesh.triangles), order_(mesh.triangles.size()) {
   positions_.reserve(mesh.positions.size());
   for (const Vec3& p : mesh.positions) positions_.push_back(p.cast<double>());

@@ -12,6 +12,10 @@
 
 namespace forest {
 
+/// How much each corner of a triangle counts at a place on it: 0 or more, in sum 1.
+Eigen::Vector3d barycentric(const Eigen::Vector3d& a, const Eigen::Vector3d& b, const Eigen::Vector3d& c,
+                            const Eigen::Vector3d& at);
+
 class TriangleTree {
  public:
   using Place = Eigen::Vector3d;  // µm

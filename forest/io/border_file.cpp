@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cmath>
 #include <pugixml.hpp>
+#include <sstream>
 
 #include <fmt/format.h>
 
@@ -47,6 +48,7 @@ class Reader {
           "{} has {} vertices and {} weights, which should be three each a point; get the whole file", what,
           vertices.size(), weights.size()));
     Border result{border, {}};
+    result.closed = std::string_view(node.attribute("Closed").value()) == "True";
     for (std::size_t i = 0; i < vertices.size(); i += 3) {
       BorderPoint point;
       double sum = 0.;
@@ -94,11 +96,51 @@ Borders read_borders(std::string_view bytes, const std::string& name) {
   result.surface_vertices = vertices[0];
   for (const pugi::xml_node& group : root.children("Class"))
     for (const pugi::xml_node& border : group.children("Border"))
-      for (const pugi::xml_node& part : border.children("BorderPart"))
+      for (const pugi::xml_node& part : border.children("BorderPart")) {
         result.borders.push_back(
             reader.part(border.attribute("Name").value(), part, result.surface_vertices));
+        result.borders.back().group = group.attribute("Name").value();
+        for (const auto& [k, channel] : {std::pair{0, "Red"}, {1, "Green"}, {2, "Blue"}})
+          result.borders.back().colour[k] = border.attribute(channel).as_float();
+      }
   if (result.borders.empty()) reader.refuse("has no borders; give a file with one or more");
   return result;
+}
+
+std::string write_borders(const Borders& borders) {
+  pugi::xml_document document;
+  auto declaration = document.append_child(pugi::node_declaration);
+  declaration.append_attribute("version") = "1.0", declaration.append_attribute("encoding") = "UTF-8";
+  auto root = document.append_child("BorderFile");
+  root.append_attribute("Version") = "3", root.append_attribute("Structure") = "CORTEX";
+  root.append_attribute("SurfaceNumberOfVertices") = std::uint64_t(borders.surface_vertices);
+  const auto paint = [](pugi::xml_node node, const Vec3& colour) {
+    node.append_attribute("Red") = colour.x(), node.append_attribute("Green") = colour.y();
+    node.append_attribute("Blue") = colour.z();
+  };
+  pugi::xml_node group;
+  for (const Border& border : borders.borders) {
+    if (!group || group.attribute("Name").value() != border.group) {
+      group = root.append_child("Class");
+      group.append_attribute("Name") = border.group.c_str();
+      paint(group, border.colour);
+    }
+    auto node = group.append_child("Border");
+    node.append_attribute("Name") = border.name.c_str();
+    paint(node, border.colour);
+    auto part = node.append_child("BorderPart");
+    part.append_attribute("Closed") = border.closed ? "True" : "False";
+    std::string vertices, weights;
+    for (const BorderPoint& p : border.points) {
+      vertices += fmt::format("{}\n", fmt::join(p.vertices, " "));
+      weights += fmt::format("{:.7g} {:.7g} {:.7g}\n", p.weights[0], p.weights[1], p.weights[2]);
+    }
+    part.append_child("Vertices").text() = vertices.c_str();
+    part.append_child("Weights").text() = weights.c_str();
+  }
+  std::ostringstream out;
+  document.save(out, " ");
+  return out.str();
 }
 
 }  // namespace forest::io

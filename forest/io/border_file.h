@@ -14,6 +14,8 @@
 #include <string_view>
 #include <vector>
 
+#include "forest/core/vec.h"
+
 namespace forest::io {
 
 struct BorderPoint {
@@ -24,6 +26,9 @@ struct BorderPoint {
 struct Border {
   std::string name;                 // "CS"; borders of several parts come as several of one name
   std::vector<BorderPoint> points;  // along the line, at least one
+  std::string group = {};           // the class that it belongs to
+  Vec3 colour = Vec3::Zero();       // sRGB, 0–1
+  bool closed = false;
 };
 
 struct Borders {
@@ -33,5 +38,7 @@ struct Borders {
 
 /// Throws InputError: what is no such file, is cut off, or names vertices that are not there.
 Borders read_borders(std::string_view bytes, const std::string& name);
+/// Borders of one group must follow one another.
+std::string write_borders(const Borders& borders);
 
 }  // namespace forest::io

@@ -57,6 +57,33 @@ TEST(BorderFile, CutOffAnywhereIsRefused) {
         << size;
 }
 
+TEST(BorderFile, WhatIsWrittenIsReadAgain) {
+  Borders written{9, {}};
+  written.borders.push_back(
+      {"a & b", {{{1, 2, 3}, {.5, .25, .25}}, {{4, 5, 8}, {0., 1., 0.}}}, "sulci", {1.f, .5f, 0.f}});
+  written.borders.push_back({"ring", {{{0, 2, 3}, {1., 0., 0.}}}, "sulci", {0.f, .5f, 0.f}, true});
+  written.borders.push_back({"crest", {{{0, 2, 3}, {1. / 3, 1. / 3, 1. / 3}}}, "crests"});
+  const std::string text = write_borders(written);
+  const Borders read = read_borders(text, "lh.border");
+  EXPECT_EQ(read.surface_vertices, 9u);
+  ASSERT_EQ(read.borders.size(), 3u);
+  for (std::size_t i = 0; i < 3; ++i) {
+    const Border &a = written.borders[i], &b = read.borders[i];
+    EXPECT_EQ(a.name, b.name);
+    EXPECT_EQ(a.group, b.group);
+    EXPECT_EQ(a.closed, b.closed);
+    EXPECT_LT((a.colour - b.colour).norm(), 1e-6f);
+    ASSERT_EQ(a.points.size(), b.points.size());
+    for (std::size_t k = 0; k < a.points.size(); ++k) {
+      EXPECT_EQ(a.points[k].vertices, b.points[k].vertices);
+      for (std::size_t j = 0; j < 3; ++j) EXPECT_NEAR(a.points[k].weights[j], b.points[k].weights[j], 1e-6);
+    }
+  }
+  std::size_t groups = 0;
+  for (std::size_t at = text.find("<Class"); at != text.npos; at = text.find("<Class", at + 1)) ++groups;
+  EXPECT_EQ(groups, 2u);
+}
+
 TEST(BorderFile, DrawnSulciAreRead) {
   FOREST_REAL_DATA(folder, "cortex/fs_LR_left");
   std::size_t points = 0;

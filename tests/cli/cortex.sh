@@ -167,6 +167,28 @@ fails_with 2 'values' $BRAINFOREST cortex curves outer inner -o no.gii --measure
 head -c 100000 outer_all.gii >cut.gii
 refuses 'cut.gii' $BRAINFOREST cortex build cut.gii inner -o no.h5
 
+# Lines alone, in three forms and at three levels; a sheet shows them.
+$BRAINFOREST cortex lines outer inner -o lines.csv --sheet sheet.gii --values lines.txt --json >lines.json
+told lines.json 'd["lines"] >= 0 and set(d["lines_mm"]) == {"crests", "valleys", "sulci"} and d["border_within_2mm"] is None'
+python3 - <<'PYTHON'
+import csv, json, math
+rows = list(csv.DictReader(open("lines.csv")))
+told = json.load(open("lines.json"))
+assert len({r["line"] for r in rows}) == told["lines"]
+assert all(math.isfinite(float(r[k])) for r in rows for k in "xyz")
+whole = sum({r["line"]: float(r["length"]) for r in rows}.values())
+assert abs(whole - sum(told["lines_mm"].values())) < .01 * len(rows) + .01, (whole, told)
+PYTHON
+$BRAINFOREST render sheet.gii --overlay lines.txt -o lines.png --size 320x240 >/dev/null
+$BRAINFOREST cortex lines outer inner -o lines.obj --level inner --show crests,valleys >/dev/null
+grep -q '^o ' lines.obj || [ "$(python3 -c 'import json; d = json.load(open("lines.json"))["lines_mm"]; print(d["crests"] + d["valleys"] == 0)')" = True ]
+refuses 'in one of these' $BRAINFOREST cortex lines outer inner -o lines.txt
+refuses 'already' $BRAINFOREST cortex lines outer inner -o lines.csv
+refuses 'leave --level out' $BRAINFOREST cortex lines outer inner -o no.border --level middle
+refuses 'swapped' $BRAINFOREST cortex lines inner outer -o no.csv
+fails_with 2 'sheet' $BRAINFOREST cortex lines outer inner -o no.csv --values no.txt
+[ ! -e no.csv ] && [ ! -e no.border ]
+
 # What could not be written in the end is refused before the work; nothing is left behind.
 refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
 refuses 'its folder is not there' $BRAINFOREST cortex contours outer inner -o nowhere/s.contours
