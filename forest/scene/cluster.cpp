@@ -280,7 +280,8 @@ class Leaves {
 
  private:
   Vec4 vertex(const Point& p) const {
-    return {p.x - origin_.x(), p.y - origin_.y(), p.z - origin_.z(), p.radius};
+    constexpr float hairline = .05f;  // µm: what was traced without a diameter is drawn all the same
+    return {p.x - origin_.x(), p.y - origin_.y(), p.z - origin_.z(), std::max(p.radius, hairline)};
   }
   std::uint32_t here() const { return std::uint32_t(drawing_.vertices.size()); }
   void put(const Vec4& v) {

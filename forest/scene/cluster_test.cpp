@@ -62,6 +62,15 @@ TEST(Cluster, LeavesHoldEverySegmentOnce) {
 
 // Few branches are drawn as wide as the thinnest line for all: as many as cover the same area, on the mean over orders, and in
 // each order others.
+TEST(Cluster, WhatWasTracedWithoutDiametersIsDrawn) {
+  MorphologyBuilder builder;
+  builder.add_section({}, SectionKind::basal, std::vector<Point>{{0, 0, 0, 0}, {5, 1, 0, 0}, {9, 0, 2, 0}});
+  const ClusterTree tree = build_clusters(builder.build());
+  ASSERT_EQ(tree.segments.size(), tree.section.size());
+  EXPECT_GT(tree.clusters[0].radius, 0.f);
+  for (const frame::Segment& s : tree.segments) EXPECT_GT(s.radii & 0xffff, 0u);
+}
+
 TEST(Cluster, FewBranchesCoverAsMuchAsAllInOrdersOfTheirOwn) {
   std::size_t alike = 0, trees = 400;
   for (const float magnification : {.01f, .03f, .1f, .3f}) {

@@ -63,6 +63,14 @@ Vec3 along(const std::array<std::uint32_t, 3>& ramp, float t) {
   return light_of(ramp[i]) + (light_of(ramp[i + 1]) - light_of(ramp[i])) * (at - float(i));
 }
 
+/// Of `count` things from the pia downwards: yellow to violet, between the colours of the table where there are more than it has.
+Vec3 layered_light(std::size_t i, std::size_t count) {
+  if (count <= layered.size()) return light_of(layered[i]);
+  const float at = float(i) / float(count - 1) * float(layered.size() - 1);
+  const std::size_t k = std::min(std::size_t(at), layered.size() - 2);
+  return light_of(layered[k]) + (light_of(layered[k + 1]) - light_of(layered[k])) * (at - float(k));
+}
+
 // What a colour class shows, before it is known which class.
 struct Hue {
   struct Name {
@@ -120,7 +128,8 @@ class Painter {
     hues_.push_back(std::move(hue));
     return std::uint16_t(hues_.size() - 1);
   }
-  Vec3 on_background(std::uint32_t rgb) const { return light_of(rgb) * (light_ ? .7f : 1.f); }
+  Vec3 on_background(const Vec3& light) const { return light * (light_ ? .7f : 1.f); }
+  Vec3 on_background(std::uint32_t rgb) const { return on_background(light_of(rgb)); }
 
   const HueOf& scheme(ColourBy by) {
     auto& known = schemes_[std::size_t(by)];
@@ -148,7 +157,7 @@ class Painter {
         return by_type();
       case ColourBy::layer:
         for (std::size_t i = 0; i < circuit.layers.size(); ++i)
-          add_hue(on_background(layered[i % layered.size()]), circuit.layers[i].name);
+          add_hue(on_background(layered_light(i, circuit.layers.size())), circuit.layers[i].name);
         return [this, first](std::uint32_t i) { return hue_at(first + forest_.layers()[i]); };
       case ColourBy::neuron:
         for (const std::uint32_t rgb : categorical) add_hue(on_background(rgb), "");
@@ -235,10 +244,7 @@ class Painter {
     const float deepest = told.empty() ? pia - bottom : float(std::ranges::max(told));
     const float step = std::max(deepest / float(depth_steps), 1e-3f);
     for (std::size_t i = 0; i < depth_steps; ++i) {
-      const float at = float(i) / float(depth_steps - 1) * float(layered.size() - 1);
-      const std::size_t k = std::min(std::size_t(at), layered.size() - 2);
-      const Vec3 a = on_background(layered[k]), b = on_background(layered[k + 1]);
-      add_hue(a + (b - a) * (at - float(k)),
+      add_hue(on_background(layered_light(i, depth_steps)),
               fmt::format("{:.0f}–{:.0f} µm deep", step * float(i), step * float(i + 1)));
     }
     return [this, first, pia, step, told](std::uint32_t i) {

@@ -20,18 +20,27 @@ float reach_along(const Forest& forest, const Vec3& direction) {
 
 // It begins at the front of the forest, or a little before the eye inside it, and takes the forest's own depth.
 Fog fog_of(const Forest& forest, const frame::Camera& camera, float strength) {
-  constexpr float seen_inside = 95.f;  // µm: how far one sees between branches
   const Bounds& bounds = forest.soma_bounds();
   if (!(strength > 0.f) || bounds.empty()) return {};
-  const float extent = .5f * bounds.extent().norm() + 100.f;
-  const float depth = -camera.axes().col(2).dot(bounds.centre() - camera.eye);
-  const Vec3 level = bounds.extent() - bounds.extent().cwiseProduct(forest.circuit().up.cwiseAbs());
-  const float size = std::min(.5f * level.norm() + 50.f, reach_along(forest, camera.axes().col(2)));
-  // Within the forest one sees a hundred micrometres or two, whatever its size.
+  const Vec3 &along = camera.axes().col(2), &up = forest.circuit().up;
+  const auto neurons = float(forest.instances().size());
+  // Few neurons are as deep as their own branches, many as their somata.
+  const float own = forest.mean_reach() / std::cbrt(neurons);
+  const float extent = std::max(.5f * bounds.extent().norm() + 100.f, 2.f * own);
+  const float depth = -along.dot(bounds.centre() - camera.eye);
+  const Vec3 level = bounds.extent() - bounds.extent().cwiseProduct(up.cwiseAbs());
+  const float high = .5f * bounds.extent().dot(up.cwiseAbs()) * std::abs(along.dot(up.normalized()));
+  const float size = std::max({std::min(.5f * level.norm() + 50.f, reach_along(forest, along)), high, own});
+  // Within the forest one sees a hundred micrometres or two, whatever its size, and farther where neurons stand farther apart.
+  constexpr float seen_inside = 95.f, spacings = 1.25f,
+                  box = 41.6f;  // √12³: the volume of a box by its deviations
+  const auto volume =
+      float(double(box) *
+            std::sqrt((forest.soma_spread() + 900.f * Mat3::Identity()).cast<double>().determinant()));
+  const float sight = std::max({seen_inside, spacings * std::cbrt(volume / neurons), own});
   const float inside = std::clamp(1.f - (depth - size) / size, 0.f, 1.f);
   const float length = std::max(60.f, std::min(2.f * size, extent) * .9f);
-  return {std::max(20.f, depth - size),
-          (length + inside * (std::min(length, seen_inside) - length)) / strength};
+  return {std::max(20.f, depth - size), (length + inside * (std::min(length, sight) - length)) / strength};
 }
 
 namespace {

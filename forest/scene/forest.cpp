@@ -88,6 +88,7 @@ struct Forest::Data {
   circuit::NodeNames nodes;
   Bounds soma_bounds;
   Mat3 soma_spread = Mat3::Zero();
+  float mean_reach = 0.f;
   std::vector<Sphere> spheres;
   Groves groves;
   std::vector<Standing> standing;
@@ -134,6 +135,7 @@ const circuit::Circuit& Forest::circuit() const { return data_->circuit; }
 const circuit::NodeNames& Forest::nodes() const { return data_->nodes; }
 const Bounds& Forest::soma_bounds() const { return data_->soma_bounds; }
 const Mat3& Forest::soma_spread() const { return data_->soma_spread; }
+float Forest::mean_reach() const { return data_->mean_reach; }
 std::vector<circuit::Layer> Forest::layers_in_place() const {
   std::vector<circuit::Layer> layers = circuit().layers;
   if (circuit().up != circuit::Circuit().up) layers.clear();  // they are curved
@@ -358,6 +360,9 @@ void Forest::Data::take_instances(const Refuse& refuse) {
     const Neuron& n = neurons[instances[i].morphology];
     spheres[i] = n.cluster_count ? placed(clusters[n.first_cluster]) : placed(Sphere{});
   });
+  double reaches = 0.;
+  for (const Sphere& sphere : spheres) reaches += double(sphere.radius);
+  mean_reach = float(reaches / double(std::max<std::size_t>(spheres.size(), 1)));
   groves = Groves(spheres);
   standing.resize(instances.size());
   parallel_for(standing.size(), 1024, [&](std::size_t m) {

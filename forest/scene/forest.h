@@ -97,6 +97,7 @@ class Forest {
   const circuit::NodeNames& nodes() const;  // of all instances, in their order
   const Bounds& soma_bounds() const;        // of all soma centres
   const Mat3& soma_spread() const;          // their covariance, µm²
+  float mean_reach() const;                 // µm, of the neurons: of the radii of spheres()
   /// circuit()'s layers that have a height, where the somata lie among them: in curved tissue they do not.
   std::vector<circuit::Layer> layers_in_place() const;
   std::span<const Sphere> spheres() const;  // of every instance: around all that belongs to it

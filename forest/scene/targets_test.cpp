@@ -217,6 +217,20 @@ TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
   EXPECT_LE(by_type.legend.size(), 16u);
 }
 
+TEST(Appearance, NoTwoLayersHaveOneColour) {
+  circuit::Circuit c = testing::sample_circuit(48);
+  c.layers.clear();
+  for (int i = 0; i < 12; ++i)
+    c.layers.push_back({"L" + std::to_string(i), 100.f - float(i), 101.f - float(i)});
+  for (std::size_t i = 0; i < c.instances.size(); ++i) c.instances[i].layer = std::uint32_t(i % 12);
+  const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
+  View view;
+  view.colour_by = ColourBy::layer;
+  const Colouring by_layer = colour(Targets(f), view);
+  ASSERT_EQ(by_layer.legend.size(), 12u);
+  for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(by_layer.legend[i].name, "L" + std::to_string(i));
+}
+
 TEST(Appearance, LayersOfATypeAreOneEntryOfTheLegend) {
   circuit::Circuit c = testing::sample_circuit(80);
   c.layers.clear();

@@ -578,7 +578,8 @@ float height_of(const Bounds& box, const Vec3& up) { return box.extent().dot(up.
 }  // namespace
 
 Mat3 standing(const Forest& forest) {
-  const Vec3& up = forest.circuit().up;
+  // Where neurons stand in all directions, as over a hemisphere, z is up, as surfaces of brains have it.
+  const Vec3 up = towards_pia(forest).value_or(Vec3::UnitZ());
   if (up == Vec3::UnitY()) return Mat3::Identity();
   Mat3 stands = Quat::FromTwoVectors(Vec3::UnitY(), up).toRotationMatrix();
   // A row of elements shows its face: in front is where somata spread least.
@@ -589,7 +590,9 @@ Mat3 standing(const Forest& forest) {
                                                               level);
   if (spread.eigenvalues()[0] >= flat * flat * spread.eigenvalues()[1]) return stands;
   Vec3 front = level * spread.eigenvectors().col(0);
-  if (front.dot(stands.col(2)) < 0.f) front = -front;
+  // From the side that z points to; of a hemisphere from outside.
+  const float aside = front.dot(stands.col(2)), out = front.dot(forest.soma_bounds().centre());
+  if ((std::abs(aside) > .1f ? aside : out) < 0.f) front = -front;
   stands.col(0) = stands.col(1).cross(front), stands.col(2) = front;
   return stands;
 }

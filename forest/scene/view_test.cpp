@@ -290,6 +290,23 @@ TEST(View, ARowOfElementsShowsItsFaceAndIsNotLostInFog) {
   }
 }
 
+TEST(View, OneNeuronIsNotLostInFogNorTheFootOfATallForest) {
+  circuit::Circuit circuit = testing::sample_circuit(1);
+  const Forest one = Forest::from_bytes(pack(circuit, testing::sample_neurons()));
+  const auto light = [](const Forest& forest, const frame::Camera& camera, const Vec3& at) {
+    const Fog fog = fog_of(forest, camera, 1.f);
+    return std::exp(-std::max(0.f, -camera.axes().col(2).dot(at - camera.eye) - fog.start) / fog.length);
+  };
+  const frame::Camera camera = overview(one).camera;
+  const Sphere& all = one.spheres()[0];
+  EXPECT_GT(light(one, camera, all.centre - all.radius * camera.axes().col(2)), .25f);
+
+  circuit = testing::sample_circuit(40);
+  for (std::size_t i = 0; i < 40; ++i) circuit.instances[i].position = {0.f, 250.f * float(i), 0.f};
+  const Forest tall = Forest::from_bytes(pack(circuit, testing::sample_neurons()));
+  EXPECT_GT(light(tall, overview(tall).camera, Vec3::Zero()), .15f);
+}
+
 TEST(View, AColumnIsAsDeepAsItIsWide) {
   const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(2000), testing::sample_neurons()));
   const float wide = .5f * std::hypot(forest.soma_bounds().extent().x(), forest.soma_bounds().extent().z());
