@@ -11,7 +11,8 @@
 
 namespace forest {
 
-scene::View view_of(std::string_view text, const std::string& name, const Vec3& up) {
+scene::View view_of(std::string_view text, const std::string& name, const Vec3& up,
+                    const scene::View* whole) {
   try {
     [[maybe_unused]] const auto json = nlohmann::json::parse(text);
   } catch (const nlohmann::json::parse_error& error) {
@@ -19,14 +20,15 @@ scene::View view_of(std::string_view text, const std::string& name, const Vec3& 
   } catch (const nlohmann::json::exception&) {
     throw InputError(name, 1, "holds a number too large for any view; write it smaller");
   }
-  return scene::parse_view(text, name, up);
+  return scene::parse_view(text, name, up, whole);
 }
 
-scene::View read_view(const std::string& file_or_text, const Vec3& up) {
+scene::View read_view(const std::string& file_or_text, const Vec3& up, const scene::View* whole) {
   const std::size_t first = file_or_text.find_first_not_of(" \t\r\n");
-  if (first != std::string::npos && file_or_text[first] == '{') return view_of(file_or_text, "--view", up);
+  if (first != std::string::npos && file_or_text[first] == '{')
+    return view_of(file_or_text, "--view", up, whole);
   const MappedFile file(file_or_text);
-  return view_of(file.text(), file_or_text, up);
+  return view_of(file.text(), file_or_text, up, whole);
 }
 
 std::vector<scene::View> read_views(const std::string& name, const Vec3& up) {

@@ -136,9 +136,9 @@ std::function<void()> render(CLI::App& command, Console& console) {
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
-    scene::View view = options->view.empty() ? default_view(artist.targets(), options->targets, surfaces,
-                                                            options->side, float(width) / float(height))
-                                             : read_view(options->view, forest.circuit().up);
+    scene::View view = default_view(artist.targets(), options->targets, surfaces, options->side,
+                                    float(width) / float(height));
+    if (!options->view.empty()) view = read_view(options->view, forest.circuit().up, &view);
     add_appearances(options->targets, view.targets);
     nlohmann::ordered_json of_surfaces;  // null where there are none
     if (!surfaces.empty()) of_surfaces["triangles"] = surfaces.triangles();

@@ -597,7 +597,7 @@ Mat3 standing(const Forest& forest) {
   return stands;
 }
 
-View parse_view(std::string_view text, const std::string& name, const Vec3& up) {
+View parse_view(std::string_view text, const std::string& name, const Vec3& up, const View* whole) {
   Json json;
   try {
     std::vector<std::set<std::string>> open;  // objects, with the keys that each has had
@@ -613,11 +613,12 @@ View parse_view(std::string_view text, const std::string& name, const Vec3& up) 
   }
   if (!json.is_object())
     throw InputError(name, 0, "a view is a JSON object with 'eye' and 'target'; see docs/scene/view.md");
-  View v;
-  v.camera.up = up;
+  const bool stands = !whole || json.contains("eye") || json.contains("target");
+  View v = stands ? View() : *whole;
+  if (stands) v.camera.up = up;
   read_all(v, json, keys_of_view(), name, "");  // what is misspelt first
   for (const char* needed : {"eye", "target"})
-    if (!json.contains(needed))
+    if (stands && !json.contains(needed))
       throw InputError(name, 0, fmt::format("the view lacks '{}'; give it as [x, y, z] in µm", needed));
   if (v.camera.eye == v.camera.target)
     throw InputError(name, 0, "'eye' and 'target' are the same point; move one of them");

@@ -53,10 +53,12 @@ struct View {
 /// {"eye":[x,y,z],"target":[x,y,z],"up":[0,1,0],"field_of_view":40,"projection":"perspective","gaze":[.5,.5],"error":1,
 ///  "colour_by":"type","background":"dark","samples":16,"fog":1,"halo":1,"skin":true,"synapses":"sign","targets":[{"name":"L5","opacity":.4}],
 ///  "activity":{"map":"plasma","range":[-80,20],"threshold":-60,"speed":300,"fade":1,"time":12.5},
-///  "plane":{"at":[0,1000,0],"normal":[0,0,1],"opacity":.18}}; only eye and target are needed.
+///  "plane":{"at":[0,1000,0],"normal":[0,0,1],"opacity":.18}}; only eye and target are needed, and these not where `whole` is given.
 /// Throws InputError naming the wrong key. Unknown keys are errors too, so that a typing slip is noticed.
-/// @param up  of the camera where nothing is said of it: the forest's (circuit::Circuit::up)
-View parse_view(std::string_view json, const std::string& name = "view", const Vec3& up = Vec3::UnitY());
+/// @param up     of the camera where nothing is said of it: the forest's (circuit::Circuit::up)
+/// @param whole  what is shown, as far as nothing else is said, where there is neither eye nor target
+View parse_view(std::string_view json, const std::string& name = "view", const Vec3& up = Vec3::UnitY(),
+                const View* whole = nullptr);
 std::string to_json(const View& view);
 
 /// A key of that object, and what it may hold: words, or the range of a number as "1–170"; none where there is more to say. So

@@ -58,6 +58,19 @@ TEST(View, EveryKeyIsWrittenAndReadBack) {
   EXPECT_EQ(to_json(parse_view(text)), text);
 }
 
+TEST(View, WithoutEyeAndTargetItIsThatOfAllWhereOneIsKnown) {
+  View all;
+  all.camera.eye = {7.f, 8.f, 9.f}, all.fog = .25f;
+  const View view = parse_view(R"({"background":"light","field_of_view":30})", "view", Vec3::UnitY(), &all);
+  EXPECT_EQ(view.camera.eye, all.camera.eye);
+  EXPECT_EQ(view.camera.field_of_view, 30.f);
+  EXPECT_EQ(view.fog, .25f);
+  EXPECT_EQ(view.background, Background::light);
+  EXPECT_THROW(parse_view(R"({"eye":[1,2,3]})", "view", Vec3::UnitY(), &all), InputError);
+  EXPECT_THROW(parse_view(R"({"fog":1})"), InputError);
+  EXPECT_EQ(parse_view(R"({"eye":[1,2,3],"target":[0,0,0]})", "view", Vec3::UnitY(), &all).fog, View().fog);
+}
+
 TEST(View, ItsPageHasEveryKeyWithWhatItMayHoldAndNoOther) {
   const MappedFile page(FOREST_SOURCE_DIR "/docs/scene/view.md");
   std::map<std::string, std::string> rows;  // of its tables, by key
