@@ -21,6 +21,7 @@
 #include "apps/cli/synapse_options.h"
 #include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
+#include "apps/forest_files.h"
 #include "apps/surface_files.h"
 #include "apps/view_text.h"
 
@@ -134,10 +135,14 @@ std::function<void()> render(CLI::App& command, Console& console) {
                       of_neurons, options->forest.string()));
     if (alone) named.files.insert(named.files.begin(), options->forest);
     scene::Surfaces surfaces = read_surfaces(named, console);
-    const scene::Forest forest = alone ? empty_forest() : scene::Forest::open(options->forest);
+    const scene::Forest forest = alone ? empty_forest() : open_forest(options->forest);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
     scene::View view = default_view(artist.targets(), options->targets, surfaces, options->side,
                                     float(width) / float(height));
+    if (!alone && holds_cells(options->forest)) {
+      view.samples = 64;  // thin lines on nothing
+      if (forest.instances().size() == 1) view.colour_by = scene::ColourBy::kind;
+    }
     if (!options->view.empty()) view = read_view(options->view, forest.circuit().up, &view);
     add_appearances(options->targets, view.targets);
     nlohmann::ordered_json of_surfaces;  // null where there are none
@@ -249,7 +254,7 @@ std::function<void()> movie(CLI::App& command, Console& console) {
     must_take(options->out, mp4_film);
     FilmPlan plan = options->plan;
     std::tie(plan.width, plan.height) = parse_size(options->size);
-    const scene::Forest forest = scene::Forest::open(options->forest);
+    const scene::Forest forest = open_forest(options->forest);
     std::vector<scene::View> views;
     for (const std::string& view : options->views) views.push_back(read_view(view, forest.circuit().up));
     if (!options->path.empty()) views = read_views(options->path, forest.circuit().up);

@@ -23,6 +23,7 @@
 #include "apps/cli/options.h"
 #include "apps/cli/target_options.h"
 #include "apps/cli/verb.h"
+#include "apps/forest_files.h"
 
 namespace forest::cli {
 namespace {
@@ -139,7 +140,7 @@ void run(const Options& options, Console& console) {
     throw Error(fmt::format("{} is no size of a film; width and height must be even", options.size));
   if (extension == ".csv" && (options.height > 0. || !options.centre.empty()))
     throw Error("--height and --centre are of pictures; a table tells of all that the plane cuts");
-  const scene::Forest forest = scene::Forest::open(options.forest);
+  const scene::Forest forest = open_forest(options.forest);
   const Plane plane = plane_of(options.plane, forest);
   scene::SlicePicture picture{.background = options.background == "dark" ? scene::Background::dark
                                                                          : scene::Background::light};

@@ -127,6 +127,7 @@ std::span<const Verb> verbs() {
        targets},
       {"render", "Draw a forest as a picture, without a display",
        "brainforest render column.forest --view view.json --size 1920x1080 -o column.png\n"
+       "  brainforest render cell7.swc --legend --scale -o cell7.png\n"
        "  brainforest render column.forest --activity run.activity --time 12.5 -o moment.png\n"
        "  brainforest render lh.pial --overlay lh.thickness --range 1.5:3.5 -o cortex.png",
        render},

@@ -53,7 +53,8 @@ std::function<void()> view(CLI::App& command, Console&) {
     std::vector<std::string> surfaces, overlays;
   };
   const auto options = std::make_shared<Options>();
-  command.add_option("forest", options->forest, "Forest file, or the surface of a cortex")->required();
+  command.add_option("forest", options->forest, "Forest file, traced neurons, or the surface of a cortex")
+      ->required();
   command.add_option("--view", options->view, "View as a JSON file or text (docs/scene/view.md)");
   add_node_sets(command, options->node_sets);
   command.add_option("--activity", options->activity, "An activity file to play");

@@ -18,6 +18,7 @@
 
 #include "apps/choice.h"
 #include "apps/drawer.h"
+#include "apps/forest_files.h"
 #include "apps/node_set_files.h"
 #include "apps/studio/report.h"
 #include "apps/studio/theme.h"
@@ -101,8 +102,8 @@ int run(const Options& options, int& argc, char** argv) {
   std::vector<std::filesystem::path> surface_files = options.surfaces;
   const bool alone = is_surface(options.forest);
   if (alone) surface_files.insert(surface_files.begin(), options.forest);
-  const scene::Forest forest = alone ? scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {}))
-                                     : scene::Forest::open(options.forest);
+  const scene::Forest forest =
+      alone ? scene::Forest::from_bytes(scene::pack(circuit::Circuit{}, {})) : open_forest(options.forest);
   scene::Surfaces surfaces;
   add_surfaces(surfaces, {surface_files, options.overlays});
   const QSize size = options.size.empty() ? QSize() : size_of(options.size);

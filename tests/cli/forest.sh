@@ -24,6 +24,19 @@ echo "$view" >view.json
 "$program" render a.forest --view view.json --size 320x200 -o c.png >/dev/null
 cmp a.png c.png || fail "a view from a file is not the same view"
 
+# Traced neurons need no forest: one by the kinds of its branches, several side by side.
+$BRAINFOREST grow --grammar pyramidal --count 3 --seed 2 --out grown >/dev/null
+$BRAINFOREST grow --grammar pyramidal --count 3 --seed 2 --out grown.cells >/dev/null
+first=$(ls grown/*.swc | head -1)
+"$program" render "$first" --size 320x200 -o one.png --json >one.json
+told one.json 'd["neurons"] == 1 and d["covered"] > 0 and d["view"]["colour_by"] == "kind"'
+"$program" render grown.cells --size 320x200 --view '{"background":"light"}' -o three.png --json >three.json
+told three.json 'd["neurons"] == 3 and d["view"]["background"] == "light" and d["view"]["colour_by"] == "type"'
+"$program" section "$first" --size 320x200 --height 300 -o cut.png >/dev/null
+head -c 40 "$first" >broken.swc
+refuses 'broken.swc' "$program" render broken.swc -o no.png
+[ ! -e no.png ] || fail "a picture of a broken neuron"
+
 # What is not there is not told: no surfaces, no colour map of theirs.
 "$program" render a.forest --view view.json --size 64x64 -o c.png --json >c.json
 told c.json 'd["surfaces"] is None and d["activity"] is None'
