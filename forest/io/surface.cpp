@@ -82,6 +82,13 @@ std::string title_of(const std::string& name) {
   return {};
 }
 
+// FreeSurfer's converter calls what it writes as GIFTI by the path that it read it from.
+std::string without_folders(const std::string& title) {
+  if (!title.starts_with('/')) return title;
+  const std::string known = title_of(title);
+  return known.empty() ? title.substr(title.rfind('/') + 1) : known;
+}
+
 }  // namespace
 
 bool may_be_surface(std::string_view bytes) {
@@ -112,7 +119,7 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
   if (is_freesurfer_values(content))
     result = {.values = read_freesurfer_values(content, name), .title = title_of(name), .labels = {}};
   else if (is_gifti(content))
-    result = read_gifti_values(content, name), result.title = title_in(result.title);
+    result = read_gifti_values(content, name), result.title = title_in(without_folders(result.title));
   else
     result = read_lines(content, name);
   if (result.values.empty())

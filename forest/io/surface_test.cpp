@@ -375,6 +375,13 @@ TEST(Surface, ValuesSayWhatTheyAreWhereTheirFileDoes) {
                 "<MetaData><MD><Name>Other</Name><Value>no</Value></MD>"
                 "<MD><Name>Name</Name><Value><![CDATA[MyelinMap]]></Value></MD></MetaData>");
   EXPECT_EQ(title(named, "g.shape.gii"), "MyelinMap");
+  const auto called = [&](const std::string& path) {
+    std::string other = named;
+    return title(other.replace(other.find("MyelinMap"), 9, path), "g.shape.gii");
+  };
+  EXPECT_EQ(called("/data/fsaverage5/surf/lh.thickness"), "thickness (mm)");
+  EXPECT_EQ(called("/data/maps/lh.myelin"), "lh.myelin");
+  EXPECT_EQ(called("T1w/T2w"), "T1w/T2w");
 }
 
 TEST(Surface, EveryFileThatIsCutOffIsAnErrorOrWhole) {
