@@ -16,6 +16,7 @@
 #include "forest/io/workbook.h"
 #include "forest/morphology/morphology.h"
 #include "forest/scene/slice_picture.h"
+#include "forest/scene/view.h"
 
 #include "apps/cli/artist.h"
 #include "apps/cli/console.h"
@@ -56,18 +57,11 @@ std::vector<float> numbers_of(const std::string& text, std::size_t count, const 
   return numbers;
 }
 
-// The normal of a section along the columns: z, or where the pia lies nearly there, x.
-Vec3 beside(const scene::Forest& forest) {
-  const Vec3 up = forest.circuit().up.normalized();
-  const Vec3 wish = std::abs(up.z()) > .9f ? Vec3(Vec3::UnitX()) : Vec3(Vec3::UnitZ());
-  return (wish - wish.dot(up) * up).normalized();
-}
-
 Plane plane_of(const std::string& text, const scene::Forest& forest) {
   if (text.empty()) {
     if (forest.soma_bounds().empty())
       throw Error("the forest has no neurons, so there is no middle to cut; give --plane");
-    return Plane::through(forest.soma_bounds().centre(), beside(forest), forest.circuit().up);
+    return Plane::through(forest.soma_bounds().centre(), scene::standing(forest).col(2), forest.circuit().up);
   }
   const auto n = numbers_of(text, 6, "x,y,z,nx,ny,nz: a point of the plane in µm and its normal");
   const Vec3 normal(n[3], n[4], n[5]);
