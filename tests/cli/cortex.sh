@@ -202,6 +202,7 @@ refuses "two boundaries are to be called 'outer'" $BRAINFOREST cortex contours o
 refuses 'pixel is of pictures, and none is given' $BRAINFOREST cortex contours outer inner --pixel .1 -o no.contours
 refuses 'as HDF5; give a name that ends in .h5' $BRAINFOREST cortex build outer inner -o elements.txt
 refuses 'is a surface, not contours of sections' $BRAINFOREST cortex compare outer.gii
+refuses 'as no brain does; give it in mm' $BRAINFOREST cortex contours large --spacing 5 -o no.contours
 refuses 'in mm, or a larger --spacing' $BRAINFOREST cortex contours outer --spacing .0005 -o no.contours
 sed '3s/"at": [-0-9.]*,/"at": NaN,/' s.contours >nan.contours
 refuses 'nan.contours:3: is no JSON from column' $BRAINFOREST cortex compare nan.contours
