@@ -438,6 +438,9 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
 TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {
   const Mesh outer = ball(10e3), inner = ball(8e3);
   EXPECT_TRUE(check_surfaces(outer, inner).empty());
+  Mesh left = outer;  // a vertex of no triangle
+  left.positions.push_back(Vec3::Zero());
+  EXPECT_TRUE(check_surfaces(left, inner).empty());
   Mesh few = inner;  // one vertex is pulled through the other side
   few.positions[20] = -1.2f * few.positions[20] + Vec3(137.f, 211.f, 97.f);
   const auto oddities = check_surfaces(outer, few);

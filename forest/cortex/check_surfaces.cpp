@@ -60,7 +60,11 @@ Strays strays(const Mesh& mesh, const TriangleTree& other, bool belongs_inside) 
         between[i] = {depth, place};
   });
   Strays found;
-  for (std::uint32_t v = 0; v < depths.size(); ++v) found.add(depths[v], at(v), found.vertices);
+  std::vector<std::uint8_t> used(depths.size(), 0);  // a vertex of no triangle is no part of the surface
+  for (const Triangle& t : mesh.triangles)
+    for (const std::uint32_t v : t) used[v] = 1;
+  for (std::uint32_t v = 0; v < depths.size(); ++v)
+    if (used[v]) found.add(depths[v], at(v), found.vertices);
   for (const auto& [depth, place] : between) found.add(depth, place, found.triangles);
   return found;
 }
