@@ -133,9 +133,11 @@ std::vector<Figure> figures_of(const Deeper& deeper) {
   std::vector<Figure> all;
   for (Figure& f : figures_of(deeper.borders)) all.push_back(std::move(f));
   all.push_back({"symmetry",
-                 {{"elements", s.elements}, {"best_planar", s.best_planar}, {"stretches", s.stretches}},
+                 {{"elements", s.stretches ? Json(s.elements) : Json()},
+                  {"best_planar", s.stretches ? Json(s.best_planar) : Json()},
+                  {"stretches", s.stretches}},
                  "symmetry",
-                 fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar),
+                 s.stretches ? fmt::format("{:.3f} / {:.3f}", s.elements, s.best_planar) : "-",
                  fmt::format("difference of successive v-sections / of the best planar ones, over {} "
                              "stretches",
                              s.stretches)});

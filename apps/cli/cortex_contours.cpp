@@ -315,6 +315,7 @@ cortex::ContourStack cut(const Mesh& surface, const std::string& name, const fs:
 
 void run(const Options& options, Console& console) {
   must_take_contours(options.out, options.force);
+  must_not_be_read("--out", options.out, options.inputs);
   if (options.names.size() > options.inputs.size())
     throw Error(fmt::format("{} are named for {}, each of which has one; name each once",
                             counted(options.names.size(), "boundary", "boundaries"),

@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest cortex curves: a w-curve from every vertex of the outer surface, what is measured along it, and where it is at a depth.
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <memory>
 #include <string>
@@ -108,14 +109,19 @@ void run(const Options& o, Console& console) {
   if (!o.values.empty()) files.emplace_back(o.values, io::write_surface_values(measure->title, values));
   write_unless_there(files, o.force);
 
+  if (lengths.empty())
+    console.warn(
+        fmt::format("no curve is longer than {:g} mm, as tissue is; figures are of none", no_tissue));
   const auto quantile = [](const std::vector<double>& of, double share) {
-    return of.empty() ? 0. : statistics::quantile(of, share);
+    return of.empty() ? NAN : statistics::quantile(of, share);  // null in JSON
   };
   const double thickness = quantile(lengths, .5), usual = quantile(angles, .5), far = quantile(angles, .99);
-  console.say(
-      fmt::format("{} of {} reach the inner surface; {:.2f} mm long in the median; {:.2f}° off "
-                  "right angles in the median, {:.1f}° at the 99th percentile",
-                  arrived, counted(all.size(), "curve"), thickness, usual, far));
+  console.say(fmt::format("{} of {} reach the inner surface{}", arrived, counted(all.size(), "curve"),
+                          lengths.empty()
+                              ? std::string()
+                              : fmt::format("; {:.2f} mm long in the median; {:.2f}° off right angles in the "
+                                            "median, {:.1f}° at the 99th percentile",
+                                            thickness, usual, far)));
   console.say(fmt::format(
       "depth {} by {} in {}{}", o.depth, o.by, o.out.string(),
       o.values.empty() ? std::string()

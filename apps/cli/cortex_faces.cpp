@@ -103,6 +103,8 @@ Mesh edges_of(const cortex::Elements& elements, std::span<const std::uint32_t> o
 void run(const Options& o, Console& console) {
   must_take_surfaces({o.out}, true);
   if (!o.values.empty()) must_take_files({o.out, o.values}, true);
+  must_not_be_read("--out", o.out, {o.file});
+  must_not_be_read("--values", o.values, {o.file});
   const io::ElementsFile file = io::read_elements(o.file);
   const cortex::Elements& elements = file.cortex.elements;
   if (!o.edges.empty()) {

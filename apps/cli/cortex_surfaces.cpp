@@ -66,6 +66,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
   add_force(command, o->force);
   return [o, &command, &console] {
     must_take_surfaces(o->out, o->force);
+    for (const fs::path& out : o->out) must_not_be_read("--out", out, {o->file});
     if (o->outer == o->inner)
       throw Error(fmt::format(
           "'{}' is to be both boundaries; name the outer one by --outer, the inner one by --inner",

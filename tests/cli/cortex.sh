@@ -189,6 +189,13 @@ refuses 'swapped' $BRAINFOREST cortex lines inner outer -o no.csv
 fails_with 2 'sheet' $BRAINFOREST cortex lines outer inner -o no.csv --values no.txt
 [ ! -e no.csv ] && [ ! -e no.border ]
 
+# --force replaces what was made before, not what is read.
+for file in e.h5 s.contours; do cp $file kept.$file; done
+refuses 'is read here' $BRAINFOREST cortex faces e.h5 -o m.gii --values e.h5 --force
+refuses 'is read here' $BRAINFOREST cortex surfaces s.contours -o s.contours i.gii --force
+refuses 'is read here' $BRAINFOREST cortex contours s.contours -o s.contours --force
+for file in e.h5 s.contours; do cmp $file kept.$file; done
+
 # What could not be written in the end is refused before the work; nothing is left behind.
 refuses 'its folder is not there' $BRAINFOREST cortex build outer inner -o nowhere/e.h5
 refuses 'its folder is not there' $BRAINFOREST cortex contours outer inner -o nowhere/s.contours
