@@ -355,6 +355,11 @@ class PathReader {
                          start_.x(), start_.y(), here_.x(), here_.y()));
       line(start_);
     }
+    if (curve_.size() == 3) {  // one cubic that ends where it begins, as two
+      const Place a = curve_[0], b = .5 * (a + curve_[1]), c = .5 * (curve_[1] + curve_[2]),
+                  d = .5 * (curve_[2] + a), bc = .5 * (b + c), cd = .5 * (c + d);
+      curve_ = {a, b, bc, .5 * (bc + cd), cd, d};
+    }
     if (curve_.size() >= 6) {
       // Downwards in the drawing is downwards in the section, whose axes run upwards.
       BezierLoop loop;

@@ -76,6 +76,9 @@ TEST(Contours, OfADrawingAreReadFromEveryCommandInItsSize) {
     EXPECT_EQ(area(loops(same).sections[0].contours[0].curve), area(square.sections[0].contours[0].curve))
         << same;
   EXPECT_EQ(loops("M1 2h4v4zM8 8h1v1z").sections[0].contours.size(), 2u);
+  const ContourStack drop = loops("M1 1C9 1 1 9 1 1Z");  // one cubic: 3/20 of the parallelogram of its arms
+  ASSERT_EQ(drop.sections[0].contours.size(), 1u);
+  EXPECT_NEAR(std::abs(area(drop.sections[0].contours[0].curve)), 64. * 3. / 20. * 4e6, 1.);
   EXPECT_EQ(area(loops("M0 0Q2 2 4 0T8 0V9H0z").sections[0].contours[0].curve),
             area(loops("M0 0q2 2 4 0q2 -2 4 0V9H0z").sections[0].contours[0].curve));
   EXPECT_EQ(loops("M0 0C0 2 2 2 2 0S4-2 4 0V9H0z").sections[0].contours[0].curve,
