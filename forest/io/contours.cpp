@@ -553,12 +553,10 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
   if (std::string_view(root.attribute("data-unit").value()) != "um") {
     // As large as the drawing says it is; without a word on it a unit is a pixel, of which CSS has 96 an inch.
     const std::string_view width = root.attribute("width").value();
-    const auto unit = [&]() -> double {
-      if (width.ends_with("mm")) return 1000.;
-      if (width.ends_with("cm")) return 10000.;
-      if (width.ends_with("in")) return 25400.;
-      return 25400. / 96.;
-    }();
+    constexpr std::pair<std::string_view, double> units[] = {
+        {"mm", 1000.}, {"cm", 10000.}, {"in", 25400.}, {"pt", 25400. / 72.}, {"pc", 25400. / 6.}, {"%", NAN}};
+    const auto named = std::ranges::find_if(units, [&](const auto& u) { return width.ends_with(u.first); });
+    const double unit = named == std::end(units) ? 25400. / 96. : named->second;
     const std::string_view box = root.attribute("viewBox").value();
     std::vector<double> four;
     for (std::size_t at = 0; at < box.size() && four.size() < 4;) {

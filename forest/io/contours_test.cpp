@@ -76,6 +76,17 @@ TEST(Contours, OfADrawingAreReadFromEveryCommandInItsSize) {
     EXPECT_EQ(area(loops(same).sections[0].contours[0].curve), area(square.sections[0].contours[0].curve))
         << same;
   EXPECT_EQ(loops("M1 2h4v4zM8 8h1v1z").sections[0].contours.size(), 2u);
+  const auto wide = [](const std::string& width) {
+    return area(read_contours("<svg width='" + width +
+                                  "' viewBox='0 0 72 72'><g id='a'><path d='M0 0h72v72H0z'/></g></svg>",
+                              "d.svg")
+                    .stack.sections[0]
+                    .contours[0]
+                    .curve);
+  };
+  for (const char* inch : {"72pt", "6pc", "25.4mm", "2.54cm", "96px", "96"})
+    EXPECT_NEAR(wide(inch), wide("1in"), 1e-6 * std::abs(wide("1in"))) << inch;
+  EXPECT_THROW(wide("100%"), InputError);
   const ContourStack drop = loops("M1 1C9 1 1 9 1 1Z");  // one cubic: 3/20 of the parallelogram of its arms
   ASSERT_EQ(drop.sections[0].contours.size(), 1u);
   EXPECT_NEAR(std::abs(area(drop.sections[0].contours[0].curve)), 64. * 3. / 20. * 4e6, 1.);
