@@ -176,8 +176,8 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options, Con
 // Distances are mm: so many sections are those of a file in µm.
 std::vector<double> planes_of(double low, double high, const Options& options, const fs::path& path) {
   const double spacing = 1e3 * options.spacing;
-  constexpr double most = 20'000., largest = 1e6;  // sections; µm
-  if (high - low > largest)
+  constexpr double most = 20'000.;
+  if (high - low > cortex::largest_brain)
     throw Error(fmt::format("{}: reaches over {:.4g} m, as no brain does; give it in mm", path.string(),
                             (high - low) / 1e6));
   if ((high - low) / spacing > most)

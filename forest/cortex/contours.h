@@ -66,6 +66,9 @@ struct ContourCrossing {
 /// from left to right. On all cores.
 std::vector<ContourCrossing> crossings(const ContourStack& stack);
 
+inline constexpr double largest_brain =
+    1e6;  // µm: what reaches farther has another unit; a whale's is .3 m long
+
 /// Where planes stand: at multiples of `spacing` (µm, > 0) moved by `offset`, all that lie within [low, high].
 std::vector<double> planes_between(double low, double high, double spacing, double offset = 0.);
 

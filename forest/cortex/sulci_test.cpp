@@ -39,8 +39,7 @@ constexpr SulcusOptions small{.scale = 4e3, .persistence = 800., .shallowest = .
 
 double length_of(const std::vector<Line>& lines) {
   double sum = 0.;
-  for (const Line& line : lines)
-    for (std::size_t i = 1; i < line.points.size(); ++i) sum += (line.points[i] - line.points[i - 1]).norm();
+  for (const Line& line : lines) sum += line.length();
   return sum;
 }
 

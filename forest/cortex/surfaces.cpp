@@ -85,8 +85,7 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
     for (const Contour& contour : section.contours)
       for (const Place& point : contour.curve.points) low = low.cwiseMin(point), high = high.cwiseMax(point);
   if (!(low.x() <= high.x())) throw Error("the sections have no contours; trace some");
-  constexpr double largest = 1e6;  // a whale's brain is .3 m long
-  if (const double extent = (high - low).maxCoeff(); extent > largest)
+  if (const double extent = (high - low).maxCoeff(); extent > largest_brain)
     throw Error(
         fmt::format("the contours spread over {:.3g} m, as no brain does; look at their unit", extent / 1e6));
   const double border = 2.5 * raster.step;
