@@ -449,14 +449,46 @@ TEST(CheckSurfaces, FewTrianglesThatCutAreToldAndManyRefused) {
   EXPECT_THAT(oddities[0], HasSubstr(" mm"));
   Mesh spike = outer;  // through all of the inner one, to the other side of it
   spike.positions[20] *= -1.f;
-  const auto through = check_surfaces(spike, inner);
-  ASSERT_EQ(through.size(), 1u);
-  EXPECT_THAT(through[0], HasSubstr("of its triangles reach there between theirs, the farthest by 7.8"));
-  Mesh noisy = outer;
-  Random random(3);
-  for (Vec3& p : noisy.positions)
-    p += 400.f * Eigen::Vector3d(random.normal(), random.normal(), random.normal()).cast<float>();
-  EXPECT_THAT(refusal(noisy, inner), HasSubstr("triangles of the outer surface cut others"));
+  EXPECT_THAT(refusal(spike, inner),
+              HasSubstr("of its triangles reach there between theirs, the farthest by 7.8"));
+  Mesh many = inner;
+  for (std::size_t v = 0; v < many.positions.size(); v += 200)
+    many.positions[v] = -1.2f * many.positions[v] + Vec3(137.f, 211.f, 97.f);
+  EXPECT_THAT(refusal(outer, many), HasSubstr("triangles of the inner surface cut others"));
+}
+
+TEST(CheckSurfaces, OneVertexThatLeavesTheOtherSurfaceIsRefusedIfItIsFar) {
+  const Mesh outer = ball(10e3), inner = ball(8e3);
+  const auto pulled = [&](float radius) {
+    Mesh mesh = inner;
+    mesh.positions[20] = radius * mesh.positions[20].normalized();
+    return mesh;
+  };
+  EXPECT_EQ(refusal(outer, pulled(10.4e3f)), "");
+  EXPECT_THAT(refusal(outer, pulled(11e3f)),
+              HasSubstr("1 of 10242 vertices of the inner surface lie outside"));
+}
+
+// Fine and coarse: such triangles cut one another when they are as wide as the noise, and else they do not.
+TEST(CheckSurfaces, NoiseIsRefused) {
+  for (const int halvings : {4, 5, 6}) {
+    const Mesh outer = ball(40e3, halvings), inner = ball(37.5e3, halvings);
+    for (const bool of_inner : {false, true})
+      for (const double sd : {100., 300.}) {
+        Mesh noisy = of_inner ? inner : outer;
+        Random random(3);
+        for (Vec3& p : noisy.positions)
+          p += Eigen::Vector3d(random.normal(0., sd), random.normal(0., sd), random.normal(0., sd))
+                   .cast<float>();
+        const std::string said = of_inner ? refusal(outer, noisy) : refusal(noisy, inner);
+        if (sd < 200.)
+          EXPECT_EQ(said, "") << halvings;
+        else
+          EXPECT_THAT(said, HasSubstr(of_inner ? "vertices of the inner surface scatter by 0.3"
+                                               : "vertices of the outer surface scatter by 0."))
+              << halvings;
+      }
+  }
 }
 
 TEST(Lines, ACrestRunsAroundALensAndAValleyAroundAWaist) {

@@ -10,8 +10,9 @@
 namespace forest::cortex {
 
 /// Throws Error, a sentence with a place, when a pair of surfaces cannot be that of a cortex: one is empty, has coordinates
-/// that are no numbers, is open, in pieces, has handles, faces inwards, cuts itself at more than one triangle of 200; its
-/// size is no hemisphere's in mm; the inner one is larger, or one lies on the wrong side of the other at more than one vertex of 33.
+/// that are no numbers, is open, in pieces, has handles, faces inwards, is noise (geometry/roughness.h), cuts itself at more than one
+/// triangle of 200; its size is no hemisphere's in mm; the inner one is larger; one lies on the wrong side of the other by half a
+/// millimetre somewhere, or at more than one vertex of 33 by a tenth, where averaged surfaces cross a little by the medial wall.
 /// Returns what is odd, in sentences: triangles that cut one another but are few.
 std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner);
 
