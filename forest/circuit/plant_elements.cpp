@@ -46,6 +46,54 @@ std::vector<double> densities_of(const Recipe& recipe) {
 
 }  // namespace
 
+// A place in an element, and what lies around it.
+struct ElementPlanter::Spot {
+  const cortex::Hexahedron& element;
+  const cortex::Borders& borders;
+  const Eigen::Vector3d& uvw;
+  cortex::Linear here = linear(element, uvw);
+  Eigen::Matrix3d to_uvw = here.jacobian.inverse();
+
+  // How far it is above (> 0) or below a border between layers, µm, if that goes on from here as it does within `near`. Farther
+  // ones are not known well. `border(u, v)` is its w.
+  template <class Border>
+  double above(Border&& border, double near) const {
+    const double at = border(uvw[0], uvw[1]), level = (at - uvw[2]) / to_uvw.row(2).norm();
+    if (std::abs(level) > 20. * near) return level;
+    Eigen::RowVector3d gradient = to_uvw.row(2);
+    for (const Eigen::Index a : {0, 1}) {
+      const double step = std::min(.2, near * to_uvw.row(a).norm());
+      double slope = 0.;
+      for (double to : {uvw[a] - step, uvw[a] + step}) {
+        to = std::clamp(to, 0., 1.);
+        const double here_and_there = border(a == 0 ? to : uvw[0], a == 1 ? to : uvw[1]) - at;
+        if (std::abs(here_and_there) > std::abs(slope * (to - uvw[a])))
+          slope = here_and_there / (to - uvw[a]);
+      }
+      gradient -= slope * to_uvw.row(a);
+    }
+    return (at - uvw[2]) / gradient.norm();
+  }
+
+  // Whether something within so many µm may be in another element.
+  bool by_a_side(double distance) const {
+    for (const Eigen::Index a : {0, 1})
+      if (std::min(uvw[a], 1. - uvw[a]) < distance * to_uvw.row(a).norm()) return true;
+    return false;
+  }
+
+  // Whether a place not far away is in a layer.
+  bool sees_in(std::size_t layer, const Eigen::Vector3d& place) const {
+    Eigen::Vector3d there = uvw + to_uvw * (place - here.at);
+    for (int round = 0; round < 2; ++round) {
+      const cortex::Linear at = linear(element, there);
+      there += at.jacobian.inverse() * (place - at.at);
+    }
+    const double u = std::clamp(there[0], 0., 1.), v = std::clamp(there[1], 0., 1.);
+    return there[2] >= borders.begin(u, v, layer) && there[2] < borders.end(u, v, layer);
+  }
+};
+
 double mean_density(const Recipe& recipe) {
   const auto densities = densities_of(recipe);
   double sum = 0.;
@@ -149,27 +197,33 @@ std::vector<std::vector<std::uint32_t>> ElementPlanter::counts(const cortex::Hex
 }
 
 // How wide a soma may be at a place: below 0 where none may stand. By the borders of layers somata are narrow and keep clear of
-// the narrow ones beyond; wide ones stay away from a border by as much as those may reach across it.
-double ElementPlanter::room_for_soma(std::size_t layer, const Eigen::Vector3d& uvw,
-                                     const cortex::Linear& here, const cortex::Borders& borders) const {
-  const double w = uvw[2];
-  const double steepness =  // of w, a µm
-      here.jacobian.col(0).cross(here.jacobian.col(1)).norm() / here.jacobian.determinant();
-  const double begin = borders.begin(uvw[0], uvw[1], layer), end = borders.end(uvw[0], uvw[1], layer),
-               narrow = narrow_[layer];
-  const double below_pia = w * here.jacobian.col(2).norm();
+// the narrow ones beyond, of any place there, taken or not; wide ones stay away from a border by as much as those may reach across it.
+double ElementPlanter::room_for_soma(std::size_t layer, const Spot& spot) const {
+  const double narrow = narrow_[layer], below_pia = spot.uvw[2] * spot.here.jacobian.col(2).norm();
   if (below_pia < narrow) return -1.;
+  const double gap = double(recipe_.soma_gap) + rounding, reach = *std::ranges::max_element(narrow_) + gap;
+  const auto below_begin = [&](std::size_t of) {
+    return -spot.above([&](double u, double v) { return spot.borders.begin(u, v, of); }, reach);
+  };
+  const auto above_end = [&](std::size_t of) {
+    return spot.above([&](double u, double v) { return spot.borders.end(u, v, of); }, reach);
+  };
+  // A border may be nearer than it looks from here, most of all in the next element.
+  const double straight = spot.by_a_side(radii_[layer] + reach) ? .6 : .8;
   double room = std::min(radii_[layer], below_pia);
-  constexpr double straight =
-      .8;  // a border may be nearer than it would be in a straight element, by a little
-  const double reach = *std::ranges::max_element(narrow_) + double(recipe_.soma_gap) + rounding;
-  if (layer > 0) room = std::min(room, straight * (w - begin) / steepness - reach);
-  if (layer + 1 < depths_.size()) room = std::min(room, straight * (end - w) / steepness - reach);
+  if (layer > 0) room = std::min(room, straight * below_begin(layer) - reach);
+  if (layer + 1 < depths_.size()) room = std::min(room, straight * above_end(layer) - reach);
   for (const std::uint32_t other : sparser_[layer]) {
-    const double contact = narrow + narrow_[other] + double(recipe_.soma_gap) + rounding;
-    const double beyond =
-        std::max(borders.begin(uvw[0], uvw[1], other) - w, w - borders.end(uvw[0], uvw[1], other));
-    if (straight * beyond < contact * steepness && packings_[other]->any_within(here.at, contact)) return -1.;
+    const double contact = narrow + narrow_[other] + gap;
+    if (straight * (other < layer ? -above_end(other) : -below_begin(other)) >= contact) continue;
+    // Where the next element may begin, all places count, in whichever layer they are.
+    const bool all = spot.by_a_side(contact);
+    bool touched = false;
+    packings_[other]->for_near(spot.here.at, contact, [&](std::uint64_t, const Eigen::Vector3d& place) {
+      touched = touched || ((place - spot.here.at).squaredNorm() < contact * contact &&
+                            (all || spot.sees_in(other, place)));
+    });
+    if (touched) return -1.;
   }
   return std::max(room, narrow);
 }
@@ -203,10 +257,9 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
     constexpr std::uint64_t blank = ~std::uint64_t(0);
     std::vector<Keyed> lots(places.size());
     parallel_for(places.size(), 1024, [&](std::size_t i) {
-      const cortex::Linear here = linear(element, places[i].uvw);
       Random random(seed_, places[i].item, lot_stream + std::uint32_t(l));
       const std::uint64_t high = random();
-      const bool free = room_for_soma(l, places[i].uvw, here, borders) >= 0.;
+      const bool free = room_for_soma(l, {element, borders, places[i].uvw}) >= 0.;
       lots[i] = {free ? high << 31 | random() >> 1 : blank, i};
     });
     parallel_sort(lots);
@@ -223,7 +276,8 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
     parallel_for(count, 1024, [&](std::size_t i) {
       const cortex::Packed& place = places[lots[i].second];
       Rooted& neuron = rooted[begin + i];
-      const cortex::Linear here = linear(element, place.uvw);
+      const Spot spot{element, borders, place.uvw};
+      const cortex::Linear& here = spot.here;
       Random random(seed_, place.item, cell_stream + std::uint32_t(l));
       neuron.uvw = place.uvw;
       neuron.turn = recipe_.rotate ? random.uniform(0., 2. * std::numbers::pi) : 0.;
@@ -231,8 +285,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.depth = float(cortex::below_outer_face(element, place.uvw));
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
       const double height = place.uvw[2] * here.jacobian.col(2).norm();
-      neuron.candidate =
-          choose(choices_[l][neuron.type], height, room_for_soma(l, place.uvw, here, borders), random);
+      neuron.candidate = choose(choices_[l][neuron.type], height, room_for_soma(l, spot), random);
     });
   }
   return rooted;

@@ -9,8 +9,7 @@
 // has those that lie in it, a few more than it needs, and takes as many as are wanted by lot. So somata do not overlap in an
 // element nor across the faces of neighbours, and no face shows as a sheet without somata (a margin of a radius on both sides of
 // every face would be simpler, and could be seen). Where two layers meet only cells with narrow somata stand, and the denser layer
-// leaves out what would touch any place of the sparser one's packing, also one not taken: this rarefies it, by some percent, within
-// a soma's width of the border.
+// leaves out what would touch any place of the sparser one, also one not taken: this rarefies it within a soma's width of the border.
 #pragma once
 
 #include <cstdint>
@@ -85,8 +84,8 @@ class ElementPlanter {
   cortex::Borders by_volume(const cortex::Layers& layers) const { return {layers, depths_}; }
 
  private:
-  double room_for_soma(std::size_t layer, const Eigen::Vector3d& uvw, const cortex::Linear& here,
-                       const cortex::Borders& borders) const;
+  struct Spot;
+  double room_for_soma(std::size_t layer, const Spot& spot) const;
   std::uint32_t choose(std::span<const std::uint32_t> choice, double height, double radius,
                        Random& random) const;
 

@@ -155,6 +155,21 @@ TEST(PlantElements, SomataKeepTheirGapInElementsAndAcrossTheirFaces) {
   }
 }
 
+// A layer that is dense and thin loses little to those beside it: only what their places would touch, those on their side.
+TEST(PlantElements, ThinLayersOfWideSomataHoldWhatTheyShould) {
+  Recipe recipe;
+  recipe.types = {{"c", "c"}}, recipe.soma_gap = .5f;
+  recipe.layers = {
+      {"III", 900.f, 16'000., {}, {1.}}, {"IV", 70.f, 85'000., {}, {1.}}, {"V", 600.f, 35'000., {}, {1.}}};
+  const std::vector<Candidate> wide{{"c", "c", 8.7f, 0.f}};
+  const ElementPlanter planter(recipe, wide, 2);
+  const auto sheet = cortex::folded_sheet(4, 2);
+  for (std::size_t e = 0; e < sheet.size(); ++e) {
+    const auto in_four = std::ranges::count(planter.plant(sheet[e], e), 1u, &Rooted::layer);
+    EXPECT_EQ(in_four, planter.counts(sheet[e], e)[1][0]) << e;
+  }
+}
+
 TEST(PlantElements, ManyMoreSomataThanPackOneByOneFit) {
   LONG_TEST();
   Recipe recipe;

@@ -141,15 +141,6 @@ Packing::Packing(std::shared_ptr<const PackedCube> cube, double density, std::ui
   for (int i = 0; i < 3; ++i) shift_[i] = random.uniform(0., side);
 }
 
-bool Packing::any_within(const Place& place, double distance) const {
-  bool found = false;
-  const double reach = distance / unit_;
-  const Place at = to_cube(place), box = Place::Constant(reach);
-  for_box(at - box, at + box,
-          [&](std::uint64_t, const Place& p) { found = found || (p - at).squaredNorm() < reach * reach; });
-  return found;
-}
-
 // The element is cut into blocks small enough to be nearly straight. What lies in a block's box in its own affine frame is
 // found by Newton's method within the element, and belongs to the block whose parameters it has.
 std::vector<Packed> places_in(const Packing& packing, const Hexahedron& element, double from_w, double to_w) {

@@ -49,7 +49,6 @@ class Packing {
     for_box(at - reach, at + reach,
             [&](std::uint64_t item, const Eigen::Vector3d& p) { visit(item, from_cube(p)); });
   }
-  bool any_within(const Eigen::Vector3d& place, double distance) const;
 
   /// In the cube's frame, where the unit of length is density^(−1/3): calls visit(item, place) for all in a box, and some others.
   template <class Visit>
