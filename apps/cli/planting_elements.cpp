@@ -118,6 +118,39 @@ void tell_too_tall(std::span<const circuit::Rooted> rooted, std::span<const circ
         count, counted(rooted.size(), "neuron"), most / 1e3f));
 }
 
+// Where layers have room for fewer somata than there should be.
+class Shortage {
+ public:
+  explicit Shortage(std::size_t layers) : layers_(layers) {}
+  void expect(const std::vector<std::vector<std::uint32_t>>& counts) {  // [layer][type] of the next element
+    for (const auto& layer : counts)
+      expected_.push_back(std::accumulate(layer.begin(), layer.end(), std::size_t(0)));
+  }
+  double expected() const { return std::accumulate(expected_.begin(), expected_.end(), 0.); }
+  void see(std::span<const circuit::Rooted> planted) {  // in the next element
+    const auto own = std::span(expected_).subspan(seen_++ * layers_, layers_);
+    for (const circuit::Rooted& r : planted) --own[r.layer];
+  }
+  void tell(const circuit::Recipe& recipe, std::vector<std::string>& sentences) const {
+    for (std::size_t l = 0; l < layers_; ++l) {
+      std::size_t elements = 0, missing = 0;
+      for (std::size_t i = l; i < expected_.size(); i += layers_)
+        elements += expected_[i] > 0, missing += expected_[i];
+      if (missing)
+        sentences.push_back(fmt::format(
+            "layer {} has no room for {} in {}, which are not planted; lower its density or the gap, or "
+            "plant "
+            "neurons with smaller somata",
+            recipe.layers[l].name, counted(missing, "soma", "somata"), counted(elements, "element")));
+    }
+  }
+
+ private:
+  std::size_t layers_, seen_ = 0;
+  std::vector<std::size_t>
+      expected_;  // of the layers of one element after the other; of those seen, what is missing
+};
+
 // The measured ends of the recipe's layers; nothing where no maps are given.
 std::optional<cortex::MeasuredBorders> measured_borders(const ElementOptions& options,
                                                         const circuit::Recipe& recipe,
@@ -252,29 +285,30 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
             all.elements, [&](std::uint32_t e) { return !measured->measured(file.cortex.elements, e); }))
       all.left_out.push_back(fmt::format("{} where no layer was measured have those of the nearest place",
                                          counted(std::size_t(guessed), "element")));
-  double wanted = 0.;
+  Shortage shortage(recipe.layers.size());
   all.layer_volumes.resize(recipe.layers.size());
   for (const std::uint32_t e : all.elements) {
     const cortex::Borders borders = borders_of(e);
-    for (const auto& layer : planter.counts(elements[e], e, borders))
-      wanted += std::accumulate(layer.begin(), layer.end(), 0.);
+    shortage.expect(planter.counts(elements[e], e, borders));
     for (std::size_t l = 0; l < recipe.layers.size(); ++l)
       all.layer_volumes[l] += borders.volume(elements[e], l);
   }
   all.volume = std::accumulate(all.layer_volumes.begin(), all.layer_volumes.end(), 0.);
-  refuse_too_many(all.elements.size(), wanted, bent);
+  refuse_too_many(all.elements.size(), shortage.expected(), bent);
 
   std::vector<circuit::Rooted> rooted;
   progress.begin("planting", all.elements.size());
   for (const std::uint32_t e : all.elements) {
     all.first.push_back(rooted.size());
     const auto here = planter.plant(elements[e], e, borders_of(e));
+    shortage.see(here);
     rooted.insert(rooted.end(), here.begin(), here.end());
     progress.advance();
   }
   progress.end();
   all.first.push_back(rooted.size());
   all.seconds = seconds_since(start);
+  shortage.tell(recipe, all.left_out);
   if (!bent) tell_too_tall(rooted, stock.candidates, all.left_out);
 
   circuit::Circuit& circuit = all.planted.circuit;

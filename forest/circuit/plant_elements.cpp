@@ -242,10 +242,10 @@ std::uint32_t ElementPlanter::choose(std::span<const std::uint32_t> choice, doub
 
 std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std::size_t number,
                                           const cortex::Borders& borders) const {
-  const auto wanted = counts(element, number, borders);
+  auto wanted = counts(element, number, borders);
   std::vector<Rooted> rooted;
   for (std::size_t l = 0; l < wanted.size(); ++l) {
-    const std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
+    std::size_t count = std::accumulate(wanted[l].begin(), wanted[l].end(), std::size_t(0));
     if (!count) continue;
     const auto [first_w, last_w] = borders.range(l);
     auto places = cortex::places_in(*packings_[l], element, first_w, last_w);
@@ -264,12 +264,14 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
     });
     parallel_sort(lots);
     const auto free = std::size_t(std::ranges::find(lots, blank, &Keyed::first) - lots.begin());
-    if (free < count)
-      throw Error(
-          fmt::format("layer {} of element {} has room for {} somata of a radius of up to {:.3g} µm, and {} "
-                      "are to stand there; lower its "
-                      "density or the gap, or plant neurons with smaller somata",
-                      recipe_.layers[l].name, number, free, radii_[l], count));
+    if (free < count) {  // the same share of all types
+      std::size_t before = 0;
+      for (std::uint32_t& of_type : wanted[l]) {
+        const std::size_t from = before * free / count, to = (before + of_type) * free / count;
+        before += of_type, of_type = std::uint32_t(to - from);
+      }
+      count = free;
+    }
     const std::size_t begin = rooted.size();
     for (std::uint32_t type = 0; type < wanted[l].size(); ++type)
       rooted.resize(rooted.size() + wanted[l][type], Rooted{.type = type, .layer = std::uint32_t(l)});

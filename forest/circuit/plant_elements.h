@@ -72,7 +72,8 @@ class ElementPlanter {
   }
 
   /// In the order of layers, then types. A neuron is one of its type's that end under the pia at its place, or the lowest one.
-  /// @param number  of the element. Throws Error when a layer of it has no room for all somata
+  /// A layer that has room for fewer somata than counts() says, as where an element is thin, has those that fit, of each type its share.
+  /// @param number  of the element
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,
                             const cortex::Borders& borders) const;
   std::vector<Rooted> plant(const cortex::Hexahedron& element, std::size_t number,

@@ -170,6 +170,30 @@ TEST(PlantElements, ThinLayersOfWideSomataHoldWhatTheyShould) {
   }
 }
 
+// Where they do not fit, as between borders 25 µm apart, there are as many as do, of each type its share.
+TEST(PlantElements, WhereThereIsNoRoomThereAreAsManyAsFit) {
+  Recipe recipe;
+  recipe.types = {{"a", "c"}, {"b", "c"}}, recipe.soma_gap = .5f;
+  recipe.layers = {{"III", 900.f, 16'000., {}, {.5, .5}},
+                   {"IV", 25.f, 100'000., {}, {.75, .25}},
+                   {"V", 600.f, 50'000., {}, {.5, .5}}};
+  const std::vector<Candidate> wide{{"c", "c", 8.7f, 0.f}};
+  const ElementPlanter planter(recipe, wide, 2);
+  const Hexahedron element = cortex::folded_sheet(4, 2)[2];
+  const auto wanted = planter.counts(element, 2);
+  std::array<std::size_t, 3> all{};
+  std::array<double, 2> in_four{};
+  for (const Rooted& r : planter.plant(element, 2)) {
+    ++all[r.layer];
+    if (r.layer == 1) ++in_four[r.type];
+  }
+  EXPECT_EQ(all[0], wanted[0][0] + wanted[0][1]);
+  EXPECT_EQ(all[2], wanted[2][0] + wanted[2][1]);
+  EXPECT_LT(all[1], wanted[1][0] + wanted[1][1]);
+  EXPECT_GT(all[1], 100u);
+  EXPECT_NEAR(in_four[0] / double(all[1]), .75, 2. / double(all[1]));
+}
+
 TEST(PlantElements, ManyMoreSomataThanPackOneByOneFit) {
   LONG_TEST();
   Recipe recipe;
