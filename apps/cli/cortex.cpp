@@ -3,11 +3,13 @@
 #include "apps/cli/cortex.h"
 
 #include <algorithm>
+#include <cmath>
 #include <filesystem>
 #include <iterator>
 #include <memory>
 #include <optional>
 #include <string>
+#include <tuple>
 #include <vector>
 
 #include <CLI/App.hpp>
@@ -84,10 +86,27 @@ void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& i
         between / 1e9, cortex.between / 1e9));
 }
 
+// Their volume alone does not show it: what elements lack in one place those around have more.
+void tell_far_faces(const cortex::Elements& elements, const cortex::Report& r, double volume,
+                    Console& console) {
+  constexpr double far = .2;  // of an element's width
+  for (const auto& [faces, w, name] : {std::tuple(r.outer, 0., "outer"), std::tuple(r.inner, 1., "inner")})
+    if (faces && faces->p99 > far * std::cbrt(volume)) {
+      const cortex::Place at = elements.hexahedron(faces->farthest).at(.5, .5, w) / 1e3;
+      console.warn(fmt::format(
+          "one of 100 places of faces is more than {:.2f} mm from the {} surface, the farthest {:.2f} mm, of "
+          "element {} at ({:.1f}, {:.1f}, {:.1f}) mm; look at the surfaces there, or give a smaller --volume",
+          faces->p99 / 1e3, name, faces->most / 1e3, faces->farthest, at.x(), at.y(), at.z()));
+    }
+}
+
 std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Report& r, double volume) {
-  const auto in_mm = [](const std::optional<double>& um) { return um ? Json(*um / 1e3) : Json(); };
-  const auto shown = [](const std::optional<double>& um) {
-    return um ? fmt::format("{:.3f}", *um / 1e3) : std::string("-");
+  using Faces = std::optional<cortex::FaceDistance>;
+  const auto in_mm = [](const Faces& faces, double cortex::FaceDistance::*which) {
+    return faces ? Json((*faces).*which / 1e3) : Json();
+  };
+  const auto shown = [](const Faces& faces) {
+    return faces ? fmt::format("{:.3f} ({:.2f})", faces->p99 / 1e3, faces->most / 1e3) : std::string("-");
   };
   return {
       {"elements", r.elements, "elements", std::to_string(r.elements)},
@@ -121,10 +140,14 @@ std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Repor
        fmt::format("{:.2f} / {:.1f}", r.crest_angle.median, r.crest_angle.p99),
        "degrees between v-isolines and the right angle to crests, median / 99th percentile"},
       {"face_distance_p99",
-       {{"outer", in_mm(r.outer_distance_p99)}, {"inner", in_mm(r.inner_distance_p99)}},
+       {{"outer", in_mm(r.outer, &cortex::FaceDistance::p99)},
+        {"inner", in_mm(r.inner, &cortex::FaceDistance::p99)}},
        "faces",
-       fmt::format("{} / {}", shown(r.outer_distance_p99), shown(r.inner_distance_p99)),
-       "mm from the outer / inner surface, 99th percentile; - where it is not given"},
+       fmt::format("{} / {}", shown(r.outer), shown(r.inner)),
+       "mm from the outer / inner surface, 99th percentile (and most); - where it is not given"},
+      {"face_distance_most",
+       {{"outer", in_mm(r.outer, &cortex::FaceDistance::most)},
+        {"inner", in_mm(r.inner, &cortex::FaceDistance::most)}}},
       lengths_of(cortex.lines)};
 }
 
@@ -216,6 +239,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
           "only {:.1f} % of the elements have about the wanted volume; look at them by 'brainforest "
           "cortex faces --measure volume', and at the surfaces",
           100. * r.volume_within));
+    tell_far_faces(built.elements, r, o->volume * 1e9, console);
     tell(built, r, deeper, o->volume * 1e9, seconds_since(begin), console);
   };
 }

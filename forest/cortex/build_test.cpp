@@ -359,8 +359,8 @@ TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   EXPECT_EQ(cortex.w_reached, 1.);
   EXPECT_LT(cortex.w_angle.p99, 3.);
   EXPECT_LT(r.equivolume_error, .005);
-  EXPECT_LT(r.outer_distance_p99.value(), 30.);
-  EXPECT_LT(r.inner_distance_p99.value(), 30.);
+  EXPECT_LT(r.outer.value().p99, 30.);
+  EXPECT_LT(r.inner.value().p99, 30.);
 
   // Every side between two elements, and Euler's number that of a ball: nothing is left open or lies double.
   std::map<std::pair<std::uint32_t, std::uint32_t>, int> sides;

@@ -10,7 +10,7 @@
 
 namespace forest::cortex {
 
-double face_distance(const Elements& elements, double w, const TriangleTree& surface) {
+FaceDistance face_distance(const Elements& elements, double w, const TriangleTree& surface) {
   constexpr std::array<std::array<double, 2>, 4> at{{{.5, .17}, {.83, .5}, {.5, .83}, {.17, .5}}};
   std::vector<double> far(at.size() * elements.size());
   parallel_for(elements.size(), 64, [&](std::size_t e) {
@@ -18,7 +18,12 @@ double face_distance(const Elements& elements, double w, const TriangleTree& sur
     for (std::size_t k = 0; k < at.size(); ++k)
       far[at.size() * e + k] = surface.nearest(h.at(at[k][0], at[k][1], w))->distance;
   });
-  return share_of(far, .99);
+  if (far.empty()) return {};
+  FaceDistance result;
+  const auto most = std::max_element(far.begin(), far.end());
+  result.most = *most, result.farthest = std::size_t(most - far.begin()) / at.size();
+  result.p99 = share_of(far, .99);
+  return result;
 }
 
 Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, const TriangleTree* inner,
@@ -55,8 +60,8 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
   result.equivolume_p99 = share_of(equivolume, .99);
   result.jacobian_least = *std::min_element(jacobian.begin(), jacobian.end());
   result.jacobian_p1 = share_of(jacobian, .01);
-  if (outer) result.outer_distance_p99 = face_distance(elements, 0., *outer);
-  if (inner) result.inner_distance_p99 = face_distance(elements, 1., *inner);
+  if (outer) result.outer = face_distance(elements, 0., *outer);
+  if (inner) result.inner = face_distance(elements, 1., *inner);
 
   // Elements by a crest: how far their v-isolines are from crossing it at a right angle.
   const Mesh crests = pieces(cortex.lines, Line::Kind::crest);

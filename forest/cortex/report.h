@@ -15,9 +15,13 @@ constexpr bool as_wanted(double volume, double wanted) {
   return volume >= least_volume * wanted && volume <= most_volume * wanted;
 }
 
-/// How far 99 of 100 places of faces, four of each, are from a surface, µm.
+/// How far places of faces, four of each, are from a surface, µm.
+struct FaceDistance {
+  double p99 = 0., most = 0.;
+  std::size_t farthest = 0;  // the element of `most`
+};
 /// @param w  0: outer faces, 1: inner ones
-double face_distance(const Elements& elements, double w, const TriangleTree& surface);
+FaceDistance face_distance(const Elements& elements, double w, const TriangleTree& surface);
 
 struct Report {
   std::size_t elements = 0, uncertified = 0;
@@ -29,8 +33,7 @@ struct Report {
   double jacobian_least = 0.,
          jacobian_p1 = 0.;  // scaled Jacobian: the least of each element over a lattice of places
   Spread crest_angle;       // degrees between v-isolines of elements by a crest and the right angle to it
-  std::optional<double> outer_distance_p99,
-      inner_distance_p99;  // µm from faces to surfaces; none where these are not given
+  std::optional<FaceDistance> outer, inner;  // of faces from surfaces; none where these are not given
 };
 
 /// @param volume  wanted of an element, µm³

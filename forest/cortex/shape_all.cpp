@@ -57,8 +57,8 @@ bool even_and_well_shaped(const Elements& elements, double volume) {
 
 bool faces_are_close(const Elements& elements, const SurfaceTrees& surfaces) {
   constexpr double close = 50.;  // µm
-  return face_distance(elements, 0., surfaces.outer) <= close &&
-         face_distance(elements, 1., surfaces.inner) <= close;
+  return face_distance(elements, 0., surfaces.outer).p99 <= close &&
+         face_distance(elements, 1., surfaces.inner).p99 <= close;
 }
 
 }  // namespace
