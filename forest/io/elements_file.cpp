@@ -28,7 +28,7 @@ void append(std::vector<double>& values, const cortex::Place& place) {
 
 void write_elements(const std::filesystem::path& path, const Cortex& cortex, double volume) {
   forest::NewFile place(path);
-  hdf5::NewFile file(place.path());
+  hdf5::NewFile file(place.path(), path);
   file.attribute("/", "magic", std::string(magic));
   file.attribute("/", "version", 1u);
   std::vector<double> numbers;

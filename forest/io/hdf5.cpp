@@ -21,6 +21,8 @@ static_assert(sizeof(hid_t) == sizeof(std::int64_t));
 class Turn {
  public:
   Turn() : lock_(mutex()) {
+    // At its exit the library would close what could not be closed on a full disk, and fall over it.
+    [[maybe_unused]] static const herr_t left_alone = H5dont_atexit();
     H5Eget_auto2(H5E_DEFAULT, &print_, &data_);
     H5Eset_auto2(H5E_DEFAULT, nullptr, nullptr);
   }
@@ -333,9 +335,10 @@ void Matrix::read(std::size_t row, std::size_t rows, std::size_t column, std::si
         fmt::format("rows {} to {} of array {} cannot be read; the file is damaged", row, row + rows, path_));
 }
 
-NewFile::NewFile(const std::filesystem::path& path) : path_(path.string()) {
+NewFile::NewFile(const std::filesystem::path& path, const std::filesystem::path& named)
+    : path_((named.empty() ? path : named).string()) {
   const Turn turn;
-  file_ = H5Fcreate(path_.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
+  file_ = H5Fcreate(path.c_str(), H5F_ACC_TRUNC, H5P_DEFAULT, H5P_DEFAULT);
   check(file_ >= 0, "created");
 }
 

@@ -72,7 +72,8 @@ class Matrix {
 /// on the way. Throws Error when the disk is full.
 class NewFile {
  public:
-  explicit NewFile(const std::filesystem::path& path);
+  /// @param named  what errors call it, where it is still written under another name; empty: by its path
+  explicit NewFile(const std::filesystem::path& path, const std::filesystem::path& named = {});
   NewFile();  // in memory: bytes() ends it
   ~NewFile();
   NewFile(const NewFile&) = delete;

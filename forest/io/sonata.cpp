@@ -140,10 +140,10 @@ std::optional<float> angle_about_y(const Quat& q) {
   return float(std::remainder(2. * std::atan2(double(q.y()), double(q.w())), 2. * std::numbers::pi));
 }
 
-void write_nodes(const fs::path& path, const Circuit& circuit) {
+void write_nodes(const fs::path& path, const fs::path& named, const Circuit& circuit) {
   const auto& instances = circuit.instances;
   const std::string base = "/nodes/" + sonata_population(circuit), group = base + "/0";
-  hdf5::NewFile file(path);
+  hdf5::NewFile file(path, named);
   file.attribute("/", "version", std::array<std::uint32_t, 2>{0, 1});
   file.attribute("/", "magic", sonata_magic);
   file.group(group + "/@library");
@@ -216,10 +216,10 @@ void write_sonata(const fs::path& folder, const Circuit& circuit, std::span<cons
     progress.advance();
   });
   progress.end();
-  write_nodes(files.path() / sonata_nodes_name, circuit);
+  write_nodes(files.path() / sonata_nodes_name, folder / sonata_nodes_name, circuit);
   files.write(sonata_types_name, types_of(circuit));
   if (!projections.empty()) {
-    write_edges(files.path() / sonata_edges_name, projections);
+    write_edges(files.path() / sonata_edges_name, folder / sonata_edges_name, projections);
     files.write(sonata_edge_types_name, edge_types_of(projections));
   }
   if (!circuit.outline.empty()) files.write(sonata_outline_name, outline_of(circuit));

@@ -279,8 +279,9 @@ SonataEdges read_edges(const fs::path& place, const circuit::Circuit& circuit, c
   return Reader(config, circuit, nodes).run();
 }
 
-void write_edges(const fs::path& path, std::span<const circuit::Projection> projections) {
-  hdf5::NewFile file(path);
+void write_edges(const fs::path& path, const fs::path& named,
+                 std::span<const circuit::Projection> projections) {
+  hdf5::NewFile file(path, named);
   file.attribute("/", "version", std::array<std::uint32_t, 2>{0, 1});
   file.attribute("/", "magic", sonata_magic);
   file.group("/edges");

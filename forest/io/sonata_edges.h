@@ -28,6 +28,8 @@ SonataEdges read_edges(const std::filesystem::path& place, const circuit::Circui
                        const reports::Nodes& nodes);
 
 /// One file with these populations. The same synapses give the same bytes.
-void write_edges(const std::filesystem::path& path, std::span<const circuit::Projection> projections);
+/// @param named  what errors call it
+void write_edges(const std::filesystem::path& path, const std::filesystem::path& named,
+                 std::span<const circuit::Projection> projections);
 
 }  // namespace forest::io

@@ -204,7 +204,7 @@ void write_sonata_report(const fs::path& path, const Report& report, Progress& p
     throw Error(fmt::format("{}: a report of {} populations is to be written; write one a file",
                             path.string(), report.populations.size()));
   NewFile place(path);
-  hdf5::NewFile file(place.path());
+  hdf5::NewFile file(place.path(), path);
   file.attribute("/", "magic", sonata_magic);
   file.attribute("/", "version", std::array<std::uint32_t, 2>{0, 1});
   file.attribute("/", "comment", report.source);

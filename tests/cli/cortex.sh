@@ -25,6 +25,8 @@ border("other.border", [0], 7)
 write("small", ([tuple(x / 1000 for x in q) for q in p], f))
 write("large", ([tuple(x * 1000 for x in q) for q in p], f))
 write("cut_itself", ([tuple(x * (1 + .05 * math.sin(1e4 * x)) for x in q) for q in p], f))
+p, f = ball(7)
+write("spike", ([tuple(1.5 * x for x in q) if i == 20 else q for i, q in enumerate(p)], f))
 write("beside", ([(q[0] + 5, q[1], q[2]) for q in ball(7)[0]], f))
 write("nan", ([(math.nan if i == 7 else q[0], q[1], q[2]) for i, q in enumerate(p)], f))
 with open("inner.obj", "w") as o:
@@ -112,7 +114,9 @@ refuses 'swapped' $BRAINFOREST cortex build inner outer -o no.h5
 refuses 'outer surface is open or not of one orientation at the edge of vertices' $BRAINFOREST cortex build open inner -o no.h5
 refuses 'check that it is in mm and not in m' $BRAINFOREST cortex build small small -o no.h5
 refuses 'check that it is in mm and not in µm' $BRAINFOREST cortex build large inner -o no.h5
-refuses 'triangles of the outer surface cut others of it' $BRAINFOREST cortex build cut_itself inner -o no.h5
+refuses 'vertices of the outer surface scatter by' $BRAINFOREST cortex build cut_itself inner -o no.h5
+refuses '1 of 2562 vertices of the inner surface lie outside' $BRAINFOREST cortex build outer spike -o no.h5
+(ulimit -f 100; refuses 'no.h5: cannot be written' $BRAINFOREST cortex build outer inner --volume 8 -o no.h5)
 refuses 'lie outside of the outer one' $BRAINFOREST cortex build outer beside -o no.h5
 refuses 'nan: has a vertex that is nowhere, number 7' $BRAINFOREST cortex build nan inner -o no.h5
 head -c 5000 outer >cut
