@@ -22,8 +22,8 @@
 #include "forest/cortex/compare.h"
 #include "forest/cortex/volume.h"
 #include "forest/io/contours.h"
+#include "forest/io/grey_picture.h"
 #include "forest/io/nifti.h"
-#include "forest/io/png.h"
 #include "forest/io/surface.h"
 
 #include "apps/cli/console.h"
@@ -65,12 +65,16 @@ bool before(const fs::path& one, const fs::path& other) {
   return order != 0 ? order < 0 : a.size() != b.size() ? a.size() < b.size() : a < b;
 }
 
-std::vector<fs::path> files_in(const fs::path& folder, std::string_view extension) {
+template <class Wanted>
+std::vector<fs::path> files_in(const fs::path& folder, Wanted&& wanted) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (extension_of(entry.path()) == extension) files.push_back(entry.path());
+    if (wanted(extension_of(entry.path()))) files.push_back(entry.path());
   std::ranges::sort(files, before);
   return files;
+}
+bool has_drawings(const fs::path& folder) {
+  return !files_in(folder, [](const std::string& extension) { return extension == ".svg"; }).empty();
 }
 
 // The last number in a file's name.
@@ -131,27 +135,59 @@ struct Options {
   bool straight = false, force = false;
 };
 
-// Grey values of a folder of pictures, one a section.
-cortex::Volume read_pictures(const fs::path& folder, const Options& options, Console& console) {
-  const auto files = files_in(folder, ".png");
-  if (files.empty())
-    throw Error(folder.string() + ": has no .png file and no .svg file; give a folder of sections");
+// The pictures of sections: files of a folder, one a section, or the pages of a file.
+struct Pictures {
+  std::vector<fs::path> files;
+  std::size_t pages = 1;  // of a single file
+
+  std::size_t size() const { return files.size() == 1 ? pages : files.size(); }
+  const fs::path& file(std::size_t i) const { return files.size() == 1 ? files[0] : files[i]; }
+  io::GreyPicture read(std::size_t i) const {
+    const MappedFile bytes(file(i));
+    return io::read_grey(bytes.text(), file(i).string(), files.size() == 1 ? i : 0);
+  }
+};
+
+Pictures pictures_at(const fs::path& path, Console& console) {
+  if (!fs::is_directory(path)) {
+    const Pictures all{{path}, io::pages_of(MappedFile(path).text(), path.string())};
+    if (all.size() == 1) throw Error(path.string() + ": is one section; give the folder of all");
+    return all;
+  }
+  Pictures pictures{files_in(path, io::is_picture_name)};
+  if (pictures.files.empty())
+    throw Error(path.string() +
+                ": has no picture (.png, .tif, .tiff) and no drawing (.svg); give a folder of sections");
+  check_numbers(pictures.files);
+  tell_gaps(pictures.files, console);
+  for (const fs::path& file : pictures.files)
+    if (const auto pages = io::pages_of(MappedFile(file).text(), file.string()); pages == 1)
+      continue;
+    else if (pictures.files.size() == 1)
+      pictures.pages = pages;
+    else
+      throw InputError(file.string(), 0,
+                       fmt::format("has {} pages, and other pictures lie beside it; give it alone", pages));
+  return pictures;
+}
+
+cortex::Volume read_pictures(const fs::path& path, const Options& options, Console& console) {
   if (!(options.pixel > 0.))
-    throw Error(folder.string() + ": pictures do not say how large they are; give --pixel, in mm");
-  check_numbers(files);
-  tell_gaps(files, console);
+    throw Error(path.string() + ": pictures do not say how large they are; give --pixel, in mm");
+  const Pictures pictures = pictures_at(path, console);
   const cortex::Axis axis = axis_of(options.axis);
   const int across = int(axis);
   const auto [right, up] = flat_axes(axis);
   cortex::Volume volume;
   std::array<std::size_t, 3> stride{};
-  for (std::size_t i = 0; i < files.size(); ++i) {
-    const io::Picture picture = io::read_png(files[i]);
+  console.progress().begin("reading pictures", pictures.size());
+  for (std::size_t i = 0; i < pictures.size(); ++i) {
+    const io::GreyPicture picture = pictures.read(i);
     if (i == 0) {
-      if (double(picture.width) * picture.height * double(files.size()) > 1e9)
-        throw Error(folder.string() + ": the pictures have more than 10⁹ pixels; make them smaller");
+      if (double(picture.width) * picture.height * double(pictures.size()) > 1e9)
+        throw Error(path.string() + ": the pictures have more than 10⁹ pixels; make them smaller");
       volume.size[std::size_t(right)] = picture.width, volume.size[std::size_t(up)] = picture.height;
-      volume.size[std::size_t(across)] = files.size();
+      volume.size[std::size_t(across)] = pictures.size();
       volume.step[right] = volume.step[up] = 1e3 * options.pixel, volume.step[across] = 1e3 * options.spacing;
       volume.origin[across] = 1e3 * options.offset;
       volume.values.resize(volume.size[0] * volume.size[1] * volume.size[2]);
@@ -159,17 +195,18 @@ cortex::Volume read_pictures(const fs::path& folder, const Options& options, Con
     }
     if (picture.width != volume.size[std::size_t(right)] || picture.height != volume.size[std::size_t(up)])
       throw InputError(
-          files[i].string(), 0,
-          fmt::format("has {} × {} pixels where the first picture has {} × {}; align them", picture.width,
-                      picture.height, volume.size[std::size_t(right)], volume.size[std::size_t(up)]));
+          pictures.file(i).string(), 0,
+          fmt::format("has {} × {} pixels{} where the first picture has {} × {}; align them", picture.width,
+                      picture.height, pictures.pages > 1 ? fmt::format(" on page {}", i + 1) : "",
+                      volume.size[std::size_t(right)], volume.size[std::size_t(up)]));
     for (std::size_t y = 0; y < picture.height; ++y)
-      for (std::size_t x = 0; x < picture.width; ++x) {
-        const std::uint8_t* p = &picture.pixels[4 * ((picture.height - 1 - y) * picture.width + x)];
+      for (std::size_t x = 0; x < picture.width; ++x)
         volume.values[x * stride[std::size_t(right)] + y * stride[std::size_t(up)] +
                       i * stride[std::size_t(across)]] =
-            (.2126f * float(p[0]) + .7152f * float(p[1]) + .0722f * float(p[2])) / 255.f;
-      }
+            picture.values[(picture.height - 1 - y) * picture.width + x];
+    console.progress().advance();
   }
+  console.progress().end();
   return volume;
 }
 
@@ -337,18 +374,16 @@ void run(const Options& options, Console& console) {
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
     const fs::path& path = options.inputs[i];
     const std::string name = name_of(options, i);
-    if (fs::is_directory(path)) {
-      const bool drawn = !files_in(path, ".svg").empty();
-      if (drawn && !files_in(path, ".png").empty())
-        console.warn(path.string() + ": has drawings (.svg) and pictures (.png); the drawings are taken");
-      if (!drawn) {
-        used.axis = used.spacing = used.threshold = used.pixel = true;
-        stacks.push_back(of_volume(read_pictures(path, options, console), path, must_be_new(name), options,
-                                   true, console));
-        continue;
-      }
+    const bool folder = fs::is_directory(path), drawn = folder && has_drawings(path);
+    if (drawn && !files_in(path, io::is_picture_name).empty())
+      console.warn(path.string() + ": has drawings (.svg) and pictures; the drawings are taken");
+    if ((folder && !drawn) || (!folder && io::is_picture_name(extension_of(path)))) {
+      used.axis = used.spacing = used.threshold = used.pixel = true;
+      stacks.push_back(
+          of_volume(read_pictures(path, options, console), path, must_be_new(name), options, true, console));
+      continue;
     }
-    if (fs::is_directory(path) || extension_of(path) == ".contours" || extension_of(path) == ".svg" ||
+    if (folder || extension_of(path) == ".contours" || extension_of(path) == ".svg" ||
         extension_of(path) == ".jser" || extension_of(path) == ".slc") {
       used.unit |= extension_of(path) == ".slc";
       stacks.push_back(read_contour_files(path, 1e3 * options.unit, console));
@@ -363,7 +398,6 @@ void run(const Options& options, Console& console) {
       stacks.push_back(of_volume(read.volume, path, must_be_new(name), options, false, console));
       continue;
     }
-    if (ending.ends_with(".png")) throw Error(path.string() + ": is one section; give the folder of all");
     used.axis = used.spacing = true;
     surfaces.push_back(io::read_surface(file.text(), path.string()));
     surface_files.push_back(path);
@@ -430,12 +464,11 @@ std::function<void()> cortex_contours(CLI::App& command, Console& console) {
   const auto o = std::make_shared<Options>();
   o->command = &command;
   command
-      .add_option(
-          "input", o->inputs,
-          "Surfaces (GIFTI, FreeSurfer, PLY, STL, OBJ), volumes (.nii, .nii.gz), folders of .png sections, "
-          "or contours of "
-          "other "
-          "programs (.jser, .slc, .svg): of two the first is the outer boundary, the second the inner one")
+      .add_option("input", o->inputs,
+                  "Surfaces (GIFTI, FreeSurfer, PLY, STL, OBJ), volumes (.nii, .nii.gz), folders of pictures "
+                  "(.png, .tif), "
+                  "one a section, or a TIFF of many pages, or contours of other programs (.jser, .slc, "
+                  ".svg): of two the first is the outer boundary, the second the inner one")
       ->required()
       ->type_name("FILE");
   command.add_option("-o,--out", o->out, "FILE.contours, or a folder for one .svg a section")

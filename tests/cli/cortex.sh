@@ -219,7 +219,7 @@ sed '3s/"at": [-0-9.]*,/"at": NaN,/' s.contours >nan.contours
 refuses 'nan.contours:3: is no JSON from column' $BRAINFOREST cortex compare nan.contours
 mkdir -p same_number && touch same_number/s1.png same_number/s01.png
 refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
-refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
+refuses 's1.png: is neither a PNG nor a TIFF picture' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 # Options of other input, which would say nothing.
 for option in 'axis x' 'spacing 3' 'offset 1' 'name a' 'unit 2' 'tolerance .01'; do
@@ -298,11 +298,29 @@ for bits, most in (8, 255), (16, 65535):
         with open(f"pictures{bits}/s{i}.png", "wb") as f:
             f.write(b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", 40, 40, bits, 0, 0, 0, 0)) +
                     chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
+# The same of 16 bits as one TIFF of eleven pages.
+pages = bytearray(b"II*\0" + struct.pack("<I", 8))
+for i in range(11):
+    grey = [[65535 * (40 - x) // 40 if 3 < y < 10 + 2 * i else 0 for x in range(40)] for y in range(40)]
+    tags = [(256, 40), (257, 40), (258, 16), (259, 1), (262, 1), (273, len(pages) + 2 + 8 * 12 + 4), (277, 1), (279, 3200)]
+    behind = len(pages) + 2 + 8 * 12 + 4 + 3200
+    pages += struct.pack("<H", 8) + b"".join(struct.pack("<HHII", tag, 4, 1, value) for tag, value in tags)
+    pages += struct.pack("<I", behind if i < 10 else 0) + b"".join(struct.pack("<40H", *row) for row in grey)
+open("pages.tif", "wb").write(pages)
+os.mkdir("mixed_pages")
+open("mixed_pages/s1.tif", "wb").write(pages)
+open("mixed_pages/s2.png", "wb").write(open("pictures8/s2.png", "rb").read())
 PY
 for bits in 8 16; do
   $BRAINFOREST cortex contours pictures$bits -o pictures$bits.contours --axis z --pixel 1 --threshold .5 --straight >out.txt 2>edge.txt
   grep -q "11 sections reach the edge of the picture" edge.txt
 done
+$BRAINFOREST cortex contours pages.tif -o pages.contours --axis z --pixel 1 --threshold .5 --straight >/dev/null 2>&1
+cmp pictures16.contours pages.contours
+refuses 's1.tif: has 11 pages, and other pictures lie beside it' $BRAINFOREST cortex contours mixed_pages --pixel 1 --threshold .5 -o no.contours
+refuses 's1.png: is one section; give the folder' $BRAINFOREST cortex contours pictures8/s1.png --pixel 1 --threshold .5 -o no.contours
+head -c 5000 pages.tif >cut.tif
+refuses 'cut.tif: is no TIFF picture that can be read' $BRAINFOREST cortex contours cut.tif --pixel 1 --threshold .5 -o no.contours
 python3 - <<'PY'
 import json
 for bits in 8, 16:
