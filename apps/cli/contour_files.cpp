@@ -35,7 +35,7 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
   if (files.empty()) throw InputError(path.string(), 0, "has no .svg file; give a folder of drawn sections");
   std::vector<cortex::ContourStack> drawings;
   for (const fs::path& file : files) drawings.push_back(read(file));
-  return io::gathered(drawings);
+  return io::gathered(drawings, path.string());
 }
 
 namespace {

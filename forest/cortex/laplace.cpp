@@ -172,8 +172,11 @@ Laplace::Laplace(const Mesh& outer, const Mesh& inner, const Options& options, P
 void Laplace::lay(const Mesh& outer, const Mesh& inner) {
   Place low = Place::Constant(std::numeric_limits<double>::infinity()), high = -low;
   for (const Mesh* mesh : {&outer, &inner})
-    for (const Vec3& p : mesh->positions)
-      low = low.cwiseMin(p.cast<double>()), high = high.cwiseMax(p.cast<double>());
+    for (const Triangle& t : mesh->triangles)  // a vertex of none is no part of the surface
+      for (const std::uint32_t v : t) {
+        const Place p = mesh->positions[v].cast<double>();
+        low = low.cwiseMin(p), high = high.cwiseMax(p);
+      }
   if (!(low.array() <= high.array()).all())
     throw Error("there is no surface; give an outer and an inner one");
   // Odd parts of a spacing, so that planes of whole numbers, in which people place things, hit no node.

@@ -69,6 +69,11 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     }
     triangles.push_back(mine);
   }
+  if (triangles.empty())
+    throw Error(fmt::format(
+        "nowhere are there {:g} mm between the surfaces, so there is no cortex; check that they are "
+        "an outer and an inner one",
+        RibbonOptions{}.least_thickness / 1e3));
   if (!(volume > 4. * options.volume))
     throw Error(fmt::format("the cortex has {:.3g} mm³, too little for elements of {:.3g} mm³", volume / 1e9,
                             options.volume / 1e9));

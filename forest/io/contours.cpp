@@ -65,13 +65,14 @@ void turn_insides_left(Section& section) {
   }
 }
 
-void sort_sections(ContourStack& stack, const std::string& name) {
+// @param how  a place is given, to be said where two have the same
+void sort_sections(ContourStack& stack, const std::string& name, std::string_view how = {}) {
   std::ranges::stable_sort(stack.sections, {}, &Section::at);
   for (std::size_t i = 1; i < stack.sections.size(); ++i)
     if (stack.sections[i].at == stack.sections[i - 1].at)
       throw InputError(name, 0,
-                       fmt::format("has two sections at {:.3f} mm; give each a place of its own",
-                                   stack.sections[i].at / 1e3));
+                       fmt::format("has two sections at {:.3f} mm; give each a place of its own{}",
+                                   stack.sections[i].at / 1e3, how));
 }
 
 // ── our own, and Reconstruct's ──
@@ -609,23 +610,24 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     }
   };
   walk(root);
+  turn_insides_left(section);  // drawing programs know no direction
   return result;
 }
 
-ContourStack gathered(const std::vector<ContourStack>& drawings) {
+ContourStack gathered(const std::vector<ContourStack>& drawings, const std::string& name) {
   ContourStack stack;
   if (drawings.empty()) return stack;
   stack.axis = drawings.front().axis;
   for (const ContourStack& drawing : drawings) {
     if (drawing.axis != stack.axis)
-      throw Error("the drawings are of different axes; give those of one stack");
+      throw InputError(name, 0, "holds drawings of different axes; give those of one stack");
     for (Section section : drawing.sections) {
       for (Contour& contour : section.contours)
         contour.object = object_of(stack, drawing.objects.at(contour.object));
       stack.sections.push_back(std::move(section));
     }
   }
-  sort_sections(stack, "the drawings");
+  sort_sections(stack, name, ", in µm, as <svg data-at=\"4000\" …> in its drawing");
   return stack;
 }
 

@@ -33,10 +33,11 @@ std::string write_contours(const cortex::ContourStack& stack);
 /// @param behind  another section that is drawn pale behind it; may be null
 std::string write_svg(const cortex::ContourStack& stack, const cortex::Section& section,
                       const cortex::Section* behind = nullptr);
-/// One section of a stack. The paths of groups are the objects; commands M L H V C S Q T Z are read, in either case.
+/// One section of a stack, contours turned so that their insides are to the left. The paths of groups are the objects; commands M L H V C S Q T Z are read, in either case.
 ReadContours read_svg(std::string_view text, const std::string& name);
 
-/// Sections of several drawings as one stack, by their places. Throws Error when two are at one place or along other axes.
-cortex::ContourStack gathered(const std::vector<cortex::ContourStack>& drawings);
+/// Sections of several drawings as one stack, by their places. Throws InputError when two are at one place or along other axes.
+/// @param name  of their folder
+cortex::ContourStack gathered(const std::vector<cortex::ContourStack>& drawings, const std::string& name);
 
 }  // namespace forest::io

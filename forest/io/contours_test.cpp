@@ -3,6 +3,7 @@
 
 #include <cmath>
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -46,7 +47,7 @@ TEST(Contours, ComeBackFromDrawingsToTheLastBit) {
   for (const auto& section : stack.sections)
     drawings.push_back(read_contours(write_svg(stack, section, &stack.sections[0]), "c.svg").stack);
   std::swap(drawings.front(), drawings.back());
-  ContourStack again = gathered(drawings);
+  ContourStack again = gathered(drawings, "drawn");
   EXPECT_EQ(again, stack);
 }
 
@@ -58,6 +59,31 @@ TEST(Contours, CutOffAnywhereAreRefused) {
     EXPECT_NE(sentence(text.substr(0, size)), "") << size;
   for (std::size_t size = 0; size + 2 < drawing.size(); size += 7)
     EXPECT_NE(sentence(drawing.substr(0, size)), "") << size;
+}
+
+TEST(Contours, OfADrawingHaveTheirInsideToTheLeftHoweverTheyWereDrawn) {
+  const std::string around = "M0 0h9v9h-9z", back = "M0 0v9h9v-9z", hole = "M2 2h3v3h-3z",
+                    hole_back = "M2 2v3h3v-3z";
+  for (const std::string& one : {around, back})
+    for (const std::string& other : {hole, hole_back}) {
+      const auto read =
+          read_contours("<svg width='9mm' viewBox='0 0 9 9'><path d='" + one + other + "'/></svg>", "d.svg")
+              .stack;
+      ASSERT_EQ(read.sections[0].contours.size(), 2u);
+      EXPECT_NEAR(area(read.sections[0].contours[0].curve), 81e6, 1.);
+      EXPECT_NEAR(area(read.sections[0].contours[1].curve), -9e6, 1.);
+    }
+}
+
+TEST(Contours, OfDrawingsWithoutPlacesAreRefusedWithTheRemedy) {
+  const auto drawing =
+      read_contours("<svg width='9mm' viewBox='0 0 9 9'><path d='M0 0h9v9h-9z'/></svg>", "d.svg").stack;
+  EXPECT_THAT(
+      refused<InputError>([&] {
+        (void)gathered({drawing, drawing}, "drawn");
+      }),
+      testing::HasSubstr(
+          "drawn: has two sections at 0.000 mm; give each a place of its own, in µm, as <svg data-at="));
 }
 
 TEST(Contours, OfADrawingAreReadFromEveryCommandInItsSize) {

@@ -20,19 +20,24 @@
 namespace forest::io {
 namespace {
 
-enum class NumberType : std::uint8_t { byte, whole, real, twice };
+constexpr std::string_view points_intent = "NIFTI_INTENT_POINTSET",
+                           triangles_intent = "NIFTI_INTENT_TRIANGLE";
+
+enum class NumberType : std::uint8_t { byte, whole, natural, long_whole, real, twice };
 struct TypeRow {
   std::string_view name;
   NumberType type;
   std::size_t size;
 };
-// The standard's three, and one that programs write besides.
-constexpr std::array<TypeRow, 4> types{{{"NIFTI_TYPE_UINT8", NumberType::byte, 1},
+// The standard's three, and what programs write besides.
+constexpr std::array<TypeRow, 6> types{{{"NIFTI_TYPE_UINT8", NumberType::byte, 1},
                                         {"NIFTI_TYPE_INT32", NumberType::whole, 4},
+                                        {"NIFTI_TYPE_UINT32", NumberType::natural, 4},
+                                        {"NIFTI_TYPE_INT64", NumberType::long_whole, 8},
                                         {"NIFTI_TYPE_FLOAT32", NumberType::real, 4},
                                         {"NIFTI_TYPE_FLOAT64", NumberType::twice, 8}}};
 
-// Rows of numbers. All of them fit a double.
+// Rows of numbers. All of them fit a double, but for whole ones above 2⁵³, which are none of a vertex.
 struct Array {
   std::string_view intent;
   std::size_t rows = 0, columns = 1;
@@ -120,8 +125,8 @@ class Reader {
     const std::string_view type_name = element.attribute("DataType").value();
     const auto type = std::ranges::find(types, type_name, &TypeRow::name);
     if (type == types.end())
-      fail(intent, fmt::format("has the type '{}', which is not read; write it as NIFTI_TYPE_FLOAT32",
-                               printable(type_name)));
+      fail(intent, fmt::format("has the type '{}', which is not read; write it as {}", printable(type_name),
+                               intent == triangles_intent ? "NIFTI_TYPE_INT32" : "NIFTI_TYPE_FLOAT32"));
     const std::uint64_t dimensions = whole(element.attribute("Dimensionality").value()).value_or(1);
     std::uint64_t count = 1;
     for (std::uint64_t i = 0; i < std::min<std::uint64_t>(dimensions, 6); ++i) {
@@ -210,6 +215,12 @@ class Reader {
         case NumberType::whole:
           numbers[i] = as(std::int32_t());
           break;
+        case NumberType::natural:
+          numbers[i] = as(std::uint32_t());
+          break;
+        case NumberType::long_whole:
+          numbers[i] = as(std::int64_t());
+          break;
         case NumberType::real:
           numbers[i] = as(float());
           break;
@@ -229,9 +240,6 @@ class Reader {
   pugi::xml_document document_;
   pugi::xml_node root_;
 };
-
-constexpr std::string_view points_intent = "NIFTI_INTENT_POINTSET",
-                           triangles_intent = "NIFTI_INTENT_TRIANGLE";
 
 }  // namespace
 

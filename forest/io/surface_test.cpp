@@ -1,12 +1,15 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/surface.h"
 
+#include <algorithm>
+#include <array>
 #include <bit>
 #include <cmath>
 #include <cstring>
 #include <zlib.h>
 
 #include <fmt/format.h>
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
@@ -157,6 +160,23 @@ TEST(Surface, IsTheSameFromEveryFormatAndInMicrometres) {
                                         array("TRIANGLE", "UINT8", point_sizes, "ASCII", columns,
                                               "ArrayIndexingOrder=\"ColumnMajorOrder\"")),
                                   "g"));
+}
+
+// Which programs write that leave the numbers as they had them.
+TEST(Surface, OfWiderWholeNumbersIsTheSame) {
+  const std::string points =
+      array("POINTSET", "FLOAT32", point_sizes, "Base64Binary", base64(raw(&places[0][0], 12, false)));
+  std::array<std::int64_t, 12> wide{};
+  std::copy_n(&corners[0][0], 12, wide.begin());
+  const auto with = [&](const char* type, const std::string& bytes) {
+    return gifti(points + array("TRIANGLE", type, point_sizes, "Base64Binary", base64(bytes)));
+  };
+  expect_tetrahedron(read_surface(with("UINT32", raw(&corners[0][0], 12, false)), "g"));
+  expect_tetrahedron(read_surface(with("INT64", raw(wide.data(), 12, false)), "g"));
+  EXPECT_THAT(surface_error(with("INT16", "")), testing::HasSubstr("write it as NIFTI_TYPE_INT32"));
+  wide[5] = -1;
+  EXPECT_THAT(surface_error(with("INT64", raw(wide.data(), 12, false))),
+              testing::HasSubstr("triangle 1 names vertex -1 of 4"));
 }
 
 std::string wavefront() {
