@@ -1,5 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 // brainforest cortex surfaces: contours of sections become the outer and the inner surface.
+#include <algorithm>
 #include <cmath>
 #include <filesystem>
 #include <memory>
@@ -21,6 +22,29 @@
 #include "apps/cli/options.h"
 
 namespace forest::cli {
+namespace {
+
+// A stack may end before the tissue does: then what lies within its last section is about what lies within the one before.
+void tell_flat_ends(const cortex::ContourStack& stack, const std::string& name, Console& console) {
+  constexpr double alike = .75, some = .05;
+  const auto object = std::uint32_t(std::ranges::find(stack.objects, name) - stack.objects.begin());
+  std::vector<double> areas;
+  for (const cortex::Section& section : stack.sections) {
+    double& sum = areas.emplace_back(0.);
+    for (const cortex::Contour& contour : section.contours)
+      if (contour.object == object) sum += area(contour.curve);
+  }
+  const double most = *std::ranges::max_element(areas);
+  const std::size_t last = areas.size() - 1;
+  for (const auto& [end, next] : {std::pair(std::size_t(0), std::size_t(1)), std::pair(last, last - 1)})
+    if (areas[end] > some * most && areas[end] > alike * areas[next])
+      console.warn(fmt::format(
+          "the {} section ({:.3f} mm) still has {:.3g} mm² within '{}', and the surfaces are closed flat "
+          "behind it; if tissue goes on there, bring its sections in",
+          end == 0 ? "first" : "last", stack.sections[end].at / 1e3, areas[end] / 1e6, name));
+}
+
+}  // namespace
 
 std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
   namespace fs = std::filesystem;
@@ -95,6 +119,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
     write_unless_there({{o->out[0], io::write_surface(made.outer, o->out[0].string())},
                         {o->out[1], io::write_surface(made.inner, o->out[1].string())}},
                        true);
+    tell_flat_ends(stack, o->outer, console);
     nlohmann::ordered_json rows = nlohmann::ordered_json::array();
     std::vector<std::vector<std::string>> table;
     const auto tell = [&](const fs::path& path, const Mesh& mesh, std::size_t cut,
