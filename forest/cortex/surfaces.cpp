@@ -170,12 +170,21 @@ std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
   return counts;
 }
 
-// In no section, either.
+// In no section, either. The first and the last one of the inner boundary may touch both surfaces where they run side by side and
+// cross a little, as averaged ones do by the medial wall.
 void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const ContourStack& stack,
                     const Raster& raster, const SurfaceOptions& options) {
   const std::size_t layer = inner.size[0] * inner.size[1];
   constexpr double much = 1.;  // mm²
-  for (std::size_t s = 0; s < stack.sections.size(); ++s) {
+  const auto has_inner = [&](const Section& section) {
+    return std::ranges::any_of(section.contours,
+                               [&](const Contour& c) { return stack.objects[c.object] == options.inner; });
+  };
+  const auto from = std::size_t(std::ranges::find_if(stack.sections, has_inner) - stack.sections.begin());
+  const auto to = stack.sections.size() -
+                  std::size_t(std::find_if(stack.sections.rbegin(), stack.sections.rend(), has_inner) -
+                              stack.sections.rbegin());
+  for (std::size_t s = from + 1; s + 1 < to; ++s) {
     const std::size_t first = (s + 1) * std::size_t(raster.between) * layer;
     std::size_t nested = 0, outside = 0;
     for (std::size_t i = first; i < first + layer; ++i)
