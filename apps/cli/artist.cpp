@@ -112,16 +112,8 @@ std::string Artist::explain(const scene::View& view, const Marks& marks, frame::
   std::vector<scene::ColourBar> bars;
   if (marks.legend && playback_)
     bars.push_back(scene::bar_of(*playback_, view.activity.value_or(playback_->view()), view.background));
-  if (marks.legend && dressing_.surfaces.has_values()) {
-    const auto [low, high] = dressing_.surfaces.shown_range();
-    const auto [below, above] = dressing_.surfaces.beyond_range();
-    bars.push_back({.map = dressing_.surfaces.map,
-                    .low = low,
-                    .high = high,
-                    .below = below,
-                    .above = above,
-                    .title = dressing_.surfaces.title});
-  }
+  if (const auto of_surfaces = scene::bar_of(dressing_.surfaces); marks.legend && of_surfaces)
+    bars.push_back(*of_surfaces);
   const bool barred = scene::paint(image, bars, view.background);
   std::vector<scene::LegendEntry> names;
   if (marks.names && colouring_ && !playback_)

@@ -79,69 +79,78 @@ void paint_directions(QPainter& painter, const QRect& area, const frame::Camera&
   }
 }
 
-void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
-                  const Ink& ink) {
+Explanations::Explanations(QPainter& painter, const QRect& area, const Ink& ink)
+    : painter_(painter), ink_(ink), corner_(area.left() + margin, area.top() + margin) {}
+
+QPointF Explanations::room_for(const QSizeF& size) {
+  constexpr qreal gap = 8.;
+  const QPointF corner = corner_;
+  plate(painter_, QRectF(corner, size), ink_);
+  corner_.ry() += size.height() + gap;
+  return corner;
+}
+
+void Explanations::add(const std::vector<scene::LegendEntry>& legend) {
   if (legend.empty()) return;
-  const qreal line = painter.fontMetrics().height() + 5.;
+  const qreal line = painter_.fontMetrics().height() + 5.;
   constexpr qreal dot = 10., step = 7.;  // one colour is a dot, several stand side by side
   qreal widest = 0, indent = dot;
   for (const auto& entry : legend) {
     widest =
-        std::max(widest, qreal(painter.fontMetrics().horizontalAdvance(QString::fromStdString(entry.name))));
+        std::max(widest, qreal(painter_.fontMetrics().horizontalAdvance(QString::fromStdString(entry.name))));
     if (entry.colours.size() > 1) indent = std::max(indent, step * qreal(entry.colours.size()));
   }
-  const QPointF corner(area.left() + margin, area.top() + margin);
-  plate(painter, QRectF(corner, QSizeF(widest + 34 + indent, line * qreal(legend.size()) + 14)), ink);
+  const QPointF corner = room_for({widest + 34 + indent, line * qreal(legend.size()) + 14});
   for (std::size_t i = 0; i < legend.size(); ++i) {
     const QPointF left = corner + QPointF(13, 7 + line * (qreal(i) + .5));
     const auto& colours = legend[i].colours;
-    painter.setPen(Qt::NoPen);
+    painter_.setPen(Qt::NoPen);
     for (std::size_t k = 0; k < colours.size(); ++k) {
-      painter.setBrush(to_screen(colours[k]));
+      painter_.setBrush(to_screen(colours[k]));
       if (colours.size() == 1)
-        painter.drawEllipse(left + QPointF(dot / 2, 0), dot / 2, dot / 2);
+        painter_.drawEllipse(left + QPointF(dot / 2, 0), dot / 2, dot / 2);
       else
-        painter.drawRect(QRectF(left + QPointF(step * qreal(k), -dot / 2), QSizeF(step, dot)));
+        painter_.drawRect(QRectF(left + QPointF(step * qreal(k), -dot / 2), QSizeF(step, dot)));
     }
-    painter.setPen(ink.text);
-    painter.drawText(QRectF(left + QPointF(indent + 8, -line / 2), QSizeF(widest + 4, line)),
-                     Qt::AlignVCenter, QString::fromStdString(legend[i].name));
+    painter_.setPen(ink_.text);
+    painter_.drawText(QRectF(left + QPointF(indent + 8, -line / 2), QSizeF(widest + 4, line)),
+                      Qt::AlignVCenter, QString::fromStdString(legend[i].name));
   }
 }
 
-void paint_bar(QPainter& painter, const QRect& area, const scene::ColourBar& bar, const Ink& ink) {
+void Explanations::add(const scene::ColourBar& bar) {
   constexpr qreal width = 190, thick = 12, dot = 10;
-  const qreal line = painter.fontMetrics().height() + 3.;
+  const qreal line = painter_.fontMetrics().height() + 3.;
   const QString note = QString::fromStdString(bar.note);
   const qreal dots = bar.marks.empty() ? 0. : dot * (qreal(bar.marks.size()) + .7);
   const qreal wide =
-      std::max(bar.map ? width : 0., dots + painter.fontMetrics().horizontalAdvance(note) + 4.);
-  const qreal lines = 1. + (bar.map ? 1. : 0.) + (bar.note.empty() ? 0. : 1.);
-  const QPointF corner(area.left() + margin, area.top() + margin);
-  plate(painter, QRectF(corner, QSizeF(wide + 28, lines * line + (bar.map ? thick + 6. : 0.) + 14)), ink);
+      std::max(bar.map ? width : 0., dots + painter_.fontMetrics().horizontalAdvance(note) + 4.);
+  const bool headed = !bar.title.empty() || !bar.units.empty();
+  const qreal lines = (headed ? 1. : 0.) + (bar.map ? 1. : 0.) + (bar.note.empty() ? 0. : 1.);
+  const QPointF corner = room_for({wide + 28, lines * line + (bar.map ? thick + 6. : 0.) + 14});
   QPointF top = corner + QPointF(14, 6);
-  painter.setPen(ink.text);
-  painter.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignLeft, QString::fromStdString(bar.title));
-  painter.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignRight, QString::fromStdString(bar.units));
-  top.ry() += line;
+  painter_.setPen(ink_.text);
+  painter_.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignLeft, QString::fromStdString(bar.title));
+  painter_.drawText(QRectF(top, QSizeF(wide, line)), Qt::AlignRight, QString::fromStdString(bar.units));
+  if (headed) top.ry() += line;
   if (bar.map) {
     for (int x = 0; x < int(width); ++x) {
       const Vec3 c = bar.at(float(x) / float(width - 1));
-      painter.fillRect(QRectF(top + QPointF(x, 2), QSizeF(1, thick)), QColor::fromRgbF(c.x(), c.y(), c.z()));
+      painter_.fillRect(QRectF(top + QPointF(x, 2), QSizeF(1, thick)), QColor::fromRgbF(c.x(), c.y(), c.z()));
     }
-    painter.setPen(ink.faint);
+    painter_.setPen(ink_.faint);
     const QRectF below(top + QPointF(0, thick + 4), QSizeF(width, line));
-    painter.drawText(below, Qt::AlignLeft, QString::number(bar.low));
-    painter.drawText(below, Qt::AlignRight, QString::number(bar.high));
+    painter_.drawText(below, Qt::AlignLeft, QString::fromStdString(bar.ends().first));
+    painter_.drawText(below, Qt::AlignRight, QString::fromStdString(bar.ends().second));
     top.ry() += thick + 6 + line;
   }
-  painter.setPen(bar.map ? ink.faint : ink.text);
-  painter.drawText(QRectF(top + QPointF(dots, 0), QSizeF(wide, line)), Qt::AlignLeft, note);
-  painter.setPen(Qt::NoPen);
+  painter_.setPen(bar.map ? ink_.faint : ink_.text);
+  painter_.drawText(QRectF(top + QPointF(dots, 0), QSizeF(wide, line)), Qt::AlignLeft, note);
+  painter_.setPen(Qt::NoPen);
   for (std::size_t i = 0; i < bar.marks.size(); ++i) {
     const Vec3& c = bar.marks[i];
-    painter.setBrush(QColor::fromRgbF(c.x(), c.y(), c.z()));
-    painter.drawEllipse(top + QPointF(.5 * dot + dot * qreal(i), .5 * line), .5 * dot, .5 * dot);
+    painter_.setBrush(QColor::fromRgbF(c.x(), c.y(), c.z()));
+    painter_.drawEllipse(top + QPointF(.5 * dot + dot * qreal(i), .5 * line), .5 * dot, .5 * dot);
   }
 }
 

@@ -27,11 +27,20 @@ void paint_scale(QPainter& painter, const QRect& area, const frame::Camera& came
 /// @param pia  which way it lies, if any: along y as in a column, or along an arrow of its own
 void paint_directions(QPainter& painter, const QRect& area, const frame::Camera& camera, const Ink& ink,
                       const std::optional<Vec3>& pia);
-/// At the top left.
-void paint_legend(QPainter& painter, const QRect& area, const std::vector<scene::LegendEntry>& legend,
-                  const Ink& ink);
-/// At the top left: what the colours of a simulation mean, and the moment that is shown.
-void paint_bar(QPainter& painter, const QRect& area, const scene::ColourBar& bar, const Ink& ink);
+/// What colours mean, one explanation below the other at the top left.
+class Explanations {
+ public:
+  Explanations(QPainter& painter, const QRect& area, const Ink& ink);
+  void add(const std::vector<scene::LegendEntry>& legend);
+  void add(const scene::ColourBar& bar);
+
+ private:
+  QPointF room_for(const QSizeF& size);  // where it begins, on ground of its own
+
+  QPainter& painter_;
+  const Ink& ink_;
+  QPointF corner_;  // of the next
+};
 /// A ring around the point that is looked at.
 void paint_gaze(QPainter& painter, const QPointF& place, const Ink& ink);
 

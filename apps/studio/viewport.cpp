@@ -520,10 +520,13 @@ void Viewport::annotate() {
     paint_scale(painter, rect(), settings_.view.camera, ink);
     paint_directions(painter, rect(), settings_.view.camera, ink, pia_);
   }
-  if (settings_.legend && playback_)
-    paint_bar(painter, rect(), scene::bar_of(*playback_, activity(), settings_.view.background), ink);
-  else if (settings_.legend)
-    paint_legend(painter, rect(), legend(), ink);
+  if (settings_.legend) {
+    Explanations explanations(painter, rect(), ink);
+    if (playback_) explanations.add(scene::bar_of(*playback_, activity(), settings_.view.background));
+    if (const auto bar = scene::bar_of(dressing_.surfaces); bar && dressing_.surfaces.visibility > 0.f)
+      explanations.add(*bar);
+    if (!playback_) explanations.add(legend());
+  }
   if (const auto& gaze = settings_.view.detail.gaze)
     paint_gaze(painter, QPointF(gaze->x() * float(width()), gaze->y() * float(height())), ink);
 }

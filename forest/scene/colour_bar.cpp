@@ -7,6 +7,7 @@
 #include <fmt/format.h>
 
 #include "forest/scene/playback.h"
+#include "forest/scene/surfaces.h"
 
 namespace forest::scene {
 namespace {
@@ -32,16 +33,6 @@ float marks_width(const ColourBar& bar, float letter) {
 float thick_of(const ColourBar& bar) { return bar.map ? thick : 0.f; }
 std::string note_of(const ActivityView& activity) {
   return fmt::format("a spike, then fading, {:g} µm/ms", activity.speed);
-}
-// As many digits as tell them apart, four or more.
-std::pair<std::string, std::string> ends_of(const ColourBar& bar) {
-  for (int digits = 4;; ++digits) {
-    std::pair ends(fmt::format("{:.{}g}", bar.low, digits), fmt::format("{:.{}g}", bar.high, digits));
-    if (ends.first == ends.second && digits < 9) continue;
-    if (bar.below) ends.first = "≤ " + ends.first;
-    if (bar.above) ends.second = "≥ " + ends.second;
-    return ends;
-  }
 }
 // The text, or as much of its beginning as has room.
 std::string shortened(const Lettering& letters, std::string text, float room) {
@@ -70,6 +61,24 @@ Vec3 ColourBar::at(float t) const {
   const bool is_less = threshold && low + t * (high - low) < *threshold;
   if (is_less) return screen_of(below_threshold(branches.value_or(Background::dark)));
   return branches ? screen_of(on_branches(*map, t, *branches)) : map->screen(t);
+}
+
+std::pair<std::string, std::string> ColourBar::ends() const {
+  for (int digits = 4;; ++digits) {
+    std::pair ends(fmt::format("{:.{}g}", low, digits), fmt::format("{:.{}g}", high, digits));
+    if (ends.first == ends.second && digits < 9) continue;
+    if (below) ends.first = "≤ " + ends.first;
+    if (above) ends.second = "≥ " + ends.second;
+    return ends;
+  }
+}
+
+std::optional<ColourBar> bar_of(const Surfaces& surfaces) {
+  if (!surfaces.has_values()) return std::nullopt;
+  const auto [low, high] = surfaces.shown_range();
+  const auto [below, above] = surfaces.beyond_range();
+  return ColourBar{
+      .map = surfaces.map, .low = low, .high = high, .below = below, .above = above, .title = surfaces.title};
 }
 
 ColourBar bar_of(const ActivityView& activity, double time, const std::string& units, Background background) {
@@ -111,7 +120,7 @@ void paint(frame::Image& image, const ColourBar& bar, const Box& place, const Le
     fill(image, {left, place.top, left + 1.f, place.bottom}, bar.at((i + .5f) / steps));
   }
   const float base = place.bottom + 1.7f * letters.height;
-  const auto [low, high] = ends_of(bar);
+  const auto [low, high] = bar.ends();
   letters.write(image, low, place.left, base);
   letters.write(image, high, place.right - letters.width(high), base);
   if (!bar.threshold) return;

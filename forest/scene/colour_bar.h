@@ -5,6 +5,7 @@
 #include <optional>
 #include <span>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "forest/scene/colour_map.h"
@@ -22,6 +23,7 @@ struct Writing {
 Writing writing_in(const frame::Image& image, Background background);
 
 class Playback;
+class Surfaces;
 
 struct ColourBar {
   const ColourMap* map = &colour_maps().front();  // null: no bar
@@ -34,6 +36,8 @@ struct ColourBar {
   std::optional<Background> branches{};           // its colours are those of branches there (on_branches)
 
   Vec3 at(float t) const;  // the colour at a share 0–1 of its length, sRGB 0–1
+  /// What stands at its ends, with as many digits as tell them apart, four or more.
+  std::pair<std::string, std::string> ends() const;
 };
 
 /// Of a simulation at a moment (ms).
@@ -43,6 +47,9 @@ ColourBar bar_of_spikes(const ActivityView& activity, double time, Background ba
 
 /// Whichever of them explains what is played.
 ColourBar bar_of(const Playback& playback, const ActivityView& activity, Background background);
+
+/// Of values on surfaces; none where they have none.
+std::optional<ColourBar> bar_of(const Surfaces& surfaces);
 
 /// One below the other at the top left, on ground that lets the picture through. A picture that is too small to read them in
 /// (about 280 × 130 pixels for one bar) stays as it is.

@@ -39,6 +39,23 @@ TEST(Studio, ShowsASurfaceWithoutAForest) {
   for (std::size_t i = 0; i < seen.pixels.size(); i += 4)
     bright += seen.pixels[i] > 110 && seen.pixels[i + 2] > 60;
   EXPECT_GT(bright, 5000u);
+  // Values have their colours explained at the top left.
+  const auto yellow = [&](const char* picture) {  // the end of the map
+    const io::Picture drawn = io::read_png(folder / picture);
+    std::size_t count = 0;
+    for (std::size_t y = 20; y < 130; ++y)
+      for (std::size_t x = 20; x < 260; ++x) {
+        const std::uint8_t* p = &drawn.pixels[4 * (y * drawn.width + x)];
+        count += p[0] > 220 && p[1] > 220 && p[2] < 90;
+      }
+    return count;
+  };
+  write_file(folder / "values.txt", "1\n2\n3\n4\n5\n6\n");
+  Studio coloured({folder / "lh.pial", "--overlay", folder / "values.txt", "--size", "800x600",
+                   "--screenshot", folder / "values.png"});
+  EXPECT_EQ(coloured.end(), std::pair(std::string(), 0));
+  EXPECT_EQ(yellow("surface.png"), 0u);
+  EXPECT_GT(yellow("values.png"), 50u);
   Studio wrong({sample_file(), "--overlay", folder / "lh.pial"});
   EXPECT_NE(wrong.end().first.find("more overlays (1) than surfaces (0)"), std::string::npos);
 }
