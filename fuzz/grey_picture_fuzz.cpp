@@ -11,9 +11,10 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
   using namespace forest;
   const std::string_view bytes(reinterpret_cast<const char*>(data), size);
   try {
-    const std::size_t pages = std::min<std::size_t>(io::pages_of(bytes, "input"), 3);
+    io::GreyFile file(bytes, "input");
+    const std::size_t pages = std::min<std::size_t>(file.pages(), 3);
     for (std::size_t page = 0; page < pages; ++page) {
-      const io::GreyPicture picture = io::read_grey(bytes, "input", page);
+      const io::GreyPicture picture = file.read(page);
       if (picture.values.size() != std::size_t(picture.width) * picture.height) std::abort();
     }
   } catch (const InputError&) {

@@ -96,7 +96,7 @@ void check_numbers(const std::vector<fs::path>& files) {
                               files[i].filename().string()));
 }
 
-// A section between two others that are twice as far apart as most is not there.
+// Between two sections half as far apart again as most, or farther, one is missing.
 void tell_gaps(const std::vector<fs::path>& files, Console& console) {
   std::vector<long> steps;
   for (std::size_t i = 1; i < files.size(); ++i) {
@@ -108,7 +108,7 @@ void tell_gaps(const std::vector<fs::path>& files, Console& console) {
   auto sorted = steps;
   std::ranges::nth_element(sorted, sorted.begin() + std::ptrdiff_t(sorted.size() / 2));
   const long usual = sorted[sorted.size() / 2];
-  const auto gap = std::ranges::find_if(steps, [usual](long step) { return step > usual; });
+  const auto gap = std::ranges::find_if(steps, [usual](long step) { return 2 * step >= 3 * usual; });
   if (gap == steps.end()) return;
   const auto at = std::size_t(gap - steps.begin());
   console.warn(fmt::format(
@@ -122,7 +122,8 @@ constexpr double least_tolerance = 1e-4;  // mm
 
 // Which options said something of an input.
 struct Used {
-  bool axis = false, spacing = false, threshold = false, pixel = false, unit = false, straight = false;
+  bool name = false, axis = false, spacing = false, threshold = false, pixel = false, unit = false,
+       straight = false;
 };
 
 struct Options {
@@ -136,45 +137,51 @@ struct Options {
 };
 
 // The pictures of sections: files of a folder, one a section, or the pages of a file.
-struct Pictures {
-  std::vector<fs::path> files;
-  std::size_t pages = 1;  // of a single file
-
-  std::size_t size() const { return files.size() == 1 ? pages : files.size(); }
-  const fs::path& file(std::size_t i) const { return files.size() == 1 ? files[0] : files[i]; }
-  io::GreyPicture read(std::size_t i) const {
-    const MappedFile bytes(file(i));
-    return io::read_grey(bytes.text(), file(i).string(), files.size() == 1 ? i : 0);
+class Pictures {
+ public:
+  Pictures(const fs::path& path, Console& console) : files_{path} {
+    const bool folder = fs::is_directory(path);
+    if (folder) {
+      files_ = files_in(path, io::is_picture_name);
+      if (files_.empty())
+        throw Error(path.string() +
+                    ": has no picture (.png, .tif, .tiff) and no drawing (.svg); give a folder of sections");
+      check_numbers(files_);
+      tell_gaps(files_, console);
+    }
+    if (files_.size() == 1) open(0);
+    if (!folder && size() == 1) throw Error(path.string() + ": is one section; give the folder of all");
   }
+
+  std::size_t size() const { return files_.size() == 1 ? file_->pages() : files_.size(); }
+  bool pages() const { return files_.size() == 1; }  // of one file
+  const fs::path& name(std::size_t i) const { return pages() ? files_[0] : files_[i]; }
+  io::GreyPicture read(std::size_t i) {  // in their order
+    if (pages()) return file_->read(i);
+    open(i);
+    if (file_->pages() != 1)
+      throw InputError(
+          name(i).string(), 0,
+          fmt::format("has {} pages, and other pictures lie beside it; give it alone", file_->pages()));
+    return file_->read();
+  }
+
+ private:
+  void open(std::size_t i) {
+    file_.reset();
+    bytes_.emplace(files_[i]);
+    file_.emplace(bytes_->text(), files_[i].string());
+  }
+
+  std::vector<fs::path> files_;
+  std::optional<MappedFile> bytes_;
+  std::optional<io::GreyFile> file_;
 };
-
-Pictures pictures_at(const fs::path& path, Console& console) {
-  if (!fs::is_directory(path)) {
-    const Pictures all{{path}, io::pages_of(MappedFile(path).text(), path.string())};
-    if (all.size() == 1) throw Error(path.string() + ": is one section; give the folder of all");
-    return all;
-  }
-  Pictures pictures{files_in(path, io::is_picture_name)};
-  if (pictures.files.empty())
-    throw Error(path.string() +
-                ": has no picture (.png, .tif, .tiff) and no drawing (.svg); give a folder of sections");
-  check_numbers(pictures.files);
-  tell_gaps(pictures.files, console);
-  for (const fs::path& file : pictures.files)
-    if (const auto pages = io::pages_of(MappedFile(file).text(), file.string()); pages == 1)
-      continue;
-    else if (pictures.files.size() == 1)
-      pictures.pages = pages;
-    else
-      throw InputError(file.string(), 0,
-                       fmt::format("has {} pages, and other pictures lie beside it; give it alone", pages));
-  return pictures;
-}
 
 cortex::Volume read_pictures(const fs::path& path, const Options& options, Console& console) {
   if (!(options.pixel > 0.))
     throw Error(path.string() + ": pictures do not say how large they are; give --pixel, in mm");
-  const Pictures pictures = pictures_at(path, console);
+  Pictures pictures(path, console);
   const cortex::Axis axis = axis_of(options.axis);
   const int across = int(axis);
   const auto [right, up] = flat_axes(axis);
@@ -195,9 +202,9 @@ cortex::Volume read_pictures(const fs::path& path, const Options& options, Conso
     }
     if (picture.width != volume.size[std::size_t(right)] || picture.height != volume.size[std::size_t(up)])
       throw InputError(
-          pictures.file(i).string(), 0,
+          pictures.name(i).string(), 0,
           fmt::format("has {} × {} pixels{} where the first picture has {} × {}; align them", picture.width,
-                      picture.height, pictures.pages > 1 ? fmt::format(" on page {}", i + 1) : "",
+                      picture.height, pictures.pages() ? fmt::format(" on page {}", i + 1) : "",
                       volume.size[std::size_t(right)], volume.size[std::size_t(up)]));
     for (std::size_t y = 0; y < picture.height; ++y)
       for (std::size_t x = 0; x < picture.width; ++x)
@@ -329,7 +336,7 @@ void refuse_unused(const Options& options, const Used& used) {
                {{"--axis", "of surfaces, volumes and pictures, and none is given", used.axis},
                 {"--spacing", "of surfaces, volumes and pictures, and none is given", used.spacing},
                 {"--offset", "of surfaces, volumes and pictures, and none is given", used.spacing},
-                {"--name", "of boundaries of surfaces, volumes and pictures, and none is given", used.axis},
+                {"--name", "of files with one boundary, and none is given", used.name || used.axis},
                 {"--threshold", "of volumes and pictures, and none is given", used.threshold},
                 {"--pixel", "of pictures, and none is given", used.pixel},
                 {"--unit", "of an .slc file, and none is given", used.unit},
@@ -386,7 +393,9 @@ void run(const Options& options, Console& console) {
     if (folder || extension_of(path) == ".contours" || extension_of(path) == ".svg" ||
         extension_of(path) == ".jser" || extension_of(path) == ".slc") {
       used.unit |= extension_of(path) == ".slc";
-      stacks.push_back(read_contour_files(path, 1e3 * options.unit, console));
+      cortex::ContourStack& read = stacks.emplace_back(read_contour_files(path, 1e3 * options.unit, console));
+      if (i < options.names.size() && read.objects.size() == 1)
+        read.objects[0] = options.names[i], used.name = true;
       continue;
     }
     const MappedFile file(path);

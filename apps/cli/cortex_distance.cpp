@@ -12,6 +12,7 @@
 #include "forest/core/bounds.h"
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/cortex/contours.h"
 #include "forest/geometry/surface_distance.h"
 #include "forest/io/surface.h"
 
@@ -37,7 +38,7 @@ Mesh read(const fs::path& path) {
   return mesh;
 }
 
-// What is a hundred times as large as the other is in other units.
+// What is a hundred times as large as the other, or as no brain is, is in other units.
 void must_be_alike(const Options& o, const Mesh (&meshes)[2]) {
   constexpr double most = 100.;
   double size[2];
@@ -45,6 +46,9 @@ void must_be_alike(const Options& o, const Mesh (&meshes)[2]) {
     Bounds bounds;
     for (const Vec3& p : meshes[i].positions) bounds.add(p);
     size[i] = double(bounds.extent().norm()) / 1e3;
+    if (size[i] > cortex::largest_brain / 1e3)
+      throw Error(fmt::format("{} reaches over {:.4g} m, as no brain does; give it in mm",
+                              (i == 0 ? o.first : o.second).string(), size[i] / 1e3));
   }
   if (!(size[0] <= most * size[1] && size[1] <= most * size[0]))
     throw Error(fmt::format("{} reaches over {:.3g} mm and {} over {:.3g} mm; check that both are in mm",

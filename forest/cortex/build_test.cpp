@@ -411,6 +411,7 @@ TEST(CheckSurfaces, NamesWhatIsWrong) {
   const Mesh outer = ball(10e3, 3), inner = ball(8e3, 3);
   EXPECT_EQ(refusal(outer, inner), "");
   EXPECT_THAT(refusal(inner, outer), HasSubstr("swapped"));
+  EXPECT_THAT(refusal(outer, outer), HasSubstr("give the outer and the inner one"));
   Mesh open = outer;
   open.triangles.pop_back();
   EXPECT_THAT(refusal(open, inner), HasSubstr("outer surface is open"));

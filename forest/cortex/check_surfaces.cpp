@@ -25,13 +25,6 @@ using Place = Eigen::Vector3d;
 // 6 mm wide triangles, too coarse for folds but no noise, have .2 and .085.
 constexpr double rough = .08, steep = .09;
 
-double mean_edge(const Mesh& mesh) {
-  double sum = 0.;
-  for (const Triangle& t : mesh.triangles)
-    sum += double((mesh.positions[t[1]] - mesh.positions[t[0]]).norm());
-  return sum / double(mesh.triangles.size());
-}
-
 std::string place_text(const Place& p) {
   return fmt::format("({:.1f}, {:.1f}, {:.1f}) mm", p[0] / 1e3, p[1] / 1e3, p[2] / 1e3);
 }
@@ -40,6 +33,7 @@ std::string place_text(const Place& p) {
 // and cross one another a little.
 struct Strays {
   std::size_t vertices = 0, triangles = 0;  // triangles: that only reach there between their corners
+  std::size_t of = 0;                       // vertices
   double farthest = 0.;                     // µm
   Place where = Place::Zero();
 
@@ -78,7 +72,7 @@ Strays strays(const Mesh& mesh, const TriangleTree& other, bool belongs_inside) 
   for (const Triangle& t : mesh.triangles)
     for (const std::uint32_t v : t) used[v] = 1;
   for (std::uint32_t v = 0; v < depths.size(); ++v)
-    if (used[v]) found.add(depths[v], at(v), found.vertices);
+    if (used[v]) ++found.of, found.add(depths[v], at(v), found.vertices);
   for (const auto& [depth, place] : between) found.add(depth, place, found.triangles);
   return found;
 }
@@ -128,7 +122,7 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
             ? fmt::format(" and not in {}, of which that would be {:.3g} mm³", metres ? "m" : "µm", other)
             : ""));
   }
-  if (volume(inner) > volume(outer))
+  if (volume(inner) >= volume(outer))
     throw Error(
         volume(inner) < 1.001 * volume(outer)
             ? fmt::format("both surfaces enclose {:.4g} mm³; give the outer and the inner one", cubic_mm)
@@ -163,13 +157,13 @@ std::vector<std::string> check_surfaces(const Mesh& outer, const Mesh& inner) {
   for (const std::size_t k : {1u, 0u}) {
     const auto& [mesh, name] = both[k];
     const Strays found = strays(*mesh, trees[1 - k], k == 1);
-    const bool many = found.vertices * 33 > mesh->positions.size();
+    const bool many = found.vertices * 33 > found.of;
     if (!many && found.farthest <= RibbonOptions{}.least_thickness) continue;
     throw Error(fmt::format(
         "{} of {} vertices of the {} surface lie {} the {} one, and {} of its triangles reach there "
         "between theirs, the farthest by {:.2f} mm at {}; {}",
-        found.vertices, mesh->positions.size(), name, k == 1 ? "outside of" : "within", both[1 - k].second,
-        found.triangles, found.farthest / 1e3, place_text(found.where),
+        found.vertices, found.of, name, k == 1 ? "outside of" : "within", both[1 - k].second, found.triangles,
+        found.farthest / 1e3, place_text(found.where),
         many ? "check that both are of one hemisphere and that they were not swapped"
              : "pull the inner one back there"));
   }

@@ -278,6 +278,9 @@ ContourStack together(std::span<const ContourStack> stacks) {
   for (const ContourStack& stack : stacks.subspan(1)) {
     if (stack.axis != all.axis || stack.sections.size() != all.sections.size())
       throw Error("the stacks are cut along different axes or have different sections; cut them alike");
+    for (const std::string& object : stack.objects)
+      if (std::ranges::find(all.objects, object) != all.objects.end())
+        throw Error(fmt::format("two boundaries are to be called '{}'; give each a name of its own", object));
     const auto before = std::uint32_t(all.objects.size());
     all.objects.insert(all.objects.end(), stack.objects.begin(), stack.objects.end());
     for (std::size_t i = 0; i < all.sections.size(); ++i) {

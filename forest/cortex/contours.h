@@ -77,7 +77,7 @@ std::vector<double> planes_between(double low, double high, double spacing, doub
 /// Throws Error where the surface has a border, with the place.
 ContourStack cut(const Mesh& surface, const std::string& object, Axis axis, std::span<const double> planes);
 
-/// The stacks as one; their sections must be at the same places. Throws Error.
+/// The stacks as one; their sections must be at the same places and their objects have names of their own. Throws Error.
 ContourStack together(std::span<const ContourStack> stacks);
 
 struct FitSummary {

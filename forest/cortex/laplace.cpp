@@ -2,7 +2,6 @@
 #include "forest/cortex/laplace.h"
 
 #include <algorithm>
-#include <atomic>
 #include <cmath>
 #include <limits>
 #include <span>
@@ -258,7 +257,8 @@ std::vector<float> Laplace::solve(const Nodes& nodes, const Crossings& crossings
   constexpr float over = 1.8f;
   constexpr std::size_t grain = 16384;
   std::vector<float> values(nodes.size() + 1, .5f);
-  for (rounds_ = 1; rounds_ <= options.most_rounds; ++rounds_) {
+  bool settled = false;
+  for (int round = 0; !settled && round < options.most_rounds; ++round) {
     float change = 0.f;
     for (const std::size_t parity : {0u, 1u}) {
       const std::size_t begin = nodes.colours[parity], count = nodes.colours[parity + 1] - begin;
@@ -279,9 +279,15 @@ std::vector<float> Laplace::solve(const Nodes& nodes, const Crossings& crossings
       change = std::max(change, *std::max_element(changes.begin(), changes.end()));
     }
     progress.advance();
-    if (double(change) < options.tolerance) break;
+    settled = double(change) < options.tolerance;
   }
   progress.end();
+  if (!settled)
+    throw Error(
+        fmt::format("the field between the surfaces does not settle in {} rounds; give a larger spacing, or "
+                    "check that they "
+                    "are those of a cortex, a few millimetres apart",
+                    options.most_rounds));
   return values;
 }
 

@@ -32,13 +32,12 @@ class Laplace {
   };
 
   /// Both surfaces closed, triangles facing outwards, the inner one within the outer one.
-  /// Throws Error when nothing lies between them, or the lattice would have over 2³¹ nodes, or 65,535 along an axis.
+  /// Throws Error when nothing lies between them, the field does not settle in so many rounds, or the lattice would have over 2³¹ nodes, or 65,535 along an axis.
   Laplace(const Mesh& outer, const Mesh& inner, const Options& options,
           Progress& progress = Progress::none());
 
   std::size_t size() const { return gradients_.size(); }  // nodes between the surfaces
   double spacing() const { return spacing_; }
-  int rounds() const { return rounds_; }
 
   /// The slope of the field, 1/µm, along which it grows; `heading` says on which side of a narrow gap one is: roughly where
   /// it grows. None where no node is near.
@@ -55,7 +54,6 @@ class Laplace {
   void find_slopes(const Nodes& nodes, const Crossings& crossings, const std::vector<float>& values);
 
   double spacing_;
-  int rounds_ = 0;
   Place origin_ = Place::Zero();
   std::array<int, 3> counts_{};
   std::vector<std::int32_t>

@@ -34,8 +34,10 @@ struct Line {
   Kind kind = Kind::crest;
   std::vector<Place> points;             // on the surface, at least two
   std::vector<std::uint32_t> triangles;  // in which each piece lies: one fewer than points
-  double strength = 0.;                  // the integral of the curvature along it: an angle in radians
-  bool closed = false;                   // it ends where it begins
+  double strength =
+      0.;  // of a crest and a valley the integral of the curvature along it, an angle in radians; of a
+           // sulcus its mean depth, µm
+  bool closed = false;  // it ends where it begins
 
   double length() const;  // µm
   /// Unit, of the line where piece i is, seen over `reach` µm to either side: single pieces turn with the triangles.

@@ -177,13 +177,6 @@ RibbonPoint RibbonLocator::nearest(const Place& to) const {
 Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions& options,
                    Progress& progress) {
   Mesh fine = outer;
-  const auto mean_edge = [](const Mesh& mesh) {
-    double sum = 0.;
-    for (const Triangle& t : mesh.triangles)
-      for (std::size_t e = 0; e < 3; ++e)
-        sum += double((mesh.positions[t[e]] - mesh.positions[t[(e + 1) % 3]]).norm());
-    return sum / (3. * double(mesh.triangles.size()));
-  };
   Ribbon ribbon;
   for (; mean_edge(fine) > options.edge; ++ribbon.halvings) fine = halved(fine);
   const std::size_t n = fine.positions.size();
@@ -205,8 +198,11 @@ Ribbon make_ribbon(const Mesh& outer, const WCurves& curves, const RibbonOptions
   progress.end();
   ribbon.wall = find_wall(ribbon, options);
   std::vector<std::size_t> lost;
+  std::vector<std::uint8_t> used(n, 0);  // a vertex of no triangle is no part of the surface
+  for (const Triangle& t : ribbon.triangles)
+    for (const std::uint32_t v : t) used[v] = 1;
   for (std::size_t v = 0; v < n; ++v)
-    if (!arrived[v] && !ribbon.wall[v]) lost.push_back(v);
+    if (used[v] && !arrived[v] && !ribbon.wall[v]) lost.push_back(v);
   if (lost.size() * 100 > n) {
     const Place& first = ribbon.outer[lost.front()];
     throw Error(fmt::format(

@@ -58,9 +58,11 @@ void must_go_on(const ContourStack& stack, std::uint32_t object) {
     return std::ranges::any_of(section.contours, [&](const Contour& c) { return c.object == object; });
   };
   const auto first = std::ranges::find_if(stack.sections, has);
+  if (first == stack.sections.end())
+    throw Error(fmt::format("no section has a contour of '{}'; trace some", stack.objects[object]));
   const auto last = std::ranges::find_if(stack.sections.rbegin(), stack.sections.rend(), has).base();
   const auto without = std::find_if_not(first, last, has);
-  if (first != stack.sections.end() && without != last)
+  if (without != last)
     throw Error(fmt::format(
         "section {} ({:.3f} mm) has no contour of '{}', and sections before and behind it have; trace "
         "it there",
@@ -92,7 +94,7 @@ Raster raster_of(const ContourStack& stack, const SurfaceOptions& options) {
   raster.origin = low - Place::Constant(border);
   const auto points = [&](double extent) {
     const double count = std::ceil((extent + 2. * border) / raster.step) + 1.;
-    if (count > 1e5)
+    if (!(count <= 1e5))
       throw Error("contours spread over more than 100,000 voxels; give a larger voxel, or look at the unit");
     return std::size_t(count);
   };
@@ -171,28 +173,30 @@ std::vector<std::size_t> within(const ScalarGrid& grid, const Raster& raster) {
 }
 
 // In no section, either. The first and the last one of the inner boundary may touch both surfaces where they run side by side and
-// cross a little, as averaged ones do by the medial wall.
+// cross, as averaged ones do by the medial wall: there most of it must be outside, and not a third.
 void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const ContourStack& stack,
                     const Raster& raster, const SurfaceOptions& options) {
+  constexpr double much = 1e6;  // µm²
+  constexpr double share = 1. / 3., share_at_ends = .8;
   const std::size_t layer = inner.size[0] * inner.size[1];
-  constexpr double much = 1.;  // mm²
-  const auto has_inner = [&](const Section& section) {
-    return std::ranges::any_of(section.contours,
-                               [&](const Contour& c) { return stack.objects[c.object] == options.inner; });
+  struct Counted {
+    std::size_t section, nested, outside;
   };
-  const auto from = std::size_t(std::ranges::find_if(stack.sections, has_inner) - stack.sections.begin());
-  const auto to = stack.sections.size() -
-                  std::size_t(std::find_if(stack.sections.rbegin(), stack.sections.rend(), has_inner) -
-                              stack.sections.rbegin());
-  for (std::size_t s = from + 1; s + 1 < to; ++s) {
+  std::vector<Counted> all;
+  for (std::size_t s = 0; s < stack.sections.size(); ++s) {
     const std::size_t first = (s + 1) * std::size_t(raster.between) * layer;
-    std::size_t nested = 0, outside = 0;
+    Counted here{s, 0, 0};
     for (std::size_t i = first; i < first + layer; ++i)
-      if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? nested : outside);
-    if (outside > nested / 2 && double(outside) * raster.step * raster.step > much * 1e6)
+      if (inner.values[i] < 0.f) ++(outer.values[i] < 0.f ? here.nested : here.outside);
+    if (here.nested + here.outside) all.push_back(here);
+  }
+  for (const Counted& here : all) {
+    const bool at_end = &here == &all.front() || &here == &all.back();
+    const double outside = double(here.outside) / double(here.nested + here.outside);
+    if (outside > (at_end ? share_at_ends : share) && double(here.outside) * raster.step * raster.step > much)
       throw Error(fmt::format(
           "section {} ({:.3f} mm): {:.0f} % of what lies within '{}' lies outside '{}'; exchange them there",
-          s + 1, stack.sections[s].at / 1e3, 100. * double(outside) / double(nested + outside), options.inner,
+          here.section + 1, stack.sections[here.section].at / 1e3, 100. * outside, options.inner,
           options.outer));
   }
 }

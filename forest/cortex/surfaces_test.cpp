@@ -150,6 +150,23 @@ TEST(SurfacesFrom, RefuseWhatCannotBeWithASentence) {
   ContourStack one_swapped = good;
   for (Contour& contour : one_swapped.sections[good.sections.size() / 2].contours) contour.object ^= 1u;
   EXPECT_NE(sentence(one_swapped).find("exchange them there"), std::string::npos) << sentence(one_swapped);
+  ContourStack end_swapped = good;  // the last that has both
+  for (std::size_t i = good.sections.size(); i-- > 0;)
+    if (std::ranges::any_of(good.sections[i].contours, [](const Contour& c) { return c.object == 1; })) {
+      for (Contour& contour : end_swapped.sections[i].contours)
+        contour.curve.points =
+            contour.object == 1 ? good.sections[i].contours[0].curve.points : contour.curve.points;
+      for (Contour& contour : end_swapped.sections[i].contours)
+        if (contour.object == 1)
+          for (Place& p : contour.curve.points) p.x() += 30e3;  // beside the outer one
+      break;
+    }
+  EXPECT_NE(sentence(end_swapped).find("lies outside"), std::string::npos) << sentence(end_swapped);
+  ContourStack undrawn = good;
+  for (Section& section : undrawn.sections)
+    std::erase_if(section.contours, [](const Contour& c) { return c.object == 1; });
+  EXPECT_NE(sentence(undrawn).find("no section has a contour of 'inner'"), std::string::npos)
+      << sentence(undrawn);
   ContourStack two_missing = good;
   two_missing.sections.erase(two_missing.sections.begin() + 4, two_missing.sections.begin() + 6);
   EXPECT_NE(sentence(two_missing).find("between section 4 "), std::string::npos) << sentence(two_missing);

@@ -73,6 +73,14 @@ double volume(const Mesh& mesh) {
   return six / 6.;
 }
 
+double mean_edge(const Mesh& mesh) {
+  double sum = 0.;
+  for (const Triangle& t : mesh.triangles)
+    for (std::size_t k = 0; k < 3; ++k)
+      sum += double((mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).norm());
+  return sum / (3. * double(std::max<std::size_t>(mesh.triangles.size(), 1)));
+}
+
 double area(const Mesh& mesh) {
   double twice = 0.;
   for (const Triangle& t : mesh.triangles) {

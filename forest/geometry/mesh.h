@@ -42,7 +42,8 @@ std::optional<std::array<std::uint32_t, 2>> open_edge(const Mesh& mesh);
 std::size_t count_pieces(const Mesh& mesh);
 /// Of a closed mesh, by the divergence theorem; µm³, positive when triangles face outwards.
 double volume(const Mesh& mesh);
-double area(const Mesh& mesh);  // µm²
+double area(const Mesh& mesh);       // µm²
+double mean_edge(const Mesh& mesh);  // µm, over the sides of all triangles; 0 without
 
 /// Unit normals of the vertices: the mean of their triangles' by area, so that slivers say little. (0, 1, 0) where the
 /// triangles have no area.

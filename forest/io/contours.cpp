@@ -8,6 +8,7 @@
 #include <optional>
 #include <pugixml.hpp>
 
+#include <Eigen/Geometry>
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 
@@ -50,15 +51,28 @@ bool contains(std::span<const Place> polygon, const Place& point) {
 }
 
 // Anticlockwise where a contour lies in an even number of others of its object, else clockwise.
-void turn_insides_left(Section& section) {
+// Refuses what no brain spreads over: the smaller an arc is beside its contour, the more points it has.
+void turn_insides_left(Section& section, const std::string& name) {
+  Eigen::AlignedBox2d all;
+  for (const Contour& contour : section.contours)
+    for (const Place& p : contour.curve.points) all.extend(p);
+  if (!all.isEmpty() && !(all.sizes().maxCoeff() <= cortex::largest_brain))
+    throw InputError(
+        name, 0,
+        fmt::format("has contours that spread over {:.3g} m, as no brain does; look at their unit",
+                    all.sizes().maxCoeff() / 1e6));
   std::vector<std::vector<Place>> polygons;
-  for (const Contour& contour : section.contours) polygons.push_back(flattened(contour.curve, 10.));
+  std::vector<Eigen::AlignedBox2d> boxes;
+  for (const Contour& contour : section.contours) {
+    const auto& polygon = polygons.emplace_back(flattened(contour.curve, 10.));
+    for (Eigen::AlignedBox2d& box = boxes.emplace_back(); const Place& p : polygon) box.extend(p);
+  }
   for (std::size_t i = 0; i < polygons.size(); ++i) {
     Contour& contour = section.contours[i];
     int around = 0;
     for (std::size_t j = 0; j < polygons.size(); ++j)
-      around +=
-          i != j && section.contours[j].object == contour.object && contains(polygons[j], polygons[i][0]);
+      around += i != j && section.contours[j].object == contour.object && boxes[j].contains(polygons[i][0]) &&
+                contains(polygons[j], polygons[i][0]);
     if ((area(contour.curve) > 0.) == (around % 2 == 0)) continue;
     std::vector<Place>& points = contour.curve.points;
     std::reverse(points.begin() + 1, points.end());
@@ -176,6 +190,7 @@ class JsonReader {
       const std::string where = fmt::format("section '{}'", shown(key));
       Section& section = result.stack.sections.emplace_back();
       section.at = index * real(value["thickness"], where);
+      if (!std::isfinite(section.at)) fail(fmt::format("{} has no number at its end", where));
       Eigen::Matrix<double, 2, 3> place;
       place << 1., 0., 0., 0., 1., 0.;
       if (value.contains("tforms") && value["tforms"].is_object() && value["tforms"].contains("default")) {
@@ -213,7 +228,7 @@ class JsonReader {
           section.contours.push_back({object_of(result.stack, object), straight_loop(points)});
         }
       }
-      turn_insides_left(section);
+      turn_insides_left(section, name_);
     }
     if (result.stack.sections.empty())
       fail("has no section with contours; give a .contours, .jser, .slc or .svg file");
@@ -289,7 +304,7 @@ ReadContours read_slc(std::string_view text, const std::string& name, double uni
     if (sections.empty() || sections.back().at != section.at) sections.push_back({section.at, {}});
     for (Contour& contour : section.contours) sections.back().contours.push_back(std::move(contour));
   }
-  for (Section& section : sections) turn_insides_left(section);
+  for (Section& section : sections) turn_insides_left(section, name);
   result.stack.sections = std::move(sections);
   if (result.stack.sections.empty()) throw InputError(name, 0, "has no slice; begin with 'slice Z'");
   if (open) result.oddities.push_back(fmt::format("{} contours are open lines and were left out", open));
@@ -468,9 +483,12 @@ ReadContours read_contours(std::string_view bytes, const std::string& name, doub
 }
 
 std::string write_contours(const ContourStack& stack) {
+  const auto quoted = [](const json& words) {  // names may be of any bytes
+    return words.dump(-1, ' ', false, json::error_handler_t::replace);
+  };
   std::string text = fmt::format(
       "{{\"brainforest_contours\": 1, \"unit\": \"um\", \"axis\": \"{}\", \"objects\": {},\n\"sections\": [",
-      axis_names[std::size_t(stack.axis)], json(stack.objects).dump());
+      axis_names[std::size_t(stack.axis)], quoted(stack.objects));
   for (std::size_t i = 0; i < stack.sections.size(); ++i) {
     const Section& section = stack.sections[i];
     text += fmt::format("{}\n{{\"at\": {}, \"contours\": [", i ? "," : "", number(section.at));
@@ -480,7 +498,7 @@ std::string write_contours(const ContourStack& stack) {
       for (std::size_t p = 0; p < contour.curve.pieces(); ++p)
         polygon = polygon && contour.curve.piece(p).straight();
       text += fmt::format("{}\n {{\"object\": {}, \"{}\": [", k ? "," : "",
-                          json(stack.objects.at(contour.object)).dump(), polygon ? "polygon" : "curve");
+                          quoted(stack.objects.at(contour.object)), polygon ? "polygon" : "curve");
       for (std::size_t p = 0; p < contour.curve.points.size(); p += polygon ? 3 : 1)
         text += fmt::format("{}[{},{}]", p ? "," : "", number(contour.curve.points[p].x()),
                             number(contour.curve.points[p].y()));
@@ -576,8 +594,9 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     // Without recursion, since a file may nest as deeply as it likes.
     for (pugi::xml_node node = top.first_child(); node;) {
       const std::string_view kind = node.name();
-      const bool skipped = node.attribute("data-behind") || kind == "defs" || kind == "clipPath";
-      if (node.attribute("transform"))
+      const bool skipped = node.attribute("data-behind") || kind == "defs" || kind == "clipPath",
+                 container = kind == "g" || kind == "a" || kind == "switch";
+      if (node.attribute("transform") && !skipped && (container || kind == "path"))
         throw InputError(
             name, 0,
             fmt::format("has a <{}> that is moved by a transform; apply it in the drawing program",
@@ -595,12 +614,12 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
           section.contours.push_back({object_of(stack, object), std::move(loop)});
       } else if (kind == "g" && !skipped) {
         if (node.attribute("data-object")) object_of(stack, node.attribute("data-object").value());
-      } else if (kind == "polygon" || kind == "polyline" || kind == "circle" || kind == "ellipse" ||
-                 kind == "rect") {
+      } else if (kind == "svg" || kind == "use" || kind == "polygon" || kind == "polyline" ||
+                 kind == "circle" || kind == "ellipse" || kind == "rect") {
         result.oddities.push_back(
             fmt::format("{}: a <{}> was left out; convert it to a path", name, shown(kind)));
       }
-      pugi::xml_node next = kind == "g" && !skipped ? node.first_child() : pugi::xml_node();
+      pugi::xml_node next = container && !skipped ? node.first_child() : pugi::xml_node();
       while (!next && node && node != top) {
         next = node.next_sibling();
         if (!next) node = node.parent();
@@ -610,7 +629,7 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     }
   };
   walk(root);
-  turn_insides_left(section);  // drawing programs know no direction
+  turn_insides_left(section, name);  // drawing programs know no direction
   return result;
 }
 

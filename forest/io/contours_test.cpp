@@ -75,6 +75,34 @@ TEST(Contours, OfADrawingHaveTheirInsideToTheLeftHoweverTheyWereDrawn) {
     }
 }
 
+// A picture to trace over is placed by a transform as a rule; links and switches are groups.
+TEST(Contours, OfADrawingAreFoundBesidePicturesAndInLinks) {
+  const auto read = read_contours(
+      "<svg width='9mm' viewBox='0 0 9 9'><image transform='rotate(90)'/><a><switch><g id='in'><path d='M0 "
+      "0h9v9z'/></g>"
+      "</switch></a><svg><path d='M0 0h9v9z'/></svg></svg>",
+      "d.svg");
+  EXPECT_EQ(read.stack.objects, std::vector<std::string>{"in"});
+  EXPECT_EQ(read.stack.sections[0].contours.size(), 1u);
+  EXPECT_EQ(read.oddities.size(), 1u);  // a drawing within the drawing
+}
+
+TEST(Contours, OfAnySizeAndNameAreReadOrRefused) {
+  EXPECT_THAT(sentence("<svg data-unit='um' viewBox='0 0 9 9'><path d='M0 0L5e9 0 0 5e9z'/></svg>"),
+              testing::HasSubstr("as no brain does; look at their unit"));
+  EXPECT_THAT(sentence("{\"s.inf\": {\"thickness\": 1, \"contours\": {}}}"),
+              testing::HasSubstr("has no number at its end"));
+  ContourStack named = curves();
+  named.objects[0] = "caf\xe9";
+  EXPECT_EQ(read_contours(write_contours(named), "c").stack.objects.size(), named.objects.size());
+}
+
+TEST(Contours, OfTwoStacksWithOneNameAreRefused) {
+  const std::vector<ContourStack> both(2, curves());
+  EXPECT_THAT(refused([&] { (void)cortex::together(both); }),
+              testing::HasSubstr("two boundaries are to be called"));
+}
+
 TEST(Contours, OfDrawingsWithoutPlacesAreRefusedWithTheRemedy) {
   const auto drawing =
       read_contours("<svg width='9mm' viewBox='0 0 9 9'><path d='M0 0h9v9h-9z'/></svg>", "d.svg").stack;

@@ -6,9 +6,11 @@
 #include <bit>
 #include <csetjmp>
 #include <cstring>
-#include <memory>
+#include <limits>
+#include <optional>
 #include <png.h>
 #include <tiffio.h>
+#include <type_traits>
 
 #include <fmt/format.h>
 
@@ -138,7 +140,10 @@ class Tiff {
 
   std::size_t pages() { return TIFFNumberOfDirectories(tiff_); }
   GreyPicture page(std::size_t number) {
-    if (!TIFFSetDirectory(tiff_, tdir_t(number))) refuse();
+    // Sought, a page is found by way of all before it.
+    if (number == at_page_ + 1 ? !TIFFReadDirectory(tiff_) : !TIFFSetDirectory(tiff_, tdir_t(number)))
+      refuse();
+    at_page_ = number;
     width_ = tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH), height_ = tag<std::uint32_t>(TIFFTAG_IMAGELENGTH);
     check_size(width_, height_, name_);
     bits_ = tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE), samples_ = tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL);
@@ -146,7 +151,8 @@ class Tiff {
     const auto shown = tag<std::uint16_t>(TIFFTAG_PHOTOMETRIC);
     const bool grey = shown == PHOTOMETRIC_MINISBLACK || shown == PHOTOMETRIC_MINISWHITE,
                colours = shown == PHOTOMETRIC_RGB && samples_ >= 3,
-               whole = format_ == SAMPLEFORMAT_UINT && (bits_ == 8 || bits_ == 16 || bits_ == 32),
+               whole = (format_ == SAMPLEFORMAT_UINT || (format_ == SAMPLEFORMAT_INT && grey)) &&
+                       (bits_ == 8 || bits_ == 16 || bits_ == 32),
                real = format_ == SAMPLEFORMAT_IEEEFP && bits_ == 32;
     GreyPicture picture{width_, height_, std::vector<float>(std::size_t(width_) * height_)};
     if (!(grey || colours) || !(whole || real)) {
@@ -156,6 +162,7 @@ class Tiff {
     for (std::uint16_t k = 0; k < (grey ? 1 : 3); ++k) add(picture, k, grey ? 1.f : shares[k]);
     if (shown == PHOTOMETRIC_MINISWHITE && whole)
       for (float& v : picture.values) v = 1.f - v;
+    turn_upright(picture);
     return picture;
   }
 
@@ -169,6 +176,23 @@ class Tiff {
     T value{};
     TIFFGetFieldDefaulted(tiff_, which, &value);
     return value;
+  }
+
+  // By the place of its first pixel.
+  void turn_upright(GreyPicture& picture) const {
+    const auto first = tag<std::uint16_t>(TIFFTAG_ORIENTATION);
+    if (first > ORIENTATION_BOTLEFT)
+      throw InputError(name_, 0,
+                       "has a page that lies on its side (Orientation); turn it, and write it again");
+    if (first == ORIENTATION_BOTRIGHT || first == ORIENTATION_BOTLEFT)
+      for (std::size_t y = 0; y < height_ / 2; ++y)
+        std::swap_ranges(picture.values.begin() + std::ptrdiff_t(y * width_),
+                         picture.values.begin() + std::ptrdiff_t((y + 1) * width_),
+                         picture.values.begin() + std::ptrdiff_t((height_ - 1 - y) * width_));
+    if (first == ORIENTATION_BOTRIGHT || first == ORIENTATION_TOPRIGHT)
+      for (std::size_t y = 0; y < height_; ++y)
+        std::reverse(picture.values.begin() + std::ptrdiff_t(y * width_),
+                     picture.values.begin() + std::ptrdiff_t((y + 1) * width_));
   }
 
   // What a viewer shows: palettes, JPEG, few bits.
@@ -210,15 +234,21 @@ class Tiff {
       }
   }
 
-  float value(const std::byte* at) const {
-    const auto as = [at]<class T>(T number) {
-      std::memcpy(&number, at, sizeof number);
+  template <class T>
+  static float share_of_most(const std::byte* at) {
+    T number{};
+    std::memcpy(&number, at, sizeof number);
+    if constexpr (std::is_floating_point_v<T>)
       return number;
-    };
-    if (format_ == SAMPLEFORMAT_IEEEFP) return as(float());
-    if (bits_ == 8) return float(as(std::uint8_t())) / 255.f;
-    if (bits_ == 16) return float(as(std::uint16_t())) / 65535.f;
-    return float(double(as(std::uint32_t())) / 4294967295.);
+    else
+      return float(double(number) / double(std::numeric_limits<T>::max()));
+  }
+  float value(const std::byte* at) const {
+    if (format_ == SAMPLEFORMAT_IEEEFP) return share_of_most<float>(at);
+    const bool has_sign = format_ == SAMPLEFORMAT_INT;
+    if (bits_ == 8) return has_sign ? share_of_most<std::int8_t>(at) : share_of_most<std::uint8_t>(at);
+    if (bits_ == 16) return has_sign ? share_of_most<std::int16_t>(at) : share_of_most<std::uint16_t>(at);
+    return has_sign ? share_of_most<std::int32_t>(at) : share_of_most<std::uint32_t>(at);
   }
 
   static Tiff& of(thandle_t self) { return *static_cast<Tiff*>(self); }
@@ -246,6 +276,7 @@ class Tiff {
   std::string reason_;  // the first of libtiff's
   std::size_t at_ = 0;
   TIFF* tiff_ = nullptr;
+  std::size_t at_page_ = 0;
   std::uint32_t width_ = 0, height_ = 0;
   std::uint16_t bits_ = 0, samples_ = 0, format_ = 0;
   std::vector<std::byte> block_;
@@ -264,12 +295,30 @@ bool is_picture_name(std::string_view extension) {
   return extension == ".png" || extension == ".tif" || extension == ".tiff";
 }
 
-std::size_t pages_of(std::string_view bytes, const std::string& name) {
-  return is_png(bytes, name) ? 1 : Tiff(bytes, name).pages();
-}
+class GreyFile::Pages {
+ public:
+  Pages(std::string_view bytes, const std::string& name) : bytes_(bytes), name_(name) {
+    if (!is_png(bytes, name_)) tiff_.emplace(bytes, name_);
+    count_ = tiff_ ? tiff_->pages() : 1;
+  }
+  std::size_t count() const { return count_; }
+  GreyPicture read(std::size_t page) {
+    if (page >= count_)
+      throw InputError(name_, 0, fmt::format("has {} pages, and none with the number {}", count_, page + 1));
+    return tiff_ ? tiff_->page(page) : read_png(bytes_, name_);
+  }
 
-GreyPicture read_grey(std::string_view bytes, const std::string& name, std::size_t page) {
-  return is_png(bytes, name) ? read_png(bytes, name) : Tiff(bytes, name).page(page);
-}
+ private:
+  std::string_view bytes_;
+  std::string name_;
+  std::optional<Tiff> tiff_;  // none: a PNG
+  std::size_t count_;
+};
+
+GreyFile::GreyFile(std::string_view bytes, const std::string& name)
+    : pages_(std::make_unique<Pages>(bytes, name)) {}
+GreyFile::~GreyFile() = default;
+std::size_t GreyFile::pages() const { return pages_->count(); }
+GreyPicture GreyFile::read(std::size_t page) { return pages_->read(page); }
 
 }  // namespace forest::io

@@ -33,6 +33,7 @@ struct Kind {
                 packing = COMPRESSION_NONE;
   bool tiled = false, apart = false;
   double error = 1e-6;
+  std::uint16_t first = ORIENTATION_TOPLEFT;
 };
 const Kind kinds[] = {
     {"grey8"},
@@ -47,6 +48,10 @@ const Kind kinds[] = {
     {.name = "colours16_with_opacity", .bits = 16, .samples = 4, .shown = PHOTOMETRIC_RGB, .tiled = true},
     {.name = "palette", .shown = PHOTOMETRIC_PALETTE},
     {.name = "one_bit", .bits = 1, .error = .51},
+    {.name = "with_a_sign", .bits = 16, .format = SAMPLEFORMAT_INT, .error = 2e-5},
+    {.name = "first_pixel_below", .first = ORIENTATION_BOTLEFT},
+    {.name = "first_pixel_below_right", .bits = 16, .first = ORIENTATION_BOTRIGHT},
+    {.name = "palette_first_pixel_below", .shown = PHOTOMETRIC_PALETTE, .first = ORIENTATION_BOTLEFT},
 };
 
 void put(std::vector<std::byte>& row, std::size_t at, const Kind& kind, double share) {
@@ -57,6 +62,8 @@ void put(std::vector<std::byte>& row, std::size_t at, const Kind& kind, double s
     store(float(share));
   else if (kind.bits == 8)
     store(std::uint8_t(std::lround(share * 255.)));
+  else if (kind.format == SAMPLEFORMAT_INT)
+    store(std::int16_t(std::lround((share - .5) * 2. * 32767.)));
   else if (kind.bits == 16)
     store(std::uint16_t(std::lround(share * 65535.)));
   else if (kind.bits == 32)
@@ -76,6 +83,7 @@ std::string written(const Kind& kind, std::uint32_t pages = 1) {
     TIFFSetField(tiff, TIFFTAG_SAMPLEFORMAT, kind.format),
         TIFFSetField(tiff, TIFFTAG_PHOTOMETRIC, kind.shown);
     TIFFSetField(tiff, TIFFTAG_COMPRESSION, kind.packing);
+    TIFFSetField(tiff, TIFFTAG_ORIENTATION, kind.first);
     TIFFSetField(tiff, TIFFTAG_PLANARCONFIG, kind.apart ? PLANARCONFIG_SEPARATE : PLANARCONFIG_CONTIG);
     if (kind.samples == 4) {
       const std::uint16_t opacity = EXTRASAMPLE_UNASSALPHA;
@@ -130,14 +138,21 @@ class Greys : public ::testing::TestWithParam<Kind> {};
 
 TEST_P(Greys, AreWhatWasPainted) {
   const std::string bytes = written(GetParam());
-  ASSERT_EQ(pages_of(bytes, "a.tif"), 1u);
-  const GreyPicture picture = read_grey(bytes, "a.tif");
+  GreyFile file(bytes, "a.tif");
+  ASSERT_EQ(file.pages(), 1u);
+  const GreyPicture picture = file.read();
   ASSERT_EQ(picture.width, width);
   ASSERT_EQ(picture.height, height);
   ASSERT_EQ(picture.values.size(), std::size_t(width) * height);
+  const std::uint16_t first = GetParam().first;
+  const bool below = first == ORIENTATION_BOTLEFT || first == ORIENTATION_BOTRIGHT,
+             right = first == ORIENTATION_BOTRIGHT;
   for (std::uint32_t y = 0; y < height; ++y)
     for (std::uint32_t x = 0; x < width; ++x)
-      ASSERT_NEAR(double(picture.values[y * width + x]), painted(x, y, 0), GetParam().error) << x << " " << y;
+      ASSERT_NEAR(GetParam().format == SAMPLEFORMAT_INT ? .5 + .5 * double(picture.values[y * width + x])
+                                                        : double(picture.values[y * width + x]),
+                  painted(right ? width - 1 - x : x, below ? height - 1 - y : y, 0), GetParam().error)
+          << x << " " << y;
 }
 
 TEST_P(Greys, CutOffAnywhereAreAPictureOrASentence) {
@@ -146,7 +161,7 @@ TEST_P(Greys, CutOffAnywhereAreAPictureOrASentence) {
   for (std::size_t size = 0; size < bytes.size(); ++size) {
     const std::string cut = bytes.substr(0, size);
     try {
-      const GreyPicture picture = read_grey(cut, "cut.tif");
+      const GreyPicture picture = GreyFile(cut, "cut.tif").read();
       EXPECT_EQ(picture.values.size(), std::size_t(picture.width) * picture.height);
     } catch (const InputError& error) {
       EXPECT_THAT(error.what(), HasSubstr("cut.tif: "));
@@ -161,10 +176,11 @@ INSTANTIATE_TEST_SUITE_P(Kinds, Greys, ::testing::ValuesIn(kinds),
 
 TEST(GreyPicture, EveryPageIsRead) {
   const std::string bytes = written({.name = "pages", .bits = 16}, 5);
-  ASSERT_EQ(pages_of(bytes, "a.tif"), 5u);
-  for (std::uint32_t page = 0; page < 5; ++page)
-    EXPECT_NEAR(double(read_grey(bytes, "a.tif", page).values[3]), painted(3, 0, page), 1e-6) << page;
-  EXPECT_THROW(read_grey(bytes, "a.tif", 5), InputError);
+  GreyFile file(bytes, "a.tif");
+  ASSERT_EQ(file.pages(), 5u);
+  for (const std::uint32_t page : {0u, 1u, 2u, 3u, 4u, 1u, 4u, 0u})
+    EXPECT_NEAR(double(file.read(page).values[3]), painted(3, 0, page), 1e-6) << page;
+  EXPECT_THAT(refused([&] { file.read(5); }), HasSubstr("has 5 pages, and none with the number 6"));
 }
 
 TEST(GreyPicture, OfSixteenBitsAPngKeepsThem) {
@@ -177,26 +193,28 @@ TEST(GreyPicture, OfSixteenBitsAPngKeepsThem) {
   png_alloc_size_t size = bytes.size();
   ASSERT_TRUE(png_image_write_to_memory(&image, bytes.data(), &size, 0, pixels.data(), 0, nullptr));
   bytes.resize(size);
-  const GreyPicture picture = read_grey(bytes, "a.png");
-  ASSERT_EQ(pages_of(bytes, "a.png"), 1u);
+  GreyFile file(bytes, "a.png");
+  ASSERT_EQ(file.pages(), 1u);
+  const GreyPicture picture = file.read();
   for (std::size_t i = 0; i < pixels.size(); ++i)
     ASSERT_NEAR(double(picture.values[i]) * 65535., double(pixels[i]), .01);
   for (std::size_t end = 0; end < bytes.size(); ++end)
-    EXPECT_THAT(refused([&] { read_grey(bytes.substr(0, end), "cut.png"); }), HasSubstr("cut.png: is n"))
+    EXPECT_THAT(refused([&] { GreyFile(bytes.substr(0, end), "cut.png").read(); }),
+                HasSubstr("cut.png: is n"))
         << end;
 }
 
 TEST(GreyPicture, WhatIsNoneIsRefused) {
-  EXPECT_THAT(refused([] { read_grey("", "a.tif"); }),
+  EXPECT_THAT(refused([] { GreyFile("", "a.tif"); }),
               HasSubstr("a.tif: is neither a PNG nor a TIFF picture"));
-  EXPECT_THAT(refused([] { read_grey("II not a picture at all", "a.tif"); }),
+  EXPECT_THAT(refused([] { GreyFile("II not a picture at all", "a.tif"); }),
               HasSubstr("a.tif: is no TIFF picture"));
   std::string large = written({});
   const auto at =
       large.find(std::string("\x00\x01\x03\x00\x01\x00\x00\x00\x25", 9));  // its width, a short number
   ASSERT_NE(at, std::string::npos);
   large[at + 2] = 4, large[at + 10] = large[at + 11] = '\x7f';
-  EXPECT_THAT(refused([&] { read_grey(large, "large.tif"); }), HasSubstr("pixels, and 1 to"));
+  EXPECT_THAT(refused([&] { GreyFile(large, "large.tif").read(); }), HasSubstr("pixels, and 1 to"));
 }
 
 }  // namespace

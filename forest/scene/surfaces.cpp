@@ -38,14 +38,6 @@ struct Neighbours {
   }
 };
 
-float mean_edge(const Mesh& mesh) {
-  double sum = 0.;
-  for (const Triangle& t : mesh.triangles)
-    for (std::size_t k = 0; k < 3; ++k)
-      sum += double((mesh.positions[t[k]] - mesh.positions[t[(k + 1) % 3]]).norm());
-  return float(sum / (3. * double(std::max<std::size_t>(mesh.triangles.size(), 1))));
-}
-
 // What no neuron is drawn with.
 std::vector<std::uint8_t> free_entries(const Colouring& colouring, bool playing) {
   std::vector<std::uint8_t> list;
@@ -66,7 +58,7 @@ std::uint64_t next_version() {
 
 std::vector<float> depth_below_smoothed(const Mesh& mesh, std::span<const Vec3> normals, float width) {
   const Neighbours near(mesh);
-  const float edge = mean_edge(mesh);
+  const float edge = float(mean_edge(mesh));
   if (!(width > 0.f) || !(edge > 0.f)) return std::vector<float>(mesh.positions.size());
   // A step spreads by the variance of an edge in one direction of the surface, halved.
   const int steps = std::clamp(int(std::lround(4.f * (width / edge) * (width / edge))), 1, most_steps);
