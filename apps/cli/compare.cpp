@@ -46,19 +46,21 @@ Json json_of(const Discrimination& d) {
 
 Json json_of(const Comparison& c, const std::array<std::string, 2>& names, const Options& options) {
   Json metrics = Json::array();
-  for (const Difference& d : c.differences)
+  for (const Difference& d : c.differences) {
+    const auto told = [&](const Json& value) { return d.compared() ? value : Json(); };
     metrics.push_back({{"name", d.feature.name},
                        {"unit", d.feature.unit},
                        {"diameters", d.feature.diameters},
                        {"a", {{"mean", d.mean_a}, {"sd", d.sd_a}}},
                        {"b", {{"mean", d.mean_b}, {"sd", d.sd_b}}},
-                       {"cliffs_delta", interval_of(d.delta)},
-                       {"cohens_d", d.cohens_d},
-                       {"ks", d.ks.statistic},
-                       {"p", d.ks.p},
-                       {"p_holm", d.p_holm},
-                       {"mvs", d.mvs},
+                       {"cliffs_delta", told(interval_of(d.delta))},
+                       {"cohens_d", told(d.cohens_d)},
+                       {"ks", told(d.ks.statistic)},
+                       {"p", told(d.ks.p)},
+                       {"p_holm", told(d.p_holm)},
+                       {"mvs", told(d.mvs)},
                        {"importance", d.importance}});
+  }
   return {{"a", {{"name", names[0]}, {"cells", c.cells_a}}},
           {"b", {{"name", names[1]}, {"cells", c.cells_b}}},
           {"kind", options.kind},
@@ -86,9 +88,9 @@ std::vector<std::string> row_of(const Difference& d) {
   return {named(d.feature),
           fmt::format("{} ± {}", shown(d.mean_a), shown(d.sd_a)),
           fmt::format("{} ± {}", shown(d.mean_b), shown(d.sd_b)),
-          fmt::format("{:.2f}", d.delta.value),
-          shown_p(d.p_holm),
-          fmt::format("{:.2f}", d.mvs)};
+          d.compared() ? fmt::format("{:.2f}", d.delta.value) : "-",
+          d.compared() ? shown_p(d.p_holm) : "-",
+          d.compared() ? fmt::format("{:.2f}", d.mvs) : "-"};
 }
 
 std::vector<std::string> header_of(const std::array<std::string, 2>& names) {
@@ -127,7 +129,7 @@ std::string report_of(const Comparison& c, const std::array<FeatureTable, 2>& ta
                   {"AUC, random forest", fmt::format("{:.3f}", c.forest.auc.value)},
                   {"AUC, structure alone", fmt::format("{:.3f}", c.structure.auc.value)},
                   {"energy distance, p", shown_p(c.energy.p)},
-                  {"features that differ", fmt::format("{} of {}", differ, c.differences.size())}});
+                  {"features that differ", fmt::format("{} of {}", differ, c.compared())}});
 
   report.heading("Can they be told apart?");
   report.plot(

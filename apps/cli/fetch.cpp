@@ -143,7 +143,7 @@ void report(const std::vector<Arrival>& cells, const fetch::Selection& selection
                     {"bytes", cell.bytes},
                     {"hash", cell.swc.hash},
                     {"sections", cell.sections},
-                    {"warnings", cell.oddities.size()}});
+                    {"warnings", io::count_of(cell.oddities)}});
       cached += cell.swc.cached;
     } else {
       entry["error"] = cell.error;
@@ -153,7 +153,7 @@ void report(const std::vector<Arrival>& cells, const fetch::Selection& selection
     const bool well = cell.error.empty();
     lines.push_back({escaped(cell.name), escaped(about.archive), escaped(about.species),
                      escaped(about.region), escaped(about.type), well ? std::to_string(cell.sections) : "-",
-                     well ? std::to_string(cell.oddities.size()) : "-", outcome(cell)});
+                     well ? std::to_string(io::count_of(cell.oddities)) : "-", outcome(cell)});
   }
   console.table({"neuron", "archive", "species", "region", "type", "sections", "warnings", ""}, lines);
   console.say(fmt::format(

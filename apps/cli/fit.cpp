@@ -93,29 +93,49 @@ std::string provenance(const Options& options, const Sample& sample) {
   return text;
 }
 
+// Those with a section of these kinds that goes anywhere; the others cannot be fitted to.
+Sample with_branches(Sample sample, statistics::KindSet kinds, Console& console) {
+  Sample kept{.name = sample.name, .cells = {}, .types = {}, .neurons = {}};
+  for (std::size_t i = 0; i < sample.neurons.size(); ++i) {
+    const Morphology& m = sample.neurons[i];
+    const auto goes = [&](const Section& s) {
+      const auto points = m.points().subspan(s.first_point, s.point_count);
+      return kinds.contains(s.kind) && std::ranges::any_of(points, [&](const Point& p) {
+               return p.position() != points[0].position();
+             });
+    };
+    if (std::ranges::none_of(m.sections(), goes)) continue;
+    kept.cells.push_back(sample.cells[i]), kept.neurons.push_back(m);
+    if (i < sample.types.size()) kept.types.push_back(sample.types[i]);
+  }
+  if (kept.neurons.empty())
+    throw Error(fmt::format(
+        "no section of {} goes anywhere, all points of each are at one place; give traced neurons",
+        repository::escaped(sample.name)));
+  if (const std::size_t without = sample.neurons.size() - kept.neurons.size())
+    console.warn(fmt::format("{} of {} {} no section of these kinds that goes anywhere and {} left out",
+                             without, counted(sample.neurons.size(), "neuron"), without == 1 ? "has" : "have",
+                             without == 1 ? "is" : "are"));
+  return kept;
+}
+
 void run(const Options& options, Console& console) {
   must_take_files({options.out}, options.force);
   const bool files = !options.files.empty();
-  const Sample sample = read_sample(files ? options.files : std::vector{options.population},
-                                    files ? "" : options.repo, console);
-  const std::vector<Morphology>& neurons = sample.neurons;
-  const std::string& of = sample.name;
+  Sample sample = read_sample(files ? options.files : std::vector{options.population},
+                              files ? "" : options.repo, console);
   for (const std::string& word : options.kinds) must_have_sections(sample, word);
   fitting::Resampling resampling = options.resampling;
   resampling.kinds = {};
   for (const std::string& word : options.kinds)
     resampling.kinds = resampling.kinds | statistics::kind_set(word);
+  sample = with_branches(std::move(sample), resampling.kinds, console);
+  const std::vector<Morphology>& neurons = sample.neurons;
+  const std::string& of = sample.name;
+  warn_of_copies(sample, console);
   look_for_slips(sample, resampling.kinds, console);
   fitting::Calibration calibration = options.calibration;
   if (!options.calibrate) calibration.candidates = 1;
-  const auto without = std::ranges::count_if(neurons, [&](const Morphology& m) {
-    return std::ranges::none_of(m.sections(),
-                                [&](const Section& s) { return resampling.kinds.contains(s.kind); });
-  });
-  if (without)
-    console.warn(fmt::format("{} of {} {} no section of these kinds and {} left out", without,
-                             counted(neurons.size(), "neuron"), without == 1 ? "has" : "have",
-                             without == 1 ? "is" : "are"));
   if (options.calibrate && neurons.size() < calibration.least)
     console.warn(fmt::format("--calibrate learns nothing of fewer than {} neurons, so there is no taste",
                              calibration.least));

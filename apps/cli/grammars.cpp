@@ -60,6 +60,28 @@ repository::TextsByName distributions_of(const lsystem::Grammar& grammar) {
   return distributions;
 }
 
+std::set<std::string> cells_fitted_to(std::string_view text) {
+  constexpr std::string_view begin = "# They are";
+  std::set<std::string> cells;
+  for (bool listing = false; text.starts_with('#');) {
+    const std::size_t end = std::min(text.find('\n'), text.size());
+    std::string_view line = text.substr(0, end);
+    text.remove_prefix(std::min(end + 1, text.size()));
+    if (!listing && !line.starts_with(begin)) continue;
+    line.remove_prefix(listing ? 1 : begin.size());
+    listing = line.ends_with(',');
+    while (!line.empty()) {
+      const std::size_t comma = std::min(line.find(", "), line.size() - listing);
+      std::string_view cell = line.substr(0, comma);
+      while (cell.starts_with(' ')) cell.remove_prefix(1);
+      cells.emplace(cell);
+      line.remove_prefix(std::min(comma + 1, line.size()));
+    }
+    if (!listing) break;
+  }
+  return cells;
+}
+
 Reference reference_of(const std::string& text) {
   const std::size_t at = text.rfind('@');
   if (at == text.npos || at == 0) return {text};

@@ -2,7 +2,9 @@
 // Grammars by name: those that come with the project lie in the folder grammars of data_folder(), models in a repository.
 #pragma once
 
+#include <set>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "forest/lsystem/grammar.h"
@@ -23,6 +25,9 @@ void tell_doubts(const lsystem::Grammar& grammar, Console& console);
 
 /// The distributions that a grammar names, each as a text that stands alone. Throws InputError when they are too large.
 repository::TextsByName distributions_of(const lsystem::Grammar& grammar);
+
+/// The cells that a model was fitted to, as its first lines say (`# They are a, b,` and more such lines), escaped; none when they do not.
+std::set<std::string> cells_fitted_to(std::string_view text);
 
 /// What NAME or NAME@version names.
 struct Reference {

@@ -87,7 +87,7 @@ Arrival read(const fs::path& path, const Opened& opened, std::size_t i) {
     arrival.hash += fmt::format("#{}", i + 1);
   }
   arrival.sections = cell.read.morphology.sections().size();
-  arrival.warnings = cell.read.warnings.size();
+  arrival.warnings = io::count_of(cell.read.warnings);
   arrival.oddities = std::move(cell.read.warnings);
   arrival.prepared.emplace(std::move(cell.read.morphology));
   return arrival;

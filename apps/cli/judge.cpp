@@ -4,6 +4,7 @@
 #include <array>
 #include <memory>
 #include <numeric>
+#include <set>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
@@ -15,6 +16,7 @@
 #include "forest/lsystem/derive.h"
 #include "forest/lsystem/grow.h"
 #include "forest/morphology/transform.h"
+#include "forest/repository/names.h"
 #include "forest/statistics/metric.h"
 #include "forest/statistics/protocol.h"
 
@@ -281,6 +283,19 @@ lsystem::Grammar model_of(const Options& options) {
   return options.repo.empty() ? find_grammar(options.model) : grammar_of_model(options.repo, options.model);
 }
 
+// A model that was fitted to the cells that it is judged by says so in its first lines.
+void warn_of_known(const lsystem::Grammar& grammar, const Sample& judged_by, Console& console) {
+  const std::set<std::string> known = cells_fitted_to(grammar.text);
+  const auto is_known = [&](const std::string& cell) { return known.contains(repository::escaped(cell)); };
+  const auto count = std::ranges::count_if(judged_by.cells, is_known);
+  if (count == 0) return;
+  console.warn(
+      fmt::format("the model says that it was fitted to {} of the {} that it is judged by, {} first; fit one "
+                  "without them",
+                  count, counted(judged_by.cells.size(), "cell"),
+                  repository::escaped(*std::ranges::find_if(judged_by.cells, is_known))));
+}
+
 }  // namespace
 
 Sample grown_from(const lsystem::Grammar& grammar, const std::string& name, std::size_t count,
@@ -318,6 +333,7 @@ void leave_out(const Options& options, Console& console) {
   if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
   if (!options.grown.empty()) trial.grown = &grown.emplace(read_sample(options.grown, options.repo, console));
   judge_leaving_out(trial, console);
+  if (model) warn_of_known(*model, trial.traced, console);
 }
 
 void run(const Options& options, Console& console) {
@@ -330,10 +346,11 @@ void run(const Options& options, Console& console) {
   std::vector<std::uint64_t> seeds{options.seed};
   Sample parametric;
   std::optional<std::size_t> longest_run;
+  std::optional<lsystem::Grammar> model;
   if (options.model.empty()) {
     grown.push_back(read_sample(options.grown, options.repo, console));
   } else {
-    const lsystem::Grammar grammar = model_of(options);
+    const lsystem::Grammar& grammar = model.emplace(model_of(options));
     const std::size_t count = options.count ? options.count : held_out.neurons.size();
     seeds = seeds_of(options);
     for (const std::uint64_t seed : seeds) {
@@ -349,11 +366,13 @@ void run(const Options& options, Console& console) {
     parametric =
         grown_from(lsystem::parse(text, "burke"), "burke", held_out.neurons.size(), options.seed, console);
   }
+  for (const Sample& population : grown) must_have_sections(population, options.kind);
   const Judged judged =
       judge_samples(train, held_out, grown, parametric, options.kind,
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
+  if (model) warn_of_known(*model, held_out, console);
   if (options.model.empty())
     for (const Sample* known : {&train, &held_out}) warn_of_shared(grown.front(), *known, console);
   if (options.count > train.neurons.size())

@@ -5,10 +5,12 @@
 #include <filesystem>
 #include <map>
 #include <memory>
+#include <set>
 #include <unistd.h>
 
 #include <CLI/App.hpp>
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 #include <nlohmann/json.hpp>
 #include <sys/wait.h>
 
@@ -101,7 +103,8 @@ void tell(const std::vector<Kept>& kept, const std::string& repo, Console& conso
 void list(const Options& options, Console& console) {
   Json out = Json::array();
   std::vector<std::vector<std::string>> lines;
-  const auto models = Repository::open(options.repo, Access::read).models();
+  const Repository repository = Repository::open(options.repo, Access::read);
+  const auto models = repository.models();
   for (std::size_t i = 0; i < models.size(); ++i) {
     const ModelRow& m = models[i];
     const bool newest = i + 1 == models.size() || models[i + 1].name != m.name;
@@ -112,9 +115,19 @@ void list(const Options& options, Console& console) {
                      std::to_string(m.neurons), escaped(m.origin)});
   }
   if (lines.empty())
-    console.say(fmt::format("{} holds no such model", options.repo));
+    console.say(fmt::format("{} holds no {}model", options.repo, options.population.empty() ? "" : "such "));
   else
     console.table({"model", "version", "population", "distributions", "neurons", "origin"}, lines);
+  // Those that 'distributions --keep' stored belong to no model.
+  std::set<std::string> of_models, alone;
+  for (const ModelRow& m : models)
+    for (const auto& [name, version] : m.distributions) of_models.insert(name);
+  for (const auto& d : repository.distributions())
+    if (!of_models.contains(d.name) && (options.population.empty() || d.population == options.population))
+      alone.insert(d.name);
+  if (!alone.empty())
+    console.say(fmt::format("{} of no model: {}; 'model show NAME' shows one",
+                            counted(alone.size(), "distribution"), fmt::join(alone, ", ")));
   console.print(out);
 }
 

@@ -34,11 +34,12 @@ void report_oddities(const std::vector<OddFile>& files, Console& console) {
   for (const OddFile& file : files)
     for (const io::Warning& w : *file.oddities) {
       Kind& kind = kinds[w.code];
-      if (kind.times++ == 0) {
+      if (kind.times == 0) {
         kind.place = place_of(file, w);
         kind.sentence = repository::escaped(w.sentence);
         kind.mending = w.mending.empty() ? "brainforest check --repair writes it so" : w.mending;
       }
+      kind.times += w.times;
       kind.files += std::exchange(kind.last, &file) != &file;
     }
   if (kinds.empty()) return;

@@ -138,19 +138,39 @@ void must_have_sections(const Sample& sample, const std::string& kind) {
   const auto has = [&](const Morphology& m) {
     return std::ranges::any_of(m.sections(), [&](const Section& s) { return kinds.contains(s.kind); });
   };
+  if (std::ranges::all_of(sample.neurons, [](const Morphology& m) { return m.sections().empty(); }))
+    throw Error(fmt::format("none of the {} of {} has a neurite; give neurons with more than a soma",
+                            counted(sample.neurons.size(), "neuron"), repository::escaped(sample.name)));
   if (std::ranges::none_of(sample.neurons, has))
     throw Error(fmt::format("none of the {} of {} has a section of kind {}; say another --kind",
                             counted(sample.neurons.size(), "neuron"), repository::escaped(sample.name),
                             kind));
 }
 
+namespace {
+std::uint64_t sum_of(const Morphology& m) { return hash64(std::as_bytes(m.points())); }
+}  // namespace
+
+void warn_of_copies(const Sample& sample, Console& console) {
+  std::map<std::uint64_t, std::size_t> first;
+  std::size_t copies = 0;
+  std::string which;
+  for (std::size_t i = 0; i < sample.neurons.size(); ++i)
+    if (const auto [at, is_new] = first.emplace(sum_of(sample.neurons[i]), i); !is_new && !copies++)
+      which = fmt::format("{} is {}", repository::escaped(sample.cells[i]),
+                          repository::escaped(sample.cells[at->second]));
+  if (copies)
+    console.warn(fmt::format("{} of {} {} there twice, first {}; leave copies out, or they count twice",
+                             counted(copies, "cell"), repository::escaped(sample.name),
+                             copies == 1 ? "is" : "are", which));
+}
+
 void warn_of_shared(const Sample& one, const Sample& other, Console& console) {
-  const auto sum = [](const Morphology& m) { return hash64(std::as_bytes(m.points())); };
   std::set<std::uint64_t> sums;
-  for (const Morphology& m : one.neurons) sums.insert(sum(m));
+  for (const Morphology& m : one.neurons) sums.insert(sum_of(m));
   std::size_t shared = 0, first = 0;
   for (std::size_t i = other.neurons.size(); i-- > 0;)
-    if (sums.contains(sum(other.neurons[i]))) ++shared, first = i;
+    if (sums.contains(sum_of(other.neurons[i]))) ++shared, first = i;
   if (shared)
     console.warn(fmt::format(
         "{} of {} {} in {}, too, {} first; leave what is in both out of one, or they look too much alike",

@@ -33,6 +33,9 @@ Sample read_sample(const std::vector<std::string>& words, const std::string& rep
 /// Throws Error when no neuron has a section of the kind, a word of --kind.
 void must_have_sections(const Sample& sample, const std::string& kind);
 
+/// Says when a neuron is in a sample more than once.
+void warn_of_copies(const Sample& sample, Console& console);
+
 /// Warns of cells that are in both samples, by their points: how two samples differ is then said of less than it seems.
 void warn_of_shared(const Sample& one, const Sample& other, Console& console);
 

@@ -22,7 +22,13 @@ struct Warning {
   std::string sentence;           // what stands there and how it was read
   std::string_view mending = {};  // as in Oddity
   bool lost = false;              // as in Oddity
+  std::size_t times = 1;          // on how many lines, where only the last of them is told
 };
+inline std::size_t count_of(std::span<const Warning> warnings) {
+  std::size_t sum = 0;
+  for (const Warning& w : warnings) sum += w.times;
+  return sum;
+}
 
 /// What of a neuron a format has words for. What it has none for is told when a neuron that has it is written.
 struct Keeps {

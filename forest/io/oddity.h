@@ -50,7 +50,7 @@ class OddityList {
         warnings_.push_back({tally.last_line, table_[i].code,
                              fmt::format("the same on {} more lines, this the last; {}",
                                          tally.count - told_lines, table_[i].reading),
-                             table_[i].mending, table_[i].lost});
+                             table_[i].mending, table_[i].lost, tally.count - told_lines});
     std::ranges::stable_sort(warnings_, {}, &Warning::line);
     return std::move(warnings_);
   }

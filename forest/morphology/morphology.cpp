@@ -69,9 +69,14 @@ Point Soma::sphere() const {
 double Soma::area() const {
   if (kind == SomaKind::cylinders) {
     double sum = 0.;
-    for (std::size_t i = 0; i < points.size(); ++i)
+    float widest = 0.f;
+    bool apart = false;
+    for (std::size_t i = 0; i < points.size(); ++i) {
+      widest = std::max(widest, points[i].radius);
+      apart |= points[i].position() != points[0].position();
       if (parents[i] >= 0) sum += segment_area(points[std::size_t(parents[i])], points[i]);
-    return sum;
+    }
+    return apart ? sum : 4. * std::numbers::pi * double(widest) * double(widest);
   }
   const double r = sphere().radius;
   return 4. * std::numbers::pi * r * r;

@@ -62,7 +62,8 @@ struct Section {
 
 enum class SomaKind : std::uint8_t { none, sphere, cylinders, contours };
 
-/// sphere: one point. cylinders: points joined to `parents` (-1 for the first) by tapered cylinders.
+/// sphere: one point. cylinders: points joined to `parents` (-1 for the first) by tapered cylinders; where all are at one place
+/// they are the sphere of the widest.
 /// contours: closed outlines, one after the other, beginning at `contour_starts`.
 struct Soma {
   SomaKind kind = SomaKind::none;

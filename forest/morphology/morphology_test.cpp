@@ -111,5 +111,14 @@ TEST(Soma, CylindersHaveLateralArea) {
   EXPECT_NEAR(soma.sphere().radius, 5.f, 1e-5f);
 }
 
+TEST(Soma, OfPointsAtOnePlaceIsTheWidestBall) {
+  const Soma soma{.kind = SomaKind::cylinders,
+                  .points = {{1, 0, 0, .5f}, {1, 0, 0, .75f}},
+                  .parents = {-1, 0},
+                  .contour_starts = {}};
+  EXPECT_FLOAT_EQ(soma.sphere().radius, .75f);
+  EXPECT_NEAR(soma.area(), 4. * std::numbers::pi * .75 * .75, 1e-6);
+}
+
 }  // namespace
 }  // namespace forest

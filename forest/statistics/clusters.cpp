@@ -101,16 +101,27 @@ void largest_first(Medoids& m) {
   m.medoids = std::move(medoids);
 }
 
-std::vector<Trait> traits_of(const FeatureTable& table, const Ids& type, std::uint32_t which) {
+// @param table  completed; what was filled in counts for nothing here
+// @param known  as measured
+std::vector<Trait> traits_of(const FeatureTable& table, const FeatureTable& known, const Ids& type,
+                             std::uint32_t which) {
   std::vector<Trait> all;
   const auto values_of = [&](Eigen::Index c, bool inside) {
+    const auto same =
+        std::ranges::find(known.features, table.features[std::size_t(c)]) - known.features.begin();
+    const auto& column = same < known.values.cols() ? known.values.col(same) : table.values.col(c);
     std::vector<double> values;
     for (std::size_t i = 0; i < type.size(); ++i)
-      if ((type[i] == which) == inside) values.push_back(table.values(Eigen::Index(i), c));
+      if (const double x = column[Eigen::Index(i)]; (type[i] == which) == inside && std::isfinite(x))
+        values.push_back(x);
     return values;
   };
   for (Eigen::Index c = 0; c < table.values.cols(); ++c) {
     const std::vector<double> in = values_of(c, true), out = values_of(c, false);
+    if (in.empty() || out.empty()) {  // that it is defined in one only is a feature of its own
+      all.push_back({table.features[std::size_t(c)], {0., 0., 0.}});
+      continue;
+    }
     all.push_back({table.features[std::size_t(c)], cliffs_delta(out, in), mean(in), mean(out)});
   }
   std::vector<std::size_t> order;
@@ -216,7 +227,7 @@ Types find_types(const FeatureTable& table, const TypesOptions& options, Progres
   if (options.types) out.chosen = *options.types - 1;
   if (out.division().types > 1)
     for (std::uint32_t t = 0; t < out.division().types; ++t)
-      out.traits.push_back(traits_of(full, out.division().type, t));
+      out.traits.push_back(traits_of(full, table, out.division().type, t));
   return out;
 }
 

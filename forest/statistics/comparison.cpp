@@ -19,23 +19,31 @@ namespace {
 std::vector<Difference> differences(const FeatureTable& all, Eigen::Index of_a) {
   const auto features = std::size_t(all.values.cols());
   std::vector<Difference> rows(features);
-  std::vector<double> p(features, 1.);
   parallel_for(features, 4, [&](std::size_t f) {
     const auto c = Eigen::Index(f);
     const std::span values(all.values.col(c).data(), all.size());
     const auto a = values.first(std::size_t(of_a)), b = values.subspan(std::size_t(of_a));
     const Summary s = summarize(a), t = summarize(b);
     Difference& d = rows[f];
-    d = {.feature = all.features[f], .mean_a = s.mean, .mean_b = t.mean, .sd_a = s.sd, .sd_b = t.sd};
-    if (s.count == 0 || t.count == 0) return;  // that it is defined in one only is a feature of its own
+    d = {.feature = all.features[f],
+         .cells_a = s.count,
+         .cells_b = t.count,
+         .mean_a = s.mean,
+         .mean_b = t.mean,
+         .sd_a = s.sd,
+         .sd_b = t.sd};
+    if (!d.compared()) return;
     d.delta = cliffs_delta(a, b);
     d.cohens_d = cohens_d(a, b);
     d.ks = kolmogorov_smirnov(a, b);
     d.mvs = median_visible_spread(a, b);
-    p[f] = d.ks.p;
   });
+  std::vector<double> p;
+  for (const Difference& d : rows)
+    if (d.compared()) p.push_back(d.ks.p);
   const std::vector<double> adjusted = holm(p);
-  for (std::size_t f = 0; f < features; ++f) rows[f].p_holm = adjusted[f];
+  for (auto next = adjusted.begin(); Difference & d : rows)
+    if (d.compared()) d.p_holm = *next++;
   return rows;
 }
 
@@ -86,7 +94,7 @@ Comparison compare(const FeatureTable& a, const FeatureTable& b, const Compariso
   c.sholl_b = mean_curve(b.sholl);
   c.sholl_inside = share_inside(c.sholl_b, c.sholl);
   c.detectable_auc = detectable_auc(a.size(), b.size());
-  c.detectable_effect = detectable_effect(a.size(), b.size(), c.differences.size());
+  c.detectable_effect = detectable_effect(a.size(), b.size(), std::max<std::size_t>(c.compared(), 1));
 
   double least = std::min({c.forest.p, c.energy.p, c.mmd.p, c.barcodes.p});
   for (const Difference& d : c.differences) least = std::min(least, d.p_holm);
@@ -109,7 +117,11 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
         "correction. Of {} and {} cells a difference by which {} of pairs are ranked rightly would have been "
         "seen in four "
         "of five cases.",
-        a, b, c.p, ranks, differ, c.differences.size(), c.cells_a, c.cells_b, percent(c.detectable_auc));
+        a, b, c.p, ranks, differ, c.compared(), c.cells_a, c.cells_b, percent(c.detectable_auc));
+  const std::size_t of_one = c.differences.size() - c.compared();
+  const std::string alone =
+      of_one ? fmt::format(" {} more {} defined in one of the two alone.", of_one, of_one == 1 ? "is" : "are")
+             : std::string();
   const char* how = auc.value >= .95   ? "almost always"
                     : auc.value >= .8  ? "mostly"
                     : auc.value >= .65 ? "more often than not"
@@ -123,8 +135,8 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
   }
   return fmt::format(
       "{} and {} can be told apart {} (p ≤ {:.2g}): {}; {} of {} features differ after Holm's "
-      "correction{}.",
-      a, b, how, c.p, ranks, differ, c.differences.size(), by.empty() ? "" : ", most of all " + by);
+      "correction{}.{}",
+      a, b, how, c.p, ranks, differ, c.compared(), by.empty() ? "" : ", most of all " + by, alone);
 }
 
 }  // namespace forest::statistics

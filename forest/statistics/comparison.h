@@ -2,6 +2,7 @@
 // Two populations side by side: can they be told apart, by what, and how surely?
 #pragma once
 
+#include <algorithm>
 #include <cstddef>
 #include <cstdint>
 #include <string>
@@ -19,13 +20,17 @@ namespace forest::statistics {
 /// One feature in both populations.
 struct Difference {
   Feature feature;
-  double mean_a = 0., mean_b = 0., sd_a = 0., sd_b = 0.;  // of the cells where it is defined
+  std::size_t cells_a = 0, cells_b = 0;                   // where it is defined
+  double mean_a = 0., mean_b = 0., sd_a = 0., sd_b = 0.;  // of these
   Estimate delta{0., 0., 0.};                             // Cliff's; positive where b is larger
   double cohens_d = 0.;
   KolmogorovSmirnov ks{0., 1., true};
-  double p_holm = 1.;  // of Kolmogorov–Smirnov, over all features
+  double p_holm = 1.;  // of Kolmogorov–Smirnov, over all features that can be compared
   double mvs = 0.;
   double importance = 0.;  // in a random forest on all features
+
+  /// Where only one population has it nothing is compared: that it is defined is a feature of its own.
+  bool compared() const { return cells_a > 0 && cells_b > 0; }
 };
 
 struct ComparisonOptions {
@@ -49,6 +54,9 @@ struct Comparison {
       1.;  // that one population looks as different: five times the smallest p of forest, energy, mmd, barcodes and features
 
   bool told_apart() const { return p <= .05; }
+  std::size_t compared() const {
+    return std::size_t(std::ranges::count_if(differences, &Difference::compared));
+  }
 };
 
 /// Throws Error when a population has fewer than four cells.

@@ -38,6 +38,21 @@ TEST(Compare, SaysByWhatPopulationsDiffer) {
   EXPECT_THAT(said, testing::HasSubstr("feature 5 (larger in new)"));
 }
 
+TEST(Compare, DoesNotCountWhatOnePopulationAloneHas) {
+  FeatureTable a = cells(1, 30, 0.), b = cells(2, 40, 3.);
+  b.values.col(2).setConstant(NAN);
+  const Comparison c = compare(a, b, quick);
+  const auto alone =
+      std::ranges::find_if(c.differences, [](const Difference& d) { return d.feature.name == "feature 2"; });
+  ASSERT_NE(alone, c.differences.end());
+  EXPECT_FALSE(alone->compared());
+  EXPECT_EQ(alone->cells_a, 30u);
+  EXPECT_EQ(alone->cells_b, 0u);
+  EXPECT_EQ(c.compared(), std::size_t(std::ranges::count_if(c.differences, &Difference::compared)));
+  EXPECT_LT(c.compared(), c.differences.size());
+  EXPECT_THAT(sentence(c, "old", "new"), testing::HasSubstr(" 1 more is defined in one of the two alone."));
+}
+
 TEST(Compare, SaysWhatItCouldHaveSeenWhereItSeesNothing) {
   const Comparison c = compare(cells(3, 20, 0.), cells(4, 20, 0.), quick);
   EXPECT_FALSE(c.told_apart());

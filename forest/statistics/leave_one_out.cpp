@@ -95,10 +95,10 @@ double chance_of(double sum, std::size_t cells, std::size_t grown) {
     ways = std::move(more);
   }
   const double middle = .5 * double(ways.size() - 1), far = std::abs(sum - middle);
-  double p = 0.;
-  for (std::size_t k = 0; k < ways.size(); ++k)
-    if (std::abs(double(k) - middle) >= far - 1e-9) p += ways[k];
-  return std::clamp(p, 0., 1.);
+  // Both tails are alike, and the lower one is summed up without anything being taken away.
+  double tail = 0.;
+  for (std::size_t k = 0; k < ways.size() && double(k) <= middle - far + 1e-9; ++k) tail += ways[k];
+  return std::min(1., 2. * tail);
 }
 
 /// Chance that so many of `cells` are below a level that one of twenty is.

@@ -57,9 +57,18 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
   }
   out.p_whole = conformal_p(whole);
 
+  // Metric by metric, beside the cells that have it: a value that was filled in says nothing of how far values go.
+  const FeatureTable raw = stacked(both);
   std::vector<double> strangest(std::size_t(n), 0.);
   for (Eigen::Index c = 0; c < table.values.cols(); ++c) {
-    const std::span values(table.values.col(c).data(), std::size_t(n));
+    const auto same = std::ranges::find(raw.features, table.features[std::size_t(c)]) - raw.features.begin();
+    const auto& column = same < raw.values.cols() ? raw.values.col(same) : table.values.col(c);
+    std::vector<Eigen::Index> having;
+    std::vector<double> values;
+    for (Eigen::Index i = 0; i < n; ++i)
+      if (std::isfinite(column[i])) having.push_back(i), values.push_back(column[i]);
+    const bool asked = !having.empty() && having.back() == last;
+    if (values.size() < 5u + asked) continue;
     const double middle = quantile(values, .5);
     std::vector<double> away;
     for (const double x : values) away.push_back(std::abs(x - middle));
@@ -67,11 +76,15 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
     const auto strangeness = [&](double x) {
       if (x <= 0.) return 0.;
       if (edge > 0.) return x / edge;
-      return .05 * double(n) / double(std::ranges::count_if(away, [&](double other) { return other >= x; }));
+      return .05 * double(away.size()) /
+             double(std::ranges::count_if(away, [&](double other) { return other >= x; }));
     };
-    for (Eigen::Index i = 0; i < n; ++i)
-      strangest[std::size_t(i)] = std::max(strangest[std::size_t(i)], strangeness(away[std::size_t(i)]));
-    const auto known = values.first(std::size_t(last));
+    for (std::size_t k = 0; k < having.size(); ++k) {
+      double& most = strangest[std::size_t(having[k])];
+      most = std::max(most, strangeness(away[k]));
+    }
+    if (!asked) continue;
+    const auto known = std::span(values).first(values.size() - 1);
     out.oddities.push_back({.feature = table.features[std::size_t(c)],
                             .value = values.back(),
                             .median = quantile(known, .5),
@@ -82,7 +95,6 @@ Typicality typicality(const FeatureTable& population, const FeatureTable& cell) 
   }
   out.p_feature = conformal_p(strangest);
   std::vector<double> missing;
-  const FeatureTable raw = stacked(both);
   for (Eigen::Index i = 0; i < n; ++i) missing.push_back(double(raw.values.row(i).array().isNaN().count()));
   out.p_missing = conformal_p(missing);
   out.p = std::min(1., 3. * std::min({out.p_whole, out.p_feature, out.p_missing}));

@@ -50,6 +50,26 @@ TEST(Typicality, NamesTheMetricThatMakesACellAbnormal) {
   EXPECT_EQ(t.cells, 60u);
 }
 
+// Nine of ten cells do not have it: what would be filled in for them says nothing of how far it goes among the others.
+TEST(Typicality, SetsAMetricBesideTheCellsThatHaveIt) {
+  FeatureTable population = cells(1, 100), cell = cells(78, 1);
+  for (Eigen::Index i = 0; i < 90; ++i) population.values(i, 1) = NAN;
+  cell.values(0, 1) = 1.5;
+  const Typicality t = typicality(population, cell);
+  const auto of = [](const Typicality& found, std::string_view name) {
+    return std::ranges::find_if(found.oddities, [&](const Oddity& o) { return o.feature.name == name; });
+  };
+  const auto rare = of(t, "feature 1");
+  ASSERT_NE(rare, t.oddities.end());
+  EXPECT_LT(rare->low, -.5);
+  EXPECT_GT(rare->high, .5);
+  EXPECT_FALSE(rare->abnormal);
+  EXPECT_GE(rare->p, 1. / 11.);
+  cell.values(0, 1) = NAN;  // and nothing is said of what the cell has not got
+  const Typicality without = typicality(population, cell);
+  EXPECT_EQ(of(without, "feature 1"), without.oddities.end());
+}
+
 TEST(Typicality, SeesACellThatIsABitOffInEverything) {
   FeatureTable cell = cells(78, 1);
   cell.values.array() += 1.6;

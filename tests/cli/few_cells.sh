@@ -53,6 +53,12 @@ grep -v '^#' grown/*00000.swc | awk '$2 != 2 { exit 1 }' || fail "kinds are lost
 "$program" judge --train insects --kind axon --count 19 --repeats 2 --json >insects.json
 told insects.json "d['cells']['traced'] == 4"
 
+"$program" judge --train insects --kind axon --model insects.lsys --count 19 --repeats 2 >out.txt 2>err.txt
+grep -qF 'was fitted to 4 of the 4 cells that it is judged by, fly0 first' err.txt || fail "a model is judged by its own cells without a word"
+mkdir twice && cp insects/fly0.swc twice/a.swc && cp insects/fly0.swc twice/b.swc && cp insects/fly1.swc twice
+"$program" fit twice --kind axon -o twice.lsys >/dev/null 2>err.txt
+grep -qF '1 cell of twice is there twice, first b is a' err.txt || fail "copies are fitted to without a word"
+
 refuses 'give at least 3' "$program" judge --train insects/fly0.swc insects/fly1.swc --kind axon --model insects.lsys --count 19
 refuses 'at least 19' "$program" judge --train insects --kind axon --count 5
 refuses 'has a section of kind dendrite' "$program" judge --train insects --kind dendrite --count 19
