@@ -34,17 +34,6 @@ Place on_curve(const Depths& curve, double w) {
          t * (t - 1.) * (t - 3.) / 2. * curve[2] + t * (t - 1.) * (t - 2.) / 6. * curve[3];
 }
 
-Place weights_in(const Mesh& mesh, const Triangle& t, const Place& at) {
-  const Place a = mesh.positions[t[0]].cast<double>(), u = mesh.positions[t[1]].cast<double>() - a,
-              v = mesh.positions[t[2]].cast<double>() - a, p = at - a;
-  const double uu = u.dot(u), uv = u.dot(v), vv = v.dot(v), pu = p.dot(u), pv = p.dot(v),
-               det = uu * vv - uv * uv;
-  if (!(det > 0.)) return Place::Constant(1. / 3.);
-  const double x = std::clamp((pu * vv - pv * uv) / det, 0., 1.),
-               y = std::clamp((pv * uu - pu * uv) / det, 0., 1. - x);
-  return {1. - x - y, x, y};
-}
-
 }  // namespace
 
 Borders::Borders(const Layers& layers, std::span<const double> depths)
@@ -140,7 +129,8 @@ MeasuredBorders::MeasuredBorders(const Elements& elements, const Mesh& outer, co
     const Triangle& triangle = outer.triangles[hit->triangle];
     measured_[c] =
         shares.measured[triangle[0]] && shares.measured[triangle[1]] && shares.measured[triangle[2]];
-    const Place weights = weights_in(outer, triangle, hit->at);
+    const auto at = [&](std::size_t k) -> Place { return outer.positions[triangle[k]].cast<double>(); };
+    const Place weights = barycentric(at(0), at(1), at(2), hit->at);
     std::vector<double> share(layers_, 0.);
     double all = 0.;
     for (std::size_t l = 0; l < layers_; ++l) {

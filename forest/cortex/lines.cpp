@@ -35,16 +35,6 @@ void smooth(std::vector<Value>& values, const Neighbours& near, int rounds) {
   }
 }
 
-std::vector<Place> normals_of(std::span<const Place> places, std::span<const Triangle> triangles) {
-  std::vector<Place> normals(places.size(), Place::Zero());
-  for (const Triangle& t : triangles) {
-    const Place across = (places[t[1]] - places[t[0]]).cross(places[t[2]] - places[t[0]]);
-    for (const std::uint32_t v : t) normals[v] += across;
-  }
-  for (Place& n : normals) n.normalize();
-  return normals;
-}
-
 // The tensor of a triangle by least squares of how the normal turns along its edges, as a matrix in space; zero without area.
 Tensor tensor_of(const std::array<Place, 3>& p, const std::array<Place, 3>& n) {
   const Place across = (p[1] - p[0]).cross(p[2] - p[0]);

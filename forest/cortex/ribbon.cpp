@@ -72,6 +72,16 @@ std::vector<std::uint8_t> find_wall(const Ribbon& ribbon, const RibbonOptions& o
 
 }  // namespace
 
+std::vector<Place> normals_of(std::span<const Place> places, std::span<const Triangle> triangles) {
+  std::vector<Place> normals(places.size(), Place::Zero());
+  for (const Triangle& t : triangles) {
+    const Place across = (places[t[1]] - places[t[0]]).cross(places[t[2]] - places[t[0]]);
+    for (const std::uint32_t v : t) normals[v] += across;
+  }
+  for (Place& n : normals) n.normalize();
+  return normals;
+}
+
 Neighbours neighbours(std::size_t vertices, std::span<const Triangle> triangles) {
   Neighbours near;
   std::vector<std::uint32_t> counts(vertices + 1, 0);

@@ -22,6 +22,9 @@ struct Neighbours {
 };
 Neighbours neighbours(std::size_t vertices, std::span<const Triangle> triangles);
 
+/// Unit normals of places, the mean of their triangles' by area; 0 where these have none.
+std::vector<Place> normals_of(std::span<const Place> places, std::span<const Triangle> triangles);
+
 /// Each triangle as four, corners of the old ones first and in their order, then the middles of edges.
 Mesh halved(const Mesh& mesh);
 

@@ -51,17 +51,6 @@ class Drift {
   std::vector<Place> before_, last_, next_;
 };
 
-std::vector<Place> normals_of(const std::vector<Place>& at, const std::vector<Triangle>& triangles) {
-  std::vector<Place> normals(at.size(), Place::Zero());
-  for (const Triangle& t : triangles) {
-    const Place across = (at[t[1]] - at[t[0]]).cross(at[t[2]] - at[t[0]]);
-    for (const Vertex v : t) normals[v] += across;
-  }
-  for (Place& n : normals)
-    if (n.squaredNorm() > 0.) n.normalize();
-  return normals;
-}
-
 // The sides opposite of every vertex in its triangles.
 struct Links {
   std::vector<std::uint32_t> starts;

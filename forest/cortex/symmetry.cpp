@@ -52,9 +52,9 @@ std::pair<double, double> of_element(const Cell& cell, double s, double t) {
   return {s, t};
 }
 
-class Lattice {
+class Sides {
  public:
-  explicit Lattice(const Elements& elements) : elements_(elements) {
+  explicit Sides(const Elements& elements) : elements_(elements) {
     for (std::uint32_t e = 0; e < elements.size(); ++e) {
       const auto c = elements.corners_of(e);
       for (const auto& [a, b] : {std::pair{c[0], c[1]}, {c[1], c[3]}, {c[3], c[2]}, {c[2], c[0]}})
@@ -93,7 +93,7 @@ class Lattice {
 };
 
 // Rows of cells, or nothing where the lattice has a fault or ends.
-std::optional<std::vector<std::vector<Cell>>> stretch_around(const Lattice& lattice, const Cell& middle,
+std::optional<std::vector<std::vector<Cell>>> stretch_around(const Sides& lattice, const Cell& middle,
                                                              const SymmetryOptions& options) {
   Cell first = middle;
   for (int j = 0; j < options.along / 2; ++j) {
@@ -130,15 +130,15 @@ std::optional<std::vector<std::vector<Cell>>> stretch_around(const Lattice& latt
 }
 
 // Places of a section: those of a depth after those of another, s runs fastest.
-struct Section {
+struct Slice {
   int wide = 0;  // places along s
   std::vector<Place> places;
 };
 
 // Sections at every sample of t.
-std::vector<Section> sampled(const Elements& elements, const std::vector<std::vector<Cell>>& rows) {
+std::vector<Slice> sampled(const Elements& elements, const std::vector<std::vector<Cell>>& rows) {
   const int wide = int(rows[0].size()) * fine + 1, high = int(rows.size()) * fine + 1;
-  std::vector<Section> sections(std::size_t(high), {wide, std::vector<Place>(std::size_t(wide * depths))});
+  std::vector<Slice> sections(std::size_t(high), {wide, std::vector<Place>(std::size_t(wide * depths))});
   for (std::size_t j = 0; j < rows.size(); ++j)
     for (std::size_t i = 0; i < rows[j].size(); ++i) {
       const Cell& cell = rows[j][i];
@@ -158,8 +158,8 @@ std::vector<Section> sampled(const Elements& elements, const std::vector<std::ve
 }
 
 // Where a plane meets every line of t; nothing when it misses one.
-std::optional<Section> cut(const std::vector<Section>& sections, const Place& normal, double offset) {
-  Section result{sections[0].wide, std::vector<Place>(sections[0].places.size())};
+std::optional<Slice> cut(const std::vector<Slice>& sections, const Place& normal, double offset) {
+  Slice result{sections[0].wide, std::vector<Place>(sections[0].places.size())};
   for (std::size_t p = 0; p < result.places.size(); ++p) {
     bool met = false;
     for (std::size_t t = 0; !met && t + 1 < sections.size(); ++t) {
@@ -174,7 +174,7 @@ std::optional<Section> cut(const std::vector<Section>& sections, const Place& no
 }
 
 // A section laid flat: s to the right, the pia upwards, its centre in the middle.
-std::vector<Plane> flat(const Section& section) {
+std::vector<Plane> flat(const Slice& section) {
   Place centre = Place::Zero();
   for (const Place& p : section.places) centre += p;
   centre /= double(section.places.size());
@@ -209,7 +209,7 @@ struct Picture {
   }
 };
 
-Picture picture_of(const Section& section, double pixel) {
+Picture picture_of(const Slice& section, double pixel) {
   const std::vector<Plane> places = flat(section);
   Picture picture;
   Plane high = places[0];
@@ -273,9 +273,9 @@ double difference(const Picture& one, const Picture& two, double pixel) {
   return 1. - best;
 }
 
-double mean_difference(const std::vector<Section>& sections, double pixel) {
+double mean_difference(const std::vector<Slice>& sections, double pixel) {
   std::vector<Picture> pictures;
-  for (const Section& s : sections) pictures.push_back(picture_of(s, pixel));
+  for (const Slice& s : sections) pictures.push_back(picture_of(s, pixel));
   double sum = 0.;
   for (std::size_t i = 0; i + 1 < pictures.size(); ++i)
     sum += difference(pictures[i], pictures[i + 1], pixel);
@@ -285,8 +285,8 @@ double mean_difference(const std::vector<Section>& sections, double pixel) {
 // Of a stretch: by its rows, and by planes.
 std::optional<std::pair<double, double>> measure(const Elements& elements,
                                                  const std::vector<std::vector<Cell>>& rows, double pixel) {
-  const std::vector<Section> samples = sampled(elements, rows);
-  std::vector<Section> whole;
+  const std::vector<Slice> samples = sampled(elements, rows);
+  std::vector<Slice> whole;
   for (std::size_t t = 0; t < samples.size(); t += fine) whole.push_back(samples[t]);
   double spacing = 0.;
   for (std::size_t t = 0; t + 1 < whole.size(); ++t)
@@ -294,7 +294,7 @@ std::optional<std::pair<double, double>> measure(const Elements& elements,
       spacing += (whole[t + 1].places[p] - whole[t].places[p]).norm();
   spacing /= double((whole.size() - 1) * whole[0].places.size());
 
-  const Section& centre = samples[samples.size() / 2];
+  const Slice& centre = samples[samples.size() / 2];
   Place along = Place::Zero(), middle = Place::Zero(), across = Place::Zero();
   for (std::size_t p = 0; p < centre.places.size(); ++p)
     along += samples.back().places[p] - samples.front().places[p], middle += centre.places[p];
@@ -306,7 +306,7 @@ std::optional<std::pair<double, double>> measure(const Elements& elements,
 
   const auto planar = [&](double a, double b) -> std::optional<double> {
     const Place normal = (along + std::tan(a) * across + std::tan(b) * third).normalized();
-    std::vector<Section> sections;
+    std::vector<Slice> sections;
     const auto from = cut(samples, normal, middle.dot(normal));
     if (!from) return std::nullopt;
     sections.push_back(*from);
@@ -346,7 +346,7 @@ Symmetry symmetry(const Elements& elements, std::span<const Line> lines, const S
   if (crests.triangles.empty()) return {};
   const std::vector<Place> alongs = directions(lines, Line::Kind::crest);
   const TriangleTree tree(crests);
-  const Lattice lattice(elements);
+  const Sides lattice(elements);
 
   // Stretches that share no element, tried in an order that spreads them.
   std::vector<std::vector<std::vector<Cell>>> stretches;
