@@ -112,10 +112,10 @@ class Plan {
   /// A sphere is one cylinder; cylinders are paths of soma points.
   void soma() {
     const Soma& soma = m_.soma();
-    if (soma.kind == SomaKind::sphere) {
-      const auto [low, middle, high] = cylinder_of(soma.points[0]);
+    if (soma.kind == SomaKind::sphere || (soma.kind == SomaKind::cylinders && soma.at_one_place())) {
+      const auto [low, middle, high] = cylinder_of(soma.sphere());
       add({"soma", lists[0]}).points = {low, high};
-      soma_places_.push_back({0, .5});
+      soma_places_.assign(soma.points.size(), {0, .5});
     } else if (soma.kind == SomaKind::cylinders) {
       soma_paths(soma);
     }

@@ -66,17 +66,19 @@ Point Soma::sphere() const {
   return {centre.x(), centre.y(), centre.z(), radius};
 }
 
+bool Soma::at_one_place() const {
+  return std::ranges::all_of(points, [&](const Point& p) { return p.position() == points[0].position(); });
+}
+
 double Soma::area() const {
   if (kind == SomaKind::cylinders) {
     double sum = 0.;
     float widest = 0.f;
-    bool apart = false;
     for (std::size_t i = 0; i < points.size(); ++i) {
       widest = std::max(widest, points[i].radius);
-      apart |= points[i].position() != points[0].position();
       if (parents[i] >= 0) sum += segment_area(points[std::size_t(parents[i])], points[i]);
     }
-    return apart ? sum : 4. * std::numbers::pi * double(widest) * double(widest);
+    return at_one_place() ? 4. * std::numbers::pi * double(widest) * double(widest) : sum;
   }
   const double r = sphere().radius;
   return 4. * std::numbers::pi * r * r;

@@ -77,7 +77,8 @@ struct Soma {
   }
   Point sphere()
       const;  // centre and radius of a sphere of the same place and mean size; radius 0 when there is none
-  double area() const;  // µm²; of contours: the sphere of their mean radius
+  bool at_one_place() const;  // all points
+  double area() const;        // µm²; of contours: the sphere of their mean radius
   bool operator==(const Soma&) const = default;
 };
 
