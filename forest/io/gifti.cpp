@@ -23,19 +23,25 @@ namespace {
 constexpr std::string_view points_intent = "NIFTI_INTENT_POINTSET",
                            triangles_intent = "NIFTI_INTENT_TRIANGLE";
 
-enum class NumberType : std::uint8_t { byte, whole, natural, long_whole, real, twice };
+template <class T>
+double number_at(const char* at) {
+  T value{};
+  std::memcpy(&value, at, sizeof value);
+  return double(value);
+}
 struct TypeRow {
   std::string_view name;
-  NumberType type;
   std::size_t size;
+  double (*number)(const char* at);
 };
+template <class T>
+constexpr TypeRow row(std::string_view name) {
+  return {name, sizeof(T), number_at<T>};
+}
 // The standard's three, and what programs write besides.
-constexpr std::array<TypeRow, 6> types{{{"NIFTI_TYPE_UINT8", NumberType::byte, 1},
-                                        {"NIFTI_TYPE_INT32", NumberType::whole, 4},
-                                        {"NIFTI_TYPE_UINT32", NumberType::natural, 4},
-                                        {"NIFTI_TYPE_INT64", NumberType::long_whole, 8},
-                                        {"NIFTI_TYPE_FLOAT32", NumberType::real, 4},
-                                        {"NIFTI_TYPE_FLOAT64", NumberType::twice, 8}}};
+constexpr std::array types{row<std::uint8_t>("NIFTI_TYPE_UINT8"),   row<std::int32_t>("NIFTI_TYPE_INT32"),
+                           row<std::uint32_t>("NIFTI_TYPE_UINT32"), row<std::int64_t>("NIFTI_TYPE_INT64"),
+                           row<float>("NIFTI_TYPE_FLOAT32"),        row<double>("NIFTI_TYPE_FLOAT64")};
 
 // Rows of numbers. All of them fit a double, but for whole ones above 2⁵³, which are none of a vertex.
 struct Array {
@@ -204,30 +210,7 @@ class Reader {
     for (std::size_t i = 0; i < count; ++i) {
       char* at = bytes.data() + i * type.size;
       if (swapped) std::reverse(at, at + type.size);
-      const auto as = [&](auto value) {
-        std::memcpy(&value, at, sizeof value);
-        return double(value);
-      };
-      switch (type.type) {
-        case NumberType::byte:
-          numbers[i] = as(std::uint8_t());
-          break;
-        case NumberType::whole:
-          numbers[i] = as(std::int32_t());
-          break;
-        case NumberType::natural:
-          numbers[i] = as(std::uint32_t());
-          break;
-        case NumberType::long_whole:
-          numbers[i] = as(std::int64_t());
-          break;
-        case NumberType::real:
-          numbers[i] = as(float());
-          break;
-        case NumberType::twice:
-          numbers[i] = as(double());
-          break;
-      }
+      numbers[i] = type.number(at);
     }
     return numbers;
   }
