@@ -101,6 +101,8 @@ class IntoRepository final : public Destination {
   void put(Ready& neuron, const std::string& name, std::uint64_t index) override {
     if (!repository_) open();
     if (!transaction_) transaction_.emplace(repository_->begin());
+    if (hash_.empty())  // with the first neurons: no model is left without any
+      hash_ = repository_->add_grammar(grammar_.name, grammar_.text, distributions_of(grammar_));
     const auto added = repository_->add(std::move(*neuron.prepared),
                                         {.name = name,
                                          .population = population_,
@@ -129,7 +131,6 @@ class IntoRepository final : public Destination {
     std::error_code none;
     made_ = !std::filesystem::exists(options_.repo, none);
     repository_.emplace(repository::Repository::open(options_.repo, repository::Access::write));
-    hash_ = repository_->add_grammar(grammar_.name, grammar_.text, distributions_of(grammar_));
   }
 
   const Options& options_;

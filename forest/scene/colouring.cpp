@@ -140,6 +140,22 @@ class Painter {
   bool is_glia(std::uint32_t instance) const {
     return forest_.circuit().types[forest_.types()[instance]].glia;
   }
+  // Which kinds of sections its neurons have that are no glia, the soma being 1.
+  std::array<bool, 8> kinds() const {
+    std::array<bool, 8> result{};
+    std::vector<bool> seen(forest_.neurons().size());
+    for (std::uint32_t i = 0; i < looks_.size(); ++i) {
+      const std::uint32_t own = forest_.instances()[i].morphology;
+      if (seen[own] || is_glia(i)) continue;
+      seen[own] = true;
+      const Neuron& neuron = forest_.neurons()[own];
+      result[1] = result[1] || neuron.soma_radius > 0.f;
+      for (const SectionFacts& section :
+           forest_.sections().subspan(neuron.first_section, neuron.section_count))
+        result[section.kind & 7u] = true;
+    }
+    return result;
+  }
   // Of a type, `t` from 0 under the pia to 1.
   Vec3 type_colour(std::size_t type, float t) const {
     const auto& types = forest_.circuit().types;
@@ -168,9 +184,11 @@ class Painter {
         add_hue(Vec3::Zero(), "");
         Hue& hue = hues_.back();
         for (std::size_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = on_background(anatomical[kind]);
-        for (const std::size_t kind : {1u, 2u, 3u, 4u})
-          hue.legend.push_back(
-              {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
+        const auto seen = kinds();
+        for (std::size_t kind = 0; kind < 8; ++kind)
+          if (seen[kind])
+            hue.legend.push_back(
+                {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
         const auto& types = circuit.types;
         if (std::ranges::none_of(types, &circuit::CellType::glia))
           return [first](std::uint32_t) { return first; };

@@ -193,6 +193,15 @@ TEST(Appearance, LaterOnesWinAndWhatIsNotSaidStays) {
   EXPECT_EQ(c.legend.back().name, "upper");
 }
 
+TEST(Appearance, TheLegendNamesTheKindsThatThereAre) {
+  const Forest f = sample();  // without axons
+  View view;
+  view.colour_by = ColourBy::kind;
+  std::vector<std::string> names;
+  for (const LegendEntry& entry : colour(Targets(f), view).legend) names.push_back(entry.name);
+  EXPECT_THAT(names, testing::ElementsAre("soma", "basal", "apical"));
+}
+
 TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
   circuit::Circuit c = testing::sample_circuit(60);
   c.types.clear();

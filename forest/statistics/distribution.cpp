@@ -358,7 +358,8 @@ const Family* find_family(std::string_view name) {
 
 double Distribution::density(double x) const {
   double sum = 0.;
-  for (const Component& c : components) sum += c.weight * std::exp(c.family->log_density(c.parameters, x));
+  for (const Component& c : components)
+    sum += c.weight * std::exp(c.family->log_density(c.parameters, counted(x)));
   return sum;
 }
 
@@ -366,7 +367,10 @@ double Distribution::cdf(double x) const {
   if (std::isnan(x)) return nan;
   const double end = step > 0. ? step_end(x, step) : x;
   double sum = 0.;
-  for (const Component& c : components) sum += c.weight * c.family->cdf(c.parameters, end);
+  for (const Component& c : components) {
+    const double below = c.family->cdf(c.parameters, counted(end));
+    sum += c.weight * (downwards ? 1. - below : below);
+  }
   for (const Atom& a : atoms) sum += a.value <= x ? a.weight : 0.;
   return std::min(sum, 1.);
 }
@@ -377,7 +381,8 @@ double Distribution::quantile(double p) const {
   const double inside = std::clamp(p, 1e-12, 1. - 1e-12);
   double low = infinity, high = -infinity;
   const auto take = [&](double x) { low = std::min(low, x), high = std::max(high, x); };
-  for (const Component& c : components) take(c.family->quantile(c.parameters, inside));
+  for (const Component& c : components)
+    take(placed(c.family->quantile(c.parameters, downwards ? 1. - inside : inside)));
   for (const Atom& a : atoms) take(a.value);
   if (components.size() == 1 && atoms.empty()) {
     const bool limited = components[0].family->support == Family::interval;
@@ -403,11 +408,16 @@ double Distribution::draw(Random& random) const {
   const auto found =
       std::ranges::find_if(components, [&](const Component& c) { return (u -= c.weight) < 0.; });
   const Component& c = found == components.end() ? components.back() : *found;
-  const double x = c.family->draw(c.parameters, random);
+  const double x = placed(c.family->draw(c.parameters, random));
   return step > 0. ? step * std::round(x / step) : x;
 }
 
 std::string number_text(double value) { return fmt::format("{:.6g}", value); }
+
+std::string Distribution::prefix() const {
+  if (downwards) return number_text(origin) + " - ";
+  return origin == 0. ? "" : number_text(origin) + " + ";
+}
 
 std::string Distribution::declaration(std::string_view name) const {
   const bool draws = !components.empty() || atoms.size() > 1;
@@ -439,8 +449,10 @@ std::string Distribution::expression() const {
   }
   for (const Atom& a : atoms) all.push_back({a.weight, number_text(a.value)});
   if (!parts.empty()) {
-    const std::string text = nested(parts);
-    all.push_back({rest, step > 0. ? fmt::format("{0} * round({1} / {0})", number_text(step), text) : text});
+    const std::string before = prefix(), text = before + nested(parts),
+                      stepped = before.empty() ? text : '(' + text + ')';
+    all.push_back(
+        {rest, step > 0. ? fmt::format("{0} * round({1} / {0})", number_text(step), stepped) : text});
   }
   return nested(all);
 }

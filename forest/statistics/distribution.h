@@ -55,13 +55,20 @@ struct Atom {
 struct Distribution {
   std::vector<Component> components;  // none to three
   std::vector<Atom> atoms;            // their weights and those of the components sum to 1
-  double step = 0.;  // what the components give is rounded to whole multiples of this; 0: it is not
+  double step = 0.;        // what the components give is rounded to whole multiples of this; 0: it is not
+  double origin = 0.;      // from which the components count, where values cannot lie on the other side …
+  bool downwards = false;  // … upwards, or down: a contraction is 1 - gamma(2, 0.05)
 
   double density(double x) const;  // of the components, before rounding; atoms have none
   double cdf(double x) const;      // that a value is <= x
   double quantile(double p)
       const;  // the least x for which cdf(x) >= p; 0 <= p <= 1, at the ends NaN where it has no limit
   double draw(Random& random) const;
+  /// Between a value and what the components give for it.
+  double counted(double x) const { return downwards ? origin - x : x - origin; }
+  double placed(double counted) const { return downwards ? origin - counted : origin + counted; }
+  /// What an expression of the components has before it: "1 - ", or nothing.
+  std::string prefix() const;
   /// For the right side of `distribution NAME = …`.
   std::string expression() const;
   /// `distribution NAME = …`; of a single value, which is no draw, `function NAME = …`. Both are called NAME().

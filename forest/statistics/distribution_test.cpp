@@ -128,6 +128,51 @@ TEST(Distribution, WritesItselfAsAnExpression) {
   EXPECT_EQ((Distribution{{}, {{2., 1.}}, 0.}.declaration("x")), "function x = 2");
 }
 
+TEST(Distribution, CountsFromWhereValuesBegin) {
+  const Distribution below{
+      {part("gamma", {2, 0.05}, 0.6), part("weibull", {2, 0.3}, 0.3)}, {{1., 0.1}}, 0., 1., true},
+      above{{part("lognormal", {-1, 0.5})}, {}, 0., 1.};
+  EXPECT_EQ(below.expression(),
+            "if(chance(0.1), 1, 1 - if(chance(0.666667), gamma(2, 0.05), weibull(2, 0.3)))");
+  EXPECT_EQ(above.expression(), "1 + lognormal(-1, 0.5)");
+  for (const Distribution* d : {&below, &above}) {
+    const auto x = drawn(*d, 40000, 6);
+    const auto [least, most] = std::ranges::minmax(x);
+    EXPECT_EQ(d->downwards ? most : std::min(least, 1.), 1.);
+    for (const double p : {0.02, 0.3, 0.5, 0.88}) {
+      const double at = d->quantile(p), h = 1e-4;
+      EXPECT_NEAR(d->cdf(at), p, 1e-6);
+      EXPECT_NEAR(double(std::ranges::count_if(x, [&](double v) { return v <= at; })) / 40000., p, 0.01);
+      EXPECT_NEAR(d->density(at), (d->cdf(at + h) - d->cdf(at - h)) / (2. * h), 2e-3);
+    }
+  }
+}
+
+TEST(Fit, NothingLiesBeyondALimit) {
+  const Distribution truth{{part("gamma", {1.5, 0.06}, 0.9)}, {{1., 0.1}}, 0., 1., true};
+  const auto x = drawn(truth, 1500, 4);
+  const DistributionFit free = fit_distribution(x), fit = fit_distribution(x, {.most = 1.});
+  EXPECT_EQ(fit.name, "1 - gamma");
+  ASSERT_EQ(fit.distribution.atoms.size(), 1u);
+  EXPECT_EQ(fit.distribution.atoms[0].value, 1.);
+  EXPECT_NEAR(fit.distribution.components[0].parameters[0], 1.5, 0.2);
+  EXPECT_LT(fit.kolmogorov, 0.03);
+  EXPECT_GT(fit.p, 0.01);
+  EXPECT_LE(std::ranges::max(drawn(fit.distribution, 20000, 7)), 1.);
+  EXPECT_LT(fit.kolmogorov, free.kolmogorov);
+  for (const Candidate& c : fit.candidates) EXPECT_NE(c.name, "normal");
+  EXPECT_EQ(fit_distribution(drawn({{part("normal", {105, 25})}, {}, 0.}, 500, 3), {.least = 0.}).name,
+            "normal");
+  // What lies on a limit is an atom, however seldom; values beyond it say that there is none.
+  std::vector<double> lengths = drawn({{part("gamma", {2, 15})}, {}, 0.}, 300, 9);
+  lengths[7] = 0.;
+  const DistributionFit positive = fit_distribution(lengths, {.least = 0.});
+  EXPECT_EQ(positive.name, "gamma");
+  EXPECT_EQ(positive.in_atoms, 1u);
+  lengths[7] = -4.;
+  EXPECT_EQ(fit_distribution(lengths, {.least = 0.}).name, fit_distribution(lengths).name);
+}
+
 TEST(Distribution, AtomsAreJumps) {
   const Distribution d{{part("uniform", {0, 2}, 0.5)}, {{1., 0.5}}, 0.};
   EXPECT_DOUBLE_EQ(d.cdf(0.999999), 0.24999975);

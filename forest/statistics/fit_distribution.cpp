@@ -30,10 +30,13 @@ double normal_quantile(double confidence) { return std::numbers::sqrt2 * boost::
 // ── What the values are ──
 
 struct Sample {
-  Values x;  // sorted, without atoms; spread over the steps that they were counted in
+  Values
+      x;  // sorted, without atoms; spread over the steps that they were counted in; as counted from where they begin
   std::vector<Atom> atoms;
   double step = 0.;
   std::size_t count = 0, left_out = 0;
+  Distribution place;    // where values begin, without any component
+  bool limited = false;  // there is such a place
 };
 
 struct Run {  // of values that are equal but for the rounding of coordinates in single precision
@@ -42,13 +45,21 @@ struct Run {  // of values that are equal but for the rounding of coordinates in
   std::size_t first;  // of the sorted values
 };
 
-std::vector<Run> runs_of(const Values& sorted) {
-  constexpr double rounding = 3e-7, of_spread = 1e-5;  // of a value, and of how far all are from their median
-  double spread = 0.;
-  for (const double v : sorted) spread += std::abs(v - sorted[sorted.size() / 2]) / double(sorted.size());
-  const auto tolerance = [&](double v) {
+/// How far values lie apart that are equal.
+struct Tolerance {
+  double spread = 0.;  // how far all are from their median
+
+  explicit Tolerance(const Values& sorted) {
+    for (const double v : sorted) spread += std::abs(v - sorted[sorted.size() / 2]) / double(sorted.size());
+  }
+  double operator()(double v) const {
+    constexpr double rounding = 3e-7, of_spread = 1e-5;
     return std::min(rounding * std::abs(v), 1e-3 * spread) + of_spread * spread;
-  };
+  }
+};
+
+std::vector<Run> runs_of(const Values& sorted) {
+  const Tolerance tolerance(sorted);
   std::vector<Run> runs;
   for (std::size_t i = 0, end = 0; i < sorted.size(); i = end) {
     const double near = tolerance(sorted[i]), far = 20. * near;
@@ -133,6 +144,17 @@ Sample sample_of(std::span<const double> values, const FitOptions& options) {
   if (options.atoms) sample.step = step_of(runs, x.size());
   std::vector<Run> atoms;
   if (options.atoms || runs.size() == 1) atoms = take_atoms(runs, x.size(), sample.step > 0.);
+  if (const auto end = options.most ? options.most : options.least; end && !options.angles) {
+    sample.place.origin = *end, sample.place.downwards = options.most.has_value();
+    const double on_it = Tolerance(sorted)(*end);
+    sample.limited = sample.place.counted(options.most ? sorted.back() : sorted.front()) >= -on_it;
+    if (sample.limited)
+      for (const Run& r : runs)
+        if (std::abs(r.value - *end) <= on_it) atoms.push_back(r), atoms.back().value = *end;
+    std::erase_if(runs, [&](const Run& r) { return sample.limited && std::abs(r.value - *end) <= on_it; });
+    std::ranges::sort(atoms, {}, &Run::value);
+  }
+  if (!sample.limited) sample.place = {};
   x.clear();
   for (const Run& r : runs)
     for (std::size_t i = 0; i < r.count; ++i) {
@@ -144,6 +166,7 @@ Sample sample_of(std::span<const double> values, const FitOptions& options) {
       x.push_back(r.value +
                   sample.step * (r.value == 0. && runs.front().value >= 0. ? 0.5 * std::abs(at) + 1e-6 : at));
     }
+  for (double& v : x) v = sample.place.counted(v);
   std::ranges::sort(x);
   if (x.size() < 4 || x.front() == x.back()) {  // too few for any family: the values themselves
     atoms.insert(atoms.end(), runs.begin(), runs.end());
@@ -506,6 +529,7 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   fit.name = "values";
   fit.distribution.atoms = sample.atoms;
   fit.in_atoms = sample.count - x.size();
+  fit.distribution.origin = sample.place.origin, fit.distribution.downwards = sample.place.downwards;
 
   struct Fitted {
     Spec spec;
@@ -514,8 +538,10 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   };
   std::vector<Fitted> all;
   const auto attempt = [&](const Spec& spec) {
+    constexpr double beyond = 1e-4;  // of draws, that may lie there
     const auto components = fitted(spec, x, options.angles);
     if (!components) return;
+    if (sample.limited && options.families.empty() && cdf(*components, 0.) > beyond) return;
     const double likelihood = log_likelihood(*components, x), n = double(x.size()),
                  k = parameters_of(spec, options.angles);
     if (!std::isfinite(likelihood)) return;
@@ -534,7 +560,9 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   const double part = double(x.size()) / double(sample.count);
   if (!all.empty()) {
     const Fitted& best = all.front();
-    fit.name = best.candidate.name;
+    const std::string before = sample.place.prefix();
+    const bool together = best.spec.size() > 1 && !before.empty();
+    fit.name = before + (together ? '(' + best.candidate.name + ')' : best.candidate.name);
     fit.distribution.components = best.components;
     for (Component& c : fit.distribution.components) c.weight *= part;
     fit.distribution.step = sample.step;
@@ -545,7 +573,8 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
     if (options.replicates > 0) fit.p = p_of(best.spec, best.components, x, options);
   } else if (!x.empty()) {  // no family has them: at most a thousand of the values themselves
     const Values some = thinned(x, 1000);
-    for (const double v : some) fit.distribution.atoms.push_back({v, part / double(some.size())});
+    for (const double v : some)
+      fit.distribution.atoms.push_back({sample.place.placed(v), part / double(some.size())});
     fit.in_atoms = sample.count;
   }
   for (const Atom& a : sample.atoms)

@@ -8,6 +8,7 @@
 
 #include <cstdint>
 #include <limits>
+#include <optional>
 #include <span>
 #include <string>
 #include <vector>
@@ -23,7 +24,10 @@ struct FitOptions {
   /// allow, and with 100 values mixtures of two, with 300 of three of one family.
   std::vector<std::string> families = {};
   bool angles = false;  // degrees on the circle: values are brought to (-180, 180]
-  bool atoms = true;    // look for values that come back exactly and for the steps of a tracer
+  /// Beyond which no value can lie. Then families count from there; one that has more than one of 10,000 values beyond it is not
+  /// chosen unless it is named; what lies on it is an atom. Of both limits the upper one is counted from.
+  std::optional<double> least = {}, most = {};
+  bool atoms = true;  // look for values that come back exactly and for the steps of a tracer
   InformationCriterion criterion = InformationCriterion::bic;
   double confidence = 0.95;
   std::size_t replicates = 99;  // of the parametric bootstrap behind p; 0: p is not worked out
@@ -49,7 +53,7 @@ struct DistributionFit {
 
   Distribution distribution;
   std::string name =
-      "none";  // of the components: "gamma + gamma"; "values": nothing but atoms; "none": there was no value
+      "none";  // of the components: "gamma + gamma", "1 - (gamma + gamma)"; "values": nothing but atoms; "none": there was no value
   std::size_t count = 0;     // values that were used
   std::size_t left_out = 0;  // not numbers, or beyond 1e100
   std::size_t in_atoms = 0;

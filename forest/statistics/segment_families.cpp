@@ -27,7 +27,8 @@ constexpr std::array<std::string_view, 5> given_units{"", "", "µm", "µm", "µm
 struct Row {
   Quantity::Family family;
   std::string_view name, unit, meaning;
-  bool angles;
+  bool angles = false;
+  std::optional<double> least = {}, most = {};
 };
 enum : std::size_t {
   nonterminal_length,
@@ -44,24 +45,31 @@ enum : std::size_t {
   parent_daughter_ratio
 };
 constexpr Row rows[] = {
-    {Quantity::trajectory, "length_of_nonterminal_segments", "µm", "path length of sections that fork",
-     false},
-    {Quantity::trajectory, "length_of_terminal_segments", "µm", "path length of sections that end", false},
-    {Quantity::trajectory, "contraction", "",
-     "straight distance between the ends of a section over its path length", false},
-    {Quantity::trajectory, "turn", "°", "angle between one piece of 10 µm of a section and the next", false},
+    {Quantity::trajectory, "length_of_nonterminal_segments", "µm", "path length of sections that fork", false,
+     0.},
+    {Quantity::trajectory, "length_of_terminal_segments", "µm", "path length of sections that end", false,
+     0.},
+    {Quantity::trajectory,
+     "contraction",
+     "",
+     "straight distance between the ends of a section over its path length",
+     false,
+     {},
+     1.},
+    {Quantity::trajectory, "turn", "°", "angle between one piece of 10 µm of a section and the next", false,
+     0.},
     {Quantity::rotations, "angle_of_thicker_daughter", "°",
-     "from the direction of the parent; over 10 µm, as all of these", false},
-    {Quantity::rotations, "angle_of_thinner_daughter", "°", "from the direction of the parent", false},
-    {Quantity::rotations, "amplitude", "°", "angle between the two daughters", false},
+     "from the direction of the parent; over 10 µm, as all of these", false, 0.},
+    {Quantity::rotations, "angle_of_thinner_daughter", "°", "from the direction of the parent", false, 0.},
+    {Quantity::rotations, "amplitude", "°", "angle between the two daughters", false, 0.},
     {Quantity::rotations, "torque", "°",
      "turn of the plane of a bifurcation about the parent, from that of the bifurcation before", true},
-    {Quantity::calibre, "stem_diameter", "µm", "diameter at the beginning of a stem", false},
-    {Quantity::calibre, "taper", "", "loss of diameter along a section over its length", false},
+    {Quantity::calibre, "stem_diameter", "µm", "diameter at the beginning of a stem", false, 0.},
+    {Quantity::calibre, "taper", "", "loss of diameter along a section over its length"},
     {Quantity::calibre, "daughter_ratio", "", "diameter of the thicker daughter over that of the thinner",
-     false},
+     false, 1.},
     {Quantity::calibre, "parent_daughter_ratio", "",
-     "diameter of a daughter over that of its parent, where they meet", false},
+     "diameter of a daughter over that of its parent, where they meet", false, 0.},
 };
 
 Vector place(const Point& p) { return p.position().cast<double>(); }
@@ -220,7 +228,8 @@ std::string_view name_of(Quantity::Family family) {
 SegmentValues segment_values(std::span<const Morphology> cells, KindSet kinds) {
   SegmentValues out;
   out.cells = cells.size();
-  for (const Row& r : rows) out.quantities.push_back({r.family, r.name, r.unit, r.meaning, r.angles, {}, {}});
+  for (const Row& r : rows)
+    out.quantities.push_back({r.family, r.name, r.unit, r.meaning, r.angles, r.least, r.most, {}, {}});
   for (const Morphology& cell : cells) {
     const Arbors arbors(cell, kinds);
     Reader(arbors, out).read();
@@ -241,7 +250,7 @@ SegmentFamilies segment_families(std::span<const Morphology> cells, const Family
   progress.begin("fitting", values.quantities.size());
   for (const Quantity& q : values.quantities) {
     FitOptions how = options.fit;
-    how.angles = q.angles;
+    how.angles = q.angles, how.least = q.least, how.most = q.most;
     FittedQuantity fitted{q.family, q.name, q.unit, q.meaning, fit_distribution(q.values, how), {}, {}};
     if (options.given == Given::nothing || q.values.empty()) {
       const DistributionFit& f = fitted.fit;

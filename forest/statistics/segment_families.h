@@ -29,7 +29,8 @@ struct Quantity {
   enum Family : std::uint8_t { trajectory, rotations, calibre } family;
   std::string_view name, unit, meaning;
   bool angles = false;
-  std::vector<double> values;  // NaN is left out
+  std::optional<double> least = {}, most = {};  // beyond which there is none
+  std::vector<double> values;                   // NaN is left out
   std::vector<std::array<double, 4>>
       places;  // of each value: order, path (µm), radius (µm), height (µm, above the soma)
 };
