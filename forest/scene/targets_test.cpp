@@ -199,7 +199,7 @@ TEST(Appearance, TheLegendNamesTheKindsThatThereAre) {
   view.colour_by = ColourBy::kind;
   std::vector<std::string> names;
   for (const LegendEntry& entry : colour(Targets(f), view).legend) names.push_back(entry.name);
-  EXPECT_THAT(names, testing::ElementsAre("soma", "basal", "apical"));
+  EXPECT_THAT(names, ::testing::ElementsAre("soma", "basal", "apical"));
 }
 
 TEST(Appearance, ColoursThatAreSharedSayByHowMany) {
