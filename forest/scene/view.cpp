@@ -17,6 +17,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/half.h"
 #include "forest/scene/placed.h"
 
 namespace forest::scene {
@@ -475,8 +476,8 @@ void paint(frame::Palette& palette, const ActivityView& a, bool light) {
 
 constexpr int outline_corners = 16;
 
-/// Places on branches of neurons that are seen: of few the ends of all segments, else spread evenly over their area, the straws of
-/// one level of bricks.
+/// Places on branches of neurons that are seen: of few the ends of all segments and all that somata take up, else spread evenly over
+/// their area, the straws of one level of bricks.
 struct Places {
   std::vector<Vec3> places;
   bool all = true;  // else a sample
@@ -495,8 +496,15 @@ Places places_on_branches(const Forest& forest, const Seen& seen) {
       if (!seen(i)) continue;
       const Placed placed(instances[i]);
       const Neuron& neuron = forest.neurons()[instances[i].morphology];
-      for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count))
-        places.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
+      const auto add = [&](const Vec3& at) { places.push_back(placed({at, 0.f}).centre); };
+      for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count)) {
+        const Vec3 from(s.ax, s.ay, s.az), to(s.bx, s.by, s.bz);
+        add(to);
+        if ((s.meta & 7u) != 1u) continue;
+        const float at_from = from_half(s.radii & 0xffffu), at_to = from_half(s.radii >> 16);
+        for (const Vec3& out : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitY()), Vec3(Vec3::UnitZ())})
+          for (const float sign : {-1.f, 1.f}) add(from + sign * at_from * out), add(to + sign * at_to * out);
+      }
     }
     return {std::move(places), true};
   }

@@ -199,6 +199,26 @@ TEST(View, TheOverviewOfASmallForestHoldsAllAndGoesByLayersOnlyWhereItStandsInTh
   }
 }
 
+TEST(View, TheOverviewHoldsASomaThatLiesAtTheEdge) {
+  circuit::Circuit c = testing::sample_circuit(1);
+  c.layers = {{"traced", -1.f, 1.f}}, c.radius = 0.f;
+  c.instances[0] = {};
+  MorphologyBuilder builder;  // a long one, under a tuft
+  builder.set_soma({.kind = SomaKind::cylinders,
+                    .points = {{0, -80, 0, 12}, {0, -40, 0, 12}, {0, 0, 0, 10}},
+                    .parents = {-1, 0, 1},
+                    .contour_starts = {}});
+  for (const float x : {-60.f, 60.f})
+    builder.add_section({}, SectionKind::basal, std::vector<Point>{{0, 20, 0, 1}, {x, 200, 0, 1}});
+  const std::vector<Morphology> neurons(c.morphologies.size(), builder.build());
+  const frame::Camera camera = overview(Forest::from_bytes(pack(c, neurons)), 1.5f).camera;
+  const Vec3 middle = neurons[0].soma().sphere().position();
+  for (const float turn : {0.f, 1.6f, 3.1f, 4.7f}) {
+    const Vec3 rim = Vec3(12.f * std::cos(turn), -80.f, 12.f * std::sin(turn)) - middle;
+    EXPECT_LT(project(camera, {900.f, 600.f}, rim).y(), 600.f);
+  }
+}
+
 TEST(View, WhatIsSeenThroughHasMoreSamplesAtRest) {
   const Targets targets(sample());
   View view = overview(targets.forest());
