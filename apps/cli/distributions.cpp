@@ -69,6 +69,8 @@ Json json_of(const DistributionFit& f) {
           {"family", f.name},
           {"expression", f.count ? f.distribution.expression() : ""},
           {"step", f.distribution.step},
+          {"origin", f.distribution.origin},
+          {"downwards", f.distribution.downwards},
           {"estimates", estimates},
           {"kolmogorov", number(f.kolmogorov)},
           {"anderson_darling", number(f.anderson_darling)},

@@ -60,6 +60,11 @@ Sample cells_of(const Options& options, Console& console) {
 
 /// As a cell's values read: "total_length 4210 µm (5110–9800)".
 std::string words_of(const Oddity& o) {
+  constexpr std::string_view whether = " is defined";
+  if (const std::string_view name = o.feature.name; name.ends_with(whether))
+    return fmt::format("{}, which has {} value here and {} of the population",
+                       name.substr(0, name.size() - whether.size()), o.value > 0. ? "a" : "no",
+                       o.median > .5 ? "one in most" : "none in most");
   return fmt::format("{} {:.4g}{}{} ({:.4g}–{:.4g} in the population)", o.feature.name, o.value,
                      o.feature.unit.empty() ? "" : " ", o.feature.unit, o.low, o.high);
 }
@@ -84,7 +89,7 @@ std::string sentence(const std::string& cell, const Typicality& t, const std::st
                       : "no metric is abnormal; the most unusual is " + words_of(t.oddities.front()) + ".");
   out +=
       fmt::format("{} abnormal, ", abnormal == 1 ? "one metric is" : fmt::format("{} metrics are", abnormal));
-  return out + "above all " + words_of(t.oddities.front()) + ".";
+  return out + "led by " + words_of(t.oddities.front()) + ".";
 }
 
 Json json_of(const std::string& cell, const Typicality& t, const std::string& population) {

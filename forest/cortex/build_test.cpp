@@ -15,7 +15,9 @@
 #include "forest/cortex/check_surfaces.h"
 #include "forest/cortex/fit_faces.h"
 #include "forest/cortex/gaps.h"
+#include "forest/cortex/gauge.h"
 #include "forest/cortex/report.h"
+#include "forest/cortex/shape.h"
 
 #include "tests/effort.h"
 
@@ -265,38 +267,74 @@ TEST_F(Shell, AHeapThatCannotBeMendedDoesNotKeepOthersFromBeginningAnew) {
   EXPECT_EQ(well.curves, made().cortex.elements.curves);
 }
 
-TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
-  const TriangleTree outer_tree(outer);
-  Elements wavy = made().cortex.elements;
-  for (Depths& curve : wavy.curves) {
+// Elements whose faces go up and down.
+Elements wavy_ones(Elements elements) {
+  for (Depths& curve : elements.curves) {
     curve[0] *= 1. + .006 * std::sin(curve[0].x() / 300.);
     curve[3] *= 1. + .006 * std::sin(curve[3].y() / 300.);
   }
-  // By 199 of 200 places: a face by a fault of the lattice stays where it would cost its element its shape.
-  const auto farthest = [&](const Elements& elements) {
-    std::vector<double> outside_by, inside_by;
-    for (std::size_t e = 0; e < elements.size(); ++e) {
-      const Hexahedron h = elements.hexahedron(e);
-      for (const double u : {0., .2, .5, .9}) {
-        outside_by.push_back(outer_tree.nearest(h.at(u, .3, 0.))->distance);
-        inside_by.push_back(tree.nearest(h.at(u, .3, 1.))->distance);
-      }
+  return elements;
+}
+// How far faces are from their surfaces, µm, outer and inner, by 199 of 200 places: a face by a fault of the lattice stays where it
+// would cost its element its shape.
+std::pair<double, double> farthest(const Elements& elements, const SurfaceTrees& surfaces) {
+  std::vector<double> outside_by, inside_by;
+  for (std::size_t e = 0; e < elements.size(); ++e) {
+    const Hexahedron h = elements.hexahedron(e);
+    for (const double u : {0., .2, .5, .9}) {
+      outside_by.push_back(surfaces.outer.nearest(h.at(u, .3, 0.))->distance);
+      inside_by.push_back(surfaces.inner.nearest(h.at(u, .3, 1.))->distance);
     }
-    std::ranges::sort(outside_by), std::ranges::sort(inside_by);
-    return std::pair{outside_by[outside_by.size() * 199 / 200], inside_by[inside_by.size() * 199 / 200]};
-  };
-  ASSERT_GT(farthest(wavy).first, 50.);
-  ASSERT_GT(farthest(wavy).second, 40.);
+  }
+  std::ranges::sort(outside_by), std::ranges::sort(inside_by);
+  return {outside_by[outside_by.size() * 199 / 200], inside_by[inside_by.size() * 199 / 200]};
+}
+
+TEST_F(Shell, FacesComeToTheSurfacesAndElementsStayValid) {
+  const TriangleTree outer_tree(outer);
+  const SurfaceTrees surfaces{outer_tree, tree};
+  Elements wavy = wavy_ones(made().cortex.elements);
+  ASSERT_GT(farthest(wavy, surfaces).first, 50.);
+  ASSERT_GT(farthest(wavy, surfaces).second, 40.);
   const auto folded = uncertified(wavy);  // by the waves
   ASSERT_LE(folded.size(), 3u);
   Elements as_a_whole = wavy;
-  fit_faces(as_a_whole, {outer_tree, tree}, Fit::mean);
+  fit_faces(as_a_whole, surfaces, Fit::mean);
   for (std::size_t c = 0; c < wavy.corners; ++c) EXPECT_EQ(as_a_whole.curves[c], wavy.curves[c]);
-  fit_faces(wavy, {outer_tree, tree}, Fit::places);
-  EXPECT_LT(farthest(wavy).first, 10.);
-  EXPECT_LT(farthest(wavy).second, 10.);
+  fit_faces(wavy, surfaces, Fit::places);
+  EXPECT_LT(farthest(wavy, surfaces).first, 10.);
+  EXPECT_LT(farthest(wavy, surfaces).second, 10.);
   EXPECT_TRUE(std::ranges::includes(folded, uncertified(wavy)));
-  EXPECT_LT(farthest(wavy).first, farthest(as_a_whole).first);
+  EXPECT_LT(farthest(wavy, surfaces).first, farthest(as_a_whole, surfaces).first);
+}
+
+TEST_F(Shell, ShapesAreMendedWithFacesHeldClose) {
+  const TriangleTree outer_tree(outer);
+  const SurfaceTrees surfaces{outer_tree, tree};
+  const Elements wavy = wavy_ones(made().cortex.elements);
+  const auto low = [](const Elements& elements) {  // scaled Jacobian, by 99 of 100
+    std::vector<float> least = look(elements).least;
+    std::ranges::sort(least);
+    return least[least.size() / 100];
+  };
+  const auto shaped = [&](double close) {
+    Elements elements = wavy;
+    improve_shapes(
+        elements, surfaces,
+        {.enough = .5, .wanted = .62, .volume = wanted, .along = 1600., .off = 10., .close = close},
+        Progress::none());
+    return elements;
+  };
+  const Elements close = shaped(15.), by_curves = shaped(0.);
+  {
+    const ThreadLimit one(1);
+    EXPECT_EQ(shaped(15.).curves, close.curves);
+  }
+  EXPECT_LT(farthest(close, surfaces).first, 15.);
+  EXPECT_LT(farthest(close, surfaces).second, 15.);
+  EXPECT_GT(farthest(by_curves, surfaces).first, 30.);  // what has a good shape stays where it is
+  EXPECT_GT(low(close), low(wavy));
+  EXPECT_TRUE(std::ranges::includes(uncertified(wavy), uncertified(close)));
 }
 
 TEST_F(Shell, GapsAreTheVolumeThatElementsLackAndFacesTakeIt) {

@@ -85,8 +85,10 @@ class Evening {
       put_back();
       progress.advance();
     }
-    for (int round = 0; rounds > 0 && round < mending_rounds; ++round)
+    for (int round = 0; rounds > 0 && round < mending_rounds; ++round) {
+      find_ways();
       step_all(least_shape, true, [&](std::size_t v) { return quads_.middle[v]; });
+    }
     progress.end();
   }
 

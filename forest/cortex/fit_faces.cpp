@@ -10,35 +10,25 @@
 #include <Eigen/Cholesky>
 
 #include "forest/core/parallel.h"
+#include "forest/cortex/face_places.h"
 #include "forest/cortex/gaps.h"
 #include "forest/cortex/go.h"
 
 namespace forest::cortex {
 namespace {
 
-constexpr int along = 5, all = along * along;  // places of a face that are compared with the surface
-constexpr double parameter(int i) { return (i + .5) / along; }
-
 // How far each of a face's sixteen places goes, of the ways from its 5×5 places to the surface.
-using Shares = Eigen::Matrix<double, 16, all>;
+using Shares = Eigen::Matrix<double, 16, face_places>;
 
 Shares shares(Fit fit) {
   Shares result = Shares::Zero();
   if (fit == Fit::mean) {
-    result.setConstant(1. / all);
+    result.setConstant(1. / face_places);
     for (const int corner : {0, 3, 12, 15}) result.row(corner).setZero();
     return result;
   }
-  // What a place weighs at each of the 5×5, and the least squares of what is left, with as little way as possible.
-  Eigen::Matrix<double, all, 16> weights;
-  for (std::size_t c = 0; c < 16; ++c) {
-    std::array<Place, 16> one;
-    one.fill(Place::Zero());
-    one[c] = Place::UnitX();
-    const Patch patch = through_lattice(one);
-    for (int k = 0; k < all; ++k)
-      weights(k, Eigen::Index(c)) = patch.at(parameter(k % along), parameter(k / along)).x();
-  }
+  // The least squares of what is left, with as little way as possible.
+  const FaceWeights& weights = face_weights();
   constexpr double ease = .1;
   return (weights.transpose() * weights + ease * Eigen::Matrix<double, 16, 16>::Identity())
       .ldlt()
@@ -48,22 +38,13 @@ Shares shares(Fit fit) {
 // How far each of a face's sixteen places goes.
 using Moves = Eigen::Matrix<double, 16, 3>;
 
-using Ways = Eigen::Matrix<double, all, 3>;
-
-// From the 5×5 places of a face to the surface, along its normals; none where that is far or the other bank.
-Ways ways(const Elements& elements, std::size_t element, std::size_t depth, const TriangleTree& surface) {
-  constexpr double reach = 300.;  // µm
-  const auto& own = elements.elements[element];
-  const Patch patch = face_of(elements, element, depth);
-  const Place outwards = elements.curves[own[slot(1, 1)]][0] - elements.curves[own[slot(1, 1)]][3];
-  Ways result = Ways::Zero();
-  for (int k = 0; k < all; ++k) {
-    const Place p = patch.at(parameter(k % along), parameter(k / along));
-    const auto hit = surface.nearest(p, reach);
-    if (!hit) continue;
-    const Place n = surface.normal(hit->triangle);
-    if (n.dot(outwards) > 0.) result.row(k) = (n * n.dot(hit->at - p)).transpose();
-  }
+// From the 5×5 places of a face to the surface, along its normals.
+Eigen::Matrix<double, face_places, 3> ways(const Elements& elements, std::size_t element, std::size_t depth,
+                                           const TriangleTree& surface) {
+  Eigen::Matrix<double, face_places, 3> result;
+  const auto pins = pins_of(elements, element, depth, surface);
+  for (std::size_t k = 0; k < pins.size(); ++k)
+    result.row(Eigen::Index(k)) = (pins[k].off * pins[k].normal).transpose();
   return result;
 }
 
@@ -104,14 +85,13 @@ void fit_faces(Elements& elements, const SurfaceTrees& surfaces, Fit fit) {
   const std::vector<double> keep = to_keep(elements, good);
   const std::vector<Depths> before = elements.curves;
   std::vector<Moves> moves(elements.size());
-  for (const auto& [depth, surface] :
-       {std::pair{std::size_t(0), &surfaces.outer}, {std::size_t(3), &surfaces.inner}})
+  for (const std::size_t depth : {0u, 3u})
     for (int round = 0; round < rounds; ++round) {
       std::vector<double> gap;
-      if (fit == Fit::volume) gap = gaps(elements, depth, *surface);
+      if (fit == Fit::volume) gap = gaps(elements, depth, surfaces.at(depth));
       parallel_for(elements.size(), 64, [&](std::size_t e) {
         moves[e] = fit == Fit::volume ? raised(elements, e, depth, gap[e])
-                                      : Moves(by_place * ways(elements, e, depth, *surface));
+                                      : Moves(by_place * ways(elements, e, depth, surfaces.at(depth)));
       });
       std::vector<Place> sum(elements.curves.size(), Place::Zero());
       std::vector<std::uint8_t> times(elements.curves.size(), 0);

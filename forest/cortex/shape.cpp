@@ -11,6 +11,7 @@
 
 #include "forest/core/distinct.h"
 #include "forest/core/parallel.h"
+#include "forest/cortex/face_places.h"
 #include "forest/cortex/gauge.h"
 #include "forest/cortex/minimise.h"
 #include "forest/cortex/neighbourhood.h"
@@ -24,6 +25,12 @@ using List = std::vector<std::uint32_t>;
 struct Anchor {
   Place at = Place::Zero();
   Matrix<3> hold = Matrix<3>::Zero();
+};
+
+// What holds the places of a face: (what each is off its plane)² times what it counts.
+struct HeldFace {
+  std::array<Pin, face_places> pins;
+  std::array<double, face_places> by{};
 };
 
 constexpr double farthest_way = 1000.;  // µm, that a place may move at once: not to another bank
@@ -70,8 +77,14 @@ class Work {
  public:
   using Anchors = std::vector<std::array<Anchor, 4>>;  // of every moving curve
 
-  Work(Elements& elements, const Patch& patch, const Shaping& shaping, Anchors anchors)
-      : elements_(elements), patch_(patch), shaping_(shaping), anchors_(std::move(anchors)) {
+  using Held = std::vector<std::array<HeldFace, 2>>;  // of every element seen, outer and inner; or none
+
+  Work(Elements& elements, const Patch& patch, const Shaping& shaping, Anchors anchors, Held held)
+      : elements_(elements),
+        patch_(patch),
+        shaping_(shaping),
+        anchors_(std::move(anchors)),
+        held_(std::move(held)) {
     before_.resize(Eigen::Index(12 * patch.curves.size()));
     for (std::size_t i = 0; i < patch.curves.size(); ++i)
       for (std::size_t d = 0; d < 4; ++d)
@@ -222,6 +235,36 @@ class Work {
         value += off.dot(pull);
         gradient.segment<3>(k) += 2. * pull;
       }
+    for (std::size_t i = 0; i < held_.size(); ++i)
+      for (const std::size_t side : {0u, 1u})
+        value += strain(seen_[i], held_[i][side], 3 * side, at, gradient);
+    return value;
+  }
+
+  // What the places of a face are off, as a sum of squares, and how that grows with the places of its curves.
+  double strain(const Seen& s, const HeldFace& held, std::size_t depth, const Vector& at,
+                Vector& gradient) const {
+    using OfCurves = Eigen::Matrix<double, 16, 3>;
+    const auto each_moving = [&](auto&& visit) {  // visit(its row, where it is among all coordinates)
+      for (std::size_t c = 0; c < 16; ++c)
+        if (s.moving[c] >= 0) visit(Eigen::Index(c), 12 * s.moving[c] + 3 * Eigen::Index(depth));
+    };
+    OfCurves ways = OfCurves::Zero();  // since the face was held
+    each_moving([&](Eigen::Index row, Eigen::Index k) {
+      ways.row(row) = (at.segment<3>(k) - before_.segment<3>(k)).transpose();
+    });
+    const Eigen::Matrix<double, face_places, 3> moved = face_weights() * ways;
+    Eigen::Matrix<double, face_places, 3> slopes;
+    double value = 0.;
+    for (std::size_t k = 0; k < held.pins.size(); ++k) {
+      const Pin& pin = held.pins[k];
+      const double left = moved.row(Eigen::Index(k)).dot(pin.normal) - pin.off;
+      value += held.by[k] * left * left;
+      slopes.row(Eigen::Index(k)) = 2. * held.by[k] * left * pin.normal.transpose();
+    }
+    const OfCurves of_curves = face_weights().transpose() * slopes;
+    each_moving(
+        [&](Eigen::Index row, Eigen::Index k) { gradient.segment<3>(k) += of_curves.row(row).transpose(); });
     return value;
   }
 
@@ -229,6 +272,7 @@ class Work {
   const Patch& patch_;
   const Shaping& shaping_;
   Anchors anchors_;
+  Held held_;
   Vector before_;
   std::vector<Seen> seen_;
   std::vector<Group> groups_;
@@ -241,14 +285,16 @@ class Shaper {
   Shaper(Elements& elements, const SurfaceTrees& surfaces, const Shaping& shaping)
       : elements_(elements), surfaces_(surfaces), shaping_(shaping) {}
 
+  // Whether a place of a face is farther from its surface than is close.
+  bool is_far(std::uint32_t element) const {
+    return std::ranges::any_of(std::array{0u, 3u}, [&](std::size_t depth) {
+      return std::ranges::any_of(pins_of(elements_, element, depth, surfaces_.at(depth)),
+                                 [&](const Pin& pin) { return std::abs(pin.off) > shaping_.close; });
+    });
+  }
+
   void operator()(const Patch& patch) const {
-    List worst;  // curves
-    const Looks looks = look(elements_, patch.seen);
-    for (std::size_t i = 0; i < patch.seen.size(); ++i)
-      if (const auto& own = elements_.elements[patch.seen[i]];
-          double(looks.least[i]) < very_bad * shaping_.enough)
-        worst.insert(worst.end(), own.begin(), own.end());
-    worst = distinct(std::move(worst));
+    const List worst = shaping_.close > 0. ? List() : curves_of_worst(patch);
     Work::Anchors anchors(patch.curves.size());
     for (std::size_t i = 0; i < anchors.size(); ++i) {
       const bool gives = std::ranges::binary_search(worst, patch.curves[i]);
@@ -256,22 +302,45 @@ class Shaper {
         anchors[i][d] =
             anchor(elements_.curves[patch.curves[i]], d, gives ? shaping_.worst_off : shaping_.off);
     }
-    Work(elements_, patch, shaping_, std::move(anchors)).run();
+    Work::Held held(shaping_.close > 0. ? patch.seen.size() : 0);
+    for (std::size_t i = 0; i < held.size(); ++i) held[i] = {hold(patch.seen[i], 0), hold(patch.seen[i], 3)};
+    Work(elements_, patch, shaping_, std::move(anchors), std::move(held)).run();
   }
 
  private:
+  // Of what holds a place that gives by so many µm as gladly as the Jacobian at one place falls short by a tenth.
+  static double strength(double give) { return .01 / (give * give); }
+
+  List curves_of_worst(const Patch& patch) const {
+    List worst;
+    const Looks looks = look(elements_, patch.seen);
+    for (std::size_t i = 0; i < patch.seen.size(); ++i)
+      if (const auto& own = elements_.elements[patch.seen[i]];
+          double(looks.least[i]) < very_bad * shaping_.enough)
+        worst.insert(worst.end(), own.begin(), own.end());
+    return distinct(std::move(worst));
+  }
+
+  HeldFace hold(std::uint32_t element, std::size_t depth) const {
+    constexpr double hopeless =
+        100.;  // µm: an element cannot follow every fold, and what is farther counts less
+    HeldFace held{pins_of(elements_, element, depth, surfaces_.at(depth)), {}};
+    for (std::size_t k = 0; k < held.by.size(); ++k)
+      held.by[k] = strength(shaping_.off) / (1. + std::pow(held.pins[k].off / hopeless, 2));
+    return held;
+  }
+
   Anchor anchor(const Depths& curve, std::size_t d, double give) const {
     constexpr double reach = 500.;  // µm
-    const double small = .01 / (shaping_.along * shaping_.along), strong = .01 / (give * give);
-    Anchor result{curve[d], small * Matrix<3>::Identity()};
-    if (d == 1 || d == 2) return result;
-    const TriangleTree& surface = d == 0 ? surfaces_.outer : surfaces_.inner;
+    Anchor result{curve[d], strength(shaping_.along) * Matrix<3>::Identity()};
+    if (d == 1 || d == 2 || shaping_.close > 0.) return result;
+    const TriangleTree& surface = surfaces_.at(d);
     const auto hit = surface.nearest(curve[d], reach);
     if (!hit) return result;
     const Place n = surface.normal(hit->triangle);
     if (n.dot(curve[0] - curve[3]) <= 0.) return result;  // the other bank
     result.at += n * n.dot(hit->at - curve[d]);
-    result.hold += strong * n * n.transpose();
+    result.hold += strength(give) * n * n.transpose();
     return result;
   }
 
@@ -297,7 +366,8 @@ void improve_shapes(Elements& elements, const SurfaceTrees& surfaces, const Shap
     parallel_for(looked_at.size(), 64, [&](std::size_t i) {
       const std::uint32_t e = looked_at[i];
       const double least = double(looks.least[i]), volume = double(looks.volume[i]);
-      bad[e] = least < shaping.enough || volume < (shaping.least - .05) * shaping.volume ||
+      bad[e] = least < shaping.enough || (shaping.close > 0. && shape.is_far(e)) ||
+               volume < (shaping.least - .05) * shaping.volume ||
                volume > (shaping.most + .05) * shaping.volume || !certify(elements.hexahedron(e)).positive();
       worst[e] = least < very_bad * shaping.enough;
     });

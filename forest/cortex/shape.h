@@ -9,6 +9,8 @@
 // measures this one is bounded and so can begin at folded elements), and χ(s) is s well above 0 and never 0, so that what is
 // nearly folded counts by far the most (gauge.h). The second is over elements, in wanted volumes; the third over places, and how far they
 // went; the last over places on a surface, and how far they are from it. What is well shaped stays where it is.
+// The last may be over 5×5 places of faces instead, since a face bulges between its curves: each is held to the plane nearest to it, the
+// less the farther that is beyond .1 mm, and not where it is beyond .3 mm or the other bank's.
 #pragma once
 
 #include <span>
@@ -25,14 +27,18 @@ struct Shaping {
   double even = 4.;                // what (a volume beyond these)² counts, in wanted volumes
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
-  double off = 25.;         // µm, likewise from a surface
-  double worst_off = 100.;  // of the worst: a surface may be creased more sharply than an element can be
-  int rounds = 3;           // of looking for what is badly shaped, and where the surfaces are
-  int iterations = 60;      // in each
-  double gain = .02;        // of the whole, by five of these: with less a patch is left
-  int room = 1;             // rings of elements around the worst that move with them
-  int patch = 24;           // elements that are shaped at once
-  bool finely = false;      // what lies between is looked at, too: at 9×9×9 places of each element
+  double off = 25.;  // µm, likewise from a surface
+  double worst_off =
+      100.;        // of the curves of the worst: a surface may be creased more sharply than an element can be
+  int rounds = 3;  // of looking for what is badly shaped, and where the surfaces are
+  int iterations = 60;  // in each
+  double gain = .02;    // of the whole, by five of these: with less a patch is left
+  int room = 1;         // rings of elements around the worst that move with them
+  int patch = 24;       // elements that are shaped at once
+  double close =
+      0.;  // µm; above 0 it is 5×5 places of each face that are held to a surface, not the curves' own, and
+           // elements with one that is farther off are shaped, too
+  bool finely = false;  // what lies between is looked at, too: at 9×9×9 places of each element
 };
 
 /// @param among  elements that are looked at; none: all of them

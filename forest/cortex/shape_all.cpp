@@ -19,8 +19,8 @@ struct Asked {
   Shaping last;     // of the few that are badly shaped still: they may take room, and leave the surface
   Shaping even;     // where nothing is tangled any more volumes can be evened …
   Shaping roomy;    // … and what is sheared still has room
-  Shaping closely;  // held closer to the surfaces
-  Shaping patient;  // finds again what shape was lost to that
+  Shaping closely;  // faces come as near as they may, and shapes yield a little …
+  Shaping patient;  // … which they get back, with patience, where it costs faces least
 
   explicit Asked(double volume)
       : first{.volume = volume},
@@ -40,9 +40,11 @@ struct Asked {
         roomy(even),
         closely(even),
         patient(even) {
-    for (Shaping* s : {&roomy, &closely, &patient}) s->along = 1600., s->off = 50., s->worst_off = 400.;
-    closely.off = 15.;
-    patient.off = 30., patient.even = 10., patient.iterations = 120, patient.gain = .005;
+    for (Shaping* s : {&roomy, &closely, &patient}) s->along = 1600.;
+    for (Shaping* s : {&closely, &patient}) s->close = 40.;
+    roomy.off = 50., roomy.worst_off = 400.;
+    closely.off = 10., closely.even = 8.;
+    patient.off = 30., patient.even = 12., patient.iterations = 150, patient.gain = .003;
   }
 };
 
@@ -64,7 +66,7 @@ bool faces_are_close(const Elements& elements, const SurfaceTrees& surfaces) {
 }  // namespace
 
 void shape_all(Cortex& cortex, const SurfaceTrees& surfaces, double volume, Progress& progress) {
-  constexpr int evenings = 2, evenings_with_faces = 6;
+  constexpr int evenings = 2;
   Elements& elements = cortex.elements;
   const Asked asked(volume);
   const auto improve = [&](const Shaping& shaping) { improve_shapes(elements, surfaces, shaping, progress); };
@@ -90,22 +92,18 @@ void shape_all(Cortex& cortex, const SurfaceTrees& surfaces, double volume, Prog
   cortex.left_out = leave_out(elements, least_jacobian);
   cortex.wall += cortex.left_out.volume;
 
-  // Faces that take what they lacked make volumes uneven again.
   fit_faces(elements, surfaces, Fit::places);
   for (int time = 0; time < 2; ++time) fit_faces(elements, surfaces, Fit::volume);
-  for (int time = 0; time < evenings_with_faces && !is_good(); ++time) {
-    improve(asked.roomy);
-    fit_faces(elements, surfaces, Fit::volume);
-  }
-  // What some faces cannot take all of them do. Then every place of a face comes as near to its surface as shapes allow.
+  // What some faces cannot take all of them do. Then faces, shapes and volumes are asked for at once.
   const double whole = cortex.between - cortex.wall;
   keep_volume(elements, whole);
-  for (int time = 0; time < evenings && !(is_good() && faces_are_close(elements, surfaces)); ++time) {
-    fit_faces(elements, surfaces, Fit::places);
+  for (int time = 0; time < evenings; ++time) {
+    const bool close = faces_are_close(elements, surfaces);
+    if (close && is_good()) break;
+    if (!close) improve(asked.closely);
+    improve(asked.patient);
     keep_volume(elements, whole);
-    improve(asked.closely);
   }
-  if (!is_good()) improve(asked.patient);
   begin_again(Rings::many);
   keep_volume(elements, whole);
   begin_again(Rings::many);  // a height for all costs some

@@ -35,6 +35,9 @@ struct WCurve {
 /// Both surfaces of a cortex, on which places are looked up.
 struct SurfaceTrees {
   const TriangleTree &outer, &inner;
+
+  /// Where curves with four places have their first and their last.
+  const TriangleTree& at(std::size_t depth) const { return depth == 0 ? outer : inner; }
 };
 
 /// Between the last .15 mm of a curve and the surfaces' normals where it ends, degrees.

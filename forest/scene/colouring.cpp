@@ -457,7 +457,7 @@ class Painter {
           all.push_back({{own.legend[k].name, as.colour, own.legend[k].step}, own.legend[k].step});
         else if (!own.legend[k].step.empty() && same->first.name == own.legend[k].name)
           same->last = own.legend[k].step;
-        else
+        else if (same->first.name != own.legend[k].name)
           ++same->others;
       }
     }

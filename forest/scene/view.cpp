@@ -480,7 +480,8 @@ constexpr int outline_corners = 16;
 /// their area, the straws of one level of bricks.
 struct Places {
   std::vector<Vec3> places;
-  bool all = true;  // else a sample
+  std::vector<Sphere> somata;  // of which each has some
+  bool all = true;             // else a sample
 };
 /// @param seen  whether an instance is
 template <class Seen>
@@ -491,22 +492,20 @@ Places places_on_branches(const Forest& forest, const Seen& seen) {
   for (std::uint32_t i = 0; i < instances.size(); ++i)
     if (seen(i)) total += forest.neurons()[instances[i].morphology].original_count;
   std::vector<Vec3> places;
+  std::vector<Sphere> somata;
   if (total <= small) {
     for (std::uint32_t i = 0; i < instances.size(); ++i) {
       if (!seen(i)) continue;
       const Placed placed(instances[i]);
       const Neuron& neuron = forest.neurons()[instances[i].morphology];
-      const auto add = [&](const Vec3& at) { places.push_back(placed({at, 0.f}).centre); };
       for (const frame::Segment& s : forest.segments().subspan(neuron.first_segment, neuron.original_count)) {
-        const Vec3 from(s.ax, s.ay, s.az), to(s.bx, s.by, s.bz);
-        add(to);
+        places.push_back(placed({{s.bx, s.by, s.bz}, 0.f}).centre);
         if ((s.meta & 7u) != 1u) continue;
-        const float at_from = from_half(s.radii & 0xffffu), at_to = from_half(s.radii >> 16);
-        for (const Vec3& out : {Vec3(Vec3::UnitX()), Vec3(Vec3::UnitY()), Vec3(Vec3::UnitZ())})
-          for (const float sign : {-1.f, 1.f}) add(from + sign * at_from * out), add(to + sign * at_to * out);
+        somata.push_back(placed({{s.ax, s.ay, s.az}, from_half(s.radii & 0xffffu)}));
+        somata.push_back(placed({{s.bx, s.by, s.bz}, from_half(s.radii >> 16)}));
       }
     }
-    return {std::move(places), true};
+    return {std::move(places), std::move(somata), true};
   }
   const auto bricks = forest.bricks();
   const auto owners = forest.owners();
@@ -523,7 +522,7 @@ Places places_on_branches(const Forest& forest, const Seen& seen) {
     }
     if (places.size() >= enough || !first.child_count) break;
   }
-  return {std::move(places), false};
+  return {std::move(places), {}, false};
 }
 
 /// Where an eye must be so that a pyramid of view of given directions and slopes encloses points. With axes r (right) and d
@@ -540,8 +539,9 @@ class Enclosing {
     reach_.fill(-std::numeric_limits<float>::infinity());
   }
 
-  void add(const Vec3& p) {
-    for (std::size_t n = 0; n < 4; ++n) reach_[n] = std::max(reach_[n], normals_[n].dot(p));
+  void add(const Vec3& p, float radius = 0.f) {
+    for (std::size_t n = 0; n < 4; ++n)
+      reach_[n] = std::max(reach_[n], normals_[n].dot(p) + radius * normals_[n].norm());
   }
   /// All but a few that reach far beyond the others; of a sample, which has few of the farthest, all but those.
   void add_most(std::span<const Vec3> points, bool sample) {
@@ -693,6 +693,7 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   if (!all) view.fog = std::clamp(bounds.extent().norm() / forest.soma_bounds().extent().norm(), least, 1.f);
   const Places branches = places_on_branches(forest, seen);
   enclosing.add_most(branches.places, !branches.all);
+  for (const Sphere& s : branches.somata) enclosing.add(s.centre, s.radius);
   // The near side of a wide forest shall not hide what lies behind it; a slab has none.
   const float wide = std::max(radius,
                               std::min(.25f * bounds.extent().norm(), reach_along(forest, stands.col(2)))),

@@ -213,8 +213,8 @@ TEST(View, TheOverviewHoldsASomaThatLiesAtTheEdge) {
   const std::vector<Morphology> neurons(c.morphologies.size(), builder.build());
   const frame::Camera camera = overview(Forest::from_bytes(pack(c, neurons)), 1.5f).camera;
   const Vec3 middle = neurons[0].soma().sphere().position();
-  for (const float turn : {0.f, 1.6f, 3.1f, 4.7f}) {
-    const Vec3 rim = Vec3(12.f * std::cos(turn), -80.f, 12.f * std::sin(turn)) - middle;
+  for (const float turn : {0.f, .8f, 2.4f, 3.1f, 5.5f}) {
+    const Vec3 rim = Vec3(8.f * std::cos(turn), -76.f, 8.f * std::sin(turn)) - middle;
     EXPECT_LT(project(camera, {900.f, 600.f}, rim).y(), 600.f);
   }
 }

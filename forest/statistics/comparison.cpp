@@ -136,7 +136,7 @@ std::string sentence(const Comparison& c, const std::string& a, const std::strin
   return fmt::format(
       "{} and {} can be told apart {} (p ≤ {:.2g}): {}; {} of {} features differ after Holm's "
       "correction{}.{}",
-      a, b, how, c.p, ranks, differ, c.compared(), by.empty() ? "" : ", most of all " + by, alone);
+      a, b, how, c.p, ranks, differ, c.compared(), by.empty() ? "" : ", led by " + by, alone);
 }
 
 }  // namespace forest::statistics

@@ -385,8 +385,9 @@ double Distribution::quantile(double p) const {
     take(placed(c.family->quantile(c.parameters, downwards ? 1. - inside : inside)));
   for (const Atom& a : atoms) take(a.value);
   if (components.size() == 1 && atoms.empty()) {
-    const bool limited = components[0].family->support == Family::interval;
-    if ((p == 0. || p == 1.) && !limited) return nan;
+    const Family::Support support = components[0].family->support;
+    if (support == Family::positive && p == (downwards ? 1. : 0.)) return origin;
+    if ((p == 0. || p == 1.) && support != Family::interval) return nan;
     return step > 0. ? step * std::round(high / step) : high;
   }
   if (step > 0.) low -= step, high += step;

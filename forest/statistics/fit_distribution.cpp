@@ -35,8 +35,9 @@ struct Sample {
   std::vector<Atom> atoms;
   double step = 0.;
   std::size_t count = 0, left_out = 0;
-  Distribution place;    // where values begin, without any component
-  bool limited = false;  // there is such a place
+  Distribution place;               // where values begin, without any component
+  std::optional<double> beginning;  // the limit that this is
+  double farthest = infinity;       // the other limit, as counted from it
 };
 
 struct Run {  // of values that are equal but for the rounding of coordinates in single precision
@@ -128,6 +129,26 @@ std::vector<Run> take_atoms(std::vector<Run>& runs, std::size_t count, bool step
   return atoms;
 }
 
+/// Sets where values begin, and takes out those that lie there; nothing where one lies beyond.
+/// @return  how many those are
+std::size_t begin_at_limit(Sample& sample, const FitOptions& options) {
+  constexpr double of_limit = 3e-6,
+                   of_spread = 3e-5;  // straight lines of single precision are so nearly straight
+  Values& x = sample.x;               // sorted
+  if (x.empty() || options.angles || !(options.least || options.most)) return 0;
+  const double median = x[x.size() / 2];
+  const bool down = options.most && (!options.least || *options.most - median < median - *options.least);
+  const double limit = down ? *options.most : *options.least;
+  const double on_it = of_limit * std::abs(limit) + of_spread * Tolerance(x).spread;
+  if (down ? x.back() > limit + on_it : x.front() < limit - on_it) return 0;
+  if (sample.step > 0. && (down || limit != 0.)) return 0;
+  sample.beginning = limit;
+  sample.place.origin = limit, sample.place.downwards = down;
+  if (options.least && options.most) sample.farthest = *options.most - *options.least;
+  if (sample.step > 0.) return 0;  // what is rounded to it lies there, too
+  return std::erase_if(x, [&](double v) { return std::abs(v - limit) <= on_it; });
+}
+
 Sample sample_of(std::span<const double> values, const FitOptions& options) {
   Sample sample;
   Values& x = sample.x;
@@ -139,22 +160,12 @@ Sample sample_of(std::span<const double> values, const FitOptions& options) {
   std::ranges::sort(x);
   sample.count = x.size(), sample.left_out = values.size() - x.size();
   if (x.empty()) return sample;
+  if (options.atoms) sample.step = step_of(runs_of(x), x.size());
+  const std::size_t on_limit = begin_at_limit(sample, options);
   const Values sorted = x;
   std::vector<Run> runs = runs_of(sorted);
-  if (options.atoms) sample.step = step_of(runs, x.size());
   std::vector<Run> atoms;
   if (options.atoms || runs.size() == 1) atoms = take_atoms(runs, x.size(), sample.step > 0.);
-  if (const auto end = options.most ? options.most : options.least; end && !options.angles) {
-    sample.place.origin = *end, sample.place.downwards = options.most.has_value();
-    const double on_it = Tolerance(sorted)(*end);
-    sample.limited = sample.place.counted(options.most ? sorted.back() : sorted.front()) >= -on_it;
-    if (sample.limited)
-      for (const Run& r : runs)
-        if (std::abs(r.value - *end) <= on_it) atoms.push_back(r), atoms.back().value = *end;
-    std::erase_if(runs, [&](const Run& r) { return sample.limited && std::abs(r.value - *end) <= on_it; });
-    std::ranges::sort(atoms, {}, &Run::value);
-  }
-  if (!sample.limited) sample.place = {};
   x.clear();
   for (const Run& r : runs)
     for (std::size_t i = 0; i < r.count; ++i) {
@@ -173,6 +184,7 @@ Sample sample_of(std::span<const double> values, const FitOptions& options) {
     std::ranges::sort(atoms, {}, &Run::value);
     x.clear(), sample.step = 0.;
   }
+  if (on_limit) atoms.push_back({*sample.beginning, on_limit, 0}), std::ranges::sort(atoms, {}, &Run::value);
   for (const Run& r : atoms) sample.atoms.push_back({r.value, double(r.count) / double(sample.count)});
   return sample;
 }
@@ -283,10 +295,11 @@ int parameters_of(const Spec& spec, bool angles) {
   return sum;
 }
 
-std::string name_of(const Spec& spec) {
+/// @param prefix  of what they count from
+std::string name_of(const Spec& spec, const std::string& prefix) {
   std::string name;
   for (const Family* f : spec) name += (name.empty() ? "" : " + ") + std::string(f->name);
-  return name;
+  return prefix + (spec.size() > 1 && !prefix.empty() ? '(' + name + ')' : name);
 }
 
 Spec spec_of(const std::string& text) {
@@ -334,6 +347,7 @@ std::vector<Spec> candidates_of(const Values& x, const FitOptions& options) {
     if (!allows(f, x, options.angles)) continue;
     specs.push_back({&f});
     if (f.support == Family::interval || f.name == "weibull" || f.name == "exponential") continue;
+    if (!options.mixtures) continue;
     if (x.size() >= 100) specs.push_back({&f, &f});
     if (x.size() >= 300 && f.support != Family::circle) specs.push_back({&f, &f, &f});
   }
@@ -541,13 +555,17 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
     constexpr double beyond = 1e-4;  // of draws, that may lie there
     const auto components = fitted(spec, x, options.angles);
     if (!components) return;
-    if (sample.limited && options.families.empty() && cdf(*components, 0.) > beyond) return;
+    if (sample.beginning && options.families.empty() &&
+        cdf(*components, 0.) + 1. - cdf(*components, sample.farthest) > beyond)
+      return;
     const double likelihood = log_likelihood(*components, x), n = double(x.size()),
                  k = parameters_of(spec, options.angles);
     if (!std::isfinite(likelihood)) return;
     const double aicc = n > k + 1. ? 2. * k - 2. * likelihood + 2. * k * (k + 1.) / (n - k - 1.) : infinity;
-    all.push_back(
-        {spec, *components, {name_of(spec), likelihood, int(k), aicc, k * std::log(n) - 2. * likelihood}});
+    all.push_back({spec,
+                   *components,
+                   {name_of(spec, sample.place.prefix()), likelihood, int(k), aicc,
+                    k * std::log(n) - 2. * likelihood}});
   };
   if (!x.empty()) {
     for (const Spec& spec : candidates_of(x, options)) attempt(spec);
@@ -560,9 +578,7 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   const double part = double(x.size()) / double(sample.count);
   if (!all.empty()) {
     const Fitted& best = all.front();
-    const std::string before = sample.place.prefix();
-    const bool together = best.spec.size() > 1 && !before.empty();
-    fit.name = before + (together ? '(' + best.candidate.name + ')' : best.candidate.name);
+    fit.name = best.candidate.name;
     fit.distribution.components = best.components;
     for (Component& c : fit.distribution.components) c.weight *= part;
     fit.distribution.step = sample.step;

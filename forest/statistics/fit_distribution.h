@@ -24,10 +24,12 @@ struct FitOptions {
   /// allow, and with 100 values mixtures of two, with 300 of three of one family.
   std::vector<std::string> families = {};
   bool angles = false;  // degrees on the circle: values are brought to (-180, 180]
-  /// Beyond which no value can lie. Then families count from there; one that has more than one of 10,000 values beyond it is not
-  /// chosen unless it is named; what lies on it is an atom. Of both limits the upper one is counted from.
+  /// Beyond which no value can lie. Then families count from there (of both limits from the one nearer to the median), and one that
+  /// has more than one of 10,000 values beyond either is not chosen unless it is named. What lies on it is an atom. Where a value
+  /// lies beyond it there is none; of values in steps only a least of 0 is heeded.
   std::optional<double> least = {}, most = {};
-  bool atoms = true;  // look for values that come back exactly and for the steps of a tracer
+  bool mixtures = true;  // of enough values, unless families are named
+  bool atoms = true;     // look for values that come back exactly and for the steps of a tracer
   InformationCriterion criterion = InformationCriterion::bic;
   double confidence = 0.95;
   std::size_t replicates = 99;  // of the parametric bootstrap behind p; 0: p is not worked out

@@ -49,13 +49,8 @@ constexpr Row rows[] = {
      0.},
     {Quantity::trajectory, "length_of_terminal_segments", "µm", "path length of sections that end", false,
      0.},
-    {Quantity::trajectory,
-     "contraction",
-     "",
-     "straight distance between the ends of a section over its path length",
-     false,
-     {},
-     1.},
+    {Quantity::trajectory, "contraction", "",
+     "straight distance between the ends of a section over its path length", false, 0., 1.},
     {Quantity::trajectory, "turn", "°", "angle between one piece of 10 µm of a section and the next", false,
      0.},
     {Quantity::rotations, "angle_of_thicker_daughter", "°",
@@ -263,8 +258,7 @@ SegmentFamilies segment_families(std::span<const Morphology> cells, const Family
       std::vector<std::vector<double>> held(edges.size());
       for (std::size_t i = 0; i < given.size(); ++i)
         if (!std::isnan(given[i])) held[bin_of(edges, given[i])].push_back(q.values[i]);
-      if (how.families.empty())  // in a bin there are too few for mixtures
-        for (const Family& f : families()) how.families.emplace_back(f.name);
+      how.mixtures = false;  // in a bin there are too few
       for (std::size_t b = 0; b < edges.size(); ++b)
         fitted.bins.push_back({edges[b], fit_distribution(held[b], how)});
       fitted.distribution =

@@ -46,6 +46,11 @@ fails_with 1 "bad.lsys:4: column 14: 'ten' is not known" $BRAINFOREST grow --gra
 printf 'limit: 1000\nsteps: 50\naxiom: A\nrabbits: A -> F [+ A] A\n' >runaway.lsys
 fails_with 1 'production rabbits' $BRAINFOREST grow --grammar runaway.lsys --out runaway --repo runaway.db
 [ -z "$(ls -A runaway)" ]
+$BRAINFOREST grow --grammar bes --count 1 --repo there.db >/dev/null
+fails_with 1 'production rabbits' $BRAINFOREST grow --grammar runaway.lsys --repo there.db
+$BRAINFOREST model list --repo there.db >models.txt  # no model without neurons
+grep -q bes models.txt
+[ -z "$(grep runaway models.txt || true)" ]
 
 # A time lapse: the same neuron younger, after every so many steps, up to the last.
 $BRAINFOREST grow --grammar bes --count 2 --seed 3 --out lapse --time-lapse 100 --json >lapse.json
