@@ -140,14 +140,15 @@ class Painter {
   bool is_glia(std::uint32_t instance) const {
     return forest_.circuit().types[forest_.types()[instance]].glia;
   }
-  // Which kinds of sections its neurons have that are no glia, the soma being 1.
+  // Which kinds of sections its neurons have that are no glia, the soma being 1; of very many distinct ones those of the first.
   std::array<bool, 8> kinds() const {
     std::array<bool, 8> result{};
+    std::size_t left = 10'000;
     std::vector<bool> seen(forest_.neurons().size());
-    for (std::uint32_t i = 0; i < looks_.size(); ++i) {
+    for (std::uint32_t i = 0; i < looks_.size() && left > 0; ++i) {
       const std::uint32_t own = forest_.instances()[i].morphology;
       if (seen[own] || is_glia(i)) continue;
-      seen[own] = true;
+      seen[own] = true, --left;
       const Neuron& neuron = forest_.neurons()[own];
       result[1] = result[1] || neuron.soma_radius > 0.f;
       for (const SectionFacts& section :
