@@ -38,11 +38,11 @@ std::array<Pin, face_places> pins_of(const Elements& elements, std::size_t eleme
   std::array<Pin, face_places> pins;
   for (int k = 0; k < face_places; ++k) {
     Pin& pin = pins[std::size_t(k)];
-    pin.at = place_of(patch, k);
-    const auto hit = surface.nearest(pin.at, reach);
+    const Place at = place_of(patch, k);
+    const auto hit = surface.nearest(at, reach);
     if (!hit) continue;
     const Place n = surface.normal(hit->triangle);
-    if (n.dot(outwards) > 0.) pin.normal = n, pin.off = n.dot(hit->at - pin.at);
+    if (n.dot(outwards) > 0.) pin.normal = n, pin.off = n.dot(hit->at - at);
   }
   return pins;
 }

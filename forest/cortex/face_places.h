@@ -19,7 +19,6 @@ const FaceWeights& face_weights();
 
 /// The surface nearest to a place of a face, as a plane.
 struct Pin {
-  Place at = Place::Zero();      // of the face
   Place normal = Place::Zero();  // of the surface; zero where it is far or the other bank
   double off = 0.;               // µm, along it, from the place to the surface
 };

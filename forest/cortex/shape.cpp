@@ -322,8 +322,7 @@ class Shaper {
   }
 
   HeldFace hold(std::uint32_t element, std::size_t depth) const {
-    constexpr double hopeless =
-        100.;  // µm: an element cannot follow every fold, and what is farther counts less
+    constexpr double hopeless = 100.;  // µm: no element follows every fold, and what is farther counts less
     HeldFace held{pins_of(elements_, element, depth, surfaces_.at(depth)), {}};
     for (std::size_t k = 0; k < held.by.size(); ++k)
       held.by[k] = strength(shaping_.off) / (1. + std::pow(held.pins[k].off / hopeless, 2));

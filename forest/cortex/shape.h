@@ -28,16 +28,16 @@ struct Shaping {
   double along =
       400.;  // µm: as far, a place moves as gladly as it lets the Jacobian at one place fall short by a tenth
   double off = 25.;  // µm, likewise from a surface
-  double worst_off =
-      100.;        // of the curves of the worst: a surface may be creased more sharply than an element can be
-  int rounds = 3;  // of looking for what is badly shaped, and where the surfaces are
+  /// Of the curves of the worst: a surface may be creased more sharply than an element can be.
+  double worst_off = 100.;
+  int rounds = 3;       // of looking for what is badly shaped, and where the surfaces are
   int iterations = 60;  // in each
   double gain = .02;    // of the whole, by five of these: with less a patch is left
   int room = 1;         // rings of elements around the worst that move with them
   int patch = 24;       // elements that are shaped at once
-  double close =
-      0.;  // µm; above 0 it is 5×5 places of each face that are held to a surface, not the curves' own, and
-           // elements with one that is farther off are shaped, too
+  /// µm; above 0 it is 5×5 places of each face that are held to a surface, not the curves' own, and elements with one that is farther
+  /// off are shaped, too.
+  double close = 0.;
   bool finely = false;  // what lies between is looked at, too: at 9×9×9 places of each element
 };
 

@@ -552,11 +552,11 @@ DistributionFit fit_distribution(std::span<const double> values, const FitOption
   };
   std::vector<Fitted> all;
   const auto attempt = [&](const Spec& spec) {
-    constexpr double beyond = 1e-4;  // of draws, that may lie there
+    constexpr double before = 1e-4, beyond = 1e-3;  // of draws, that may lie outside of both limits
     const auto components = fitted(spec, x, options.angles);
     if (!components) return;
     if (sample.beginning && options.families.empty() &&
-        cdf(*components, 0.) + 1. - cdf(*components, sample.farthest) > beyond)
+        (cdf(*components, 0.) > before || 1. - cdf(*components, sample.farthest) > beyond))
       return;
     const double likelihood = log_likelihood(*components, x), n = double(x.size()),
                  k = parameters_of(spec, options.angles);

@@ -25,8 +25,8 @@ struct FitOptions {
   std::vector<std::string> families = {};
   bool angles = false;  // degrees on the circle: values are brought to (-180, 180]
   /// Beyond which no value can lie. Then families count from there (of both limits from the one nearer to the median), and one that
-  /// has more than one of 10,000 values beyond either is not chosen unless it is named. What lies on it is an atom. Where a value
-  /// lies beyond it there is none; of values in steps only a least of 0 is heeded.
+  /// has more than one of 10,000 values beyond it, or of 1,000 beyond the other, is not chosen unless it is named. What lies on it is
+  /// an atom. Where a value lies beyond it there is none; of values in steps only a least of 0 is heeded.
   std::optional<double> least = {}, most = {};
   bool mixtures = true;  // of enough values, unless families are named
   bool atoms = true;     // look for values that come back exactly and for the steps of a tracer
