@@ -191,7 +191,8 @@ std::string report_of(const SegmentFamilies& f, const SegmentValues& seen, const
                          .note = note_of(q.fit),
                          .values = seen.quantities[i].values,
                          .density = [&d = q.fit.distribution](double x) { return d.density(x); },
-                         .step = q.fit.distribution.step};
+                         .step = q.fit.distribution.step,
+                         .origin = q.fit.distribution.origin};
       for (const Atom& atom : q.fit.distribution.atoms) panel.atoms.emplace_back(atom.value, atom.weight);
       panels.push_back(std::move(panel));
       bool first = true;

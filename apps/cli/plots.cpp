@@ -335,11 +335,12 @@ std::string density_plots(std::span<const DensityPanel> panels) {
     double bin = 2. * quartiles * std::pow(double(values.size()), -1. / 3.);  // Freedman & Diaconis 1981
     bin = std::clamp(bin, (x.high - x.low) / 60., (x.high - x.low) / 8.);
     if (panel.step > 0.) bin = panel.step * std::max(1., std::round(bin / panel.step));
-    const double first = panel.step > 0. ? (std::floor(x.low / panel.step) - .5) * panel.step : x.low;
+    const double begin = panel.step > 0. ? -.5 * panel.step : panel.origin;  // of a bar: none reaches beyond
+    const double first = begin + std::floor((x.low - begin) / bin) * bin;
     std::vector<double> bars(std::size_t(std::clamp((x.high - first) / bin, 0., 1e4)) + 1, 0.);
     for (const double v : smooth)
-      if (v >= x.low && v <= x.high)
-        bars[std::min(std::size_t((v - first) / bin), bars.size() - 1)] += 1. / (double(values.size()) * bin);
+      if (const double at = (v - first) / bin; at >= 0. && at < double(bars.size()))
+        bars[std::size_t(at)] += 1. / (double(values.size()) * bin);
     std::vector<double> curve(181, 0.);
     const auto place = [&](std::size_t i) {
       return x.low + (x.high - x.low) * double(i) / double(curve.size() - 1);
@@ -367,6 +368,8 @@ std::string density_plots(std::span<const DensityPanel> panels) {
       if (!(value >= x.low && value <= x.high)) continue;
       svg.add(R"(<line x1="{0:.1f}" y1="{1:.1f}" x2="{0:.1f}" y2="{2:.1f}" stroke="{3}" stroke-width="3"/>)",
               x(value), base, base - plot * std::min(1., share), colour_of(2));
+      constexpr double told = .05;  // the table has them all
+      if (share < told) continue;
       const bool right = x(value) > .5 * (x.from + x.to);
       svg.text(x(value) + (right ? -6. : 6.), base - plot * std::min(.95, share) - 2.,
                fmt::format("{:.0f} % are {}", 100. * share, number(value)), right ? "end" : "start", 10.5,

@@ -78,13 +78,14 @@ std::string heat_plots(std::span<const HeatPanel> panels, std::size_t side, doub
                        const std::string& x_title, const std::string& y_title);
 
 /// Values as bars, and the density that was fitted to them. Atoms, values that come back exactly, are lines with their share and
-/// count in no bar; bars and curve have the area that atoms leave to 1.
+/// count in no bar; bars and curve have the area that atoms leave to 1. Shares of a twentieth and more are written beside them.
 struct DensityPanel {
   std::string title, unit, note;
   std::vector<double> values;
   std::function<double(double)> density;
   std::vector<std::pair<double, double>> atoms = {};  // value, share
   double step = 0.;                                   // values are whole multiples of this; 0: they are not
+  double origin = 0.;                                 // from which the density counts: where a bar begins
 };
 
 std::string density_plots(std::span<const DensityPanel> panels);
