@@ -48,7 +48,8 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   cortex.wall = under_wall(dropped, surfaces.inner);
   Folds folds = find_folds(dropped, curves, options.line_scale, progress);
   const Ribbon& ribbon = folds.ribbon;
-  const Quads quads = lay_quads(ribbon, folds.bent, folds.lines, {.volume = options.volume}, progress);
+  const Quads quads = lay_quads(ribbon, folds.bent, folds.lines,
+                                {.volume = options.volume, .whole = cortex.between - cortex.wall}, progress);
   cortex.elements = make_elements(ribbon, quads, folds.bent, curves, progress);
   cortex.lines = std::move(folds.lines);
   cortex.lines.insert(cortex.lines.end(), folds.sulci.begin(), folds.sulci.end());

@@ -14,6 +14,7 @@
 #include "forest/core/random.h"
 #include "forest/cortex/check_surfaces.h"
 #include "forest/cortex/fit_faces.h"
+#include "forest/cortex/folds.h"
 #include "forest/cortex/gaps.h"
 #include "forest/cortex/gauge.h"
 #include "forest/cortex/report.h"
@@ -415,6 +416,25 @@ TEST_F(Shell, ElementsAreValidEvenWholeAndTheSameAtAnyNumberOfThreads) {
   const Cortex again = made().build();
   EXPECT_EQ(again.elements.elements, cortex.elements.elements);
   EXPECT_EQ(again.elements.curves, cortex.elements.curves);
+}
+
+TEST(SmallCortex, HasElementsOfTheVolumeWantedInTheMean) {
+  LONG_TEST();
+  const auto radius = [](const Vec3& at) {
+    return 4500. + 1600. * std::sin(7. * at.x()) * std::cos(6. * at.y()) * std::cos(5. * at.z());
+  };
+  const Mesh outer = star(5, radius), inner = star(5, [&](const Vec3&at) { return radius(at) - 900.; });
+  const Laplace field(outer, inner, {.spacing = 300.}, Progress::none());
+  const Boundary outside(outer), inside(inner);
+  const WCurves curves(field, outside, inside);
+  const double whole = volume(outer) - volume(inner);
+  for (const double each : {2e8, 5e8}) {
+    const Folds folds = find_folds(make_ribbon(outer, curves, {.edge = ribbon_edge(each)}, Progress::none()),
+                                   curves, 1500., Progress::none());
+    const Quads quads =
+        lay_quads(folds.ribbon, folds.bent, folds.lines, {.volume = each, .whole = whole}, Progress::none());
+    EXPECT_NEAR(whole / double(quads.quads.size()), each, .008 * each);
+  }
 }
 
 TEST_F(Shell, NoiseShuffledFootprintsSwappedSurfacesAndDepthByLengthAreReported) {

@@ -101,9 +101,12 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
   progress.end();
 
   Quads quads;
-  const double count = std::round(volume / options.volume);
-  double factor = 1., nearest = 1e300;
-  for (int attempt = 0; attempt < 6; ++attempt) {
+  // How many elements a lattice has jumps with its spacing, by some percent where there are few. So steps by what lies under the ribbon,
+  // as spacings are, are followed by tries about the mean of what all before them say.
+  const double wanted = (options.whole > 0. ? options.whole : volume) / options.volume;
+  constexpr int steps = 6;
+  double factor = 1., nearest = 1e300, sum = 0.;
+  for (int attempt = 0; nearest >= options.volume_within && attempt < options.attempts; ++attempt) {
     progress.begin("laying the lattice of elements", 0);
     std::vector<double> spacings;
     for (const std::uint32_t v : vertices)
@@ -114,11 +117,11 @@ Quads lay_quads(const Ribbon& ribbon, std::span<const Curvature> curvature, std:
     Quads laid = halved(collapsed(settled, triangles));
     even_valences(laid);
     progress.end();
-    const double off = double(laid.quads.size()) / count;
-    if (quads.quads.empty() || std::abs(off - 1.) < nearest)
-      nearest = std::abs(off - 1.), quads = std::move(laid);
-    if (nearest < options.volume_within) break;
-    factor *= off;
+    const double elements = double(laid.quads.size()), off = std::abs(elements / wanted - 1.);
+    if (off < nearest) nearest = off, quads = std::move(laid);
+    sum += std::log(factor * elements / wanted);
+    factor = attempt + 1 < steps ? factor * elements / std::round(volume / options.volume)
+                                 : std::exp(sum / (attempt + 1));
   }
 
   const Guides guides{.curvatures = curvature, .arms = arms, .by = by, .heights = height, .lines = lines};

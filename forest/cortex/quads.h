@@ -28,8 +28,10 @@ struct Quads {
 };
 
 struct QuadOptions {
-  double volume = 1e9;          // µm³ under each
-  double volume_within = .007;  // of it: how near their mean must come
+  double volume = 1e9;  // µm³ under each
+  double whole = 0.;    // µm³ that all share; 0: what lies under the ribbon, whose triangles cut folds
+  double volume_within = .007;  // of the volume wanted: how near their mean must come
+  int attempts = 40;            // to have it so
   int relaxations = 30;
 };
 
