@@ -34,6 +34,28 @@ constexpr std::array binaries{
 constexpr int unary_level = 7;
 const Lookups nothing;
 
+// Takes arguments that are a number or a name out of a program that ends with all of them: whoever is called may say these itself.
+// Of each argument what it is, or a store when it is to be worked out and kept.
+Program without_plain(Program& out, const std::vector<std::size_t>& begins) {
+  Program plain;
+  if (begins.empty()) return plain;
+  const Program all(out.begin() + std::ptrdiff_t(begins[0]), out.end());
+  out.resize(begins[0]);
+  for (std::size_t k = 0; k < begins.size(); ++k) {
+    const auto first = all.begin() + std::ptrdiff_t(begins[k] - begins[0]);
+    const auto last =
+        k + 1 < begins.size() ? all.begin() + std::ptrdiff_t(begins[k + 1] - begins[0]) : all.end();
+    const Op op = first->op;
+    if (last - first == 1 && (op == Op::constant || op == Op::slot || op == Op::cell)) {
+      plain.push_back(*first);
+    } else {
+      plain.push_back({Op::store, 0, 0.});
+      out.insert(out.end(), first, last);
+    }
+  }
+  return plain;
+}
+
 }  // namespace
 
 void Compiler::add_slot(const std::string& name) {
@@ -49,9 +71,9 @@ std::int32_t Compiler::slot_of(const std::string& name) const {
   return found == names_.end() ? -1 : std::int32_t(found - names_.begin());
 }
 
-int Compiler::arguments(Program& out, const Signature& of) {
-  if (text_.takes(")")) return 0;
-  std::size_t count = 0;
+std::vector<std::size_t> Compiler::arguments(Program& out, const Signature& of) {
+  if (text_.takes(")")) return {};
+  std::vector<std::size_t> begins;
   std::map<std::size_t, Program> named;
   do {
     const std::size_t place = (text_.more(), text_.at());
@@ -59,8 +81,8 @@ int Compiler::arguments(Program& out, const Signature& of) {
     if (name.empty()) {
       if (!named.empty())
         text_.fail_at(place, "an argument in order stands before those by name; move it there");
+      begins.push_back(out.size());
       expression(out);
-      ++count;
       continue;
     }
     const auto parameter = std::size_t(std::ranges::find(of.parameters, name) - of.parameters.begin());
@@ -70,13 +92,15 @@ int Compiler::arguments(Program& out, const Signature& of) {
                         ? fmt::format("{} has no parameters with names; give its arguments in order", of.name)
                         : fmt::format("{} has no parameter '{}'; it has {}", of.name, name,
                                       fmt::join(of.parameters, ", ")));
-    if (parameter < count || named.contains(parameter))
+    if (parameter < begins.size() || named.contains(parameter))
       text_.fail_at(place, fmt::format("the parameter '{}' of {} is given twice", name, of.name));
     named[parameter] = apart();
   } while (text_.takes(","));
   text_.expect(")", "after the arguments");
   const std::size_t needed = of.parameters.size() - of.defaults.size();
-  for (; !named.empty(); ++count) {
+  while (!named.empty()) {
+    const std::size_t count = begins.size();
+    begins.push_back(out.size());
     if (const auto given = named.extract(count)) {
       out.insert(out.end(), given.mapped().begin(), given.mapped().end());
       barrier_ = out.size();
@@ -86,7 +110,7 @@ int Compiler::arguments(Program& out, const Signature& of) {
       text_.fail(fmt::format("the parameter '{}' of {} is missing", of.parameters[count], of.name));
     }
   }
-  return int(count);
+  return begins;
 }
 
 void Compiler::binding(Program& out) {
@@ -188,11 +212,10 @@ Program Compiler::apart() {
 }
 
 void Compiler::call(Program& out, const std::string& name, std::size_t place) {
-  const auto close = [&](int taken, std::size_t count) {
-    const int wanted = int(count);
-    if (taken != wanted)
+  const auto close = [&](const std::vector<std::size_t>& taken, std::size_t wanted) {
+    if (taken.size() != wanted)
       text_.fail_at(place, fmt::format("{} takes {} argument{}, {} given", name, wanted,
-                                       wanted == 1 ? "" : "s", taken));
+                                       wanted == 1 ? "" : "s", taken.size()));
   };
   if (name == "if") return choose(out);
   const auto found = meanings_.find(name);
@@ -200,10 +223,17 @@ void Compiler::call(Program& out, const std::string& name, std::size_t place) {
     const Meaning& f = found->second;
     const std::int32_t base = slots_;
     slots_ += f.slots;
-    close(arguments(out, {name, f.parameters}), f.parameters.size());
-    for (auto i = std::int32_t(f.parameters.size()); i-- > 0;) out.push_back({Op::store, base + i, 0.});
+    const std::vector<std::size_t> begins = arguments(out, {name, f.parameters});
+    close(begins, f.parameters.size());
+    const Program plain = without_plain(out, begins);
+    for (auto i = std::int32_t(plain.size()); i-- > 0;)
+      if (plain[std::size_t(i)].op == Op::store) out.push_back({Op::store, base + i, 0.});
     for (Instruction i : f.body) {
-      if (i.op == Op::slot || i.op == Op::store) i.index += base;
+      if (i.op == Op::slot && std::size_t(i.index) < plain.size() &&
+          plain[std::size_t(i.index)].op != Op::store)
+        i = plain[std::size_t(i.index)];
+      else if (i.op == Op::slot || i.op == Op::store)
+        i.index += base;
       out.push_back(i);
     }
     barrier_ = out.size();

@@ -50,8 +50,8 @@ class Compiler {
 
   /// Arguments and the parenthesis behind them: in order, then by name, `reach = 5`, with the default of what is left out
   /// before the last.
-  /// @return how many there are
-  int arguments(Program& out, const Signature& of);
+  /// @return where each of them begins
+  std::vector<std::size_t> arguments(Program& out, const Signature& of);
 
   /// `name = expression` as a store.
   void binding(Program& out);

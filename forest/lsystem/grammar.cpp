@@ -518,8 +518,8 @@ class Parser {
       Shape s{symbol(), 0};
       if (text_.takes("(")) {
         const Arity& arity = arities_[s.symbol];
-        const int count =
-            compiler.arguments(values, {grammar_.symbols[s.symbol], arity.names, arity.defaults});
+        const auto count =
+            int(compiler.arguments(values, {grammar_.symbols[s.symbol], arity.names, arity.defaults}).size());
         check_count(s.symbol, count, place);
         s.count = std::uint16_t(count);
       } else {

@@ -62,6 +62,24 @@ TEST(Expression, CallsFunctionsTablesAndConstants) {
   EXPECT_EQ(value_of("steps_of(99)", declarations), 20.);
 }
 
+// A parameter that is a name or a number where it is called is not kept; what is worked out or drawn is, once.
+TEST(Expression, ArgumentsAreWorkedOutOnce) {
+  const std::string declarations =
+      "function less(a, b) = a - b\n"
+      "function swapped(a, b) = less(b, a) * 100 + less(a, b)\n"
+      "function chosen(a, b) = if(a > b, less(a, b), if(b == 4, swapped(b, a), less(7, b)))\n"
+      "distribution drawn(a, b) = swapped(uniform(a, b), a) + 0 * b\n"
+      "cell size = swapped(2, 5)\n";
+  EXPECT_EQ(value_of("swapped(x, y)", declarations), 99.);
+  EXPECT_EQ(value_of("swapped(y, 2 * x) - swapped(b=x, a=10)", declarations), 198. - -693.);
+  EXPECT_EQ(value_of("swapped(swapped(x, y), less(x, 1))", declarations), -97. * 99.);
+  EXPECT_EQ(value_of("chosen(x, y) + chosen(y, x) + chosen(1, 2)", declarations), -99. + 1. + 5.);
+  EXPECT_EQ(value_of("size", declarations), 297.);
+  const double once = value_of("drawn(1, 2)", declarations);  // 99 (1 − u), where u is from 1 to 2
+  EXPECT_LT(once, 0.);
+  EXPECT_GT(once, -99.);
+}
+
 // What is called by names, beside the same in order; behind it declarations, before it the word that it grows.
 TEST(Expression, ArgumentsHaveNames) {
   const std::string declarations =

@@ -236,7 +236,7 @@ double* run(std::span<const Instruction> program, double* slots, std::span<const
         binary([](double a, double b) { return a / b; });
         break;
       case Op::power:
-        binary([](double a, double b) { return std::pow(a, b); });
+        binary([](double a, double b) { return b == 2. ? a * a : std::pow(a, b); });
         break;
       case Op::modulo:
         binary(modulo);

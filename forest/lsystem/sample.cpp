@@ -118,6 +118,7 @@ Course::Course(const Trace& t, float scale) {
     if (const float off = (end - t.end()).squaredNorm(); off < least)
       least = off, first = f, skip = count - wanted;
   }
+  places.reserve(std::size_t(wanted)), lengths.reserve(std::size_t(wanted));
   for (long i = 1; i <= first; ++i) places.push_back(place(i)), lengths.push_back(way(i));
   const Vec3 aside = place(first) - place(first + skip);
   const float longer = way(first) - way(first + skip);
@@ -141,11 +142,12 @@ std::vector<float> Course::climbed(float by) const {
   std::vector<float> heights(places.size());
   for (std::size_t i = 0; i < places.size(); ++i) heights[i] = places[i].z();
   if (by == 0.f) return heights;
-  std::vector<float> climbs, sloping;  // of each step: how far along z, and its length unless it is level
+  // Of each step: how far along z, and its length unless it is level.
+  std::vector<float> climbs(places.size()), sloping(places.size());
   float before = 0.f;
   for (std::size_t i = 0; i < places.size(); ++i) {
-    climbs.push_back(std::abs(places[i].z() - std::exchange(before, places[i].z())));
-    sloping.push_back(climbs[i] > as_high ? step_to(lengths, i) : 0.f);
+    climbs[i] = std::abs(places[i].z() - std::exchange(before, places[i].z()));
+    sloping[i] = climbs[i] > as_high ? step_to(lengths, i) : 0.f;
   }
   const float whole = std::reduce(climbs.begin(), climbs.end());
   float along = std::reduce(sloping.begin(), sloping.end());
@@ -168,6 +170,7 @@ void Course::levels(float share) {
   if (share == 0.f) return;
   std::vector<float> climbs;
   std::vector<std::size_t> to_change;  // if all of them were to
+  climbs.reserve(places.size()), to_change.reserve(places.size());
   float before = 0.f;
   for (std::size_t i = 0; i < places.size(); ++i) {
     climbs.push_back(places[i].z() - std::exchange(before, places[i].z()));
@@ -229,6 +232,7 @@ void Course::kinks(float times, float power) {
   const std::vector<Vec3> was = places;
   const auto before = [&](std::size_t i) { return i ? was[i - 1] : Vec3(Vec3::Zero()); };
   std::vector<float> turns, wanted;
+  turns.reserve(was.size()), wanted.reserve(was.size());
   float sum = 0.f, sum_wanted = 0.f;
   for (std::size_t i = 0; i + 1 < was.size(); ++i) {
     const Vec3 step = was[i] - before(i), next = was[i + 1] - was[i];
@@ -329,6 +333,7 @@ std::vector<Calibre> calibres(const Trace& of, std::span<const float> along) {
     return std::log(std::max(step_to(lengths, i), 1e-3f));
   };
   std::vector<float> diameters, own, here;
+  diameters.reserve(places.size()), own.reserve(places.size()), here.reserve(places.size());
   for (std::size_t n = 0; n < places.size(); ++n) {
     diameters.push_back(of.stops[places[n]].diameter);
     own.push_back(size(of.lengths, places[n]));
@@ -339,6 +344,7 @@ std::vector<Calibre> calibres(const Trace& of, std::span<const float> along) {
                   std::span<const float, window>(&own[n], window),
                   std::span<const float, window>(&here[n], window));
   std::vector<Calibre> told;
+  told.reserve(diameters.size());
   for (const float diameter : diameters) told.push_back({diameter, 0.f});
   share_changes(told);
   return told;
