@@ -30,7 +30,8 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
   if (!fs::is_directory(path)) return read(path);
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(path))
-    if (extension_of(entry.path()) == ".svg") files.push_back(entry.path());
+    if (extension_of(entry.path()) == ".svg" && !entry.path().filename().string().starts_with('.'))
+      files.push_back(entry.path());
   std::ranges::sort(files);
   if (files.empty()) throw InputError(path.string(), 0, "has no .svg file; give a folder of drawn sections");
   std::vector<cortex::ContourStack> drawings;

@@ -89,9 +89,13 @@ void tell_foreign(const cortex::Cortex& cortex, const Mesh& outer, const Mesh& i
 // Their volume alone does not show it: what elements lack in one place those around have more.
 void tell_far_faces(const cortex::Elements& elements, const cortex::Report& r, double volume,
                     Console& console) {
-  constexpr double far = .2;  // of an element's width
+  constexpr double far = .2, foreign = 2.;  // of an element's width
   for (const auto& [faces, w, name] : {std::tuple(r.outer, 0., "outer"), std::tuple(r.inner, 1., "inner")})
-    if (faces && faces->p99 > far * std::cbrt(volume)) {
+    if (faces && faces->p99 > foreign * std::cbrt(volume)) {
+      console.warn(fmt::format(
+          "faces are up to {:.2f} mm from the {} surface: they were made of another; give that one",
+          faces->most / 1e3, name));
+    } else if (faces && faces->p99 > far * std::cbrt(volume)) {
       const cortex::Place at = elements.hexahedron(faces->farthest).at(.5, .5, w) / 1e3;
       console.warn(fmt::format(
           "one of 100 places of faces is more than {:.2f} mm from the {} surface, the farthest {:.2f} mm, of "
@@ -281,9 +285,11 @@ std::function<void()> report(CLI::App& command, Console& console) {
     if (!o->borders.empty())
       deeper.borders = measure_borders(o->borders, outer_mesh, inner_mesh, file.cortex.lines);
     if (!o->layers.empty()) deeper.layers = measure_layers(o->layers, outer_mesh, inner_mesh);
+    if (const std::string doubt = doubt_of_order(o->layers); !doubt.empty()) console.warn(doubt);
     if (outer && inner) tell_foreign(file.cortex, outer_mesh, inner_mesh, console);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
+    tell_far_faces(file.cortex.elements, r, file.volume, console);
     deeper.symmetry = cortex::symmetry(file.cortex.elements, file.cortex.lines);
     deeper.bok = cortex::bok(file.cortex.elements);
     tell(file.cortex, r, deeper, file.volume, seconds_since(begin), console);

@@ -19,6 +19,7 @@
 #include "forest/core/error.h"
 #include "forest/core/file.h"
 #include "forest/core/lower.h"
+#include "forest/core/number_order.h"
 #include "forest/cortex/compare.h"
 #include "forest/cortex/volume.h"
 #include "forest/io/contours.h"
@@ -37,85 +38,48 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// Names by the value of the numbers in them, so that s2 comes before s10 and s01 is s1; the rest by its bytes.
-std::strong_ordering by_numbers(std::string_view a, std::string_view b) {
-  const auto is_digit = [](char c) { return c >= '0' && c <= '9'; };
-  std::size_t i = 0, j = 0;
-  while (i < a.size() && j < b.size()) {
-    if (!is_digit(a[i]) || !is_digit(b[j])) {
-      if (a[i] != b[j]) return a[i] <=> b[j];
-      ++i, ++j;
-      continue;
-    }
-    const auto number = [&](std::string_view text, std::size_t& at) {  // without the zeros before it
-      while (at < text.size() && text[at] == '0') ++at;
-      const std::size_t begin = at;
-      while (at < text.size() && is_digit(text[at])) ++at;
-      return text.substr(begin, at - begin);
-    };
-    const std::string_view m = number(a, i), n = number(b, j);
-    if (m != n) return m.size() != n.size() ? m.size() <=> n.size() : m <=> n;
-  }
-  return a.size() - i <=> b.size() - j;
-}
-
-bool before(const fs::path& one, const fs::path& other) {
-  const std::string a = one.filename().string(), b = other.filename().string();
-  const auto order = by_numbers(a, b);
-  return order != 0 ? order < 0 : a.size() != b.size() ? a.size() < b.size() : a < b;
-}
-
+// But those that are hidden.
 template <class Wanted>
 std::vector<fs::path> files_in(const fs::path& folder, Wanted&& wanted) {
   std::vector<fs::path> files;
   for (const auto& entry : fs::directory_iterator(folder))
-    if (wanted(extension_of(entry.path()))) files.push_back(entry.path());
-  std::ranges::sort(files, before);
+    if (wanted(extension_of(entry.path())) && !entry.path().filename().string().starts_with('.'))
+      files.push_back(entry.path());
+  std::ranges::sort(files);
   return files;
 }
 bool has_drawings(const fs::path& folder) {
   return !files_in(folder, [](const std::string& extension) { return extension == ".svg"; }).empty();
 }
 
-// The last number in a file's name.
-std::optional<long> number_of(const fs::path& file) {
-  const std::string name = file.stem().string();
-  const auto end = name.find_last_of("0123456789");
-  if (end == std::string::npos) return std::nullopt;
-  const auto before = name.find_last_not_of("0123456789", end);
-  const std::size_t begin = std::max(before == std::string::npos ? 0 : before + 1, end < 17 ? 0 : end - 17);
-  return std::stol(name.substr(begin, end + 1 - begin));
-}
-
-// Numbers that differ only by zeros before them are one number of two pictures.
-void check_numbers(const std::vector<fs::path>& files) {
-  for (std::size_t i = 1; i < files.size(); ++i)
-    if (by_numbers(files[i - 1].filename().string(), files[i].filename().string()) == 0)
-      throw Error(fmt::format("{}: {} and {} have the same number; take one of them out",
-                              files[i].parent_path().string(), files[i - 1].filename().string(),
-                              files[i].filename().string()));
+std::vector<NumberedFile> in_order(const fs::path& folder, std::span<const fs::path> files) {
+  try {
+    return in_number_order(files);
+  } catch (const Error& error) {
+    throw Error(fmt::format("{}: {}", folder.string(), error.what()));
+  }
 }
 
 // Between two sections half as far apart again as most, or farther, one is missing.
-void tell_gaps(const std::vector<fs::path>& files, Console& console) {
-  std::vector<long> steps;
+void tell_gaps(const fs::path& folder, std::span<const NumberedFile> files, Console& console) {
+  std::vector<double> steps;
   for (std::size_t i = 1; i < files.size(); ++i) {
-    const auto one = number_of(files[i - 1]), next = number_of(files[i]);
+    const auto one = files[i - 1].number, next = files[i].number;
     if (!one || !next || *next <= *one) return;  // no numbers of sections
     steps.push_back(*next - *one);
   }
   if (steps.size() < 2) return;
   auto sorted = steps;
   std::ranges::nth_element(sorted, sorted.begin() + std::ptrdiff_t(sorted.size() / 2));
-  const long usual = sorted[sorted.size() / 2];
-  const auto gap = std::ranges::find_if(steps, [usual](long step) { return 2 * step >= 3 * usual; });
+  constexpr double half_again = 1.499;  // decimals are not exact
+  const double usual = sorted[sorted.size() / 2];
+  const auto gap = std::ranges::find_if(steps, [&](double step) { return step >= half_again * usual; });
   if (gap == steps.end()) return;
   const auto at = std::size_t(gap - steps.begin());
   console.warn(fmt::format(
       "{}: sections seem to be missing between {} and {}, and all are taken at equal distances; bring "
       "them in",
-      files.front().parent_path().string(), files[at].filename().string(),
-      files[at + 1].filename().string()));
+      folder.string(), files[at].file.filename().string(), files[at + 1].file.filename().string()));
 }
 
 constexpr double least_tolerance = 1e-4;  // mm
@@ -146,8 +110,9 @@ class Pictures {
       if (files_.empty())
         throw Error(path.string() +
                     ": has no picture (.png, .tif, .tiff) and no drawing (.svg); give a folder of sections");
-      check_numbers(files_);
-      tell_gaps(files_, console);
+      const std::vector<NumberedFile> numbered = in_order(path, files_);
+      tell_gaps(path, numbered, console);
+      std::ranges::transform(numbered, files_.begin(), &NumberedFile::file);
     }
     if (files_.size() == 1) open(0);
     if (!folder && size() == 1) throw Error(path.string() + ": is one section; give the folder of all");
@@ -214,6 +179,9 @@ cortex::Volume read_pictures(const fs::path& path, const Options& options, Conso
     console.progress().advance();
   }
   console.progress().end();
+  if (const auto odd = std::ranges::count_if(volume.values, [](float v) { return std::isnan(v); }))
+    console.warn(fmt::format("{}: has {} no number; what is none counts as outside", path.string(),
+                             odd == 1 ? "a pixel that is" : fmt::format("{} pixels that are", odd)));
   return volume;
 }
 
@@ -268,7 +236,7 @@ void tell_edges(const cortex::ContourStack& stack, const cortex::Volume& volume,
   const auto first = std::ranges::find_if(stack.sections, cut);
   if (first == stack.sections.end()) return;
   console.warn(fmt::format(
-      "{}: {} reach the edge of the picture and are closed along it, first that at {:.3f} mm; if tissue goes "
+      "{}: {} reach the edge of the picture and are closed along it, first that at {:.6g} mm; if tissue goes "
       "on there, give larger pictures",
       path.string(), counted(std::size_t(std::count_if(first, stack.sections.end(), cut)), "section"),
       first->at / 1e3));
@@ -313,7 +281,7 @@ nlohmann::ordered_json tell_crossings(const cortex::ContourStack& stack, Console
                     {"sections", two.sections},
                     {"first", {{"at", at}, {"place", {x, y}}}}});
     console.warn(
-        fmt::format("{} cross at {} in {}, first in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; {}",
+        fmt::format("{} cross at {} in {}, first in section {} ({:.6g} mm) at ({:.6g}, {:.6g}) mm; {}",
                     one == other ? fmt::format("contours of '{}'", one)
                                  : fmt::format("contours of '{}' and '{}'", one, other),
                     counted(two.count, "place"), counted(two.sections, "section"), two.first.section + 1, at,
@@ -364,6 +332,11 @@ void run(const Options& options, Console& console) {
     throw Error(fmt::format("{} are named for {}, each of which has one; name each once",
                             counted(options.names.size(), "boundary", "boundaries"),
                             counted(options.inputs.size(), "file")));
+  for (std::size_t i = 0; i < options.inputs.size(); ++i)
+    for (std::size_t j = 0; j < i; ++j)
+      if (std::error_code none; fs::equivalent(options.inputs[i], options.inputs[j], none))
+        throw Error(options.inputs[i].string() +
+                    ": is given twice; give the outer boundary and the inner one");
   std::vector<cortex::ContourStack> stacks;
   std::vector<Mesh> surfaces;
   std::vector<std::string> surface_names;
@@ -558,7 +531,7 @@ std::function<void()> cortex_compare(CLI::App& command, Console& console) {
                       {"hausdorff", change.greatest / 1e3},
                       {"overlap", change.overlap}});
       table.push_back(
-          {fmt::format("{:.3f}", from), fmt::format("{:.3f}", to), name, mm(change.mean), mm(change.p95),
+          {fmt::format("{:.6g}", from), fmt::format("{:.6g}", to), name, mm(change.mean), mm(change.p95),
            mm(change.greatest),
            std::isnan(change.mean) ? "in one section only" : fmt::format("{:.3f}", change.overlap)});
     }

@@ -39,7 +39,7 @@ void tell_flat_ends(const cortex::ContourStack& stack, const std::string& name, 
   for (const auto& [end, next] : {std::pair(std::size_t(0), std::size_t(1)), std::pair(last, last - 1)})
     if (areas[end] > some * most && areas[end] > alike * areas[next])
       console.warn(fmt::format(
-          "the {} section ({:.3f} mm) still has {:.3g} mm² within '{}', and the surfaces are closed flat "
+          "the {} section ({:.6g} mm) still has {:.3g} mm² within '{}', and the surfaces are closed flat "
           "behind it; if tissue goes on there, bring its sections in",
           end == 0 ? "first" : "last", stack.sections[end].at / 1e3, areas[end] / 1e6, name));
 }
@@ -127,7 +127,7 @@ std::function<void()> cortex_surfaces(CLI::App& command, Console& console) {
       constexpr double much = .01;
       if (unjoined.share > much)
         console.warn(
-            fmt::format("section {} ({:.3f} mm): {:.3g} mm² within '{}' hang together with nothing and are "
+            fmt::format("section {} ({:.6g} mm): {:.3g} mm² within '{}' hang together with nothing and are "
                         "not in {}; look at "
                         "the contours there, or for one that is missing before or behind",
                         unjoined.section + 1, stack.sections[unjoined.section].at / 1e3, unjoined.area / 1e6,

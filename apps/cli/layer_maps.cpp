@@ -7,6 +7,7 @@
 
 #include "forest/core/error.h"
 #include "forest/core/file.h"
+#include "forest/core/number_order.h"
 #include "forest/io/surface.h"
 
 namespace forest::cli {
@@ -41,6 +42,23 @@ std::vector<std::vector<float>> read_layer_maps(const std::vector<std::filesyste
     maps.push_back(std::move(values));
   }
   return maps;
+}
+
+std::string doubt_of_order(const std::vector<std::filesystem::path>& files) {
+  std::vector<NumberedFile> order;
+  try {
+    order = in_number_order(files);
+  } catch (const Error&) {  // numbers that say nothing
+    return {};
+  }
+  if (order.size() < 2 || !order.front().number ||
+      !std::ranges::equal(order.rbegin(), order.rend(), files.begin(), files.end(), {}, &NumberedFile::file))
+    return {};
+  return fmt::format(
+      "layers are taken from the pia inwards as they are given, {} first, though the numbers in their names "
+      "run "
+      "the other way; if that is wrong, give them the other way round",
+      files.front().string());
 }
 
 }  // namespace forest::cli

@@ -4,6 +4,7 @@
 
 #include <cstddef>
 #include <filesystem>
+#include <string>
 #include <vector>
 
 namespace forest::cli {
@@ -13,5 +14,8 @@ namespace forest::cli {
 /// Throws InputError for a file of another number of values, and for one below 0.
 std::vector<std::vector<float>> read_layer_maps(const std::vector<std::filesystem::path>& files,
                                                 std::size_t vertices);
+
+/// A sentence where the numbers in their names run against their order; else empty.
+std::string doubt_of_order(const std::vector<std::filesystem::path>& files);
 
 }  // namespace forest::cli

@@ -125,7 +125,8 @@ void run(const Options& options, Console& console) {
     const std::string &layer = circuit.layers[row.layer].name, &type = circuit.types[row.type].name;
     const double density = curved ? double(row.count) / (all.layer_volumes[row.layer] * 1e-9) : row.density;
     list.push_back({{"layer", layer}, {"type", type}, {"count", row.count}, {"density", density}});
-    lines.push_back({layer, type, std::to_string(row.count), fmt::format("{:.0f}", density)});
+    lines.push_back({layer, type, std::to_string(row.count),
+                     density < 10. ? fmt::format("{:.3g}", density) : fmt::format("{:.0f}", density)});
   }
   nlohmann::ordered_json json{{"circuit", options.out.string()},
                               {"name", circuit.name},

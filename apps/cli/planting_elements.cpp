@@ -167,8 +167,8 @@ void refuse_too_many(std::size_t elements, double neurons, bool bent, double lee
   constexpr double most = 50e6, most_bent = 200'000;
   if (neurons > leeway * (bent ? most_bent : most))
     throw Error(
-        fmt::format("{} would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements "
-                    "or lower --scale",
+        fmt::format("{} would have {:.3g} neurons, and {:.3g} is the most{}; choose fewer elements, "
+                    "or lower --scale or --density",
                     counted(elements, "element"), neurons, bent ? most_bent : most,
                     bent ? " of distinct shapes (--bend grid)" : ""));
 }
@@ -266,16 +266,17 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
                                         {.scale = scale, .element = file.volume});
   for (std::size_t l = 0; l < recipe.layers.size(); ++l)
     if (planter.left_out(l))
-      all.left_out.push_back(
-          fmt::format("{} with somata too wide for the density of layer {} are not planted there; those that "
-                      "are have radii of up to {:.3g} µm",
-                      counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
+      all.left_out.push_back(fmt::format(
+          "somata of {} are too wide for the density of layer {}, and not planted there; those that "
+          "are have radii of up to {:.3g} µm",
+          counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
   const auto measured = measured_borders(options, recipe, file.cortex.elements);
   all.measured = measured.has_value();
   if (const std::string doubt =
           measured ? circuit::doubt_of_maps(recipe, options.layers.size()) : std::string();
       !doubt.empty())
     all.left_out.push_back(doubt);
+  if (const std::string doubt = doubt_of_order(options.layers); !doubt.empty()) all.left_out.push_back(doubt);
   const auto borders_of = [&](std::uint32_t e) {
     return measured ? measured->of(file.cortex.elements, e)
                     : planter.by_volume(cortex::Layers(file.cortex.elements, e));

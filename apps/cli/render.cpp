@@ -46,7 +46,8 @@ std::vector<frame::State> states_of(const scene::Targets& targets, const TargetO
 
 // What is shown when nobody says what: the neurons that are visible, or the surfaces from one side.
 scene::View default_view(const scene::Targets& targets, const TargetOptions& shown,
-                         const scene::Surfaces& surfaces, std::optional<scene::Side> side, float aspect) {
+                         const scene::Surfaces& surfaces, std::optional<scene::Side> side, float aspect,
+                         std::span<const frame::Overlay> drawn) {
   if (side && surfaces.empty())
     throw Error(
         "--from shows surfaces from a side, and there are none; give --surface, or say by --view where one "
@@ -57,7 +58,7 @@ scene::View default_view(const scene::Targets& targets, const TargetOptions& sho
     view.fog = 0.f;
     return view;
   }
-  return scene::overview(targets.forest(), aspect, states_of(targets, shown));
+  return scene::overview(targets.forest(), aspect, states_of(targets, shown), drawn);
 }
 
 // A picture without anything in it may be wanted; nobody should have to guess why it is so.
@@ -137,8 +138,11 @@ std::function<void()> render(CLI::App& command, Console& console) {
     scene::Surfaces surfaces = read_surfaces(named, console);
     const scene::Forest forest = alone ? empty_forest() : open_forest(options->forest);
     Artist artist(forest, options->drawer, read_node_sets(forest, options->targets.node_sets, console));
+    const auto outline = options->outline ? scene::outline(forest) : std::vector<frame::Overlay>();
+    if (options->outline && outline.empty())
+      console.warn("the forest is neither a column nor planted in elements, so it has no outline");
     scene::View view = default_view(artist.targets(), options->targets, surfaces, options->side,
-                                    float(width) / float(height));
+                                    float(width) / float(height), outline);
     if (!alone && holds_cells(options->forest)) {
       view.samples = 64;  // thin lines on nothing
       if (forest.instances().size() == 1) view.colour_by = scene::ColourBy::kind;
@@ -159,8 +163,6 @@ std::function<void()> render(CLI::App& command, Console& console) {
       artist.show(std::move(*synapses));
     if (options->synapses.colour) view.synapses = *options->synapses.colour;
     play(artist, options->activity, view, console);
-    if (options->outline && scene::outline(forest).empty())
-      console.warn("the forest is neither a column nor planted in elements, so it has no outline");
     view.samples = artist.still_samples(view);
     Drawn drawn = artist.draw(view, width, height, {.outline = options->outline});
     if (drawn.image.covered == 0.) console.warn(nothing_shown(artist, drawn));

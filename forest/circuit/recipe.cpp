@@ -187,8 +187,8 @@ cortex::Column column_of(const Recipe& recipe, float radius) {
 cortex::Column column(const Recipe& recipe) {
   if (recipe.radius == 0.f)
     throw Error(
-        "the recipe speaks of no column, in which so many neurons could stand; add [column] with its radius, "
-        "or give densities and plant it in elements (--elements)");
+        "the recipe says how many neurons stand in a column (neurons, count), and speaks of no column; add "
+        "[column] with its radius, or give densities alone and plant it in elements (--elements)");
   return column_of(recipe, recipe.radius);
 }
 

@@ -172,17 +172,17 @@ std::string fault_of(const ContourStack& stack) {
     if (!std::isfinite(section.at)) return fmt::format("section {} is at no number; say where it is", i + 1);
     if (i && section.at <= stack.sections[i - 1].at)
       return fmt::format(
-          "sections {} and {} are both at {:.3f} mm or in the wrong order; sort them by their place", i,
+          "sections {} and {} are both at {:.6g} mm or in the wrong order; sort them by their place", i,
           i + 1, section.at / 1e3);
     for (const Contour& contour : section.contours) {
       const std::string& object = stack.objects.at(contour.object);
       if (contour.curve.pieces() < 1 || contour.curve.points.size() % 3 != 0)
-        return fmt::format("a contour of '{}' in section {} ({:.3f} mm) has no points; leave it out", object,
+        return fmt::format("a contour of '{}' in section {} ({:.6g} mm) has no points; leave it out", object,
                            i + 1, section.at / 1e3);
       for (const Place& point : contour.curve.points)
         if (!point.allFinite())
           return fmt::format(
-              "a contour of '{}' in section {} ({:.3f} mm) has a coordinate that is no number; trace "
+              "a contour of '{}' in section {} ({:.6g} mm) has a coordinate that is no number; trace "
               "it again",
               object, i + 1, section.at / 1e3);
     }
@@ -196,12 +196,12 @@ std::string fault_of(const ContourStack& stack) {
         if (contour.object == object) polygons.push_back(flattened(contour.curve, fine));
       if (const auto twin = twin_in(polygons))
         faults[i] = fmt::format(
-            "'{}' has one contour twice in section {} ({:.3f} mm), by ({:.3f}, {:.3f}) mm; leave "
+            "'{}' has one contour twice in section {} ({:.6g} mm), by ({:.6g}, {:.6g}) mm; leave "
             "one of them out",
             stack.objects[object], i + 1, section.at / 1e3, twin->x() / 1e3, twin->y() / 1e3);
       else if (const auto found = crossing_in(polygons))
         faults[i] = fmt::format(
-            "{} of '{}' cross{} in section {} ({:.3f} mm) at ({:.3f}, {:.3f}) mm; draw them apart",
+            "{} of '{}' cross{} in section {} ({:.6g} mm) at ({:.6g}, {:.6g}) mm; draw them apart",
             found->first == found->second ? "one contour" : "two contours", stack.objects[object],
             found->first == found->second ? "es itself" : "", i + 1, section.at / 1e3, found->place.x() / 1e3,
             found->place.y() / 1e3);

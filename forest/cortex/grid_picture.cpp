@@ -142,8 +142,10 @@ std::string colour_of(const Quad& quad) {
 std::string to_svg(std::span<const GridPanel> panels, const GridPicture& picture) {
   const int columns = std::max(1, std::min(picture.columns, int(panels.size())));
   const int rows = (int(panels.size()) + columns - 1) / columns;
-  const double caption = 20., legend = 30., margin = 8., side = picture.panel;
-  const double width = columns * side, height = rows * (side + caption) + legend;
+  const double caption = 20., entry = 78., line = 20., margin = 8., side = picture.panel;
+  const double width = columns * side, legend = rows * (side + caption);  // where it begins
+  const int abreast = std::max(1, int((width - margin) / entry));         // entries of it
+  const double height = legend + 10. + line * double((int(classes.size()) + abreast - 1) / abreast);
   std::string text = fmt::format(
       "<svg xmlns=\"http://www.w3.org/2000/svg\" viewBox=\"0 0 {0:.0f} {1:.0f}\" width=\"{0:.0f}\" "
       "height=\"{1:.0f}\" "
@@ -187,15 +189,14 @@ std::string to_svg(std::span<const GridPanel> panels, const GridPicture& picture
                    top + side + 12., panels[n].caption);
   }
   text += "</g>\n" + captions;
-  double x = margin;
-  for (const Class& row : classes) {
+  for (std::size_t i = 0; i < classes.size(); ++i) {
+    const Class& row = classes[i];
+    const double x = margin + entry * double(int(i) % abreast), y = legend + line * double(int(i) / abreast);
     fmt::format_to(out,
                    "<rect x=\"{:.1f}\" y=\"{:.1f}\" width=\"12\" height=\"12\" fill=\"#{:02x}{:02x}{:02x}\" "
                    "stroke=\"#333\" "
                    "stroke-width=\".4\"/><text x=\"{:.1f}\" y=\"{:.1f}\">{}</text>\n",
-                   x, height - 20., row.colour[0], row.colour[1], row.colour[2], x + 16., height - 10.,
-                   row.name);
-    x += 78.;
+                   x, y + 10., row.colour[0], row.colour[1], row.colour[2], x + 16., y + 20., row.name);
   }
   return text + "</svg>\n";
 }

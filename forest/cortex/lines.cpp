@@ -100,8 +100,12 @@ namespace {
 // Where the extremality of one kind of line vanishes on an edge of the mesh.
 struct Crossing {
   Place at;
-  double bend;  // the curvature there, 1/µm
+  double bend, other;  // the curvatures there, across the line and along it, 1/µm
 };
+
+// A line is bent no more than this share of its own bend the other way: on a ball, bent alike in all directions, any unevenness would
+// make lines. Of folds it is .6 at the most.
+constexpr double most_along = .8;
 
 std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<const Curvature> curvature,
                            const LineOptions& options) {
@@ -140,7 +144,8 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
     // A greatest bend, not a least one: it grows from each end towards the middle of the edge.
     if ((ea - eb) * (at[b] - at[a]).dot(ta) <= 0.) return std::nullopt;
     const double share = ea / (ea - eb);
-    return Crossing{at[a] + share * (at[b] - at[a]), bend(a) + share * (bend(b) - bend(a))};
+    return Crossing{at[a] + share * (at[b] - at[a]), bend(a) + share * (bend(b) - bend(a)),
+                    other(a) + share * (other(b) - other(a))};
   };
 
   // Pieces, one in each triangle that two of them cross; they join at the edges.
@@ -164,6 +169,7 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
   const auto follow = [&](const Edge& start) {
     Line line{.kind = kind, .points = {}, .triangles = {}, .strength = 0., .closed = false};
     Edge here = start;
+    double along = 0.;  // of the strength, what it would be the other way
     std::optional<std::uint32_t> by;
     for (;;) {
       line.points.push_back(crossings.at(here).at);
@@ -173,6 +179,7 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
       if (way == ways.end()) break;
       const Crossing &a = crossings.at(here), &b = crossings.at(way->second);
       line.strength += .5 * (a.bend + b.bend) * (b.at - a.at).norm();
+      along += .5 * (a.other + b.other) * (b.at - a.at).norm();
       line.triangles.push_back(way->first);
       by = way->first, here = way->second;
       if (here == start) {
@@ -180,6 +187,7 @@ std::vector<Line> lines_of(Line::Kind kind, const Ribbon& ribbon, std::span<cons
         break;
       }
     }
+    if (along > most_along * line.strength) line.strength = 0.;
     return line;
   };
   const auto keep = [&](Line line) {

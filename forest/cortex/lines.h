@@ -53,7 +53,7 @@ Line faired(const Line& line, const Ribbon& ribbon, const RibbonLocator& locator
 
 struct LineOptions {
   double scale = 1500.;        // µm
-  double least_strength = 2.;  // radians
+  double least_strength = 2.;  // radians; of what is bent as much the other way it is none
   double least_length = 4e3;   // µm
 };
 

@@ -295,20 +295,24 @@ std::vector<Line> sulci(const Ribbon& ribbon, const SulcusOptions& options) {
   }
   prune(graph, ribbon, depth, options);
 
+  constexpr double beside = 4e3;  // µm: as far as its banks
+  const std::vector<double> below_banks = below_surroundings(ribbon, depth, beside);
   std::vector<Line> lines;
   std::set<std::pair<Vertex, Vertex>> used;
   const auto add = [&](Vertex from, Vertex to) {
     if (used.contains(std::minmax(from, to))) return;
     const auto vertices = way(graph, from, to);
-    double deepest = 0.;
-    for (const Vertex v : vertices) deepest = std::max(deepest, depth[v] - level);
+    double deepest = 0., deeper = 0.;
+    for (const Vertex v : vertices)
+      deepest = std::max(deepest, depth[v] - level), deeper = std::max(deeper, below_banks[v]);
     Line line{.kind = Line::Kind::sulcus, .points = {}, .triangles = {}, .strength = 0., .closed = false};
     for (const Vertex v : vertices)
       line.points.push_back(ribbon.middle[v]), line.strength += depth[v] / double(vertices.size());
     for (std::size_t i = 1; i < vertices.size(); ++i) used.insert(std::minmax(vertices[i - 1], vertices[i]));
     // A ring that hangs at a node stays there.
     line.closed = vertices.front() == vertices.back() && graph.at(vertices.front()).size() == 2;
-    if (deepest < options.persistence) return;
+    // On a ball the least unevenness has passes and pits; there is no sulcus.
+    if (deepest < options.persistence || deeper < options.persistence) return;
     lines.push_back(std::move(line));
   };
   for (const auto& [v, next] : graph)

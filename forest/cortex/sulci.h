@@ -23,8 +23,10 @@ namespace forest::cortex {
 std::vector<double> sulcal_depth(const Ribbon& ribbon, double scale);
 
 struct SulcusOptions {
-  double scale = 18e3;        // µm, of the depth: the standard deviation of the smoothing
-  double persistence = 300.;  // µm: a pass lies lower than both crowns that it parts by so much
+  double scale = 18e3;  // µm, of the depth: the standard deviation of the smoothing
+  double persistence =
+      300.;  // µm: a pass lies lower than both crowns that it parts by so much, and a line somewhere deeper
+             // than what lies around it
   double shallowest =
       .4;  // share of the vertices outside the wall; a line ends where it is less deep than these
   double shortest_spur =

@@ -35,7 +35,7 @@ double distance_of_sections(const ContourStack& stack) {
     const double times = (stack.sections[i + 1].at - stack.sections[i].at) / usual, whole = std::round(times);
     if (whole >= 2. && std::abs(times - whole) < .02)
       throw Error(fmt::format(
-          "between section {} ({:.3f} mm) and the next ({:.3f} mm) {:.0f} {} missing: others are {:.3f} "
+          "between section {} ({:.6g} mm) and the next ({:.6g} mm) {:.0f} {} missing: others are {:.6g} "
           "mm apart; bring in what is missing",
           i + 1, stack.sections[i].at / 1e3, stack.sections[i + 1].at / 1e3, whole - 1.,
           whole > 2. ? "are" : "is", usual / 1e3));
@@ -45,7 +45,7 @@ double distance_of_sections(const ContourStack& stack) {
   for (std::size_t i = 0; i < stack.sections.size(); ++i)
     if (std::abs(stack.sections[i].at - stack.sections[0].at - double(i) * spacing) > .01 * spacing)
       throw Error(
-          fmt::format("section {} is at {:.3f} mm where {:.3f} mm is expected: sections must be at equal "
+          fmt::format("section {} is at {:.6g} mm where {:.6g} mm is expected: sections must be at equal "
                       "distances; bring in "
                       "the missing ones",
                       i + 1, stack.sections[i].at / 1e3, (stack.sections[0].at + double(i) * spacing) / 1e3));
@@ -64,7 +64,7 @@ void must_go_on(const ContourStack& stack, std::uint32_t object) {
   const auto without = std::find_if_not(first, last, has);
   if (without != last)
     throw Error(fmt::format(
-        "section {} ({:.3f} mm) has no contour of '{}', and sections before and behind it have; trace "
+        "section {} ({:.6g} mm) has no contour of '{}', and sections before and behind it have; trace "
         "it there",
         without - stack.sections.begin() + 1, without->at / 1e3, stack.objects[object]));
 }
@@ -195,7 +195,7 @@ void must_be_nested(const ScalarGrid& inner, const ScalarGrid& outer, const Cont
     const double outside = double(here.outside) / double(here.nested + here.outside);
     if (outside > (at_end ? share_at_ends : share) && double(here.outside) * raster.step * raster.step > much)
       throw Error(fmt::format(
-          "section {} ({:.3f} mm): {:.0f} % of what lies within '{}' lies outside '{}'; exchange them there",
+          "section {} ({:.6g} mm): {:.0f} % of what lies within '{}' lies outside '{}'; exchange them there",
           here.section + 1, stack.sections[here.section].at / 1e3, 100. * outside, options.inner,
           options.outer));
   }

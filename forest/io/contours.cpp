@@ -85,7 +85,7 @@ void sort_sections(ContourStack& stack, const std::string& name, std::string_vie
   for (std::size_t i = 1; i < stack.sections.size(); ++i)
     if (stack.sections[i].at == stack.sections[i - 1].at)
       throw InputError(name, 0,
-                       fmt::format("has two sections at {:.3f} mm; give each a place of its own{}",
+                       fmt::format("has two sections at {:.6g} mm; give each a place of its own{}",
                                    stack.sections[i].at / 1e3, how));
 }
 
@@ -541,6 +541,18 @@ std::string write_svg(const ContourStack& stack, const Section& section, const S
   return text + "</svg>\n";
 }
 
+namespace {
+
+// As Inkscape hides a layer.
+bool hidden(const pugi::xml_node& node) {
+  std::string style = node.attribute("style").value();
+  std::erase_if(style, [](char c) { return static_cast<unsigned char>(c) <= ' '; });
+  return std::string_view(node.attribute("display").value()) == "none" ||
+         (';' + style + ';').find(";display:none;") != std::string::npos;
+}
+
+}  // namespace
+
 ReadContours read_svg(std::string_view text, const std::string& name) {
   pugi::xml_document document;
   const auto parsed = document.load_buffer(text.data(), text.size());
@@ -590,19 +602,25 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
   }
   if (!std::isfinite(section.at))
     throw InputError(name, 0, "is at no number (data-at); say where the section is, in µm");
+  std::size_t loose = 0, grouped = 0;  // paths
   const auto walk = [&](const pugi::xml_node& top) {
     // Without recursion, since a file may nest as deeply as it likes.
     for (pugi::xml_node node = top.first_child(); node;) {
       const std::string_view kind = node.name();
-      const bool skipped = node.attribute("data-behind") || kind == "defs" || kind == "clipPath",
+      const bool unseen = hidden(node),
+                 skipped = unseen || node.attribute("data-behind") || kind == "defs" || kind == "clipPath",
                  container = kind == "g" || kind == "a" || kind == "switch";
       if (node.attribute("transform") && !skipped && (container || kind == "path"))
         throw InputError(
             name, 0,
             fmt::format("has a <{}> that is moved by a transform; apply it in the drawing program",
                         shown(kind)));
+      if (unseen && (container || kind == "path"))
+        result.oddities.push_back(fmt::format(
+            "a hidden <{}>{} was left out; show it, and save again, to have it", shown(kind),
+            node.attribute("id") ? fmt::format(" '{}'", shown(node.attribute("id").value())) : ""));
       if (kind == "path" && !skipped) {
-        std::string object = "outer";
+        std::string object;
         for (pugi::xml_node up = node; up && up != root; up = up.parent())
           if (const auto said = up.attribute("data-object")          ? up.attribute("data-object")
                                 : std::string_view(up.name()) == "g" ? up.attribute("id")
@@ -610,14 +628,15 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
             object = said.value();
             break;
           }
+        ++(object.empty() ? loose : grouped);
+        if (object.empty()) object = "outer";
         for (BezierLoop& loop : PathReader(node.attribute("d").value(), name, scale).read())
           section.contours.push_back({object_of(stack, object), std::move(loop)});
       } else if (kind == "g" && !skipped) {
         if (node.attribute("data-object")) object_of(stack, node.attribute("data-object").value());
       } else if (kind == "svg" || kind == "use" || kind == "polygon" || kind == "polyline" ||
                  kind == "circle" || kind == "ellipse" || kind == "rect") {
-        result.oddities.push_back(
-            fmt::format("{}: a <{}> was left out; convert it to a path", name, shown(kind)));
+        result.oddities.push_back(fmt::format("a <{}> was left out; convert it to a path", shown(kind)));
       }
       pugi::xml_node next = container && !skipped ? node.first_child() : pugi::xml_node();
       while (!next && node && node != top) {
@@ -629,6 +648,10 @@ ReadContours read_svg(std::string_view text, const std::string& name) {
     }
   };
   walk(root);
+  if (loose && grouped)
+    result.oddities.push_back(fmt::format("{} in no group {} taken for contours of 'outer'",
+                                          loose == 1 ? "a path" : fmt::format("{} paths", loose),
+                                          loose == 1 ? "is" : "are"));
   turn_insides_left(section, name);  // drawing programs know no direction
   return result;
 }

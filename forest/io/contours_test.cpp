@@ -106,12 +106,29 @@ TEST(Contours, OfTwoStacksWithOneNameAreRefused) {
 TEST(Contours, OfDrawingsWithoutPlacesAreRefusedWithTheRemedy) {
   const auto drawing =
       read_contours("<svg width='9mm' viewBox='0 0 9 9'><path d='M0 0h9v9h-9z'/></svg>", "d.svg").stack;
-  EXPECT_THAT(
-      refused<InputError>([&] {
-        (void)gathered({drawing, drawing}, "drawn");
-      }),
-      testing::HasSubstr(
-          "drawn: has two sections at 0.000 mm; give each a place of its own, in µm, as <svg data-at="));
+  EXPECT_THAT(refused<InputError>([&] {
+                (void)gathered({drawing, drawing}, "drawn");
+              }),
+              testing::HasSubstr(
+                  "drawn: has two sections at 0 mm; give each a place of its own, in µm, as <svg data-at="));
+}
+
+TEST(Contours, OfADrawingThatAreHiddenAreLeftOutAndLooseOnesTold) {
+  const std::string path = "<path d='M0 0h9v9h-9z'/>";
+  const auto drawn = [&](const std::string& inside) {
+    return read_contours("<svg width='9mm' viewBox='0 0 9 9'>" + inside + "</svg>", "d.svg");
+  };
+  for (const char* hides : {"style='fill:none; display : none'", "display='none'", "style='display:none;'"}) {
+    const ReadContours read =
+        drawn("<g id='inner'>" + path + "</g><g id='old' " + hides + ">" + path + "</g>");
+    EXPECT_EQ(read.stack.objects, std::vector<std::string>{"inner"}) << hides;
+    EXPECT_THAT(read.oddities, testing::ElementsAre(testing::HasSubstr("hidden <g> 'old' was left out")));
+  }
+  EXPECT_EQ(drawn("<g id='a' style='display:inline'>" + path + "</g>").stack.sections[0].contours.size(), 1u);
+  const ReadContours loose = drawn("<g id='inner'>" + path + "</g>" + path);
+  EXPECT_EQ(loose.stack.objects, (std::vector<std::string>{"inner", "outer"}));
+  EXPECT_THAT(loose.oddities, testing::ElementsAre(testing::HasSubstr("a path in no group")));
+  EXPECT_TRUE(drawn(path).oddities.empty());
 }
 
 TEST(Contours, OfADrawingAreReadFromEveryCommandInItsSize) {

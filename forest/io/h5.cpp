@@ -771,6 +771,10 @@ ReadResult read_cell(const Image& image, const Image::Object& group, const Membe
 }
 
 [[noreturn]] void refuse_without_cells(const Image& image) {
+  if (image.text(image.open(image.root()), "magic") == "brainforest cortex")
+    throw NotANeuron(image.name(), 0,
+                     "holds elements of a cortex; brainforest cortex faces makes surfaces of them, and plant "
+                     "--elements puts neurons there");
   throw NotANeuron(image.name(), 0, "holds no neuron: no group of it has the arrays points and structure");
 }
 

@@ -657,7 +657,8 @@ std::vector<ViewKey> view_keys() { return facts_of(keys_of_view()); }
 std::vector<ViewKey> activity_keys() { return facts_of(keys_of_activity()); }
 std::vector<ViewKey> plane_keys() { return facts_of(keys_of_plane()); }
 
-View overview(const Forest& forest, float aspect, std::span<const frame::State> states) {
+View overview(const Forest& forest, float aspect, std::span<const frame::State> states,
+              std::span<const frame::Overlay> drawn) {
   const auto seen = seen_in(states);
   View view;
   view.camera.near = 2.f;
@@ -694,6 +695,7 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   const Places branches = places_on_branches(forest, seen);
   enclosing.add_most(branches.places, !branches.all);
   for (const Sphere& s : branches.somata) enclosing.add(s.centre, s.radius);
+  for (const frame::Overlay& line : drawn) enclosing.add(line.a), enclosing.add(line.b);
   // The near side of a wide forest shall not hide what lies behind it; a slab has none.
   const float wide = std::max(radius,
                               std::min(.25f * bounds.extent().norm(), reach_along(forest, stands.col(2)))),

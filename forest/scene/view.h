@@ -84,7 +84,9 @@ inline auto seen_in(std::span<const frame::State> states) {
 /// The view that shows the whole forest, branches and all, from outside, a little from above.
 /// @param aspect  width over height of the picture
 /// @param states  of its instances: those that are hidden need no room, unless all are; what is seen has less fog, the smaller it is
-View overview(const Forest& forest, float aspect = 16.f / 9.f, std::span<const frame::State> states = {});
+/// @param drawn   lines beside it that are to be seen whole, as its outline
+View overview(const Forest& forest, float aspect = 16.f / 9.f, std::span<const frame::State> states = {},
+              std::span<const frame::Overlay> drawn = {});
 
 /// A picture to hang on a wall: the column from its crown down, near enough to follow single dendrites.
 View portrait(const Forest& forest);

@@ -209,7 +209,9 @@ refuses 'is named twice' $BRAINFOREST cortex surfaces s.contours -o no.gii no.gi
 refuses "'outer' is to be both boundaries" $BRAINFOREST cortex surfaces s.contours --inner outer -o no.gii no2.gii
 refuses 'not as .obj' $BRAINFOREST cortex surfaces s.contours -o no.gii no2.obj
 refuses "two boundaries are to be called 'a'" $BRAINFOREST cortex contours outer inner --name a --name a -o no.contours
-refuses "two boundaries are to be called 'outer'" $BRAINFOREST cortex contours outer inner outer -o no.contours
+refuses 'is given twice' $BRAINFOREST cortex contours outer ./outer -o no.contours
+mkdir -p again && cp outer again/outer
+refuses "two boundaries are to be called 'outer'" $BRAINFOREST cortex contours outer inner again/outer -o no.contours
 refuses 'pixel is of pictures, and none is given' $BRAINFOREST cortex contours outer inner --pixel .1 -o no.contours
 refuses 'as HDF5; give a name that ends in .h5' $BRAINFOREST cortex build outer inner -o elements.txt
 refuses 'is a surface, not contours of sections' $BRAINFOREST cortex compare outer.gii
@@ -219,6 +221,8 @@ sed '3s/"at": [-0-9.]*,/"at": NaN,/' s.contours >nan.contours
 refuses 'nan.contours:3: is no JSON from column' $BRAINFOREST cortex compare nan.contours
 mkdir -p same_number && touch same_number/s1.png same_number/s01.png
 refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
+mkdir -p either && touch either/s1.5.png either/s1.10.png either/s1.2.png
+refuses 'either: s1.10.png and s1.2.png may follow one another either way' $BRAINFOREST cortex contours either --pixel 1 --threshold .5 -o no.contours
 refuses 's1.png: is neither a PNG nor a TIFF picture' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
 refuses '3 boundaries are named for 1 file' $BRAINFOREST cortex contours outer --name a --name b --name c -o no.contours
 # Options of other input, which would say nothing.
