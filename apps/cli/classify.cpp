@@ -69,7 +69,9 @@ std::string sentence(const Types& t, const Given& given, const Options& options)
   const Division& d = t.division();
   const std::size_t best = std::ranges::max_element(t.divisions, {}, &Division::silhouette)->types;
   std::string out;
-  if (d.types == 1)
+  if (d.types == 1 && options.types)
+    out = fmt::format("These {} cells were taken for one type.", d.type.size());
+  else if (d.types == 1)
     out = fmt::format(
         "These {} cells are of one type: divided into {}, their silhouette is no higher than that of one "
         "cloud of cells (p = "

@@ -2,12 +2,15 @@
 #include "apps/cli/console.h"
 
 #include <algorithm>
+#include <cstdio>
 #include <cstdlib>
 #include <unistd.h>
 
 #include <fmt/format.h>
 #include <nlohmann/json.hpp>
 #include <sys/resource.h>
+
+#include "forest/core/file.h"
 
 namespace forest::cli {
 
@@ -54,9 +57,12 @@ void ProgressBar::draw(Clock::time_point now) {
   shown_ = true;
 }
 
+// A file that was sent to standard output has it for itself.
+static std::FILE* output() { return standard_output_taken() ? stderr : stdout; }
+
 void Console::say(std::string_view line) {
   bar_.end();
-  if (!json) fmt::print("{}\n", line);
+  if (!json) fmt::print(output(), "{}\n", line);
 }
 
 void Console::warn(std::string_view sentence) {
@@ -67,7 +73,8 @@ void Console::warn(std::string_view sentence) {
 
 void Console::print(const nlohmann::ordered_json& value) {
   bar_.end();
-  if (json) fmt::print("{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
+  if (json)
+    fmt::print(output(), "{}\n", value.dump(2, ' ', false, nlohmann::ordered_json::error_handler_t::replace));
 }
 
 void Console::table(const std::vector<std::string>& header,
@@ -99,7 +106,7 @@ void Console::table(const std::vector<std::string>& header,
       line += "  ";
     }
     line.erase(line.find_last_not_of(' ') + 1);
-    fmt::print("{}\n", line);
+    fmt::print(output(), "{}\n", line);
   };
   print(header);
   for (const auto& row : rows) print(row);

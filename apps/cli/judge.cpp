@@ -284,16 +284,17 @@ lsystem::Grammar model_of(const Options& options) {
 }
 
 // A model that was fitted to the cells that it is judged by says so in its first lines.
-void warn_of_known(const lsystem::Grammar& grammar, const Sample& judged_by, Console& console) {
+std::size_t warn_of_known(const lsystem::Grammar& grammar, const Sample& judged_by, Console& console) {
   const std::set<std::string> known = cells_fitted_to(grammar.text);
   const auto is_known = [&](const std::string& cell) { return known.contains(repository::escaped(cell)); };
   const auto count = std::ranges::count_if(judged_by.cells, is_known);
-  if (count == 0) return;
+  if (count == 0) return 0;
   console.warn(
       fmt::format("the model says that it was fitted to {} of the {} that it is judged by, {} first; fit one "
                   "without them",
                   count, counted(judged_by.cells.size(), "cell"),
                   repository::escaped(*std::ranges::find_if(judged_by.cells, is_known))));
+  return std::size_t(count);
 }
 
 }  // namespace
@@ -319,6 +320,7 @@ namespace {
 
 void leave_out(const Options& options, Console& console) {
   LeftOutTrial trial{.traced = read_sample(options.train, options.repo, console),
+                     .fitted_to = 0,
                      .kind = options.kind,
                      .slices = options.slices,
                      .count = options.count ? options.count : 99,
@@ -332,8 +334,8 @@ void leave_out(const Options& options, Console& console) {
   std::optional<Sample> grown;
   if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
   if (!options.grown.empty()) trial.grown = &grown.emplace(read_sample(options.grown, options.repo, console));
+  if (model) trial.fitted_to = warn_of_known(*model, trial.traced, console);
   judge_leaving_out(trial, console);
-  if (model) warn_of_known(*model, trial.traced, console);
 }
 
 void run(const Options& options, Console& console) {
@@ -372,7 +374,7 @@ void run(const Options& options, Console& console) {
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
-  if (model) warn_of_known(*model, held_out, console);
+  const std::size_t known_cells = model ? warn_of_known(*model, held_out, console) : 0;
   if (options.model.empty())
     for (const Sample* known : {&train, &held_out}) warn_of_shared(grown.front(), *known, console);
   if (options.count > train.neurons.size())
@@ -394,7 +396,9 @@ void run(const Options& options, Console& console) {
                                                 statistics::kind_set(options.kind), options.seed),
                                  "Grown neurons on trial: " + grown.front().name),
                        options.force);
-  console.print(json_of(judged.judgement, seeds));
+  auto json = json_of(judged.judgement, seeds);
+  json["fitted_to"] = known_cells;  // of the cells that it is judged by
+  console.print(json);
   tell_judgement(judged.judgement, console);
 }
 

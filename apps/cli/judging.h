@@ -46,7 +46,8 @@ std::optional<std::size_t> longest_run_of(const lsystem::Grammar& grammar, std::
 /// Few cells: each is left out in turn (statistics/leave_one_out.h).
 struct LeftOutTrial {
   Sample traced;
-  const lsystem::Grammar* model = nullptr;  // that saw none of them …
+  const lsystem::Grammar* model = nullptr;  // that saw none of them, or says so …
+  std::size_t fitted_to = 0;                // … of how many it says that it did
   const Sample* grown =
       nullptr;  // … or what such a one grew; with neither, one is fitted to the others each time
   std::string kind = "dendrite", slices = {};

@@ -58,6 +58,7 @@ Json json_of(const LeaveOneOut& r, const LeftOutTrial& trial, std::optional<std:
       {"told_apart", r.told_apart()},
       {"sentence", sentence(r)},
       {"refitted", !trial.model && !trial.grown},
+      {"fitted_to", trial.fitted_to},
       {"cells", {{"traced", r.traced}, {"grown_for_each", r.grown}}},
       {"detectable_auc", r.detectable_auc},
       {"strange", {{"cells", r.strange}, {"p", r.strange_p}}},

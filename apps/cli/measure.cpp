@@ -57,6 +57,9 @@ constexpr std::array<std::pair<std::string_view, double Summary::*>, 5> parts{{{
                                                                                {"median", &Summary::median},
                                                                                {"max", &Summary::max}}};
 
+/// Of one value nothing can be said.
+double spread(const Summary& s) { return s.count > 1 ? s.sd : std::numeric_limits<double>::quiet_NaN(); }
+
 using Cell = std::variant<std::string, double>;  // NaN: not defined
 using Row = std::vector<Cell>;
 
@@ -210,7 +213,8 @@ std::vector<Row> rows(const Options& options, const Picks& picks, const std::str
         row.emplace_back(values[0]);
       } else {
         const Summary summary = summarize(values);
-        for (const auto& [part, member] : parts) row.emplace_back(summary.*member);
+        for (const auto& [part, member] : parts)
+          row.emplace_back(member == &Summary::sd ? spread(summary) : summary.*member);
       }
     }
     return {row};
@@ -234,9 +238,6 @@ struct Table {
   std::vector<Column> columns;
   std::vector<Row> rows;
 };
-
-/// Over neurons: of one neuron nothing can be said.
-double spread(const Summary& s) { return s.count > 1 ? s.sd : std::numeric_limits<double>::quiet_NaN(); }
 
 /// A row a group: how many neurons, and over them mean and standard deviation of each metric, of which a neuron's own mean
 /// counts where it has many values.

@@ -2,6 +2,7 @@
 #include "forest/core/file.h"
 
 #include <algorithm>
+#include <atomic>
 #include <cerrno>
 #include <charconv>
 #include <cstring>
@@ -56,7 +57,11 @@ int open_file_at(const std::filesystem::path& place) {
   return number;
 }
 
+std::atomic<bool> output_taken = false;
+
 }  // namespace
+
+bool standard_output_taken() { return output_taken; }
 
 unsigned permissions(unsigned wanted) {
   // It can only be asked by being set.
@@ -125,6 +130,7 @@ NewFile::NewFile(const std::filesystem::path& wanted) : wanted_(wanted), place_(
   struct stat status {};
   const bool there = ::stat(place_.c_str(), &status) == 0;
   if (there && S_ISDIR(status.st_mode)) throw Error(wanted_.string() + ": is a folder; name a file");
+  if (open_file_at(place_) == STDOUT_FILENO) output_taken = true;
   stream_ = open_file_at(place_) >= 0 || (there && !S_ISREG(status.st_mode));
   folder_ = stream_                    ? std::filesystem::temp_directory_path()
             : place_.has_parent_path() ? place_.parent_path()

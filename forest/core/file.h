@@ -26,6 +26,9 @@ class MappedFile {
   std::size_t size_ = 0;
 };
 
+/// Whether some NewFile was for standard output (/dev/stdout): what a person reads belongs elsewhere then.
+bool standard_output_taken();
+
 /// A file on its way: written without a name on the disk of its place, put there by commit(), so that a killed program
 /// leaves the old file or the new one, and nothing else. (Where the file system knows no files without names, and after
 /// path(), it has a passing name beside its place until then, which a kill leaves behind.) Links are followed: what they

@@ -79,9 +79,10 @@ double von_mises(Random& random, double mean, double concentration) {
 
 // Knuth 1969, in pieces of at most 32 so that the product does not vanish.
 double poisson(Random& random, double mean) {
-  if (!(mean >= 0.)) return nonsense;
+  constexpr double most = 1e6;  // which takes a while
+  if (!(mean >= 0. && mean <= most)) return nonsense;
   double count = 0.;
-  for (double left = std::min(mean, 1e6); left > 0.; left -= 32.) {
+  for (double left = mean; left > 0.; left -= 32.) {
     const double bound = std::exp(-std::min(left, 32.));
     for (double product = random.uniform(); product > bound; product *= random.uniform()) ++count;
   }

@@ -27,8 +27,8 @@ struct Band {
 Band band_of(std::span<const Curve> known, std::span<const Curve> more, std::size_t cells, std::size_t draws,
              std::uint64_t seed);
 
-/// Share of radii at which a curve lies in the band: of those where either is more than a fiftieth of the band's highest
-/// mean, which leaves out what only one or two cells reach.
+/// Share of radii at which a curve lies in the band: of those where the band's mean is more than a fiftieth of its highest one, or the
+/// curve more than twice that, which leaves out what only one or two cells reach.
 double share_inside(const Curve& curve, const Band& band);
 
 }  // namespace forest::statistics

@@ -171,7 +171,8 @@ Types find_types(const FeatureTable& table, const TypesOptions& options, Progres
             .components = projection.scores,
             .shares = projection.shares};
   const Matrix D = distances(out.components, out.components);
-  const std::size_t most = std::max(options.types.value_or(0), std::min(options.most, n / 3));
+  const std::size_t most =
+      std::max({std::size_t(1), options.types.value_or(0), std::min(options.most, n / 3)});
 
   // What one cloud of as many cells gives, as long in each component.
   std::vector<std::vector<double>> reference(references, std::vector<double>(most, 0.));

@@ -37,7 +37,9 @@ struct Discrimination {
   Estimate auc{.5, 0., 1.};
   std::vector<double> repeats;  // the AUC of each
   std::vector<double> null;     // of each permutation, sorted
-  double p = 1.;  // share of permutations, with what was found, that reach it; 1 without permutations
+  // Share of permutations, with what was found, that reach it; 1 without permutations. Each is one cross-validation and what was found
+  // the mean of many, so that it is rather too large than too small.
+  double p = 1.;
   std::vector<double>
       scores;  // of each cell, first sample first: mean over repeats where it was among the tested
 };

@@ -375,8 +375,30 @@ double Distribution::cdf(double x) const {
   return std::min(sum, 1.);
 }
 
+// The least value there is (p = 0), or the greatest (1); NaN where there is none.
+static double end_of(const Distribution& d, double p) {
+  const auto& [components, atoms, step, origin, downwards] = d;
+  double low = infinity, high = -infinity;
+  const auto take = [&](double x) { low = std::min(low, x), high = std::max(high, x); };
+  for (const Component& c : components) {
+    const Family::Support support = c.family->support;
+    const bool first = p == (downwards ? 1. : 0.);
+    if (support == Family::positive && first)
+      take(origin);
+    else if (support == Family::interval)
+      take(d.placed(c.family->quantile(c.parameters, first ? 0. : 1.)));
+    else
+      return nan;
+  }
+  if (step > 0. && !components.empty())
+    low = step * std::round(low / step), high = step * std::round(high / step);
+  for (const Atom& a : atoms) take(a.value);
+  return p == 0. ? low : high;
+}
+
 double Distribution::quantile(double p) const {
   if (!(p >= 0. && p <= 1.)) return nan;
+  if (p == 0. || p == 1.) return end_of(*this, p);
   // All of them lie between the quantiles of the parts.
   const double inside = std::clamp(p, 1e-12, 1. - 1e-12);
   double low = infinity, high = -infinity;
@@ -384,12 +406,7 @@ double Distribution::quantile(double p) const {
   for (const Component& c : components)
     take(placed(c.family->quantile(c.parameters, downwards ? 1. - inside : inside)));
   for (const Atom& a : atoms) take(a.value);
-  if (components.size() == 1 && atoms.empty()) {
-    const Family::Support support = components[0].family->support;
-    if (support == Family::positive && p == (downwards ? 1. : 0.)) return origin;
-    if ((p == 0. || p == 1.) && support != Family::interval) return nan;
-    return step > 0. ? step * std::round(high / step) : high;
-  }
+  if (components.size() == 1 && atoms.empty()) return step > 0. ? step * std::round(high / step) : high;
   if (step > 0.) low -= step, high += step;
   if (cdf(low) >= p) return low;
   for (int i = 0; i < 200 && low < high; ++i) {

@@ -61,8 +61,8 @@ struct Distribution {
 
   double density(double x) const;  // of the components, before rounding; atoms have none
   double cdf(double x) const;      // that a value is <= x
-  double quantile(double p)
-      const;  // the least x for which cdf(x) >= p; 0 <= p <= 1, at the ends NaN where it has no limit
+  /// The least x for which cdf(x) >= p; 0 <= p <= 1, at the ends NaN where it has no limit.
+  double quantile(double p) const;
   double draw(Random& random) const;
   /// Between a value and what the components give for it.
   double counted(double x) const { return downwards ? origin - x : x - origin; }

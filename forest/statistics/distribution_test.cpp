@@ -201,6 +201,18 @@ TEST(Distribution, AtomsAreJumps) {
   EXPECT_NEAR(double(std::ranges::count(x, 1.)) / 20000., 0.5, 0.02);
 }
 
+TEST(Distribution, EndsWhereAllItsPartsDo) {
+  const Distribution two{{part("uniform", {0, 2}, 0.4), part("gamma", {2, 3}, 0.4)}, {{-1., 0.2}}, 0.};
+  EXPECT_EQ(two.quantile(0.), -1.);
+  EXPECT_TRUE(std::isnan(two.quantile(1.)));
+  const Distribution endless{{part("normal", {0, 1}, 0.5), part("normal", {3, 1}, 0.5)}, {}, 0.};
+  EXPECT_TRUE(std::isnan(endless.quantile(0.)) && std::isnan(endless.quantile(1.)));
+  Distribution down{{part("gamma", {2, 3}, 0.5)}, {{0.5, 0.5}}, 0.};
+  down.origin = 1., down.downwards = true;
+  EXPECT_EQ(down.quantile(1.), 1.);
+  EXPECT_TRUE(std::isnan(down.quantile(0.)));
+}
+
 // ── Fitting ──
 
 TEST(Fit, FindsTheFamilyAndItsParametersAgain) {

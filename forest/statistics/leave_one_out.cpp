@@ -4,7 +4,9 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 #include <numeric>
+#include <vector>
 
 #include <fmt/format.h>
 
@@ -80,21 +82,28 @@ double paired(const Beside& b, const LeaveOneOutOptions& options, std::uint64_t 
   return sum / count;
 }
 
-/// Chance that ranks of `cells` cells among `grown` others each, all equally likely, add up to what is as far from the middle as
-/// `sum` (in grown cells below). Exact, by adding up rank after rank.
-double chance_of(double sum, std::size_t cells, std::size_t grown) {
+std::size_t doubled_rank(double rank, std::size_t count, std::size_t most) {
+  return std::size_t(std::llround(2. * double(most) * rank / double(count)));
+}
+
+/// How likely each sum is of the ranks of cells among so many others each, all ranks equally likely. Ranks count from 0 to 2 `most`,
+/// whatever there are of others, so that half a rank is a whole one.
+std::vector<double> sums_of_ranks(std::span<const std::size_t> others, std::size_t most) {
   std::vector<double> ways{1.};
-  for (std::size_t i = 0; i < cells; ++i) {
-    std::vector<double> more(ways.size() + grown, 0.);
-    double window = 0.;
-    for (std::size_t k = 0; k < more.size(); ++k) {
-      if (k < ways.size()) window += ways[k];
-      if (k > grown) window -= ways[k - grown - 1];
-      more[k] = window / double(grown + 1);
+  for (const std::size_t count : others) {
+    std::vector<double> more(ways.size() + 2 * most, 0.);
+    for (std::size_t rank = 0; rank <= count; ++rank) {
+      const std::size_t at = doubled_rank(double(rank), count, most);
+      for (std::size_t k = 0; k < ways.size(); ++k) more[k + at] += ways[k] / double(count + 1);
     }
     ways = std::move(more);
   }
-  const double middle = .5 * double(ways.size() - 1), far = std::abs(sum - middle);
+  return ways;
+}
+
+/// Chance of what is as far from the middle as `sum`. Exact.
+double chance_of(std::size_t sum, std::span<const double> ways) {
+  const double middle = .5 * double(ways.size() - 1), far = std::abs(double(sum) - middle);
   // Both tails are alike, and the lower one is summed up without anything being taken away.
   double tail = 0.;
   for (std::size_t k = 0; k < ways.size() && double(k) <= middle - far + 1e-9; ++k) tail += ways[k];
@@ -113,28 +122,38 @@ double chance_of_so_many(std::size_t strange, std::size_t cells) {
 
 std::vector<PairedFeature> ranked_features(const FeatureTable& traced, std::span<const FeatureTable> grown) {
   std::vector<PairedFeature> out(traced.features.size());
+  std::vector<std::size_t> sums(out.size(), 0);
+  std::vector<std::vector<std::size_t>> others(out.size());  // of each cell in which it is defined
+  std::size_t most = 0;
+  for (const FeatureTable& g : grown) most = std::max(most, g.size());
   parallel_for(out.size(), 8, [&](std::size_t f) {
     PairedFeature& feature = out[f];
     feature.feature = traced.features[f];
     const auto c = Eigen::Index(f);
-    std::size_t most = 0;
-    for (const FeatureTable& g : grown) most = std::max(most, g.size());
-    double sum = 0., above = 0.;
+    double above = 0.;
     bool same = true;
     for (std::size_t i = 0; i < traced.size(); ++i) {
       const double x = traced.values(Eigen::Index(i), c);
       if (!std::isfinite(x)) continue;
-      double below = 0., count = 0.;
+      double below = 0.;
+      std::size_t count = 0;
       for (const double y : grown[i].values.col(c))
-        if (std::isfinite(y)) below += y < x ? 1. : y == x ? .5 : 0., count += 1., same = same && y == x;
-      if (count < double(least_grown)) continue;
-      sum += below / count * double(most), above += 1. - below / count;
-      ++feature.cells;
+        if (std::isfinite(y)) below += y < x ? 1. : y == x ? .5 : 0., ++count, same = same && y == x;
+      if (count < least_grown) continue;
+      sums[f] += doubled_rank(below, count, most), above += 1. - below / double(count);
+      others[f].push_back(count);
     }
-    if (feature.cells == 0 || same) return;
+    if (others[f].empty() || same) return others[f].clear();
+    feature.cells = others[f].size();
     feature.auc = above / double(feature.cells);
-    feature.p = chance_of(sum, feature.cells, most);
   });
+  std::map<std::vector<std::size_t>, std::vector<double>> ways;  // most features are defined in all cells
+  for (std::size_t f = 0; f < out.size(); ++f) {
+    if (others[f].empty()) continue;
+    auto& known = ways[others[f]];
+    if (known.empty()) known = sums_of_ranks(others[f], most);
+    out[f].p = chance_of(sums[f], known);
+  }
   std::vector<FeatureTable> all{traced};  // what repeats another, or is the same in all, is not asked
   all.insert(all.end(), grown.begin(), grown.end());
   const std::vector<Feature> told = distinct(stacked(all)).features;

@@ -50,6 +50,19 @@ TEST(LeaveOneOut, CellsOfThePopulationAreHardlyEverToldApart) {
   EXPECT_NEAR(area, .5, .06);
 }
 
+// Chances of ranks are right also where most grown cells have no value.
+TEST(LeaveOneOut, RanksAmongFewAreNoStrangerThanTheyAre) {
+  int below = 0, asked = 0;
+  for (std::uint64_t trial = 0; trial < 60; ++trial) {
+    auto others = grown(900 + trial, 5, 100);
+    for (FeatureTable& g : others) g.values.bottomRows(81).setConstant(NAN), g.values(99, 0) = 0.;
+    const auto result = leave_one_out(cells(trial, 5), others, {.repeats = 1, .trees = 1});
+    for (const PairedFeature& f : result.features) below += f.p <= .05, ++asked;
+  }
+  ASSERT_GT(asked, 1000);
+  EXPECT_LT(below, asked * 6 / 100);
+}
+
 TEST(LeaveOneOut, FindsWhatIsFarOffAndNamesIt) {
   const auto result = leave_one_out(cells(1, 8), grown(2, 8, 59, 4.), quick);
   EXPECT_TRUE(result.told_apart());

@@ -89,7 +89,7 @@ double fraction_above_soma(const Arbors& a) {
     for (std::size_t row = b.first_row + 1; row <= b.last_row(); ++row) {
       const double low = std::min(c.y[row - 1], c.y[row]) - soma,
                    high = std::max(c.y[row - 1], c.y[row]) - soma;
-      above += low >= 0. ? c.length[row] : high <= 0. ? 0. : c.length[row] * (high / (high - low));
+      above += high <= 0. ? 0. : low >= 0. ? c.length[row] : c.length[row] * (high / (high - low));
     }
   return ratio(above, sum<length>(a));
 }

@@ -157,7 +157,7 @@ constexpr auto table = std::to_array<Metric>({
     {"section_end_distances", "µm", section, axes_only, per_section<chord>,
      "Straight distance between the ends of the section.", "NeuroM", ""},
     {"section_branch_orders", "", section, axes_only, per_section<order>,
-     "Centrifugal order: 0 for a stem, one more at every branch point.", "Uylings & van Pelt 2002", ""},
+     "Centrifugal order: 0 for a stem, one more at every branch point, and where a branch goes on as one of another kind.", "Uylings & van Pelt 2002", ""},
     {"section_term_branch_orders", "", section, axes_only, per_section<ending_in<order, terminal>>,
      "Centrifugal order of a section that ends in a terminal.", "Uylings & van Pelt 2002", ""},
     {"section_bif_branch_orders", "", section, axes_only, per_section<ending_in<order, bifurcation_of>>,

@@ -126,7 +126,9 @@ Estimate area_interval(double area, std::span<const double> first, std::span<con
                         (n_second - 1.) * (q2 - inside * inside)) /
                        (n_first * n_second);
   const double delong = variance(first) / n_first + variance(second) / n_second;
-  const double spread = area == inside ? delong : std::max(delong, floor);
+  constexpr double few = 8.;  // of so few the variance is no measure; of one it is none
+  const double spread =
+      area == inside && std::min(n_first, n_second) >= few ? delong : std::max(delong, floor);
   const double logit = std::log(inside / (1. - inside));
   const double reach = 1.959964 * std::sqrt(spread) / (inside * (1. - inside));
   const auto back = [](double x) { return 1. / (1. + std::exp(-x)); };

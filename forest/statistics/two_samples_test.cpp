@@ -116,6 +116,21 @@ TEST(AreaUnderCurve, IsNotCertainOfFewCellsThatAreFullyApart) {
   EXPECT_GT(area_under_curve(low, high).lower, .95);
 }
 
+TEST(AreaUnderCurve, OfOneCellOrAFewSaysLittle) {
+  for (const std::size_t few : {1u, 3u}) {
+    int held = 0;
+    for (std::uint64_t trial = 0; trial < 500; ++trial) {
+      Random random(9, trial);
+      Values x(few), y(100);
+      for (double& v : x) v = random.normal();
+      for (double& v : y) v = random.normal();
+      const Estimate e = area_under_curve(x, y);
+      held += e.lower <= .5 && .5 <= e.upper;
+    }
+    EXPECT_GT(held, 465) << few;
+  }
+}
+
 TEST(Quantile, IsInterpolated) {
   EXPECT_EQ(quantile(Values{4, 1, 3, 2}, .5), 2.5);
   EXPECT_EQ(quantile(Values{1, 2, 3}, 1.), 3.);
