@@ -216,8 +216,12 @@ void report(const std::vector<std::vector<Conversion>>& done, const Target& targ
             Console& console) {
   nlohmann::ordered_json list = nlohmann::ordered_json::array();
   std::size_t written = 0, failed = 0, skipped = 0, oddities = 0, lost = 0;
+  std::string several;  // files that one has become
   Teller teller(options, console);
-  for (const auto& conversions : done)
+  for (const auto& conversions : done) {
+    if (several.empty() && conversions.size() > 1 && conversions[0].to != conversions[1].to)
+      several = fmt::format(" ({}, {}{})", escaped(conversions[0].to.string()),
+                            escaped(conversions[1].to.string()), conversions.size() > 2 ? ", …" : "");
     for (const Conversion& c : conversions) {
       teller.tell(c);
       (c.error.empty() ? written : c.skipped ? skipped : failed) += 1;
@@ -233,14 +237,15 @@ void report(const std::vector<std::vector<Conversion>>& done, const Target& targ
       }
       list.push_back(std::move(entry));
     }
+  }
   teller.end();
   console.print({{"format", target.name()},
                  {"written", written},
                  {"failed", failed},
                  {"skipped", skipped},
                  {"files", list}});
-  console.say(fmt::format("{} written as {}, {} not read, {} skipped, {} told above{}", written,
-                          target.title(), failed, skipped, counted(lost, "loss", "losses"),
+  console.say(fmt::format("{} written as {}{}, {} not read, {} skipped, {} told above{}", written,
+                          target.title(), several, failed, skipped, counted(lost, "loss", "losses"),
                           oddities && !options.verbose ? fmt::format("; {} of the files, shown by --verbose",
                                                                      counted(oddities, "oddity", "oddities"))
                                                        : ""));

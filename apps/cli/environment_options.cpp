@@ -78,10 +78,10 @@ void add_environment(CLI::App& command, EnvironmentOptions& options) {
 
 Surroundings::Surroundings(const EnvironmentOptions& options, Console& console) {
   if (options.file.empty()) return;
+  environment_ = read(options.file, console);
   if (options.at.empty() && !options.depth)
     throw InputError(options.file, 0,
                      "where in it the neurons grow is not said; give --at X,Y,Z or --depth UM");
-  environment_ = read(options.file, console);
   site_.environment = &environment_;
   if (!options.at.empty()) {
     site_.at = *place_of(options.at);

@@ -543,13 +543,17 @@ class Parser {
       text_.fail(open > 0 ? "a [ is not closed; write ] where the branch ends"
                           : "a ] closes nothing; write [ where the branch begins");
   }
-  void check_count(Symbol symbol, int count, std::size_t place) const {
+  void check_count(Symbol symbol, int count, std::size_t place) {
     const Arity& a = arities_[symbol];
     if (count >= a.least && count <= a.most) return;
     const std::string wanted =
         a.least == a.most ? fmt::format("{}", a.least) : fmt::format("{} to {}", a.least, a.most);
-    text_.fail_at(place, fmt::format("module {} has {} parameter{}, {} given", grammar_.symbols[symbol],
-                                     wanted, wanted == "1" ? "" : "s", count));
+    const std::string_view behind = text_.rest();
+    const bool word = count == 0 && !behind.empty() && is_letter(behind[0]);
+    text_.fail_at(place,
+                  fmt::format("module {} has {} parameter{}, {} given{}", grammar_.symbols[symbol], wanted,
+                              wanted == "1" ? "" : "s", count,
+                              word ? "; a name of more letters must be declared above (module …)" : ""));
   }
 
   Symbol add_symbol(const std::string& name, Arity arity) {

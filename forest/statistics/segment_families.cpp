@@ -45,10 +45,10 @@ enum : std::size_t {
   parent_daughter_ratio
 };
 constexpr Row rows[] = {
-    {Quantity::trajectory, "length_of_nonterminal_segments", "µm", "path length of sections that fork", false,
-     0.},
-    {Quantity::trajectory, "length_of_terminal_segments", "µm", "path length of sections that end", false,
-     0.},
+    {Quantity::trajectory, "length_of_nonterminal_segments", "µm",
+     "path length of sections that fork, and have one", false, 0.},
+    {Quantity::trajectory, "length_of_terminal_segments", "µm",
+     "path length of sections that end, and have one", false, 0.},
     {Quantity::trajectory, "contraction", "",
      "straight distance between the ends of a section over its path length", false, 0., 1.},
     {Quantity::trajectory, "turn", "°", "angle between one piece of 10 µm of a section and the next", false,
@@ -175,9 +175,10 @@ class Reader {
     add(amplitude, degrees_between(first, second), where);
     add(daughter_ratio, ratio(first_diameter(big), first_diameter(small)), where);
     if (parent.parent < 0) return;
-    const auto above =
-        std::ranges::find(arbors_.bifurcations(), std::uint32_t(parent.parent), &Bifurcation::parent);
-    if (above == arbors_.bifurcations().end()) return;
+    // They stand in the order of their parents.
+    const auto above = std::ranges::lower_bound(arbors_.bifurcations(), std::uint32_t(parent.parent), {},
+                                                &Bifurcation::parent);
+    if (above == arbors_.bifurcations().end() || above->parent != std::uint32_t(parent.parent)) return;
     const Vector chord = place(arbors_.points(parent).back()) - place(arbors_.points(parent).front());
     if (chord.isZero(0.)) return;
     const Vector axis = chord.normalized();
