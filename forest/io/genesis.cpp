@@ -309,10 +309,9 @@ class Scanner {
   }
 
   std::size_t find_group(std::string_view name) {
-    const auto row = std::ranges::find(scan_.groups, name, &Group::name);
-    if (row != scan_.groups.end()) return std::size_t(row - scan_.groups.begin());
-    scan_.groups.emplace_back().name = name;
-    return scan_.groups.size() - 1;
+    const auto [row, is_new] = group_numbers_.try_emplace(std::string(name), scan_.groups.size());
+    if (is_new) scan_.groups.emplace_back().name = name;
+    return row->second;
   }
 
   double coordinate(const std::vector<std::string_view>& words, std::size_t column) const {
@@ -426,6 +425,7 @@ class Scanner {
   const std::string& name_;
   Oddities& oddities_;
   Scan scan_;
+  std::unordered_map<std::string, std::size_t> group_numbers_{{"", 0}};  // by name
   std::deque<std::string> names_;
   std::size_t line_ = 0, group_ = 0, comment_line_ = 0;
   bool relative_ = false, polar_ = false, two_ends_ = false, spherical_ = false, in_comment_ = false;
@@ -688,9 +688,10 @@ std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
     oddities.add(Odd::several_cells, 0, [&] { return fmt::format("there are {} cells", groups.size()); });
   if (groups.empty()) groups.push_back(&scan.groups[0]);
   // What stands outside of the cells (a header, a prototype that is left out) is said of all.
+  std::vector<bool> is_cell(scan.groups.size());
+  for (const Group* group : groups) is_cell[std::size_t(group - scan.groups.data())] = true;
   const auto is_of = [&](const Said& said, std::size_t number) {
-    const bool of_a_cell = std::ranges::find(groups, &scan.groups[said.group]) != groups.end();
-    return !of_a_cell || said.group == number || (said.on && said.group < number);
+    return !is_cell[said.group] || said.group == number || (said.on && said.group < number);
   };
   for (Group* const group : groups) {
     Cell& cell = cells.emplace_back();
