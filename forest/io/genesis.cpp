@@ -150,15 +150,6 @@ std::vector<std::string_view> words_of(std::string_view text) {
   return words;
 }
 
-template <class Visit>  // of each line, with its number; stops where it returns false
-void each_line(std::string_view bytes, Visit visit) {
-  for (std::size_t begin = 0, line = 1; begin < bytes.size(); ++line) {
-    const std::size_t end = std::min(bytes.find_first_of("\r\n", begin), bytes.size());
-    if (!visit(bytes.substr(begin, end - begin), line)) return;
-    begin = end + (bytes.substr(end, 2) == "\r\n" ? 2 : 1);
-  }
-}
-
 struct Compartment {
   std::int32_t parent = -1;
   std::size_t line = 0;
@@ -202,7 +193,8 @@ class Scanner {
       } else if (scan_.ours && text.starts_with(genesis_note)) {
         const std::string_view note = text.substr(genesis_note.size());
         const std::size_t end = std::min(note.find(' '), note.size());
-        say(unescaped_note(note.substr(0, end)), unescaped_note(note.substr(std::min(end + 1, note.size()))));
+        say(percent_decoded(note.substr(0, end)),
+            percent_decoded(note.substr(std::min(end + 1, note.size()))));
       } else if (scan_.ours && text.starts_with(genesis_ends)) {
         ends_ = text.substr(genesis_ends.size());
       } else {
