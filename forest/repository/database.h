@@ -56,8 +56,8 @@ class Database {
 /// Brings what version `from` stored into the new tables, in the transaction that makes them.
 using Refill = void (*)(Database& database, int from);
 
-/// Opens `place`, which must be a repository this program can read; with `write` it is made when there is none, so that
-/// whoever looks sees none or a whole one, and brought to the newest schema. Throws InputError.
+/// Opens `place`, which must be a repository this program can read, and brings it to the newest schema; with `write` it is
+/// made when there is none, so that whoever looks sees none or a whole one. Throws InputError.
 std::unique_ptr<Database> connect(const std::string& place, bool write, Refill refill);
 
 std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, Refill refill);

@@ -379,7 +379,7 @@ std::unique_ptr<Database> connect_postgresql(const std::string& place, bool writ
                        "holds no repository; check the address, or make one with brainforest import");
     if (version < schema_version) {
       database->bring_up_to_date(refill);
-      version = schema_version;
+      version = database->version();
     }
     if (version > schema_version)
       throw InputError(
