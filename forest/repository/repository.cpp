@@ -100,6 +100,15 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
     if (data.morphology.sections().size() >> section_bits)
       throw Error(fmt::format("{} has more than {} sections, which no repository holds", shown(neuron.name),
                               (1 << section_bits) - 1));
+    const auto* grown = std::get_if<Grown>(&neuron.provenance);
+    if (grown) {
+      const auto grammar = impl.grammar(*grown);
+      if (!grammar)
+        throw Error(fmt::format(
+            "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
+            shown(grown->grammar), shown(neuron.name)));
+      insert.grammar = *grammar;
+    }
     insert.population = impl.population(neuron.population);
     const auto stored_as = [&](const std::string& fingerprint) -> std::optional<Added> {
       const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
@@ -108,16 +117,8 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
       return Added{NeuronId(std::size_t(*id)),
                    *impl.ask<std::string>("select name " + same, insert.population, fingerprint), true};
     };
-    if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
-      const auto grammar = impl.grammar(*grown);
-      if (!grammar)
-        throw Error(fmt::format(
-            "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
-            shown(grown->grammar), shown(neuron.name)));
-      insert.grammar = *grammar;
-      if (impl.holds_older_grown())
-        if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
-    }
+    if (grown && impl.holds_older_grown())
+      if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
     insert.name = neuron.name;
     for (int number = 2;;) {
       insert.id = impl.database->next_id("neurons");
