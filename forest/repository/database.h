@@ -28,6 +28,8 @@ class Database {
 
   virtual void begin_reading() = 0;  // what is read until the end of the transaction was there at one moment
   virtual void begin_writing() = 0;
+  /// Whether the transaction that was begun has come to nothing by an error, a question's too.
+  virtual bool is_undone() = 0;
   /// SQL of schema.h, whose words in @ this database has other names for.
   virtual std::string dialect(std::string_view sql) const = 0;
   /// A number for a new row of a table: never one that is taken, also when others write too.

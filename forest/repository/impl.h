@@ -94,7 +94,8 @@ struct Repository::Impl {
   auto write(Body&& body, bool settled = true) {
     return guarded([&] {
       if (writing) {
-        if (failed) throw Error(place + ": the open transaction has failed before; begin another");
+        if (failed || database->is_undone())
+          throw Error(place + ": the open transaction has failed before; begin another");
         try {
           if (settled) settle();
           return body();

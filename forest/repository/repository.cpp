@@ -157,7 +157,8 @@ void Repository::Transaction::commit() {
   assert(impl_);
   Impl& impl = *impl_;
   impl.guarded([&] {
-    if (impl.failed) throw Error(impl.place + ": the transaction has failed and is undone; begin another");
+    if (impl.failed || impl.database->is_undone())
+      throw Error(impl.place + ": the transaction has failed and is undone; begin another");
     impl.settle();
     impl.sql << "commit";  // when this throws, the destructor undoes
   });

@@ -203,6 +203,38 @@ TEST_P(EveryDatabase, ATransactionIsAllOrNothing) {
   EXPECT_EQ(repository.neurons().size(), 1u) << "a refused neuron does not spoil the others";
 }
 
+TEST_P(EveryDatabase, WhatIsRefusedInATransactionChangesNothing) {
+  Repository repository = Repository::open(place_, Access::write);
+  const NeuronId id = repository.add(neuron(1), called("one")).id;
+  auto transaction = repository.begin();
+  EXPECT_THROW(repository.add(neuron(2), {.name = "two",
+                                          .population = "grown",
+                                          .provenance = Grown{"bush", std::string(32, '0'), 1, 2}}),
+               Error);
+  const std::pair<const statistics::Metric*, double> values[] = {
+      {statistics::find_metric("total_length"), 12345.}, {statistics::find_metric("type"), 1.}};
+  EXPECT_THROW(repository.store_metrics(id, values), Error);
+  transaction.commit();
+  EXPECT_EQ(repository.populations().size(), 1u);
+  EXPECT_TRUE(repository.neurons_where("total_length = 12345").empty());
+}
+
+TEST_P(EveryDatabase, ATransactionInWhichAQuestionFailedIsStoredOrSaysThatItIsNot) {
+  Repository repository = Repository::open(place_, Access::write);
+  std::string error;
+  {
+    auto transaction = repository.begin();
+    repository.add(neuron(1), called("one"));
+    EXPECT_THROW(repository.neurons_where("no_column = 1"), Error);
+    error = message([&] { transaction.commit(); });
+  }
+  if (is_file())
+    EXPECT_EQ(error, "no error");
+  else
+    EXPECT_THAT(error, HasSubstr("has failed and is undone"));
+  EXPECT_EQ(repository.neurons().size(), is_file() ? 1u : 0u);
+}
+
 TEST_P(EveryDatabase, WhatIsBeingStoredIsNoTableForQuestions) {
   Repository repository = Repository::open(place_, Access::write);
   repository.add(neuron(4), called("four"));

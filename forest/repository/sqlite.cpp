@@ -252,6 +252,7 @@ class Sqlite final : public Database {
  public:
   void begin_reading() override { sql_ << "begin"; }
   void begin_writing() override { sql_ << "begin immediate"; }  // waits a minute for other writers
+  bool is_undone() override { return sqlite::sqlite3_get_autocommit(handle()); }
   std::string dialect(std::string_view text) const override { return dialect_of(text); }
   int next_id(const std::string& table) override {
     auto& [of, statement] = next_id_;  // kept, since each of many neurons asks
