@@ -120,7 +120,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
     if (grown && impl.holds_older_grown())
       if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
     insert.name = neuron.name;
-    for (int number = 2;;) {
+    for (;;) {
       insert.id = impl.database->next_id("neurons");
       if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
       if (const auto there = stored_as(insert.fingerprint)) return *there;
@@ -132,7 +132,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
         throw Error(
             fmt::format("another neuron of population {} is called {}; choose another name or population",
                         shown(neuron.population), shown(neuron.name)));
-      insert.name = fmt::format("{}-{}", neuron.name, number++);
+      insert.name = fmt::format("{}-{}", neuron.name, impl.next_number(insert.population, neuron.name));
     }
   };
   return impl.write(store, false);  // it asks for no metrics
@@ -140,8 +140,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
 
 Repository::Transaction Repository::begin() {
   if (impl_->writing) throw Error(impl_->place + ": a transaction is open already; commit it first");
-  impl_->guarded([&] { impl_->database->begin_writing(); });
-  impl_->writing = true;
+  impl_->guarded([&] { impl_->begin_writing(); });
   return Transaction(*impl_);
 }
 
@@ -201,6 +200,16 @@ int Repository::Impl::population(const std::string& name) {
   }
   known_population = {name, *number};
   return *number;
+}
+
+int Repository::Impl::next_number(int population, const std::string& name) {
+  int& last = last_numbers.try_emplace({population, name}, 1).first->second;
+  last = *ask<int>(
+      "with recursive taken (number) as (select cast(:next as integer) union all select number + 1 from "
+      "taken where exists (select 1 from neurons where population = :population and name = cast(:name as "
+      "text) || '-' || cast(number as text))) select max(number) from taken",
+      last + 1, population, name);
+  return last;
 }
 
 std::optional<int> Repository::Impl::grammar(const Grown& grown) {
@@ -319,6 +328,7 @@ bool Repository::remove(NeuronId id) {
     impl_->sql << "delete from " + of_sections(neuron);
     impl_->sql << "delete from " + of_metrics(neuron);
     impl_->sql << "delete from neurons where id = :id", use(neuron);
+    impl_->last_numbers.clear();
     return true;
   });
 }

@@ -143,6 +143,34 @@ TEST_P(EveryDatabase, ANameTakenByAnotherNeuronIsRefusedOrNumbered) {
   EXPECT_EQ(repository.find("cell", "elsewhere").size(), 1u);
 }
 
+TEST_P(EveryDatabase, TheNumberOfANameIsTheLeastThatIsFree) {
+  Repository repository = Repository::open(place_, Access::write);
+  std::uint64_t next = 0;
+  const auto add = [&] {
+    NewNeuron cell = called("cell");
+    cell.provenance = Traced{"cell.swc", std::to_string(++next)};
+    cell.number_if_taken = true;
+    return repository.add(neuron(next, 3), cell);
+  };
+  repository.add(neuron(50, 3), called("cell-4"));
+  repository.add(neuron(51, 3), called("cell-x"));
+  auto transaction = repository.begin();
+  const char* names[] = {"cell", "cell-2", "cell-3", "cell-5", "cell-6"};
+  std::vector<NeuronId> ids;
+  for (const char* name : names) {
+    const Added added = add();
+    EXPECT_EQ(added.name, name);
+    ids.push_back(added.id);
+  }
+  repository.remove(ids[2]);
+  EXPECT_EQ(add().name, "cell-3");
+  EXPECT_EQ(add().name, "cell-7");
+  transaction.commit();
+  Repository::open(place_, Access::write).remove(ids[1]);
+  EXPECT_EQ(add().name, "cell-2") << "another program has removed it";
+  EXPECT_EQ(add().name, "cell-8");
+}
+
 TEST_P(EveryDatabase, HostileNamesAreJustNames) {
   Repository repository = Repository::open(place_, Access::write);
   const std::vector<std::string> names{"'",
