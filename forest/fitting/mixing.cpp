@@ -150,9 +150,10 @@ std::vector<std::size_t> most_alike(const std::vector<Cell>& cells, std::size_t 
   std::vector<std::pair<double, std::size_t>> others;
   for (std::size_t j = 0; j < cells.size(); ++j)
     if (j != neuron) others.emplace_back(apart(cells[neuron], cells[j]), j);
-  std::ranges::sort(others);
+  const auto end = others.begin() + std::ptrdiff_t(std::min(most, others.size()));
+  std::ranges::partial_sort(others, end);
   std::vector<std::size_t> order;
-  for (std::size_t k = 0; k < std::min(most, others.size()); ++k) order.push_back(others[k].second);
+  for (auto other = others.begin(); other != end; ++other) order.push_back(other->second);
   return order;
 }
 

@@ -117,11 +117,6 @@ bool ends_word(char c) {
          c == '>' || c == '"';
 }
 
-bool same_word(std::string_view text, std::string_view lower) {
-  return std::ranges::equal(text, lower,
-                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
-}
-
 std::optional<SectionKind> type_of(std::string_view word) {
   if (same_word(word, "axon")) return SectionKind::axon;
   if (same_word(word, "dendrite")) return SectionKind::basal;

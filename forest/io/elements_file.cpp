@@ -127,7 +127,7 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   const std::set<std::int64_t> known{int(Kind::crest), int(Kind::valley), int(Kind::sulcus)};
   for (std::size_t i = 0; i < starts.size(); ++i) {
     const std::int64_t end = i + 1 < starts.size() ? starts[i + 1] : std::int64_t(points.size() / 3);
-    if (starts[i] < 0 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) ||
+    if (starts[i] < 0 || end < 2 || starts[i] > end - 2 || end > std::int64_t(points.size() / 3) ||
         !known.contains(kinds[i]) || !std::isfinite(strength[i]))
       file.refuse("/lines has a line that cannot be");
     Line line{.kind = Line::Kind(kinds[i]),

@@ -150,15 +150,6 @@ std::vector<std::string_view> words_of(std::string_view text) {
   return words;
 }
 
-template <class Visit>  // of each line, with its number; stops where it returns false
-void each_line(std::string_view bytes, Visit visit) {
-  for (std::size_t begin = 0, line = 1; begin < bytes.size(); ++line) {
-    const std::size_t end = std::min(bytes.find_first_of("\r\n", begin), bytes.size());
-    if (!visit(bytes.substr(begin, end - begin), line)) return;
-    begin = end + (bytes.substr(end, 2) == "\r\n" ? 2 : 1);
-  }
-}
-
 struct Compartment {
   std::int32_t parent = -1;
   std::size_t line = 0;
@@ -202,7 +193,8 @@ class Scanner {
       } else if (scan_.ours && text.starts_with(genesis_note)) {
         const std::string_view note = text.substr(genesis_note.size());
         const std::size_t end = std::min(note.find(' '), note.size());
-        say(unescaped_note(note.substr(0, end)), unescaped_note(note.substr(std::min(end + 1, note.size()))));
+        say(percent_decoded(note.substr(0, end)),
+            percent_decoded(note.substr(std::min(end + 1, note.size()))));
       } else if (scan_.ours && text.starts_with(genesis_ends)) {
         ends_ = text.substr(genesis_ends.size());
       } else {
@@ -309,10 +301,9 @@ class Scanner {
   }
 
   std::size_t find_group(std::string_view name) {
-    const auto row = std::ranges::find(scan_.groups, name, &Group::name);
-    if (row != scan_.groups.end()) return std::size_t(row - scan_.groups.begin());
-    scan_.groups.emplace_back().name = name;
-    return scan_.groups.size() - 1;
+    const auto [row, is_new] = group_numbers_.try_emplace(std::string(name), scan_.groups.size());
+    if (is_new) scan_.groups.emplace_back().name = name;
+    return row->second;
   }
 
   double coordinate(const std::vector<std::string_view>& words, std::size_t column) const {
@@ -426,6 +417,7 @@ class Scanner {
   const std::string& name_;
   Oddities& oddities_;
   Scan scan_;
+  std::unordered_map<std::string, std::size_t> group_numbers_{{"", 0}};  // by name
   std::deque<std::string> names_;
   std::size_t line_ = 0, group_ = 0, comment_line_ = 0;
   bool relative_ = false, polar_ = false, two_ends_ = false, spherical_ = false, in_comment_ = false;
@@ -688,9 +680,10 @@ std::vector<Cell> cells_of(std::string_view bytes, const std::string& name) {
     oddities.add(Odd::several_cells, 0, [&] { return fmt::format("there are {} cells", groups.size()); });
   if (groups.empty()) groups.push_back(&scan.groups[0]);
   // What stands outside of the cells (a header, a prototype that is left out) is said of all.
+  std::vector<bool> is_cell(scan.groups.size());
+  for (const Group* group : groups) is_cell[std::size_t(group - scan.groups.data())] = true;
   const auto is_of = [&](const Said& said, std::size_t number) {
-    const bool of_a_cell = std::ranges::find(groups, &scan.groups[said.group]) != groups.end();
-    return !of_a_cell || said.group == number || (said.on && said.group < number);
+    return !is_cell[said.group] || said.group == number || (said.on && said.group < number);
   };
   for (Group* const group : groups) {
     Cell& cell = cells.emplace_back();

@@ -33,8 +33,7 @@ inline constexpr std::string_view genesis_note = "//@note ";  // an annotation: 
 inline constexpr std::string_view genesis_ends =
     "//@ends ";  // radii at both ends of the next compartment, soma point
 
-/// Without blanks and line ends (%20), and back.
+/// Without blanks and line ends (%20); percent_decoded() is the way back.
 std::string escaped_note(std::string_view text, bool blanks);
-std::string unescaped_note(std::string_view text);
 
 }  // namespace forest::io

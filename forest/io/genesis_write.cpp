@@ -1,7 +1,6 @@
 // SPDX-License-Identifier: Apache-2.0
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 
 #include <fmt/format.h>
@@ -196,21 +195,6 @@ std::string escaped_note(std::string_view text, bool blanks) {
       result += fmt::format("%{:02x}", static_cast<unsigned char>(c));
     else
       result += c;
-  return result;
-}
-
-std::string unescaped_note(std::string_view text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    unsigned code = 0;
-    if (text[i] == '%' && i + 2 < text.size() &&
-        std::from_chars(text.data() + i + 1, text.data() + i + 3, code, 16).ptr == text.data() + i + 3) {
-      result += char(code);
-      i += 2;
-    } else {
-      result += text[i];
-    }
-  }
   return result;
 }
 

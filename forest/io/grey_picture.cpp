@@ -146,6 +146,9 @@ class Tiff {
     at_page_ = number;
     width_ = tag<std::uint32_t>(TIFFTAG_IMAGEWIDTH), height_ = tag<std::uint32_t>(TIFFTAG_IMAGELENGTH);
     check_size(width_, height_, name_);
+    if (tag<std::uint16_t>(TIFFTAG_ORIENTATION) > ORIENTATION_BOTLEFT)
+      throw InputError(name_, 0,
+                       "has a page that lies on its side (Orientation); turn it, and write it again");
     bits_ = tag<std::uint16_t>(TIFFTAG_BITSPERSAMPLE), samples_ = tag<std::uint16_t>(TIFFTAG_SAMPLESPERPIXEL);
     format_ = tag<std::uint16_t>(TIFFTAG_SAMPLEFORMAT);
     const auto shown = tag<std::uint16_t>(TIFFTAG_PHOTOMETRIC);
@@ -181,9 +184,6 @@ class Tiff {
   // By the place of its first pixel.
   void turn_upright(GreyPicture& picture) const {
     const auto first = tag<std::uint16_t>(TIFFTAG_ORIENTATION);
-    if (first > ORIENTATION_BOTLEFT)
-      throw InputError(name_, 0,
-                       "has a page that lies on its side (Orientation); turn it, and write it again");
     if (first == ORIENTATION_BOTRIGHT || first == ORIENTATION_BOTLEFT)
       for (std::size_t y = 0; y < height_ / 2; ++y)
         std::swap_ranges(picture.values.begin() + std::ptrdiff_t(y * width_),

@@ -183,6 +183,17 @@ TEST(GreyPicture, EveryPageIsRead) {
   EXPECT_THAT(refused([&] { file.read(5); }), HasSubstr("has 5 pages, and none with the number 6"));
 }
 
+TEST(GreyPicture, WhatLiesOnItsSideIsRefusedHoweverItIsKept) {
+  for (const Kind& kind : kinds)
+    for (std::uint16_t first = ORIENTATION_LEFTTOP; first <= ORIENTATION_LEFTBOT; ++first) {
+      Kind lying = kind;
+      lying.first = first;
+      const std::string bytes = written(lying);
+      EXPECT_THAT(refused([&] { GreyFile(bytes, "a.tif").read(); }), HasSubstr("lies on its side"))
+          << kind.name << " " << first;
+    }
+}
+
 TEST(GreyPicture, OfSixteenBitsAPngKeepsThem) {
   std::vector<std::uint16_t> pixels(width * height);
   for (std::size_t i = 0; i < pixels.size(); ++i) pixels[i] = std::uint16_t(30000 + i);

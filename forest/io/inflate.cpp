@@ -18,6 +18,8 @@ std::string inflated(std::string_view bytes, std::size_t most, const std::string
   } end{stream};
   std::string result;
   std::array<char, 1 << 16> piece;
+  constexpr std::string_view gzip = "\x1f\x8b";
+  const bool of_members = bytes.starts_with(gzip);
   constexpr std::size_t step = 1u << 30;  // zlib counts in 32 bits
   for (int state = Z_OK; state != Z_STREAM_END;) {
     if (stream.avail_in == 0) {
@@ -33,7 +35,15 @@ std::string inflated(std::string_view bytes, std::size_t most, const std::string
     result.append(piece.data(), piece.size() - stream.avail_out);
     if (result.size() > most)
       throw InputError(name, 0, "unpacks to more than it says it holds; it is broken, get it again");
-    if (state == Z_STREAM_END) break;
+    if (state == Z_STREAM_END) {
+      bytes = {reinterpret_cast<const char*>(stream.next_in), stream.avail_in + bytes.size()};
+      if (bytes.find_first_not_of('\0') == bytes.npos) break;  // padding, of tapes
+      if (!of_members || !bytes.starts_with(gzip))
+        throw InputError(name, 0, "holds other bytes after its packed ones; get the file again");
+      inflateReset(&stream);
+      stream.avail_in = 0, state = Z_OK;
+      continue;
+    }
     if (state != Z_OK && state != Z_BUF_ERROR)
       throw InputError(name, 0, "its packed bytes are broken; get the file again");
     if (stream.avail_in == 0 && bytes.empty() && stream.avail_out != 0)

@@ -3,7 +3,6 @@
 
 #include <algorithm>
 #include <array>
-#include <charconv>
 #include <cmath>
 #include <limits>
 #include <map>
@@ -145,21 +144,6 @@ bool parse(std::string_view text, T& value) {
   const auto found = number_of<T>(trimmed(text, xml_blanks));
   if (found) value = *found;
   return found.has_value();
-}
-
-std::string decoded(std::string_view text) {
-  std::string result;
-  for (std::size_t i = 0; i < text.size(); ++i) {
-    unsigned value = 0;
-    if (text[i] == '%' && i + 2 < text.size() &&
-        std::from_chars(text.data() + i + 1, text.data() + i + 3, value, 16).ptr == text.data() + i + 3) {
-      result += char(value);
-      i += 2;
-    } else {
-      result += text[i];
-    }
-  }
-  return result;
 }
 
 /// The text as XML, and where its nodes stand.
@@ -778,8 +762,8 @@ void read_properties(const xml_node& owner, MorphologyBuilder& builder, std::vec
     if (tag == marker_tag) continue;
     if (tag == encoded_tag) {
       const std::size_t blank = value.find(' ');
-      builder.annotate(decoded(value.substr(0, blank)),
-                       blank == value.npos ? "" : decoded(value.substr(blank + 1)));
+      builder.annotate(percent_decoded(value.substr(0, blank)),
+                       blank == value.npos ? "" : percent_decoded(value.substr(blank + 1)));
     } else if (tag == spine_tag) {
       std::array<float, 8> n{};
       std::size_t count = 0;

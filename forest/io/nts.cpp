@@ -135,21 +135,7 @@ std::optional<Record> record_of(std::string_view line) {
 }
 
 bool same_start(std::string_view text, std::string_view lower) {
-  return text.size() >= lower.size() &&
-         std::ranges::equal(text.substr(0, lower.size()), lower,
-                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
-}
-
-/// Calls `visit(line, number)` for each; lines end as on any system.
-template <class Visit>
-void each_line(std::string_view bytes, Visit visit) {
-  std::size_t number = 0;
-  while (!bytes.empty()) {
-    const std::size_t end = std::min(bytes.find_first_of("\r\n"), bytes.size());
-    if (!visit(bytes.substr(0, end), ++number)) return;
-    bytes.remove_prefix(end);
-    if (!bytes.empty()) bytes.remove_prefix(bytes.starts_with("\r\n") ? 2 : 1);
-  }
+  return same_word(text.substr(0, lower.size()), lower);
 }
 
 class Reader {

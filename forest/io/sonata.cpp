@@ -61,7 +61,7 @@ void check_file_name(const std::string& name) {
   if (!good)
     throw Error(
         fmt::format("\"{}\" cannot be the file name of a morphology; give it a name without slashes, of at "
-                    "most 200 letters",
+                    "most 250 bytes",
                     name));
 }
 

@@ -418,6 +418,15 @@ TEST(Surface, EveryFileThatIsCutOffIsAnErrorOrWhole) {
     EXPECT_NE(values_error(values.substr(0, size)), "") << size;
 }
 
+TEST(Surface, AllMembersOfAPackedFileAreRead) {
+  const std::string whole = freesurfer_surface(),
+                    parts = gzipped(whole.substr(0, 40)) + gzipped("") + gzipped(whole.substr(40));
+  expect_tetrahedron(read_surface(parts, "lh.pial.gz"));
+  expect_tetrahedron(read_surface(parts + std::string(512, '\0'), "lh.pial.gz"));
+  EXPECT_NE(surface_error(parts.substr(0, parts.size() - 12)).find("cut off"), std::string::npos);
+  EXPECT_NE(surface_error(parts + "more").find("other bytes after"), std::string::npos);
+}
+
 TEST(Surface, SizesThatLieCostNoMemory) {
   std::string bytes =
       "\xff\xff\xfe"

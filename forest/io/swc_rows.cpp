@@ -27,11 +27,6 @@ constexpr std::array<std::string_view, 8> plain_keys{"CREATURE",  "REGION", "TYP
 constexpr std::array<std::string_view, 7> columns{"id", "type", "x", "y", "z", "radius", "parent"};
 constexpr std::string_view layout = "a row is: id type x y z radius parent";
 
-bool same_word(std::string_view text, std::string_view lower) {
-  return std::ranges::equal(text, lower,
-                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
-}
-
 bool means_unknown(std::string_view token) {
   if (!token.empty() && (token[0] == '-' || token[0] == '+')) token.remove_prefix(1);
   constexpr std::array<std::string_view, 8> words{"nan", "na", "n/a", "null", "none", "inf", "infinity", "?"};

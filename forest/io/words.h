@@ -1,7 +1,9 @@
 // SPDX-License-Identifier: Apache-2.0
-// Pieces of a line of text, for readers of what people and programs wrote.
+// Pieces of a text, for readers of what people and programs wrote.
 #pragma once
 
+#include <algorithm>
+#include <charconv>
 #include <cstddef>
 #include <string>
 #include <string_view>
@@ -10,6 +12,38 @@ namespace forest::io {
 
 constexpr std::string_view blanks = " \t\v\f";      // within a line
 constexpr std::string_view xml_blanks = " \t\r\n";  // XML 1.0, section 2.3
+
+/// Calls `visit(line, number)` for each line, ended as on any system; stops where it returns false.
+template <class Visit>
+void each_line(std::string_view text, Visit visit) {
+  for (std::size_t begin = 0, number = 1; begin < text.size(); ++number) {
+    const std::size_t end = std::min(text.find_first_of("\r\n", begin), text.size());
+    if (!visit(text.substr(begin, end - begin), number)) return;
+    begin = end + (text.substr(end, 2) == "\r\n" ? 2 : 1);
+  }
+}
+
+/// Whether a text is a word that is given in small letters; its own may be either.
+inline bool same_word(std::string_view text, std::string_view lower) {
+  return std::ranges::equal(text, lower,
+                            [](char a, char b) { return (a >= 'A' && a <= 'Z' ? a - 'A' + 'a' : a) == b; });
+}
+
+/// With the bytes that are written %hh; other % are left.
+inline std::string percent_decoded(std::string_view text) {
+  std::string result;
+  for (std::size_t i = 0; i < text.size(); ++i) {
+    unsigned value = 0;
+    if (text[i] == '%' && i + 2 < text.size() &&
+        std::from_chars(text.data() + i + 1, text.data() + i + 3, value, 16).ptr == text.data() + i + 3) {
+      result += char(value);
+      i += 2;
+    } else {
+      result += text[i];
+    }
+  }
+  return result;
+}
 
 /// Without what stands around it.
 inline std::string_view trimmed(std::string_view text, std::string_view around = blanks) {

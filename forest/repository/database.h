@@ -28,6 +28,8 @@ class Database {
 
   virtual void begin_reading() = 0;  // what is read until the end of the transaction was there at one moment
   virtual void begin_writing() = 0;
+  /// Whether the transaction that was begun has come to nothing by an error, a question's too.
+  virtual bool is_undone() = 0;
   /// SQL of schema.h, whose words in @ this database has other names for.
   virtual std::string dialect(std::string_view sql) const = 0;
   /// A number for a new row of a table: never one that is taken, also when others write too.
@@ -56,8 +58,8 @@ class Database {
 /// Brings what version `from` stored into the new tables, in the transaction that makes them.
 using Refill = void (*)(Database& database, int from);
 
-/// Opens `place`, which must be a repository this program can read; with `write` it is made when there is none, so that
-/// whoever looks sees none or a whole one, and brought to the newest schema. Throws InputError.
+/// Opens `place`, which must be a repository this program can read, and brings it to the newest schema; with `write` it is
+/// made when there is none, so that whoever looks sees none or a whole one. Throws InputError.
 std::unique_ptr<Database> connect(const std::string& place, bool write, Refill refill);
 
 std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, Refill refill);

@@ -4,6 +4,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <optional>
 #include <span>
@@ -57,6 +58,8 @@ struct Repository::Impl {
   // Those last stored under: thousands of neurons have the same.
   std::pair<std::string, int> known_population, known_grammar;
   std::string known_hash;
+  /// The numbers that were given last in the open transaction, by population and name; all before are taken.
+  std::map<std::pair<int, std::string>, int> last_numbers;
   std::optional<bool> older_grown;  // what holds_older_grown() found
 
   Impl(const std::string& at, std::shared_ptr<Database> open)
@@ -81,6 +84,11 @@ struct Repository::Impl {
     }
   }
 
+  void begin_writing() {
+    database->begin_writing();
+    writing = true;
+    last_numbers.clear();  // another program may have removed neurons
+  }
   void undo() noexcept;
 
   /// Stores what waits to be stored together with more of its kind.
@@ -94,7 +102,8 @@ struct Repository::Impl {
   auto write(Body&& body, bool settled = true) {
     return guarded([&] {
       if (writing) {
-        if (failed) throw Error(place + ": the open transaction has failed before; begin another");
+        if (failed || database->is_undone())
+          throw Error(place + ": the open transaction has failed before; begin another");
         try {
           if (settled) settle();
           return body();
@@ -103,8 +112,7 @@ struct Repository::Impl {
           throw;
         }
       }
-      database->begin_writing();
-      writing = true;
+      begin_writing();
       try {
         auto result = body();
         settle();
@@ -159,6 +167,9 @@ struct Repository::Impl {
 
   /// The number of a population, which is made when there is none.
   int population(const std::string& name);
+
+  /// The least from 2 with which no neuron of the population is called "name-2".
+  int next_number(int population, const std::string& name);
 
   std::optional<int> grammar(const Grown& grown);
 

@@ -309,6 +309,23 @@ TEST_P(EveryDatabase, AnOlderRepositoryIsBroughtUpToDateWholeOrNotAtAll) {
   EXPECT_GT(unfinished, 0u) << "none was killed before it was done, so this has tested nothing";
 }
 
+TEST_P(EveryDatabase, ADamagedNeuronOfAnOlderRepositoryGetsNoMetrics) {
+  const std::vector source{neuron(1), neuron(2)};
+  {
+    Repository repository = Repository::open(place_, Access::write);
+    for (std::size_t i = 0; i < 2; ++i) repository.add(source[i], called(std::to_string(i)));
+  }
+  ASSERT_TRUE(made_older(file_, name_, 7, source, "delete from somata where neuron = 2;\n"));
+  Repository repository = Repository::open(place_, Access::read);
+  const auto rows = repository
+                        .query(
+                            "select neuron, count(*) from neuron_metrics where metric > 47 group by neuron "
+                            "order by neuron")
+                        .rows;
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0][0], Answer::Value(std::int64_t(1)));
+}
+
 TEST_P(EveryDatabase, WhatWasGrownBeforeVersion7IsKnownAgainThoughItWasCorrectedSince) {
   const auto value = [&](const char* question) {
     return Repository::open(place_, Access::read).query(question).rows.at(0).at(0);

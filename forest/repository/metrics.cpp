@@ -19,8 +19,6 @@ int Repository::Impl::number_of_metric(const statistics::Metric& metric) {
   const std::string name(metric.name), level(statistics::name_of(metric.level)), unit(metric.unit),
       definition(metric.definition);
   if (const auto known = ask<int>("select id from metrics where name = :name", name)) return *known;
-  if (!can_store(metric))
-    throw Error("the metric type cannot be stored, for a neuron has a type anyway; leave it out");
   const int number = std::max(first_further_number, ask<int>("select max(id) from metrics").value_or(0) + 1);
   sql << "insert into metrics (id, name, level, unit, definition) values (:id, :name, :level, :unit, "
          ":definition)",
@@ -30,6 +28,9 @@ int Repository::Impl::number_of_metric(const statistics::Metric& metric) {
 
 void Repository::store_metrics(NeuronId id,
                                std::span<const std::pair<const statistics::Metric*, double>> values) {
+  for (const auto& [metric, value] : values)
+    if (!can_store(*metric))
+      throw Error("the metric type cannot be stored, for a neuron has a type anyway; leave it out");
   impl_->write([&] {
     const int neuron = number_of(id);
     if (!impl_->ask<int>("select id from neurons where id = :id", neuron))

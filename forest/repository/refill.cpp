@@ -1,6 +1,7 @@
 // SPDX-License-Identifier: Apache-2.0
 // Repositories of earlier versions, brought up to date where SQL alone does not do it (schema.h).
 #include <algorithm>
+#include <optional>
 #include <span>
 
 #include <fmt/format.h>
@@ -47,21 +48,22 @@ void Repository::Impl::refill_metrics() {
   constexpr std::size_t together = 64;  // on all cores
   for (std::size_t first = 0; first < ids.size(); first += together) {
     const auto some = std::span(ids).subspan(first, std::min(together, ids.size() - first));
-    std::vector<Rows> rows(some.size());
+    std::vector<std::optional<Rows>> rows(some.size());
     for (std::size_t i = 0; i < some.size(); ++i) try {
         rows[i] = stored(NeuronId(std::size_t(some[i])), "points", of_sections(some[i]) + " order by id");
       } catch (const Error&) {  // damaged: it stays as it is, without metrics, and who reads it is told
       }
     parallel_for(some.size(), 1, [&](std::size_t i) {
-      try {
-        rows[i] = rows_of(morphology_of(rows[i]));
-      } catch (const Error&) {
-        rows[i] = {};
-      }
+      if (rows[i]) try {
+          rows[i] = rows_of(morphology_of(*rows[i]));
+        } catch (const Error&) {
+          rows[i].reset();
+        }
     });
     for (std::size_t i = 0; i < some.size(); ++i) {
+      if (!rows[i]) continue;
       all.id = some[i];
-      all.rows = std::move(rows[i]);
+      all.rows = std::move(*rows[i]);
       all.run_metrics();
     }
   }

@@ -100,6 +100,15 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
     if (data.morphology.sections().size() >> section_bits)
       throw Error(fmt::format("{} has more than {} sections, which no repository holds", shown(neuron.name),
                               (1 << section_bits) - 1));
+    const auto* grown = std::get_if<Grown>(&neuron.provenance);
+    if (grown) {
+      const auto grammar = impl.grammar(*grown);
+      if (!grammar)
+        throw Error(fmt::format(
+            "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
+            shown(grown->grammar), shown(neuron.name)));
+      insert.grammar = *grammar;
+    }
     insert.population = impl.population(neuron.population);
     const auto stored_as = [&](const std::string& fingerprint) -> std::optional<Added> {
       const std::string same = "from neurons where population = :population and fingerprint = :fingerprint";
@@ -108,18 +117,10 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
       return Added{NeuronId(std::size_t(*id)),
                    *impl.ask<std::string>("select name " + same, insert.population, fingerprint), true};
     };
-    if (const auto* grown = std::get_if<Grown>(&neuron.provenance)) {
-      const auto grammar = impl.grammar(*grown);
-      if (!grammar)
-        throw Error(fmt::format(
-            "the grammar {} of neuron {} is not in the repository; store it with add_grammar first",
-            shown(grown->grammar), shown(neuron.name)));
-      insert.grammar = *grammar;
-      if (impl.holds_older_grown())
-        if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
-    }
+    if (grown && impl.holds_older_grown())
+      if (const auto there = stored_as(older_fingerprint(*grown, sum))) return *there;
     insert.name = neuron.name;
-    for (int number = 2;;) {
+    for (;;) {
       insert.id = impl.database->next_id("neurons");
       if (insert.run(data.morphology)) return Added{NeuronId(std::size_t(insert.id)), insert.name, false};
       if (const auto there = stored_as(insert.fingerprint)) return *there;
@@ -131,7 +132,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
         throw Error(
             fmt::format("another neuron of population {} is called {}; choose another name or population",
                         shown(neuron.population), shown(neuron.name)));
-      insert.name = fmt::format("{}-{}", neuron.name, number++);
+      insert.name = fmt::format("{}-{}", neuron.name, impl.next_number(insert.population, neuron.name));
     }
   };
   return impl.write(store, false);  // it asks for no metrics
@@ -139,8 +140,7 @@ Added Repository::add(Prepared prepared, const NewNeuron& neuron) {
 
 Repository::Transaction Repository::begin() {
   if (impl_->writing) throw Error(impl_->place + ": a transaction is open already; commit it first");
-  impl_->guarded([&] { impl_->database->begin_writing(); });
-  impl_->writing = true;
+  impl_->guarded([&] { impl_->begin_writing(); });
   return Transaction(*impl_);
 }
 
@@ -156,7 +156,8 @@ void Repository::Transaction::commit() {
   assert(impl_);
   Impl& impl = *impl_;
   impl.guarded([&] {
-    if (impl.failed) throw Error(impl.place + ": the transaction has failed and is undone; begin another");
+    if (impl.failed || impl.database->is_undone())
+      throw Error(impl.place + ": the transaction has failed and is undone; begin another");
     impl.settle();
     impl.sql << "commit";  // when this throws, the destructor undoes
   });
@@ -199,6 +200,16 @@ int Repository::Impl::population(const std::string& name) {
   }
   known_population = {name, *number};
   return *number;
+}
+
+int Repository::Impl::next_number(int population, const std::string& name) {
+  int& last = last_numbers.try_emplace({population, name}, 1).first->second;
+  last = *ask<int>(
+      "with recursive taken (number) as (select cast(:next as integer) union all select number + 1 from "
+      "taken where exists (select 1 from neurons where population = :population and name = cast(:name as "
+      "text) || '-' || cast(number as text))) select max(number) from taken",
+      last + 1, population, name);
+  return last;
 }
 
 std::optional<int> Repository::Impl::grammar(const Grown& grown) {
@@ -317,6 +328,7 @@ bool Repository::remove(NeuronId id) {
     impl_->sql << "delete from " + of_sections(neuron);
     impl_->sql << "delete from " + of_metrics(neuron);
     impl_->sql << "delete from neurons where id = :id", use(neuron);
+    impl_->last_numbers.clear();
     return true;
   });
 }

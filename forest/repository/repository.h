@@ -257,7 +257,9 @@ class Repository::Transaction {
   ~Transaction();
   Transaction(Transaction&& other) noexcept;
   Transaction& operator=(Transaction&&) = delete;
-  void commit();  // throws Error when the disk is full; then nothing of the transaction is stored
+  /// Throws Error when the disk is full, or something in it has failed so that the database undoes it; then nothing of it is
+  /// stored.
+  void commit();
 
  private:
   friend class Repository;

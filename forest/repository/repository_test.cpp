@@ -143,6 +143,34 @@ TEST_P(EveryDatabase, ANameTakenByAnotherNeuronIsRefusedOrNumbered) {
   EXPECT_EQ(repository.find("cell", "elsewhere").size(), 1u);
 }
 
+TEST_P(EveryDatabase, TheNumberOfANameIsTheLeastThatIsFree) {
+  Repository repository = Repository::open(place_, Access::write);
+  std::uint64_t next = 0;
+  const auto add = [&] {
+    NewNeuron cell = called("cell");
+    cell.provenance = Traced{"cell.swc", std::to_string(++next)};
+    cell.number_if_taken = true;
+    return repository.add(neuron(next, 3), cell);
+  };
+  repository.add(neuron(50, 3), called("cell-4"));
+  repository.add(neuron(51, 3), called("cell-x"));
+  auto transaction = repository.begin();
+  const char* names[] = {"cell", "cell-2", "cell-3", "cell-5", "cell-6"};
+  std::vector<NeuronId> ids;
+  for (const char* name : names) {
+    const Added added = add();
+    EXPECT_EQ(added.name, name);
+    ids.push_back(added.id);
+  }
+  repository.remove(ids[2]);
+  EXPECT_EQ(add().name, "cell-3");
+  EXPECT_EQ(add().name, "cell-7");
+  transaction.commit();
+  Repository::open(place_, Access::write).remove(ids[1]);
+  EXPECT_EQ(add().name, "cell-2") << "another program has removed it";
+  EXPECT_EQ(add().name, "cell-8");
+}
+
 TEST_P(EveryDatabase, HostileNamesAreJustNames) {
   Repository repository = Repository::open(place_, Access::write);
   const std::vector<std::string> names{"'",
@@ -201,6 +229,38 @@ TEST_P(EveryDatabase, ATransactionIsAllOrNothing) {
   EXPECT_THROW(repository.add(neuron(2), called("")), Error);
   transaction.commit();
   EXPECT_EQ(repository.neurons().size(), 1u) << "a refused neuron does not spoil the others";
+}
+
+TEST_P(EveryDatabase, WhatIsRefusedInATransactionChangesNothing) {
+  Repository repository = Repository::open(place_, Access::write);
+  const NeuronId id = repository.add(neuron(1), called("one")).id;
+  auto transaction = repository.begin();
+  EXPECT_THROW(repository.add(neuron(2), {.name = "two",
+                                          .population = "grown",
+                                          .provenance = Grown{"bush", std::string(32, '0'), 1, 2}}),
+               Error);
+  const std::pair<const statistics::Metric*, double> values[] = {
+      {statistics::find_metric("total_length"), 12345.}, {statistics::find_metric("type"), 1.}};
+  EXPECT_THROW(repository.store_metrics(id, values), Error);
+  transaction.commit();
+  EXPECT_EQ(repository.populations().size(), 1u);
+  EXPECT_TRUE(repository.neurons_where("total_length = 12345").empty());
+}
+
+TEST_P(EveryDatabase, ATransactionInWhichAQuestionFailedIsStoredOrSaysThatItIsNot) {
+  Repository repository = Repository::open(place_, Access::write);
+  std::string error;
+  {
+    auto transaction = repository.begin();
+    repository.add(neuron(1), called("one"));
+    EXPECT_THROW(repository.neurons_where("no_column = 1"), Error);
+    error = message([&] { transaction.commit(); });
+  }
+  if (is_file())
+    EXPECT_EQ(error, "no error");
+  else
+    EXPECT_THAT(error, HasSubstr("has failed and is undone"));
+  EXPECT_EQ(repository.neurons().size(), is_file() ? 1u : 0u);
 }
 
 TEST_P(EveryDatabase, WhatIsBeingStoredIsNoTableForQuestions) {

@@ -57,6 +57,7 @@ void Repository::revise(std::span<const Revision> revisions) {
       if (now[i].empty() || now[i] != revisions[i].version)
         throw undone(fmt::format("neuron {} has been {} since it was looked at", ids[i].value(),
                                  now[i].empty() ? "removed" : "changed"));
+    impl.last_numbers.clear();
     for (const Revision& r : revisions) {  // none has its old name while they get the new ones
       const int id = number_of(r.id);
       const std::string none = fmt::format("\x01{}", id);

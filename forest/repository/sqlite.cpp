@@ -252,6 +252,7 @@ class Sqlite final : public Database {
  public:
   void begin_reading() override { sql_ << "begin"; }
   void begin_writing() override { sql_ << "begin immediate"; }  // waits a minute for other writers
+  bool is_undone() override { return sqlite::sqlite3_get_autocommit(handle()); }
   std::string dialect(std::string_view text) const override { return dialect_of(text); }
   int next_id(const std::string& table) override {
     auto& [of, statement] = next_id_;  // kept, since each of many neurons asks
@@ -396,6 +397,14 @@ void create(const std::string& path) {
   clean();
 }
 
+[[noreturn]] void refuse_newer(const std::string& place, int version) {
+  throw InputError(
+      place, 0,
+      fmt::format("was made by a newer Brain Forest (its tables are of version {}, this program knows {}); "
+                  "use the newer program",
+                  version, schema_version));
+}
+
 /// The version of its tables. Throws InputError when the open file is not a whole repository of one we know.
 int examine(Sqlite& database, const std::string& place, const std::string& path) {
   soci::session& sql = database.sql();
@@ -406,12 +415,7 @@ int examine(Sqlite& database, const std::string& place, const std::string& path)
         place, 0,
         "is no repository but another SQLite database; name another file, or one that does not exist yet");
   const int version = value<int>(sql, "pragma user_version");
-  if (version > schema_version)
-    throw InputError(
-        place, 0,
-        fmt::format("was made by a newer Brain Forest (its tables are of version {}, this program knows {}); "
-                    "use the newer program",
-                    version, schema_version));
+  if (version > schema_version) refuse_newer(place, version);
   const auto whole = value<long long>(sql, "pragma page_count") * value<long long>(sql, "pragma page_size");
   std::error_code ignored;
   const auto size = fs::file_size(path, ignored);
@@ -425,10 +429,11 @@ int examine(Sqlite& database, const std::string& place, const std::string& path)
 }
 
 /// Brings an older repository to today's tables, whole or not at all.
-void bring_up_to_date(Sqlite& database, Refill refill) {
+void bring_up_to_date(Sqlite& database, const std::string& place, Refill refill) {
   database.begin_writing();
   const int from =
       value<int>(database.sql(), "pragma user_version");  // another program may have been quicker
+  if (from > schema_version) refuse_newer(place, from);
   migrate(database, from, refill);
   database.sql() << fmt::format("pragma user_version = {}", schema_version);
   database.sql() << "commit";
@@ -467,7 +472,7 @@ std::unique_ptr<Database> connect_sqlite(const std::string& place, bool write, R
             fmt::format("its tables are of version {} and this program reads version {}; open it once "
                         "for writing, with 'brainforest import', where that is allowed",
                         version, schema_version));
-      bring_up_to_date(*database, refill);
+      bring_up_to_date(*database, place, refill);
     }
     if (!write) database->sql() << "pragma query_only = on";
   } catch (...) {
