@@ -220,7 +220,7 @@ refuses 'in mm, or a larger --spacing' $BRAINFOREST cortex contours outer --spac
 sed '3s/"at": [-0-9.]*,/"at": NaN,/' s.contours >nan.contours
 refuses 'nan.contours:3: is no JSON from column' $BRAINFOREST cortex compare nan.contours
 mkdir -p same_number && touch same_number/s1.png same_number/s01.png
-refuses 's1.png and s01.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
+refuses 's01.png and s1.png have the same number' $BRAINFOREST cortex contours same_number --pixel 1 --threshold .5 -o no.contours
 mkdir -p either && touch either/s1.5.png either/s1.10.png either/s1.2.png
 refuses 'either: s1.10.png and s1.2.png may follow one another either way' $BRAINFOREST cortex contours either --pixel 1 --threshold .5 -o no.contours
 refuses 's1.png: is neither a PNG nor a TIFF picture' $BRAINFOREST cortex contours same_number/s1.png --pixel 1 --threshold .5 -o no.contours
