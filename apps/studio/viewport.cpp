@@ -194,9 +194,10 @@ void Viewport::show(scene::Surfaces surfaces) {
 }
 
 void Viewport::play(scene::Playback playback) {
+  // What is said of a view that is opened with its simulation is kept, what was said of another simulation is not.
+  if (playback_ || !settings_.view.activity) settings_.view.activity = playback.view();
   playback_.emplace(std::move(playback));
   playing_ = false;
-  if (!settings_.view.activity) settings_.view.activity = playback_->view();
   set_time(settings_.view.activity->time.value_or(playback_->begin()));
   Q_EMIT opened();
   Q_EMIT changed();
@@ -542,7 +543,8 @@ void Viewport::mouseMoveEvent(QMouseEvent* event) {
   mouse_ = event->position();
   if (settings_.gaze_follows && settings_.view.detail.gaze) {
     Settings s = settings_;
-    s.view.detail.gaze = Vec2(vec(mouse_).array() / Vec2(float(width()), float(height())).array());
+    const Vec2 share = vec(mouse_).array() / Vec2(float(width()), float(height())).array();
+    s.view.detail.gaze = share.cwiseMax(0.f).cwiseMin(1.f);  // a drag goes on outside
     change(s);
   }
   if (!event->buttons()) return;
