@@ -338,7 +338,7 @@ void draw_line(Capsule c, int lane, int lanes) {
   float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
   float a2 = max(0.0, 1.0 - along * along - b * b);
   float shade = 0.5 * sqrt(max(0.0, 1.0 + 1.5707963 * b + (a2 + 2.0 * b * b) / 3.0));
-  float noise = fract(c.rank * 7.0);
+  float noise = fract(c.rank * 7.0 + (view.thinnest > 0.0 ? golden * float(view.subframe) : 0.0));
   uint payload = payload_of(c.entry, shade, noise);
   // Of several subframes each meets the cylinder somewhere.
   vec3 beside = cross(c.b - c.a, eye);
