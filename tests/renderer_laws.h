@@ -788,6 +788,25 @@ TEST_P(RendererLaws, AStrawLiesInTheWorldAndLooksAsItsOwner) {
   EXPECT_THROW(draw(straws, elsewhere, states, std::span(owners).last(1)), Error);
 }
 
+TEST_P(RendererLaws, AStrawIsDrawnForItsLikeInEverySampleOrInNone) {
+  Fixture f(GetParam());
+  f.frame.subframes = 16, f.frame.thinnest = 1.f;
+  f.add({-20, 3, 0}, {15, -8, 0}, .05f);
+  const std::vector<frame::Item> straws{{FOREST_IN_WORLD, 0, 1, 0, 0, 0, 0, 200}};
+  const std::vector<frame::Owner> owners{{0, 0}};
+  f.frame.lines = straws;
+  std::vector<double> areas;  // of those that are drawn
+  for (std::uint32_t rank = 0; rank < 256; rank += 16) {
+    f.segments[0].meta = 3u | rank << 8 | to_half(.04f) << 16;
+    f.renderer->load({f.segments, f.instances, owners});
+    f.renderer->draw(f.frame);
+    if (const double area = red_area(f.renderer->read()); area > 0.) areas.push_back(area);
+  }
+  ASSERT_GT(areas.size(), 2u);
+  EXPECT_LT(areas.size(), 14u);
+  EXPECT_NEAR(std::ranges::min(areas), std::ranges::max(areas), .02 * std::ranges::max(areas));
+}
+
 TEST_P(RendererLaws, SegmentsMayHaveColoursOfTheirOwn) {
   Fixture f(GetParam());
   f.frame.palette.fill(Vec3::Zero());

@@ -114,12 +114,8 @@ void SectionView::wheelEvent(QWheelEvent* event) {
   soon_.start();
 }
 
-SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings,
-                           std::function<void(const Settings&)> change, QWidget* parent)
-    : QWidget(parent),
-      settings_(settings),
-      view_(new SectionView(forest, this)),
-      slider_(new QSlider(Qt::Horizontal, this)) {
+SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings, Change change, QWidget* parent)
+    : QWidget(parent), view_(new SectionView(forest, this)), slider_(new QSlider(Qt::Horizontal, this)) {
   setAccessibleName(tr("Section"));
   const Bounds bounds = forest.soma_bounds();
   const double far = bounds.empty() ? 100. : .5 * double(bounds.extent().norm()) + 200.;
@@ -128,9 +124,7 @@ SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings,
   slider_->setAccessibleName(tr("Place of the plane"));
   slider_->setToolTip(tr("Moves the plane along its normal"));
   connect(slider_, &QSlider::valueChanged, this, [this, change = std::move(change)](int value) {
-    settings_.plane_at = float(value * slider_step);
-    settings_.plane = true;
-    change(settings_);
+    change([value](Settings& s) { s.plane_at = float(value * slider_step), s.plane = true; });
   });
   auto* column = new QVBoxLayout(this);
   column->setContentsMargins(4, 4, 4, 4);
@@ -140,7 +134,6 @@ SectionPanel::SectionPanel(scene::Forest forest, const Settings& settings,
 }
 
 void SectionPanel::show_settings(const Settings& settings) {
-  settings_ = settings;
   const QSignalBlocker quiet(slider_);
   slider_->setValue(int(std::lround(double(settings.plane_at) / slider_step)));
   view_->show_settings(settings);

@@ -51,14 +51,11 @@ class SectionView final : public QWidget {
 
 class SectionPanel final : public QWidget {
  public:
-  /// `change` is called with the new settings when a person moves the plane.
-  SectionPanel(scene::Forest forest, const Settings& settings, std::function<void(const Settings&)> change,
-               QWidget* parent = nullptr);
+  SectionPanel(scene::Forest forest, const Settings& settings, Change change, QWidget* parent = nullptr);
   /// Shows `settings`, telling nobody.
   void show_settings(const Settings& settings);
 
  private:
-  Settings settings_;
   SectionView* view_;
   QSlider* slider_;
 };

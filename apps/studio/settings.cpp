@@ -53,6 +53,10 @@ void set_gaze(S& s, float percent) {
   (*s.view.detail.gaze)[axis] = percent / 100.f;
 }
 
+scene::SynapseColour synapse_colour(const S& s) {
+  return s.view.synapses == scene::SynapseColour::none ? s.synapse_colour : s.view.synapses;
+}
+
 using Camera = frame::Camera;
 constexpr Number number_table[] = {
     {"Eye", "Eye", "x", "µm", "Where the eye is", "Alt+X", -far, far, 10, 1, coordinate<&Camera::eye, 0>,
@@ -131,7 +135,7 @@ constexpr Choice choice_table[] = {
      [](const S& s) { return int(s.view.colour_by); },
      [](S& s, int i) { s.view.colour_by = scene::ColourBy(i); }},
     {"Colour", "Synapse colour", "What the colours of synapses mean", "Shift+Y", synapse_words,
-     [](const S& s) { return int(s.view.synapses == scene::SynapseColour::target); },
+     [](const S& s) { return int(synapse_colour(s) == scene::SynapseColour::target); },
      [](S& s, int i) { s.view.synapses = i ? scene::SynapseColour::target : scene::SynapseColour::sign; }},
     {"Colour", "Background", "Dark for the eye and film, light for print", "B", background_words,
      [](const S& s) { return int(s.view.background); },
@@ -159,7 +163,10 @@ constexpr Toggle toggle_table[] = {
      [](const S& s) { return s.dim; }, [](S& s, bool on) { s.dim = on; }},
     {"Shown", "Synapses", "Where their branches are in sight, when a file of synapses is open", "Y",
      [](const S& s) { return s.view.synapses != scene::SynapseColour::none; },
-     [](S& s, bool on) { s.view.synapses = on ? scene::SynapseColour::sign : scene::SynapseColour::none; }},
+     [](S& s, bool on) {
+       s.synapse_colour = synapse_colour(s);
+       s.view.synapses = on ? s.synapse_colour : scene::SynapseColour::none;
+     }},
     {"Shown", "Skin", "Neurons near the eye have a smooth skin and spines, once the view stands still", "N",
      [](const S& s) { return s.skin; }, [](S& s, bool on) { s.skin = on; }},
     {"Shown", "Surfaces", "Of a cortex, when some are open", "U", [](const S& s) { return s.surfaces; },

@@ -3,6 +3,7 @@
 // the shortcuts and what a screen reader says.
 #pragma once
 
+#include <functional>
 #include <span>
 
 #include "forest/geometry/plane.h"
@@ -28,8 +29,12 @@ struct Settings {
   bool dim = true;            // the rest of the forest while a branch is selected
   bool skin = false;          // of neurons near the eye; a target's that is forced to have one aside
   bool surfaces = true;       // of a cortex, where some are open
+  scene::SynapseColour synapse_colour = scene::SynapseColour::sign;  // while none are shown: the last one
   float surface_opacity = 1.f;
 };
+
+/// Called by a panel with what a person did, which is done to the settings of that moment.
+using Change = std::function<void(const std::function<void(Settings&)>&)>;
 
 /// The plane of intersection, `middle` being that of the forest.
 Plane plane_of(const Settings& settings, const Vec3& middle, const Vec3& pia = Vec3::UnitY());

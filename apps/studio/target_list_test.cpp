@@ -58,6 +58,19 @@ TEST(TargetList, WhatIsSaidLastWins) {
   EXPECT_EQ(f.view.targets.size(), 2u);  // nothing is left of what was taken back
 }
 
+TEST(TargetList, ANodeSetMayBeNamedAsAllAre) {
+  Fixture f;
+  circuit::NodeSets sets;
+  sets.put({.name = "all", .clauses = {{"mtype", circuit::Clause::Test::any_of, {"first"}, {}}}, .of = {}});
+  f.targets.use(sets);
+  const auto rows = f.rows();
+  EXPECT_EQ(rows.front().title, "all");
+  EXPECT_EQ(rows.back().title, "all");
+  EXPECT_LT(rows.front().count, 40u);
+  EXPECT_EQ(rows.back().count, 40u);
+  for (const TargetRow& row : rows) EXPECT_EQ(row.problem, "");
+}
+
 TEST(TargetList, ColoursAreForgottenWhenTheViewsOwnIsWanted) {
   Fixture f;
   const Vec3 before = f.row("second").colour;

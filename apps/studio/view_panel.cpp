@@ -69,7 +69,7 @@ class NumberField final : public QDoubleSpinBox {
 
 }  // namespace
 
-ViewPanel::ViewPanel(const Settings& settings, std::function<void(const Settings&)> change, QWidget* parent)
+ViewPanel::ViewPanel(const Settings& settings, Change change, QWidget* parent)
     : QWidget(parent), settings_(settings), change_(std::move(change)) {
   setAccessibleName(tr("View"));
   auto* column = new QVBoxLayout(this);
@@ -115,8 +115,7 @@ ViewPanel::ViewPanel(const Settings& settings, std::function<void(const Settings
 
 template <class Row, class Value>
 void ViewPanel::set(const Row& row, Value value) {
-  row.set(settings_, value);
-  change_(settings_);
+  change_([&](Settings& settings) { row.set(settings, value); });
 }
 
 QWidget* ViewPanel::field(const Number& number) {

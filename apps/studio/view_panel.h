@@ -12,8 +12,7 @@ namespace forest::studio {
 
 class ViewPanel final : public QWidget {
  public:
-  /// `change` is called with the new settings when a person has changed one.
-  ViewPanel(const Settings& settings, std::function<void(const Settings&)> change, QWidget* parent = nullptr);
+  ViewPanel(const Settings& settings, Change change, QWidget* parent = nullptr);
   /// Shows `settings`, telling nobody.
   void show_settings(const Settings& settings);
 
@@ -24,8 +23,8 @@ class ViewPanel final : public QWidget {
   template <class Row, class Value>
   void set(const Row& row, Value value);
 
-  Settings settings_;
-  std::function<void(const Settings&)> change_;
+  Settings settings_;  // that are shown
+  Change change_;
   std::vector<std::function<void()>> refresh_;  // one a control: shows its value
 };
 

@@ -164,8 +164,8 @@ std::optional<scene::Pick> Viewport::pick(const QPointF& place) const {
   const frame::Camera& camera = settings_.view.camera;
   const Vec2 at = vec(place) + Vec2(.5f, .5f);
   const auto exact =
-      scene::pick(forest_, camera, in_points(), at, .5f / float(devicePixelRatioF()), colouring_.states);
-  return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.states);
+      scene::pick(forest_, camera, in_points(), at, .5f / float(devicePixelRatioF()), colouring_.shown());
+  return exact ? exact : scene::pick(forest_, camera, in_points(), at, reach, colouring_.shown());
 }
 
 std::optional<std::pair<std::uint32_t, scene::Pick>> Viewport::pick_synapse(const QPointF& place) const {
@@ -174,7 +174,7 @@ std::optional<std::pair<std::uint32_t, scene::Pick>> Viewport::pick_synapse(cons
   const auto found = scene::pick(dressing_.chosen, settings_.view.camera, in_points(), at, 1.5f);
   if (!found) return std::nullopt;
   const scene::Synapse& synapse = dressing_.synapses->all()[found->synapse];
-  const auto branch = scene::pick(forest_, settings_.view.camera, in_points(), at, 0.f, colouring_.states);
+  const auto branch = scene::pick(forest_, settings_.view.camera, in_points(), at, 0.f, colouring_.shown());
   if (branch && branch->distance < found->distance - double(synapse.radius_um())) return std::nullopt;
   const scene::Neuron& neuron = forest_.neurons()[forest_.instances()[synapse.target].morphology];
   return std::pair(found->synapse, scene::Pick{synapse.target, neuron.first_segment + synapse.segment,
@@ -194,9 +194,10 @@ void Viewport::show(scene::Surfaces surfaces) {
 }
 
 void Viewport::play(scene::Playback playback) {
+  // What is said of a view that is opened with its simulation is kept, what was said of another simulation is not.
+  if (playback_ || !settings_.view.activity) settings_.view.activity = playback.view();
   playback_.emplace(std::move(playback));
   playing_ = false;
-  if (!settings_.view.activity) settings_.view.activity = playback_->view();
   set_time(settings_.view.activity->time.value_or(playback_->begin()));
   Q_EMIT opened();
   Q_EMIT changed();
@@ -542,7 +543,8 @@ void Viewport::mouseMoveEvent(QMouseEvent* event) {
   mouse_ = event->position();
   if (settings_.gaze_follows && settings_.view.detail.gaze) {
     Settings s = settings_;
-    s.view.detail.gaze = Vec2(vec(mouse_).array() / Vec2(float(width()), float(height())).array());
+    const Vec2 share = vec(mouse_).array() / Vec2(float(width()), float(height())).array();
+    s.view.detail.gaze = share.cwiseMax(0.f).cwiseMin(1.f);  // a drag goes on outside
     change(s);
   }
   if (!event->buttons()) return;

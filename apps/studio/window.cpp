@@ -158,24 +158,25 @@ QString Window::panels_key() const {
 }
 
 void Window::add_docks() {
-  view_panel_ = new ViewPanel(
-      viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
+  const Change change = [this](const std::function<void(Settings&)>& what) {
+    Settings settings = viewport_->settings();
+    what(settings);
+    viewport_->change(settings);
+  };
+  view_panel_ = new ViewPanel(viewport_->settings(), change, this);
   selection_panel_ = new SelectionPanel(
       surfaces_alone() ? tr("There are no branches here to click: a surface is shown without a forest.")
                        : tr("Click a branch to see what it is.\nIts subarbor is lit; Esc puts it out."),
       this);
   auto* scroll = new Scroll(this);
   scroll->setWidget(view_panel_);
-  targets_panel_ =
-      new TargetsPanel({[this](const scene::Appearance& who, const scene::Appearance& what, bool own_colour) {
-                          Settings settings = viewport_->settings();
-                          change_target(settings.view, who, what, own_colour);
-                          viewport_->change(settings);
-                        },
-                        [this](const QString& expression) { return add_target(expression); }},
-                       this);
-  section_panel_ = new SectionPanel(
-      viewport_->forest(), viewport_->settings(), [this](const Settings& s) { viewport_->change(s); }, this);
+  targets_panel_ = new TargetsPanel(
+      {[change](const scene::Appearance& who, const scene::Appearance& what, bool own_colour) {
+         change([&](Settings& settings) { change_target(settings.view, who, what, own_colour); });
+       },
+       [this](const QString& expression) { return add_target(expression); }},
+      this);
+  section_panel_ = new SectionPanel(viewport_->forest(), viewport_->settings(), change, this);
   const std::pair<const char*, QWidget*> docks[] = {{"Selection", selection_panel_},
                                                     {"Targets", targets_panel_},
                                                     {"View", scroll},

@@ -53,8 +53,8 @@ void Closeness::seen_by(const Eye& eye) {
 float* Closeness::reserve(std::uint32_t standing, std::size_t count) {
   const std::lock_guard lock(reserving_);
   standing_.push_back(standing);
-  if (block_ < blocks_.size() && used_ + count > block_size) ++block_, used_ = 0;
-  if (block_ == blocks_.size()) blocks_.emplace_back(new float[std::max(block_size, count)]);
+  for (; block_ < blocks_.size() && count > blocks_[block_].size() - used_; ++block_) used_ = 0;
+  if (block_ == blocks_.size()) blocks_.emplace_back(std::max(block_size, count));
   return &blocks_[block_][std::exchange(used_, used_ + count)];
 }
 

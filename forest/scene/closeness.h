@@ -46,9 +46,9 @@ class Closeness {
   std::optional<Eye> eye_;
   std::unique_ptr<std::atomic<const float*>[]> known_;  // by standing
   std::mutex reserving_;
-  std::vector<std::uint32_t> standing_;  // whose are known
-  std::vector<std::unique_ptr<float[]>> blocks_;
-  std::size_t block_ = 0, used_ = 0;  // where the next one goes
+  std::vector<std::uint32_t> standing_;     // whose are known
+  std::vector<std::vector<float>> blocks_;  // each of the size that it was made with
+  std::size_t block_ = 0, used_ = 0;        // where the next one goes
 };
 
 }  // namespace forest::scene

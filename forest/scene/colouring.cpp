@@ -120,13 +120,20 @@ class Painter {
   /// @param flat  somata and axons have the same colour
   std::uint16_t add_hue(const Vec3& base, const std::string& name, bool flat = false,
                         const std::string& step = {}) {
-    if (hues_.size() >= most_hues) return std::uint16_t(most_hues - 1);
     Hue hue{{}, {}};
     for (std::uint32_t kind = 0; kind < 8; ++kind)
       hue.kinds[kind] = flat ? base : of_kind(base, kind, light_ ? 0.f : 1.f);
     if (!name.empty()) hue.legend.push_back({name, base, step});
-    hues_.push_back(std::move(hue));
+    return add_hue(std::move(hue));
+  }
+  /// Where it is: the last one where there is no room.
+  std::uint16_t add_hue(Hue hue) {
+    if (hues_.size() < most_hues) hues_.push_back(std::move(hue));
     return std::uint16_t(hues_.size() - 1);
+  }
+  /// Of a scheme whose hues began with `first`.
+  std::uint16_t hue_at(std::size_t first, std::size_t i) const {
+    return std::uint16_t(std::min(first + i, hues_.size() - 1));
   }
   Vec3 on_background(const Vec3& light) const { return light * (light_ ? .7f : 1.f); }
   Vec3 on_background(std::uint32_t rgb) const { return on_background(light_of(rgb)); }
@@ -175,36 +182,37 @@ class Painter {
       case ColourBy::layer:
         for (std::size_t i = 0; i < circuit.layers.size(); ++i)
           add_hue(on_background(layered_light(i, circuit.layers.size())), circuit.layers[i].name);
-        return [this, first](std::uint32_t i) { return hue_at(first + forest_.layers()[i]); };
+        return [this, first](std::uint32_t i) { return hue_at(first, forest_.layers()[i]); };
       case ColourBy::neuron:
         for (const std::uint32_t rgb : categorical) add_hue(on_background(rgb), "");
-        return [first](std::uint32_t i) {
-          return std::uint16_t(first + (i * 2654435761u >> 16 & 0xff) % categorical.size());
+        return [this, first](std::uint32_t i) {
+          return hue_at(first, (i * 2654435761u >> 16 & 0xff) % categorical.size());
         };
       case ColourBy::kind: {
-        add_hue(Vec3::Zero(), "");
-        Hue& hue = hues_.back();
+        Hue hue{{}, {}};
         for (std::size_t kind = 0; kind < 8; ++kind) hue.kinds[kind] = on_background(anatomical[kind]);
         const auto seen = kinds();
         for (std::size_t kind = 0; kind < 8; ++kind)
           if (seen[kind])
             hue.legend.push_back(
                 {kind == 1 ? "soma" : std::string(name_of(SectionKind(kind))), hue.kinds[kind]});
+        const std::uint16_t neurons = add_hue(std::move(hue));
         const auto& types = circuit.types;
         if (std::ranges::none_of(types, &circuit::CellType::glia))
-          return [first](std::uint32_t) { return first; };
+          return [neurons](std::uint32_t) { return neurons; };
         // Whatever a file calls its processes.
         Hue glia{{}, {{"glia", on_background(anatomical[7])}}};
         glia.kinds.fill(glia.legend[0].colour);
         glia.kinds[1] = on_background(anatomical[1]);
-        hues_.push_back(std::move(glia));
-        return [this, first](std::uint32_t i) { return std::uint16_t(first + is_glia(i)); };
+        return [this, neurons, others = add_hue(std::move(glia))](std::uint32_t i) {
+          return is_glia(i) ? others : neurons;
+        };
       }
       case ColourBy::depth:
         return by_depth();
       case ColourBy::target: {
-        add_hue(on_background(grey), view_.targets.empty() ? "no target" : "");
-        std::vector<std::uint16_t> of(looks_.size(), first);
+        std::vector<std::uint16_t> of(looks_.size(),
+                                      add_hue(on_background(grey), view_.targets.empty() ? "no target" : ""));
         for (std::size_t t = 0; t < view_.targets.size(); ++t) {
           const Appearance& a = view_.targets[t];
           if (a.branch) continue;
@@ -218,8 +226,6 @@ class Painter {
     return [first](std::uint32_t) { return first; };
   }
 
-  std::uint16_t hue_at(std::size_t i) const { return std::uint16_t(std::min(i, most_hues - 1)); }
-
   // The hue tells the type, its step the layer. Pairs of them are numbered as they are met.
   HueOf by_type() {
     const auto& circuit = forest_.circuit();
@@ -228,7 +234,7 @@ class Painter {
       const auto first = std::uint16_t(hues_.size());
       for (std::size_t t = 0; t < circuit.types.size(); ++t)
         add_hue(type_colour(t, .5f), circuit.types[t].name);
-      return [this, first](std::uint32_t i) { return hue_at(first + forest_.types()[i]); };
+      return [this, first](std::uint32_t i) { return hue_at(first, forest_.types()[i]); };
     }
     std::vector<std::uint16_t> hue_of(pairs);
     std::vector<bool> met(pairs);
@@ -268,7 +274,7 @@ class Painter {
     }
     return [this, first, pia, step, told](std::uint32_t i) {
       const float depth = told.empty() ? pia - forest_.instances()[i].y : float(told[i]);
-      return std::uint16_t(first + std::size_t(std::clamp(depth / step, 0.f, float(depth_steps) - .5f)));
+      return hue_at(first, std::size_t(std::clamp(depth / step, 0.f, float(depth_steps) - .5f)));
     };
   }
 

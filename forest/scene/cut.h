@@ -90,7 +90,6 @@ struct Sight {
   const Occluders* before = nullptr;
   float horizon = INFINITY;  // µm along the view: what begins beyond is left out
 };
-inline constexpr std::size_t most_sights = 32;
 
 /// Which neurons are looked at (Detail::turns): those of which something was seen in the picture before, and of the others every
 /// so-many-th.

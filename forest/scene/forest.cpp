@@ -76,6 +76,22 @@ struct Refuse {
   void unless(bool good) const { unless(good, "names things that are not in it"); }
 };
 
+// The children in a tree. One of two parents would be walked twice, and what is below it four times.
+class Family {
+ public:
+  explicit Family(std::size_t all) : has_parent_(all) {}
+  bool take(std::size_t child) {  // whether it had none yet
+    const bool fresh = !has_parent_[child];
+    has_parent_[child] = true, count_ += fresh;
+    return fresh;
+  }
+  bool complete() const { return has_parent_.empty() || count_ + 1 == has_parent_.size(); }
+
+ private:
+  std::vector<bool> has_parent_;
+  std::size_t count_ = 0;
+};
+
 bool within(std::uint64_t first, std::uint64_t count, std::size_t size) { return first + count <= size; }
 
 }  // namespace
@@ -293,16 +309,23 @@ void Forest::Data::check_neurons(const Refuse& refuse) const {
     const auto is_section = [&](std::uint32_t s) { return s == soma_section || s < n.section_count; };
     refuse.unless(std::ranges::all_of(originals.subspan(n.first_original, n.original_count), is_section));
     const std::size_t end = n.first_cluster + n.cluster_count;
+    Family family(n.cluster_count);
     for (std::size_t at = n.first_cluster; at < end; ++at) {
       const Cluster& c = clusters[at];
       // The leaves are its last clusters, and the tree is its own.
       refuse.unless(c.is_leaf() == (at - n.first_cluster >= n.cluster_count / 2) &&
                     std::ranges::all_of(c.children, [&](std::uint32_t child) { return child < end; }));
+      if (c.is_leaf())
+        refuse.unless(c.first_segment >= n.first_segment &&
+                      within(c.first_segment - n.first_segment, c.segment_count, n.original_count));
+      else
+        for (const std::uint32_t child : c.children) refuse.unless(family.take(child - n.first_cluster));
       bool good = true;  // of all, without a branch for each
       for (const reports::Place& p : places.subspan(c.first_segment, c.segment_count))
         good &= is_section(p.section) & (p.position >= 0.f) & (p.position <= 1.f);
       refuse.unless(good);
     }
+    refuse.unless(family.complete());
     for (std::uint32_t i = 0; i < n.section_count; ++i) {
       const std::uint32_t parent = sections[n.first_section + i].parent;
       refuse.unless(parent == 0xffffffffu || parent < i);
@@ -324,6 +347,10 @@ void Forest::Data::check_bricks(const Refuse& refuse) const {
                   std::isfinite(b.x + b.y + b.z + b.radius + b.width + b.length + b.neurons) &&
                   b.radius >= 0.f && b.width > 0.f && b.length > 0.f);
   });
+  Family family(bricks.size());
+  for (const Brick& b : bricks)
+    for (std::uint32_t c = 0; c < b.child_count; ++c) refuse.unless(family.take(b.first_child + c));
+  refuse.unless(family.complete());
   parallel_for(owners.size(), 4096, [&](std::size_t i) {
     refuse.unless(owners[i].instance < instances && owners[i].segment < segments);
   });

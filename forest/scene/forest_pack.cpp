@@ -2,6 +2,7 @@
 // Packing. Neurons are clustered on all cores and written in their order; segments, two thirds of the file, go to where
 // they stay, the other parts into scratch files that are joined at the end.
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <optional>
 
@@ -21,6 +22,22 @@ namespace {
 using namespace layout;
 using Json = nlohmann::ordered_json;
 using Bytes = std::span<const std::byte>;
+
+// What a part may hold too many of, and what to do then.
+constexpr std::array<const char*, part_count> too_many{
+    "distinct segments; plant fewer distinct neurons",
+    "neurons; plant fewer",
+    "clusters of segments; plant fewer distinct neurons",
+    "distinct neurons; plant fewer",
+    "distinct segments; plant fewer distinct neurons",
+    "distinct sections; plant fewer distinct neurons",
+    "neurons; plant fewer",
+    "neurons; plant fewer",
+    "bytes of names and node sets; leave some out",
+    "distinct segments; plant fewer distinct neurons",
+    "bricks of straws; plant fewer neurons",
+    "straws; plant fewer neurons",
+    "numbers in the attributes of its nodes; leave some attributes out"};
 
 Json list_of(const Vec3& p) { return Json{p.x(), p.y(), p.z()}; }
 
@@ -232,8 +249,7 @@ class Packer {
   void add(Part part, const Range& elements) {
     const Bytes bytes = std::as_bytes(std::span(elements));
     if ((counts_[part] += bytes.size() / element_sizes[part]) > 0xffffffffull)
-      throw LimitError(
-          "a forest file holds at most 4,294,967,295 distinct segments; plant fewer distinct neurons");
+      throw LimitError(fmt::format("a forest file holds at most 4,294,967,295 {}", too_many[part]));
     hashes_[part].add(bytes);
     if (part == Part::segments)
       out_.write(bytes);

@@ -163,7 +163,7 @@ TEST(ForestFile, AnyChangedByteIsRefused) {
 }
 
 // The walk over a neuron relies on it.
-TEST(ForestFile, ATreeOfClustersThatReachesIntoAnotherNeuronOrHasALeafAmongOthersIsRefused) {
+TEST(ForestFile, ATreeOfClustersThatIsNoTreeOfItsNeuronIsRefused) {
   const auto bytes = pack(sample_circuit(), sample_neurons());
   layout::Header header;
   std::memcpy(&header, bytes.data(), sizeof header);
@@ -171,13 +171,16 @@ TEST(ForestFile, ATreeOfClustersThatReachesIntoAnotherNeuronOrHasALeafAmongOther
   const Forest whole = Forest::from_bytes(bytes);
   const Neuron& first = whole.neurons()[0];
   ASSERT_GT(first.cluster_count, 4u);
-  const auto refused_with = [&](std::uint32_t cluster, std::uint32_t a, std::uint32_t b) {
+  const auto refused = [&](std::uint32_t cluster, auto&& change) {
     auto changed = bytes;
     Cluster c = whole.clusters()[cluster];
-    c.children[0] = a, c.children[1] = b;
+    change(c);
     std::memcpy(&changed[part.offset + cluster * sizeof c], &c, sizeof c);
     testing::put_forest_right(changed);
     return !forest::refused([&] { Forest::from_bytes(std::move(changed)); }).empty();
+  };
+  const auto refused_with = [&](std::uint32_t cluster, std::uint32_t a, std::uint32_t b) {
+    return refused(cluster, [&](Cluster& c) { c.children[0] = a, c.children[1] = b; });
   };
   const auto [a, b] = whole.clusters()[0].children;
   EXPECT_FALSE(refused_with(0, a, b));
@@ -185,6 +188,17 @@ TEST(ForestFile, ATreeOfClustersThatReachesIntoAnotherNeuronOrHasALeafAmongOther
   EXPECT_TRUE(refused_with(0, 0, 0));                    // a leaf before the others
   const std::uint32_t last = first.cluster_count - 1;
   EXPECT_TRUE(refused_with(last - 2, last - 1, last));  // a leaf with children
+  EXPECT_TRUE(refused_with(0, a, a));                   // twice
+  EXPECT_TRUE(refused_with(0, a, last));                // of two parents
+  const auto first_segment = [&](std::uint32_t segment) {
+    return refused(last, [&](Cluster& c) { c.first_segment = segment; });
+  };
+  EXPECT_FALSE(first_segment(first.first_segment));
+  EXPECT_TRUE(first_segment(first.first_segment + first.original_count));  // a coarser one's
+  EXPECT_TRUE(first_segment(whole.neurons()[1].first_segment));            // the next neuron's
+  const std::uint32_t own = first.cluster_count;
+  EXPECT_TRUE(refused(own + whole.neurons()[1].cluster_count - 1,
+                      [&](Cluster& c) { c.first_segment = first.first_segment; }));
 }
 
 // Checksums tell of accidents, not of intent.

@@ -7,6 +7,7 @@
 #include <mutex>
 #include <queue>
 #include <tuple>
+#include <unordered_map>
 #include <utility>
 
 #include "forest/core/half.h"
@@ -109,14 +110,37 @@ std::uint32_t section_of(const Forest& forest, const Neuron& neuron, std::uint32
   return forest.section_of_segment()[neuron.first_original + segment - neuron.first_segment];
 }
 
-// Whether a segment can be picked where neurons are in these states.
-bool shows(const Forest& forest, std::span<const frame::State> states, std::uint32_t instance,
-           const Neuron& neuron, std::uint32_t segment) {
-  if (states.empty()) return true;
-  const frame::State& state = states[instance];
-  return state.is(frame::State::visible) &&
-         (state.kind != frame::Kind::somata || section_of(forest, neuron, segment) == soma_section);
-}
+// What can be picked where neurons are shown so. For one thread: it remembers the branches of neurons.
+class Pickable {
+ public:
+  Pickable(const Forest& forest, const Shown& shown) : forest_(forest), shown_(shown) {}
+
+  // Whether anything of a neuron may be.
+  bool any(std::uint32_t instance) const {
+    if (shown_.states.empty()) return true;
+    const frame::State& state = shown_.states[instance];
+    return state.is(frame::State::visible) || state.is(frame::State::parted);
+  }
+  bool operator()(std::uint32_t instance, const Neuron& neuron, std::uint32_t segment) {
+    if (shown_.states.empty()) return true;
+    const frame::State* state = &shown_.states[instance];
+    const bool parted = state->is(frame::State::parted);
+    if (!parted && state->kind != frame::Kind::somata) return state->is(frame::State::visible);
+    const std::uint32_t section = section_of(forest_, neuron, segment);
+    if (parted && section != soma_section) {
+      const auto [known, fresh] = sections_.try_emplace(instance);
+      if (fresh) known->second = section_states(forest_, shown_, instance);
+      if (known->second[section]) state = known->second[section];
+    }
+    return state->is(frame::State::visible) &&
+           (state->kind != frame::Kind::somata || section == soma_section);
+  }
+
+ private:
+  const Forest& forest_;
+  const Shown& shown_;
+  std::unordered_map<std::uint32_t, std::vector<const frame::State*>> sections_;
+};
 
 // At a joint two segments are met at once: the first of them is meant, whatever the order of the walk.
 bool better(const Pick& a, const std::optional<Pick>& b) {
@@ -138,8 +162,9 @@ RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t s
 }
 
 std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, const frame::Viewport& viewport,
-                         const Vec2& place, float reach, std::span<const frame::State> states) {
+                         const Vec2& place, float reach, const Shown& shown) {
   const Probe probe(camera, viewport, place, reach);
+  Pickable pickable(forest, shown);
   // The clusters that the ray meets, those that may begin nearest first: when one begins behind what is found, all do.
   struct Open {
     float from;
@@ -155,7 +180,7 @@ std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, cons
   };
   for (std::uint32_t i = 0; i < forest.instances().size(); ++i)
     if (const Neuron& n = forest.neurons()[forest.instances()[i].morphology];
-        n.cluster_count && (states.empty() || states[i].is(frame::State::visible)))
+        n.cluster_count && pickable.any(i))
       offer(i, n.first_cluster);
 
   std::optional<Pick> best;
@@ -169,7 +194,7 @@ std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, cons
     }
     const Neuron& neuron = forest.neurons()[forest.instances()[next.instance].morphology];
     for (std::uint32_t s = c.first_segment; s < c.first_segment + c.segment_count; ++s) {
-      if (!shows(forest, states, next.instance, neuron, s)) continue;
+      if (!pickable(next.instance, neuron, s)) continue;
       const auto cone = before_the_eye(probe, in_world(forest, next.instance, s));
       const auto t = cone ? intersect(probe.exact, *cone) : std::nullopt;
       if (!t) continue;
@@ -182,7 +207,8 @@ std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, cons
 
 std::vector<std::optional<Pick>> plain_picks(const Forest& forest, const frame::Camera& camera,
                                              const frame::Viewport& viewport, std::span<const Vec2> places,
-                                             float reach, std::span<const frame::State> states) {
+                                             float reach, const Shown& shown) {
+  if (places.empty()) return {};
   constexpr std::size_t block = 32;
   std::vector<Probe> probes;
   for (const Vec2& place : places) probes.emplace_back(camera, viewport, place, reach);
@@ -198,11 +224,12 @@ std::vector<std::optional<Pick>> plain_picks(const Forest& forest, const frame::
   std::mutex mutex;
   parallel_ranges(forest.instances().size(), 4, [&](std::size_t begin, std::size_t end) {
     std::vector<std::optional<Pick>> nearest(probes.size());
+    Pickable pickable(forest, shown);
     for (std::uint32_t index = std::uint32_t(begin); index < end; ++index) {
       const Neuron& neuron = forest.neurons()[forest.instances()[index].morphology];
       for (std::uint32_t k = 0; k < neuron.original_count; ++k) {
         const std::uint32_t s = neuron.first_segment + k;
-        if (!shows(forest, states, index, neuron, s)) continue;
+        if (!pickable(index, neuron, s)) continue;
         const RoundCone cone = in_world(forest, index, s);
         const Vec3 to = .5f * (cone.a + cone.b) - camera.eye;
         const float size = .5f * (cone.b - cone.a).norm() + std::max(cone.radius_a, cone.radius_b);

@@ -12,6 +12,7 @@
 #include <span>
 #include <vector>
 
+#include "forest/scene/cut.h"
 #include "forest/scene/forest.h"
 
 namespace forest::scene {
@@ -25,16 +26,15 @@ struct Pick {
 
 /// @param place  x to the right, y down, in pixels: the middle of the pixel in column i and row j is (i + ½, j + ½)
 /// @param reach  pixels that branches are widened by on each side
-/// @param states  one an instance: those that are not visible are not met, of those that show their somata alone the rest
-///                is not. None: all are
+/// @param shown  neurons and branches that are not visible are not met, of those that show their somata alone the rest is not
 std::optional<Pick> pick(const Forest& forest, const frame::Camera& camera, const frame::Viewport& viewport,
-                         const Vec2& place, float reach = .5f, std::span<const frame::State> states = {});
+                         const Vec2& place, float reach = .5f, const Shown& shown = {});
 
 /// The same for many places, found in another way: each of them against each original segment of each neuron, without
 /// trees or bounds, as the union of spheres along the segment's axis. Slow; what `pick` is compared with.
 std::vector<std::optional<Pick>> plain_picks(const Forest& forest, const frame::Camera& camera,
                                              const frame::Viewport& viewport, std::span<const Vec2> places,
-                                             float reach = .5f, std::span<const frame::State> states = {});
+                                             float reach = .5f, const Shown& shown = {});
 
 /// A segment of an instance in the world.
 RoundCone in_world(const Forest& forest, std::uint32_t instance, std::uint32_t segment);

@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "forest/core/random.h"
+#include "forest/scene/colouring.h"
 #include "forest/scene/path.h"
 
 #include "tests/sample_forest.h"
@@ -41,6 +42,40 @@ TEST(Pick, IsWhatAPlainLoopOverAllSegmentsFinds) {
         }
       }
   EXPECT_GT(hits, 500);
+}
+
+TEST(Pick, OnlyWhatIsShownOfANeuronIsMet) {
+  const Forest forest = sample();
+  View view = overview(forest);
+  for (std::uint32_t i = 0; i < forest.instances().size(); ++i) {
+    const Neuron& neuron = forest.neurons()[forest.instances()[i].morphology];
+    if (i % 2) {  // a branch of a hidden neuron is shown, one of the others hidden
+      view.targets.emplace_back().branch = Branch{i, soma_section};
+      view.targets.back().visible = false;
+    }
+    view.targets.emplace_back().branch = Branch{i, i % neuron.section_count};
+    view.targets.back().visible = i % 2;
+  }
+  const Colouring colouring = colour(Targets(forest), view);
+  std::size_t on_shown = 0, hidden = 0;
+  std::vector<Vec2> places;
+  for (float y = .5f; y < viewport.height; y += 9.f)
+    for (float x = .5f; x < viewport.width; x += 9.f) places.emplace_back(x, y);
+  const auto plain = plain_picks(forest, view.camera, viewport, places, 2.f, colouring.shown());
+  for (std::size_t i = 0; i < places.size(); ++i) {
+    const auto found = pick(forest, view.camera, viewport, places[i], 2.f, colouring.shown());
+    ASSERT_EQ(found.has_value(), plain[i].has_value());
+    hidden += pick(forest, view.camera, viewport, places[i], 2.f).has_value() && !found;
+    if (!found) continue;
+    EXPECT_EQ(found->segment, plain[i]->segment);
+    const auto states = section_states(forest, colouring.shown(), found->instance);
+    const bool of_branch = found->section != soma_section && states[found->section];
+    EXPECT_EQ(of_branch, found->instance % 2 == 1) << found->instance;
+    on_shown += of_branch;
+  }
+  EXPECT_GT(on_shown, 10u);
+  EXPECT_GT(hidden, 10u);
+  EXPECT_TRUE(plain_picks(forest, view.camera, viewport, {}).empty());
 }
 
 TEST(Pick, AThinBranchIsUnderThePixelsItTouches) {

@@ -550,11 +550,11 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
       ++figures_.missing;
       continue;
     }
+    found->second->used = picture_;  // what is looked at to be left out is not to be made again either
     const std::size_t more = found->second->piece.mesh.triangles.size();
     if (!shows(*found->second, list[one->near])) continue;
     if (triangles + more > limits.triangles) break;
     triangles += more;
-    found->second->used = picture_;
     used.push_back({&*one, found->second.get(),
                     1.f - smooth_step(.5f, 1.f, float(double(triangles) / double(limits.triangles)))});
   }
@@ -615,14 +615,15 @@ void Skin::show(frame::Frame& frame, const Cut& cut, const Eye& eye, const Colou
   frame.surfaces = shown_;
 
   // Those not seen for the longest time are let go.
-  while (kept_ > most_kept) {
-    auto oldest = made_.end();
-    for (auto it = made_.begin(); it != made_.end(); ++it)
-      if (it->second->used < picture_ && (oldest == made_.end() || it->second->used < oldest->second->used))
-        oldest = it;
-    if (oldest == made_.end()) break;
-    kept_ -= oldest->second->piece.mesh.triangles.size();
-    made_.erase(oldest);
+  if (kept_ <= most_kept) return;
+  std::vector<decltype(made_)::iterator> unused;
+  for (auto it = made_.begin(); it != made_.end(); ++it)
+    if (it->second->used < picture_) unused.push_back(it);
+  std::ranges::stable_sort(unused, {}, [](const auto& it) { return it->second->used; });
+  for (const auto& it : unused) {
+    if (kept_ <= most_kept) break;
+    kept_ -= it->second->piece.mesh.triangles.size();
+    made_.erase(it);
   }
 }
 

@@ -103,12 +103,14 @@ void Surfaces::colour(std::span<const float> values) {
         fmt::format("there are {} values and the surface has {} vertices; give the values of this surface",
                     values.size(), one.mesh.positions.size()));
   one.values.assign(values.begin(), values.end());
+  learn_values();
 }
 
 void Surfaces::colour(std::span<const float> keys, std::span<const AreaColour> areas) {
   colour(keys);
   One& one = list_.back();
   one.values.clear();
+  learn_values();
   std::vector<std::pair<std::int32_t, std::uint16_t>> places;
   for (const AreaColour& area : areas) {
     const auto known = std::ranges::find(area_colours_, area.colour);
@@ -176,35 +178,34 @@ bool zero_means_none(std::span<const float> values) {
          std::ranges::any_of(values, [](float value) { return value > 0.f; });
 }
 
-std::vector<float> Surfaces::values() const {
-  std::vector<float> values;
+void Surfaces::learn_values() {
+  std::vector<float> all;
   for (const One& one : list_) {
     const bool without_zero = zero_means_none(one.values);
     for (const float value : one.values)
-      if (std::isfinite(value) && !(without_zero && value == 0.f)) values.push_back(value);
+      if (std::isfinite(value) && !(without_zero && value == 0.f)) all.push_back(value);
   }
-  return values;
-}
-
-std::pair<bool, bool> Surfaces::beyond_range() const {
-  const auto [low, high] = shown_range();
-  const std::vector<float> all = values();
-  if (all.empty()) return {false, false};
+  values_.reset();
+  if (all.empty()) return;
   const auto [least, most] = std::ranges::minmax(all);
-  return {least<low, most> high};
-}
-
-std::pair<float, float> Surfaces::shown_range() const {
-  if (range) return *range;
-  std::vector<float> all = values();
-  if (all.empty()) return {0.f, 1.f};
   const auto at = [&](double share) {
     const auto place = all.begin() + std::ptrdiff_t(share * double(all.size() - 1));
     std::ranges::nth_element(all, place);
     return *place;
   };
   const float low = at(.02), high = at(.98);
-  return {low, high > low ? high : low + 1.f};
+  values_ = {least, most, {low, high > low ? high : low + 1.f}};
+}
+
+std::pair<bool, bool> Surfaces::beyond_range() const {
+  if (!values_) return {false, false};
+  const auto [low, high] = shown_range();
+  return {values_->least<low, values_->most> high};
+}
+
+std::pair<float, float> Surfaces::shown_range() const {
+  if (range) return *range;
+  return values_ ? values_->usual : std::pair(0.f, 1.f);
 }
 
 void Surfaces::show(frame::Frame& frame, const Colouring& colouring, bool playing) {

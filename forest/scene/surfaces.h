@@ -76,7 +76,7 @@ class Surfaces {
   void show(frame::Frame& frame, const Colouring& colouring, bool playing);
 
  private:
-  std::vector<float> values() const;  // of all, that are some
+  void learn_values();
 
   struct One {
     Mesh mesh;
@@ -92,6 +92,11 @@ class Surfaces {
   std::vector<Vec3> area_colours_;
   std::vector<frame::Surface> shown_;
   Bounds bounds_;
+  struct Values {  // of all that are some
+    float least, most;
+    std::pair<float, float> usual;  // all but the lowest and highest two hundredths
+  };
+  std::optional<Values> values_;
 };
 
 }  // namespace forest::scene

@@ -6,8 +6,10 @@
 #include <bit>
 #include <cmath>
 #include <cstring>
+#include <functional>
 #include <numbers>
 #include <numeric>
+#include <optional>
 #include <unordered_map>
 
 #include <fmt/format.h>
@@ -19,8 +21,10 @@
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
+#include "forest/scene/closeness.h"
 #include "forest/scene/grove.h"
 #include "forest/scene/pick.h"
+#include "forest/scene/placed.h"
 #include "forest/scene/synapses_layout.h"
 
 namespace forest::scene {
@@ -201,6 +205,7 @@ struct Synapses::Data {
   std::array<std::span<const std::byte>, part_count> parts;
   std::vector<ProjectionFacts> projections;
   Forest forest;
+  std::vector<std::uint32_t> standing;  // of every instance: its number in Forest::standing()
 
   template <class T>
   std::span<const T> as(FilePart part) const {
@@ -338,15 +343,19 @@ std::vector<std::byte> Synapses::make(const Forest& forest, std::span<const circ
 
 Synapses Synapses::open(const std::filesystem::path& path, const Forest& forest) {
   auto data = std::make_shared<Data>(
-      Data{.file = {}, .memory = {}, .parts = {}, .projections = {}, .forest = forest});
+      Data{.file = {}, .memory = {}, .parts = {}, .projections = {}, .forest = forest, .standing = {}});
   data->file.emplace(path);
   const auto bytes = data->file->bytes();
   return check(std::move(data), bytes, path.string());
 }
 
 Synapses Synapses::from_bytes(std::vector<std::byte> memory, const Forest& forest, const std::string& name) {
-  auto data = std::make_shared<Data>(
-      Data{.file = {}, .memory = std::move(memory), .parts = {}, .projections = {}, .forest = forest});
+  auto data = std::make_shared<Data>(Data{.file = {},
+                                          .memory = std::move(memory),
+                                          .parts = {},
+                                          .projections = {},
+                                          .forest = forest,
+                                          .standing = {}});
   const std::span<const std::byte> bytes = data->memory;
   return check(std::move(data), bytes, name);
 }
@@ -410,6 +419,8 @@ Synapses Synapses::check(std::shared_ptr<Data> data, std::span<const std::byte> 
                 (s.flags & Synapse::sign_mask) < 3 && s.centre().allFinite(),
             wrong);
   });
+  data->standing.resize(instances.size());
+  for (std::uint32_t i = 0; i < instances.size(); ++i) data->standing[forest.standing()[i].index] = i;
   // Every bundle but the last has one parent, which comes later: so a walk ends.
   const auto bundles = data->as<Bundle>(FilePart::bundles);
   const auto list = data->as<std::uint32_t>(FilePart::samples);
@@ -440,6 +451,40 @@ float synapse_weight(double rank, double f) {
   const double mean = f <= 1. ? .75 * f : 2. - .25 * f - 1. / f;  // of the ramp below, over ranks in [0, 1)
   return float(std::min(1., 2. * (1. - rank / f)) / mean);
 }
+
+namespace {
+
+// Which segments a picture draws where thin branches are left to others of their like, as a cut of leaves has it (cut.h).
+class Thinned {
+ public:
+  Thinned(const Forest& forest, const Eye& eye) : forest_(forest), eye_(eye), closeness_(forest) {
+    closeness_.seen_by(eye);
+  }
+  Closeness::OfNeuron closeness(std::uint32_t standing) {
+    return closeness_.of(standing, Placed(forest_.standing()[standing].instance));
+  }
+  // A neuron's leaves are its last clusters, the last of them first.
+  bool draws(std::uint32_t instance, const Neuron& neuron, std::uint32_t segment,
+             const Closeness::OfNeuron& closeness) const {
+    const auto clusters = forest_.clusters().subspan(neuron.first_cluster, neuron.cluster_count);
+    const auto leaves = clusters.subspan(clusters.size() / 2);
+    const auto leaf =
+        std::ranges::lower_bound(leaves, segment, std::ranges::greater(), &Cluster::first_segment);
+    if (leaf == leaves.end()) return false;
+    const auto at = std::uint32_t(clusters.size() / 2 + std::size_t(leaf - leaves.begin()));
+    const std::uint32_t shown =
+        leaf->visible_at(eye_.magnification(closeness(at)) / eye_.detail().thinnest, order_of(instance));
+    const std::uint32_t place = segment - leaf->first_segment;
+    return place < frame::cluster_size && (shown >> place & 1u);
+  }
+
+ private:
+  const Forest& forest_;
+  const Eye& eye_;
+  Closeness closeness_;
+};
+
+}  // namespace
 
 Synapses::Choice Synapses::choose(const Eye& eye, const Colouring& colouring, SynapseColour colour,
                                   std::size_t most) const {
@@ -505,10 +550,12 @@ Synapses::Choice Synapses::choose(const Eye& eye, const Colouring& colouring, Sy
 
   const Forest& forest = data_->forest;
   const Shown shown = colouring.shown();
-  const float thinnest = eye.detail().thinnest;
+  std::optional<Thinned> thinned;
+  if (eye.detail().thinnest > 0.f) thinned.emplace(forest, eye);
   std::vector<Choice> pieces((taken.size() + at_once - 1) / at_once);
   parallel_for(pieces.size(), 1, [&](std::size_t piece) {
     std::unordered_map<std::uint32_t, std::vector<const frame::State*>> parts;
+    std::unordered_map<std::uint32_t, Closeness::OfNeuron> close;
     for (std::size_t n = piece * at_once; n < std::min(taken.size(), (piece + 1) * at_once); ++n)
       for (std::uint32_t k = 0; k < taken[n].count; ++k) {
         const std::uint32_t index = number(list[taken[n].bundle], k);
@@ -529,15 +576,17 @@ Synapses::Choice Synapses::choose(const Eye& eye, const Colouring& colouring, Sy
         if (!eye.frustum().may_see(sphere)) continue;
         const float magnification = eye.magnification({sphere.centre, 0.f});
         const frame::Segment& segment = forest.segments()[neuron.first_segment + s.segment];
-        if (const float width = 2.f * from_half(segment.meta >> 16) * magnification;
-            width > 0.f && width < thinnest && float(segment.meta >> 8 & 255) * thinnest >= 256.f * width)
-          continue;  // its branch is left to others of its like
         const float weight = synapse_weight(
             s.rank(), f_of(sphere.radius * magnification, coarser * whole_at({sphere.centre, 0.f})));
         if (!(weight > 0.f)) continue;
         const std::uint32_t of_branch = state.colour_class * 8u + (segment.meta & 7u);
         const std::uint32_t opacity = (state.opacity * colouring.opacities[of_branch] + 127u) / 255u;
         if (opacity == 0) continue;
+        if (thinned) {
+          const auto [known, fresh] = close.try_emplace(s.target);
+          if (fresh) known->second = thinned->closeness(data_->standing[s.target]);
+          if (!thinned->draws(s.target, neuron, neuron.first_segment + s.segment, known->second)) continue;
+        }
         pieces[piece].balls.push_back(
             {sphere.centre, sphere.radius * std::sqrt(weight),
              std::uint8_t(colour == SynapseColour::target ? of_branch

@@ -4,12 +4,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstring>
+#include <set>
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "forest/core/error.h"
-#include "forest/core/half.h"
 #include "forest/core/hash.h"
 #include "forest/core/parallel.h"
 #include "forest/core/random.h"
@@ -207,24 +207,28 @@ TEST(Synapses, ShowAsTheirNeuronDoes) {
 }
 
 TEST(Synapses, SitOnlyOnBranchesThatAPictureOfOneSampleDraws) {
-  const Sample s;
-  Detail coarse;
-  coarse.thinnest = 4.f;
-  const Eye eye = s.eye({0, 300, 2500}, {0, 300, 0}, coarse);
-  const auto choice = s.synapses.choose(eye, s.colouring, SynapseColour::sign);
-  ASSERT_FALSE(choice.balls.empty());
-  std::size_t drawn = 0;
-  for (const std::uint32_t i : choice.synapses) {
-    const Synapse& one = s.synapses.all()[i];
-    const Neuron& neuron = s.forest.neurons()[s.forest.instances()[one.target].morphology];
-    const frame::Segment& segment = s.forest.segments()[neuron.first_segment + one.segment];
-    const float width = 2.f * from_half(segment.meta >> 16) * eye.magnification({one.centre(), 0.f});
-    drawn += width >= 4.f || float(segment.meta >> 8 & 255) / 256.f < width / 4.f;
+  Sample s;
+  for (frame::State& state : s.colouring.states) state.kind = frame::Kind::lines;  // and not straws
+  for (const Vec3& from : {Vec3(0, 300, 2500), Vec3(0, 300, 700)}) {
+    Detail fine, coarse;
+    fine.error = coarse.error = .001f, coarse.thinnest = 4.f;
+    const Eye eye = s.eye(from, {0, 300, 0}, coarse);
+    std::set<std::pair<std::uint32_t, std::uint32_t>> drawn;
+    const Cut cut = choose(s.forest, eye, viewport, s.colouring.shown());
+    for (const frame::Item& item : cut.lines)
+      for (std::uint32_t i = 0; i < frame::cluster_size; ++i)
+        if (item.drawn >> i & 1u) drawn.insert({item.instance, item.first_segment + i});
+    std::vector<std::uint32_t> expected;
+    const auto all = s.synapses.choose(s.eye(from, {0, 300, 0}, fine), s.colouring, SynapseColour::sign);
+    for (const std::uint32_t i : all.synapses) {
+      const Synapse& one = s.synapses.all()[i];
+      const Neuron& neuron = s.forest.neurons()[s.forest.instances()[one.target].morphology];
+      if (drawn.contains({one.target, neuron.first_segment + one.segment})) expected.push_back(i);
+    }
+    EXPECT_EQ(s.synapses.choose(eye, s.colouring, SynapseColour::sign).synapses, expected);
+    EXPECT_GT(expected.size(), 20u);
+    EXPECT_LT(expected.size(), all.synapses.size());
   }
-  EXPECT_EQ(drawn, choice.synapses.size());
-  EXPECT_LT(
-      drawn,
-      s.synapses.choose(s.eye({0, 300, 2500}, {0, 300, 0}), s.colouring, SynapseColour::sign).balls.size());
 }
 
 TEST(Synapses, AreTheSameAtAnyNumberOfThreads) {

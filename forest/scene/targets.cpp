@@ -167,7 +167,7 @@ const Members& Targets::find(const std::string& expression) const {
 Members Targets::named(const std::string& name) const {
   if (sets_.find(name)) return circuit::members(sets_, name, node_table(forest_));
   if (name.starts_with("set:")) return circuit::members(sets_, name.substr(4), node_table(forest_));
-  if (name == "all") {
+  if (name == "all" || name == "all:all") {
     Members all(forest_.instances().size());
     std::iota(all.begin(), all.end(), 0u);
     return all;

@@ -35,7 +35,7 @@ class Targets {
   void use(circuit::NodeSets sets);
 
   /// The neurons of a name or an expression (circuit::evaluate). A node set comes before what has its name by itself;
-  /// "type:L5", "layer:L5", "population:L5" and "set:L5" are never mistaken. Throws Error with one sentence.
+  /// "type:L5", "layer:L5", "population:L5", "set:L5" and "all:all" are never mistaken. Throws Error with one sentence.
   const circuit::Members& find(const std::string& expression) const;
   /// In the order of the file, then those that a forest has by itself.
   std::vector<TargetFacts> list() const;

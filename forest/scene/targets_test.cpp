@@ -116,10 +116,13 @@ TEST(Targets, NodeSetsAskForAttributes) {
   sets.put({.name = "first", .clauses = {{"mtype", Clause::Test::any_of, {"second"}, {}}}, .of = {}});
   sets.put({.name = "both", .clauses = {}, .of = {"some", "high"}, .compound = true});
   sets.put({.name = "odd", .clauses = {{"etype", Clause::Test::any_of, {"x"}, {}}}, .of = {}});
+  sets.put({.name = "all", .clauses = {}, .of = {"some", "high"}, .compound = true});
   const Targets targets(f, sets);
   EXPECT_EQ(targets.find("some"), (Members{2, 5}));
   EXPECT_EQ(targets.find("high"), where(f, [&](auto i) { return f.instances()[i].y > 300.f; }));
   EXPECT_EQ(targets.find("first"), targets.find("type:second"));  // a node set comes first
+  EXPECT_EQ(targets.find("all"), targets.find("both"));
+  EXPECT_EQ(targets.find("all:all").size(), 40u);
   EXPECT_EQ(targets.find("both and not high").size(),
             2 - (f.instances()[2].y > 300.f) - (f.instances()[5].y > 300.f));
   EXPECT_THAT(refused([&] { targets.find("odd"); }),
@@ -240,6 +243,25 @@ TEST(Appearance, NoTwoLayersHaveOneColour) {
   for (std::size_t i = 0; i < 12; ++i) EXPECT_EQ(by_layer.legend[i].name, "L" + std::to_string(i));
 }
 
+TEST(Appearance, ThereMayBeMoreHuesThanThereIsRoomFor) {
+  circuit::Circuit c = testing::sample_circuit(48);
+  c.layers.clear();
+  for (int i = 0; i < 61'000; ++i) c.layers.push_back({"L" + std::to_string(i), -float(i), 1.f - float(i)});
+  for (std::size_t i = 0; i < c.instances.size(); ++i)
+    c.instances[i].layer = std::uint32_t(i % 2 ? 60'999 : i);
+  const Forest f = Forest::from_bytes(pack(c, testing::sample_neurons()));
+  for (const ColourBy by : {ColourBy::type, ColourBy::layer, ColourBy::kind, ColourBy::neuron,
+                            ColourBy::target, ColourBy::depth}) {
+    View view;
+    view.colour_by = ColourBy::layer;
+    view.targets.emplace_back().name = "first";
+    view.targets.back().colour_by = by;
+    const Colouring seen = colour(Targets(f), view);
+    ASSERT_EQ(seen.states.size(), 48u);
+    for (const frame::State& state : seen.states) EXPECT_LT(state.colour_class, colour_classes);
+  }
+}
+
 TEST(Appearance, LayersOfATypeAreOneEntryOfTheLegend) {
   circuit::Circuit c = testing::sample_circuit(80);
   c.layers.clear();
@@ -338,7 +360,7 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   for (float x = 100; x < 220; x += 3)
     for (float y = 20; y < 180; y += 5) {
       const auto any = pick(f, view.camera, {320, 200}, {x, y}),
-                 seen = pick(f, view.camera, {320, 200}, {x, y}, .5f, c.states);
+                 seen = pick(f, view.camera, {320, 200}, {x, y}, .5f, c.shown());
       hidden += any && f.types()[any->instance] == 0;
       if (any && f.types()[any->instance] == 1) {
         EXPECT_EQ(seen->segment, any->segment);

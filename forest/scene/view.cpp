@@ -691,7 +691,8 @@ View overview(const Forest& forest, float aspect, std::span<const frame::State> 
   if (bounds.empty()) return view;
   // Fog is as deep as the whole forest, and would only dim a part of it.
   constexpr float least = .2f;
-  if (!all) view.fog = std::clamp(bounds.extent().norm() / forest.soma_bounds().extent().norm(), least, 1.f);
+  if (const float whole = forest.soma_bounds().extent().norm(); !all && whole > 0.f)
+    view.fog = std::clamp(bounds.extent().norm() / whole, least, 1.f);
   const Places branches = places_on_branches(forest, seen);
   enclosing.add_most(branches.places, !branches.all);
   for (const Sphere& s : branches.somata) enclosing.add(s.centre, s.radius);

@@ -250,6 +250,15 @@ TEST(View, WhatIsHiddenNeedsNoRoom) {
   }
 }
 
+TEST(View, SomataMayAllLieInOnePlace) {
+  circuit::Circuit circuit = testing::sample_circuit(4);
+  for (auto& instance : circuit.instances) instance.position = {0.f, 300.f, 0.f};
+  const Forest forest = Forest::from_bytes(pack(circuit, testing::sample_neurons()));
+  std::vector<frame::State> states(4);
+  states[1].flags = 0;
+  EXPECT_EQ(overview(forest, 1.5f, states).fog, View().fog);
+}
+
 TEST(View, NeuronsOfAColumnStandUprightAndThoseInAFoldDoNot) {
   circuit::Circuit circuit = testing::sample_circuit(20);
   const auto forest = [&] { return Forest::from_bytes(pack(circuit, testing::sample_neurons())); };

@@ -62,6 +62,17 @@ TEST_F(Playing, SpacePlaysAndStopsAndStepsGoBothWays) {
   EXPECT_EQ(saved("moment_again.png").pixels, first.pixels);
 }
 
+TEST_F(Playing, WhatIsSetInAPanelLeavesTheMomentAlone) {
+  key("period period period");
+  settle();
+  key("alt+r");
+  xdotool("key ctrl+a type --delay 5 '2'");
+  key("Return");
+  settle();
+  EXPECT_EQ(view_.detail.error, 2.f);
+  EXPECT_NEAR(time(), 1.5, 1e-6);
+}
+
 TEST_F(PlayingDamaged, PutsTheSimulationAwayAndGoesOn) {
   EXPECT_TRUE(activity_.is_null());  // its raster was to be drawn
   key("space period");               // nothing plays

@@ -70,7 +70,7 @@ class Canvas {
   /// Finds the farthest key of the square's tiles: from now on `hidden` knows what has been drawn.
   void look(const Square& square);
   /// Whether all that lies within a rectangle of pixels, at a depth code or behind it, is hidden or beside the square. Looks at
-  /// few tiles; a rectangle that needs more is not hidden.
+  /// few tiles; a rectangle that has more is looked at in groups of them.
   bool hidden(const Square& square, float left, float top, float right, float bottom,
               float nearest_code) const;
 

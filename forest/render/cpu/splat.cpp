@@ -23,6 +23,7 @@ constexpr float look_every = 1.f;  // times a square's pixels are drawn; between
 // Which thing of which chunk: a number, above it the kind, above that the chunk.
 enum class What : std::uint32_t { solid, dot, stroke };
 constexpr std::uint32_t what_bits = 2;
+constexpr std::size_t chunks_at_once = std::size_t(1) << (32 - number_bits - what_bits);
 
 // What some items, that follow one another, give to be drawn.
 struct Chunk {
@@ -366,6 +367,16 @@ void draw_squares(const Picture& picture, const Splatter::Sorted& sorted, Canvas
   }
 }
 
+// Calls gather(i, chunk) for every chunk, which it fills, and draws them.
+void draw_chunks(const Picture& picture, Splatter::Sorted& sorted, Canvas& canvas, std::size_t chunks,
+                 auto&& gather) {
+  for (std::size_t first = 0; first < chunks; first += chunks_at_once) {
+    sorted.sort(canvas, std::min(chunks_at_once, chunks - first),
+                [&](std::size_t n, Chunk& chunk) { gather(first + n, chunk); });
+    draw_squares(picture, sorted, canvas);
+  }
+}
+
 }  // namespace
 
 Splatter::Splatter() : sorted_(std::make_unique<Sorted>()) {}
@@ -394,8 +405,7 @@ std::uint64_t Splatter::draw(const Picture& picture, const frame::Lists& lists, 
       for (std::size_t i = begin[kind]; i < end[kind]; i += items_a_chunk)
         pieces.push_back({Kind(kind), i, std::min(i + items_a_chunk, end[kind])});
     begin = end;
-    if (pieces.empty()) continue;
-    sorted_->sort(canvas, pieces.size(), [&](std::size_t n, Chunk& chunk) {
+    draw_chunks(picture, *sorted_, canvas, pieces.size(), [&](std::size_t n, Chunk& chunk) {
       const Piece& piece = pieces[n];
       const auto kind = std::size_t(piece.kind);
       const std::span<const frame::Item> list = items[kind];
@@ -413,31 +423,27 @@ std::uint64_t Splatter::draw(const Picture& picture, const frame::Lists& lists, 
       }
       drawn += added;
     });
-    draw_squares(picture, *sorted_, canvas);
   }
   return drawn;
 }
 
 void Splatter::draw(const Picture& picture, std::span<const frame::Overlay> overlays, Canvas& canvas) {
-  if (overlays.empty()) return;
-  sorted_->sort(canvas, (overlays.size() + items_a_chunk - 1) / items_a_chunk,
-                [&](std::size_t n, Chunk& chunk) {
-                  Gatherer gatherer(picture, canvas);
-                  for (const frame::Overlay& o : overlays.subspan(
-                           n * items_a_chunk, std::min(items_a_chunk, overlays.size() - n * items_a_chunk)))
-                    gatherer.add(o, chunk);
-                });
-  draw_squares(picture, *sorted_, canvas);
+  const std::size_t chunks = (overlays.size() + items_a_chunk - 1) / items_a_chunk;
+  draw_chunks(picture, *sorted_, canvas, chunks, [&](std::size_t n, Chunk& chunk) {
+    Gatherer gatherer(picture, canvas);
+    for (const frame::Overlay& o :
+         overlays.subspan(n * items_a_chunk, std::min(items_a_chunk, overlays.size() - n * items_a_chunk)))
+      gatherer.add(o, chunk);
+  });
 }
 
 void Splatter::draw(const Picture& picture, std::span<const frame::Ball> balls, Canvas& canvas) {
-  if (balls.empty()) return;
-  sorted_->sort(canvas, (balls.size() + balls_a_chunk - 1) / balls_a_chunk, [&](std::size_t n, Chunk& chunk) {
+  const std::size_t chunks = (balls.size() + balls_a_chunk - 1) / balls_a_chunk;
+  draw_chunks(picture, *sorted_, canvas, chunks, [&](std::size_t n, Chunk& chunk) {
     const Gatherer gatherer(picture, canvas);
     for (std::size_t i = n * balls_a_chunk; i < std::min(balls.size(), (n + 1) * balls_a_chunk); ++i)
       gatherer.add(balls[i], std::uint32_t(i), chunk);
   });
-  draw_squares(picture, *sorted_, canvas);
 }
 
 }  // namespace forest::render::cpu

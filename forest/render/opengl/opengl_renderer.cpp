@@ -419,7 +419,7 @@ struct OpenGLRenderer::Device {
       set_constants(w.uniforms);
     }
     cull.use();
-    each([](const Part& part) { glDispatchCompute((part.last - part.first + 63) / 64, 1, 1); });
+    each([](const Part& part) { dispatch((part.last - part.first + 63) / 64); });
     glMemoryBarrier(written_for_shaders);
     each([&](const Part& part) { run(*drawing->alone[part.list.kind], work[part.list.kind].queue); });
     glMemoryBarrier(written_for_shaders);
@@ -427,6 +427,11 @@ struct OpenGLRenderer::Device {
       if (const Program* shared = drawing->shared[part.list.kind])
         run(*shared, work[part.list.kind].large_queue);
     });
+  }
+
+  // As group_index() in common.glsl counts them: a card need not take more than 65,535 in a row.
+  static void dispatch(std::uint32_t groups) {
+    glDispatchCompute(std::min(groups, 32768u), (groups + 32767) / 32768, 1);
   }
 
   static void run(const Program& program, const Buffer& groups) {
@@ -469,7 +474,7 @@ struct OpenGLRenderer::Device {
       mesh_looks.bind_texels(9, GL_RG8UI);
       facing->triangles.use();
       const std::uint32_t groups = (constants.item_count + FOREST_GROUP - 1) / FOREST_GROUP;
-      glDispatchCompute(std::min(groups, 32768u), (groups + 32767) / 32768, 1);
+      dispatch(groups);
       glMemoryBarrier(written_for_shaders);
       run(facing->close_ups, large_queue);
     }

@@ -83,7 +83,7 @@ uint payload_of(uint entry, float shade, float noise) {
 }
 
 float noise_at(int x, int y) {  // interleaved gradient noise (Jimenez 2014), moved by the subframe
-  return fract(52.9829189 * fract(0.06711056 * float(x) + 0.00583715 * float(y)) + golden * float(view.thinnest > 0.0 ? 0u : view.subframe));
+  return fract(52.9829189 * fract(0.06711056 * float(x) + 0.00583715 * float(y)) + golden * float(view.subframe));
 }
 
 vec3 light() { return vec3(view.light_x, view.light_y, view.light_z); }
@@ -158,7 +158,8 @@ bool fetch(uint item_index, uint index, out Capsule c) {
 #endif
     if ((view.flags & FOREST_ENTRIES) != 0u)
       c.entry = texelFetch(entries, int((view.flags & FOREST_SINGLE) != 0u ? item_index : item_index * FOREST_CLUSTER_SIZE + index)).x;
-    c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.subframe));
+    // Which lines are drawn for their like does not change from sample to sample.
+    c.rank = fract(float((meta >> 8) & 255u) / 256.0 + golden * float(view.thinnest > 0.0 ? 0u : view.subframe));
   }
   return clip_near(c);
 }
@@ -337,7 +338,7 @@ void draw_line(Capsule c, int lane, int lanes) {
   float b = (dot(eye, light()) - end_on * along) / sqrt(max(1.0 - end_on * end_on, 1e-4));
   float a2 = max(0.0, 1.0 - along * along - b * b);
   float shade = 0.5 * sqrt(max(0.0, 1.0 + 1.5707963 * b + (a2 + 2.0 * b * b) / 3.0));
-  float noise = fract(c.rank * 7.0);
+  float noise = fract(c.rank * 7.0 + (view.thinnest > 0.0 ? golden * float(view.subframe) : 0.0));
   uint payload = payload_of(c.entry, shade, noise);
   // Of several subframes each meets the cylinder somewhere.
   vec3 beside = cross(c.b - c.a, eye);

@@ -12,7 +12,7 @@ bool hidden(vec4 sphere) {
 }
 
 void main() {
-  uint at = gl_GlobalInvocationID.x;
+  uint at = group_index() * 64u + gl_LocalInvocationID.x;
   uint item = view.first_item + at;
   if (at >= view.item_count || hidden(uintBitsToFloat(texelFetch(items, int(2u * item + 1u))))) return;
   uint drawn = texelFetch(items, int(2u * item)).z, count = uint(bitCount(drawn));
