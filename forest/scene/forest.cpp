@@ -80,7 +80,8 @@ struct Refuse {
 class Family {
  public:
   explicit Family(std::size_t all) : has_parent_(all) {}
-  bool take(std::size_t child) {  // whether it had none yet
+  bool take(std::size_t child) {  // whether it is one of all, and had none yet
+    if (child >= has_parent_.size()) return false;
     const bool fresh = !has_parent_[child];
     has_parent_[child] = true, count_ += fresh;
     return fresh;
@@ -319,7 +320,8 @@ void Forest::Data::check_neurons(const Refuse& refuse) const {
         refuse.unless(c.first_segment >= n.first_segment &&
                       within(c.first_segment - n.first_segment, c.segment_count, n.original_count));
       else
-        for (const std::uint32_t child : c.children) refuse.unless(family.take(child - n.first_cluster));
+        for (const std::uint32_t child : c.children)
+          refuse.unless(child > at && family.take(child - n.first_cluster));
       bool good = true;  // of all, without a branch for each
       for (const reports::Place& p : places.subspan(c.first_segment, c.segment_count))
         good &= is_section(p.section) & (p.position >= 0.f) & (p.position <= 1.f);
