@@ -283,18 +283,20 @@ lsystem::Grammar model_of(const Options& options) {
   return options.repo.empty() ? find_grammar(options.model) : grammar_of_model(options.repo, options.model);
 }
 
-// A model that was fitted to the cells that it is judged by says so in its first lines.
-std::size_t warn_of_known(const lsystem::Grammar& grammar, const Sample& judged_by, Console& console) {
+// Of the cells by which a model is judged those that it was fitted to, as it says in its first lines.
+std::vector<std::string> known_to(const lsystem::Grammar& grammar, const Sample& judged_by) {
   const std::set<std::string> known = cells_fitted_to(grammar.text);
-  const auto is_known = [&](const std::string& cell) { return known.contains(repository::escaped(cell)); };
-  const auto count = std::ranges::count_if(judged_by.cells, is_known);
-  if (count == 0) return 0;
+  std::vector<std::string> cells;
+  for (const std::string& cell : judged_by.cells)
+    if (known.contains(repository::escaped(cell))) cells.push_back(repository::escaped(cell));
+  return cells;
+}
+void warn_of_known(const std::vector<std::string>& known, const Sample& judged_by, Console& console) {
+  if (known.empty()) return;
   console.warn(
       fmt::format("the model says that it was fitted to {} of the {} that it is judged by, {} first; fit one "
                   "without them",
-                  count, counted(judged_by.cells.size(), "cell"),
-                  repository::escaped(*std::ranges::find_if(judged_by.cells, is_known))));
-  return std::size_t(count);
+                  known.size(), counted(judged_by.cells.size(), "cell"), known.front()));
 }
 
 }  // namespace
@@ -334,8 +336,10 @@ void leave_out(const Options& options, Console& console) {
   std::optional<Sample> grown;
   if (!options.model.empty()) trial.model = &model.emplace(model_of(options));
   if (!options.grown.empty()) trial.grown = &grown.emplace(read_sample(options.grown, options.repo, console));
-  if (model) trial.fitted_to = warn_of_known(*model, trial.traced, console);
+  const auto known = model ? known_to(*model, trial.traced) : std::vector<std::string>();
+  trial.fitted_to = known.size();
   judge_leaving_out(trial, console);
+  warn_of_known(known, trial.traced, console);
 }
 
 void run(const Options& options, Console& console) {
@@ -374,9 +378,10 @@ void run(const Options& options, Console& console) {
                     {.repeats = options.repeats, .seed = options.seed, .longest_run = longest_run}, console,
                     options.slices);
   warn_of_shared(train, held_out, console);
-  const std::size_t known_cells = model ? warn_of_known(*model, held_out, console) : 0;
+  const auto known = model ? known_to(*model, held_out) : std::vector<std::string>();
+  warn_of_known(known, held_out, console);
   if (options.model.empty())
-    for (const Sample* known : {&train, &held_out}) warn_of_shared(grown.front(), *known, console);
+    for (const Sample* other : {&train, &held_out}) warn_of_shared(grown.front(), *other, console);
   if (options.count > train.neurons.size())
     console.warn(fmt::format("there are {}, and no more neurons are judged of a population",
                              counted(train.neurons.size(), "training cell")));
@@ -397,7 +402,7 @@ void run(const Options& options, Console& console) {
                                  "Grown neurons on trial: " + grown.front().name),
                        options.force);
   auto json = json_of(judged.judgement, seeds);
-  json["fitted_to"] = known_cells;  // of the cells that it is judged by
+  json["fitted_to"] = known.size();  // of the cells that it is judged by
   console.print(json);
   tell_judgement(judged.judgement, console);
 }

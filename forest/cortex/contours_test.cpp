@@ -195,10 +195,10 @@ TEST(FaultOf, NamesThePlaceWhereContoursCross) {
   EXPECT_EQ(fault_of(drawn({square, within})), "");
   const std::string crossing = fault_of(drawn({square, shifted}));
   EXPECT_NE(crossing.find("'outer'"), std::string::npos) << crossing;
-  EXPECT_NE(crossing.find("3.000"), std::string::npos) << crossing;         // the section
-  EXPECT_NE(crossing.find("2.000, 4.000"), std::string::npos) << crossing;  // and where
+  EXPECT_NE(crossing.find("(3 mm)"), std::string::npos) << crossing;     // the section
+  EXPECT_NE(crossing.find("(2, 4) mm"), std::string::npos) << crossing;  // and where
   const std::string eight = fault_of(drawn({{{0., 0.}, {4000., 4000.}, {4000., 0.}, {0., 4000.}}}));
-  EXPECT_NE(eight.find("2.000, 2.000"), std::string::npos) << eight;
+  EXPECT_NE(eight.find("(2, 2) mm"), std::string::npos) << eight;
   ContourStack twice = drawn({square});
   twice.sections.push_back(twice.sections[0]);
   EXPECT_NE(fault_of(twice), "");
