@@ -21,6 +21,17 @@ cortex::Axis axis_of(const std::string& name) {
   return name == "x" ? cortex::Axis::x : name == "z" ? cortex::Axis::z : cortex::Axis::y;
 }
 
+std::vector<fs::path> sections_in(const fs::path& folder, bool (*wanted)(std::string_view extension)) {
+  std::vector<fs::path> files;
+  for (const auto& entry : fs::directory_iterator(folder))
+    if (wanted(extension_of(entry.path())) && !entry.path().filename().string().starts_with('.'))
+      files.push_back(entry.path());
+  std::ranges::sort(files);
+  return files;
+}
+
+bool is_drawing_name(std::string_view extension) { return extension == ".svg"; }
+
 cortex::ContourStack read_contour_files(const fs::path& path, double unit, Console& console) {
   const auto read = [&](const fs::path& file) {
     io::ReadContours result = io::read_contours(MappedFile(file).text(), file.string(), unit);
@@ -28,11 +39,7 @@ cortex::ContourStack read_contour_files(const fs::path& path, double unit, Conso
     return std::move(result.stack);
   };
   if (!fs::is_directory(path)) return read(path);
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(path))
-    if (extension_of(entry.path()) == ".svg" && !entry.path().filename().string().starts_with('.'))
-      files.push_back(entry.path());
-  std::ranges::sort(files);
+  const std::vector<fs::path> files = sections_in(path, is_drawing_name);
   if (files.empty()) throw InputError(path.string(), 0, "has no .svg file; give a folder of drawn sections");
   std::vector<cortex::ContourStack> drawings;
   for (const fs::path& file : files) drawings.push_back(read(file));

@@ -4,6 +4,8 @@
 
 #include <filesystem>
 #include <string>
+#include <string_view>
+#include <vector>
 
 #include "forest/cortex/contours.h"
 
@@ -12,6 +14,11 @@ namespace forest::cli {
 class Console;
 
 cortex::Axis axis_of(const std::string& name);  // "x", "y" or "z"
+
+/// The files of a folder whose extension, in small letters, is wanted, by their names' bytes; not those that are hidden.
+std::vector<std::filesystem::path> sections_in(const std::filesystem::path& folder,
+                                               bool (*wanted)(std::string_view extension));
+bool is_drawing_name(std::string_view extension);  // ".svg"
 
 /// What was left out is told. Throws InputError.
 /// @param unit  µm of one unit, where a format does not say it

@@ -38,20 +38,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-// But those that are hidden.
-template <class Wanted>
-std::vector<fs::path> files_in(const fs::path& folder, Wanted&& wanted) {
-  std::vector<fs::path> files;
-  for (const auto& entry : fs::directory_iterator(folder))
-    if (wanted(extension_of(entry.path())) && !entry.path().filename().string().starts_with('.'))
-      files.push_back(entry.path());
-  std::ranges::sort(files);
-  return files;
-}
-bool has_drawings(const fs::path& folder) {
-  return !files_in(folder, [](const std::string& extension) { return extension == ".svg"; }).empty();
-}
-
 std::vector<NumberedFile> in_order(const fs::path& folder, std::span<const fs::path> files) {
   try {
     return in_number_order(files);
@@ -106,7 +92,7 @@ class Pictures {
   Pictures(const fs::path& path, Console& console) : files_{path} {
     const bool folder = fs::is_directory(path);
     if (folder) {
-      files_ = files_in(path, io::is_picture_name);
+      files_ = sections_in(path, io::is_picture_name);
       if (files_.empty())
         throw Error(path.string() +
                     ": has no picture (.png, .tif, .tiff) and no drawing (.svg); give a folder of sections");
@@ -354,8 +340,8 @@ void run(const Options& options, Console& console) {
   for (std::size_t i = 0; i < options.inputs.size(); ++i) {
     const fs::path& path = options.inputs[i];
     const std::string name = name_of(options, i);
-    const bool folder = fs::is_directory(path), drawn = folder && has_drawings(path);
-    if (drawn && !files_in(path, io::is_picture_name).empty())
+    const bool folder = fs::is_directory(path), drawn = folder && !sections_in(path, is_drawing_name).empty();
+    if (drawn && !sections_in(path, io::is_picture_name).empty())
       console.warn(path.string() + ": has drawings (.svg) and pictures; the drawings are taken");
     if ((folder && !drawn) || (!folder && io::is_picture_name(extension_of(path)))) {
       used.axis = used.spacing = used.threshold = used.pixel = true;
