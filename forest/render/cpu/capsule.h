@@ -281,25 +281,36 @@ class Outline {
   std::array<Tangent, 2> tangents_;
 };
 
-/// How far beside their middles the spheres of a capsule's ends are seen, pixels.
+/// How far beside their middles the spheres of a capsule's ends are seen, pixels: f r |p| / z (z - r) holds a sphere at p, as in
+/// scene/occlusion.cpp, and between two ends it changes about evenly. Not so before the eye or far aside, where one bound of
+/// all three factors holds the whole capsule; what reaches behind the eye may be seen anywhere.
 struct Reach {
   float a, b;
-  bool exact;  // they are small beside their distance, and not far from the middle of the picture
+  bool exact;
 
-  Reach(const frame::Constants& c, const Vec3& at_a, const Vec3& at_b, float ra, float rb) {
-    const auto small = [&](const Vec3& at, float radius) {
-      return c.parallel > 0.f || (radius < .25f * at.z() && at.squaredNorm() < 2.5f * at.z() * at.z());
-    };
-    exact = small(at_a, ra) && small(at_b, rb);
-    const auto of = [&](const Vec3& at, float radius) {
-      if (c.parallel > 0.f) return c.focal * radius;
-      return c.focal * radius *
-             (exact ? at.norm() / (at.z() * (at.z() - radius))  // as scene/occlusion.cpp
-                    : 1.05f / std::max(at.z() - .5f * radius, c.near));
-    };
-    a = of(at_a, ra), b = of(at_b, rb);
+  Reach(const frame::Constants& c, const Vec3& at_a, const Vec3& at_b, float ra, float rb)
+      : Reach(c, at_a.squaredNorm(), at_a.z(), ra, at_b.squaredNorm(), at_b.z(), rb) {}
+
+  /// @param a2, b2  squares of their distances
+  [[gnu::always_inline]] Reach(const frame::Constants& c, float a2, float az, float ra, float b2, float bz,
+                               float rb) {
+    const bool even = c.parallel > 0.f;
+    const float wide_a = ra / az, wide_b = rb / bz, aside_a = std::sqrt(a2) / az,
+                aside_b = std::sqrt(b2) / bz, wide = larger(wide_a, wide_b), aside = larger(aside_a, aside_b);
+    const bool small = (wide < .25f) & (aside < 1.58f);
+    const float all =
+        wide < 1.f ? smaller(c.focal * wide * aside / larger(1.f - wide, 1e-6f), anywhere) : anywhere;
+    const float of_a = c.focal * wide_a * aside_a / (1.f - wide_a),
+                of_b = c.focal * wide_b * aside_b / (1.f - wide_b);
+    exact = even | small;
+    a = even ? c.focal * ra : small ? of_a : all;
+    b = even ? c.focal * rb : small ? of_b : all;
   }
+
+ private:
+  static constexpr float anywhere = 1e6f;
 };
+
 /// What a picture shows of a capsule: its axis without what lies so far beside the picture that no sphere around it reaches in.
 class Crop {
  public:

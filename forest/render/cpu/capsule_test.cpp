@@ -35,10 +35,6 @@ struct Case {
     const Vec3 way(float(random.normal()), float(random.normal()), float(random.normal()));
     b = a + way.normalized() * ra * float(random.below(8) ? random.uniform(.2, 30.) : 0.);
   }
-  float nearest_code(const frame::Constants& c) const {
-    const float depth = std::min(a.z() - ra, b.z() - rb);
-    return depth > c.near ? depth_code(depth) : 0.f;
-  }
 };
 
 TEST(Capsule, ItsSilhouetteIsWhatItsRaysMeet) {
@@ -81,17 +77,28 @@ TEST(Capsule, ItsSilhouetteIsWhatItsRaysMeet) {
   EXPECT_LT(brighter, hit / 500);
 }
 
+// Of capsules before the eye, and of such as lie far aside, or reach beside it and behind.
 TEST(Capsule, ItsOutlineHoldsWhatItsRaysMeet) {
   const frame::Constants c = picture();
   Random random(5);
-  int inside = 0, beside = 0;
-  for (int i = 0; i < 2000; ++i) {
-    const Case k(c, random);
+  int inside = 0, beside = 0, even = 0, near = 0;
+  for (int i = 0; i < 4000; ++i) {
+    Case k(c, random);
+    if (i % 2) {
+      const auto place = [&] {
+        const float depth = c.near + float(std::exp(random.uniform(std::log(.1), std::log(30.))));
+        return Vec3(depth * float(random.normal()), depth * float(random.normal()), depth);
+      };
+      k.a = place(), k.b = place();
+      k.ra = k.a.z() * float(random.uniform(.02, .9)), k.rb = k.b.z() * float(random.uniform(.02, .9));
+    }
+    if (std::min(k.a.z(), k.b.z()) < c.near) continue;  // cut there before
     const Body body(k.a, k.b, k.ra, k.rb);
-    if (k.nearest_code(c) == 0.f || !Reach(c, k.a, k.b, k.ra, k.rb).exact) continue;
+    ++(Reach(c, k.a, k.b, k.ra, k.rb).exact ? even : near);
     const Outline outline = outline_of(c, 0.f, pixel_of(c, k.a), pixel_of(c, k.b), body);
-    const float top = std::floor(std::max(outline.top(), -2000.f)), high = outline.bottom() - top;
-    if (!(high > 1.f && high < 4000.f)) continue;
+    const float top = std::floor(std::max(outline.top(), -2000.f)),
+                high = std::min(outline.bottom(), 2000.f) - top;
+    if (!(high > 1.f)) continue;
     for (int row = 0; row < 40; ++row) {
       const float first = std::floor(top + high * float(random.uniform(-.1, 1.1))) + .5f;
       Outline::Rows rows;
@@ -104,7 +111,7 @@ TEST(Capsule, ItsOutlineHoldsWhatItsRaysMeet) {
       }
       Hits<lanes> hits;
       meet(c, Vec3(0, 0, -1), body, x, y, hits);
-      for (int lane = 0; lane < lanes; ++lane) beside += hits.hit[lane] && std::abs(x[lane]) < 1e6f;
+      for (int lane = 0; lane < lanes; ++lane) beside += hits.hit[lane] && std::abs(x[lane]) < 1e5f;
       for (int lane = 0; lane < rows_at_once; ++lane) {
         const float middle = .5f * (rows.left[lane] + rows.right[lane]);
         x[lane] = rows.left[lane] < rows.right[lane] ? middle : -1e9f;
@@ -114,7 +121,9 @@ TEST(Capsule, ItsOutlineHoldsWhatItsRaysMeet) {
     }
   }
   EXPECT_EQ(beside, 0);
-  EXPECT_GT(inside, 50000);
+  EXPECT_GT(inside, 100000);
+  EXPECT_GT(even, 1500);
+  EXPECT_GT(near, 1500);
 }
 
 // Of capsules around and behind the edges of the picture, some of which begin right before the eye.

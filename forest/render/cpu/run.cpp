@@ -120,25 +120,14 @@ FOREST_CLONES void place(const frame::Constants& c, const Mat3& turn, const Vec3
 }
 
 FOREST_CLONES void surround(const frame::Constants& c, float margin, Run& r) {
-  const float near = c.near, focal = c.focal;
-  const bool even = c.parallel > 0.f;
+  const float near = c.near;
   const std::size_t count = whole_vectors(r.count);
   for (std::size_t i = 0; i < count; ++i) {
     const float ra = r.ra[i], rb = r.rb[i], az = r.az[i], bz = r.bz[i];
     const float a2 = r.ax[i] * r.ax[i] + r.ay[i] * r.ay[i] + az * az,
                 b2 = r.bx[i] * r.bx[i] + r.by[i] * r.by[i] + bz * bz;
-    // As Reach.
-    const bool exact = (ra < .25f * az) & (a2 < 2.5f * az * az) & (rb < .25f * bz) & (b2 < 2.5f * bz * bz);
-    const float a_exactly = std::sqrt(a2) / (az * (az - ra)), b_exactly = std::sqrt(b2) / (bz * (bz - rb)),
-                a_roughly = 1.05f / larger(az - .5f * ra, near),
-                b_roughly = 1.05f / larger(bz - .5f * rb, near);
-    const float per_a = even    ? 1.f
-                        : exact ? a_exactly
-                                : a_roughly,
-                per_b = even    ? 1.f
-                        : exact ? b_exactly
-                                : b_roughly;
-    const float reach = focal * larger(ra * per_a, rb * per_b), all = reach + margin;
+    const Reach of(c, a2, az, ra, b2, bz, rb);
+    const float reach = larger(of.a, of.b), all = reach + margin;
     const float depth = smaller(az - ra, bz - rb);
     r.reach[i] = reach;
     r.front[i] = depth > near ? depth_code(depth) : 0.f;

@@ -34,9 +34,14 @@ Cone cone_of(Capsule c) {
               uint(depth_code(max(min(c.a.z - c.ra, c.b.z - c.rb), view.near))) << 12);
 }
 
-// Discs on screen around its ends, between which it is seen: a radius each.
+// Discs on screen around its ends, between which it is seen: a radius each, as Reach in render/cpu/capsule.h.
 vec2 reaches(Capsule c) {
-  return 1.0 + 1.05 * view.focal * vec2(c.ra, c.rb) / max(vec2(lens(c.a.z - 0.5 * c.ra), lens(c.b.z - 0.5 * c.rb)), lens(view.near));
+  vec2 wide = vec2(c.ra / lens(c.a.z), c.rb / lens(c.b.z));
+  if (view.parallel > 0.0) return 1.0 + view.focal * wide;
+  vec2 aside = vec2(length(c.a) / c.a.z, length(c.b) / c.b.z);
+  float widest = max(wide.x, wide.y), farthest = max(aside.x, aside.y);
+  if (widest < 0.25 && farthest < 1.58) return 1.0 + view.focal * wide * aside / (1.0 - wide);
+  return vec2(widest < 1.0 ? min(1.0 + view.focal * widest * farthest / (1.0 - widest), 1e6) : 1e6);
 }
 
 void meet(Capsule c, Cone cone, int px, int py) {
@@ -85,7 +90,7 @@ void draw_capsule(Capsule c, int lane, int lanes) {
   bool steep = abs(q.y - p.y) > abs(q.x - p.x);
   if (steep) { p = p.yx; q = q.yx; }
   int limit_x = int(steep ? view.height : view.width), limit_y = int(steep ? view.width : view.height);
-  int first = max(int(floor(min(p.x - r.x, q.x - r.y))), 0), last = min(int(ceil(max(p.x + r.x, q.x + r.y))), limit_x);
+  int first = clipped(floor(min(p.x - r.x, q.x - r.y)), limit_x), last = clipped(ceil(max(p.x + r.x, q.x + r.y)), limit_x);
   float reach = max(r.x, r.y);
   Cone cone = cone_of(c);
   for (int x = first + lane; x < last; x += lanes) {
@@ -99,7 +104,7 @@ void draw_capsule(Capsule c, int lane, int lanes) {
     }
     float y0 = mix(p.y, q.y, t0), y1 = mix(p.y, q.y, t1);
     float w = max(mix(r.x, r.y, t0), mix(r.x, r.y, t1));
-    int low = max(int(floor(min(y0, y1) - w)), 0), high = min(int(ceil(max(y0, y1) + w)), limit_y);
+    int low = clipped(floor(min(y0, y1) - w), limit_y), high = clipped(ceil(max(y0, y1) + w), limit_y);
     for (int y = low; y < high; ++y) meet(c, cone, steep ? y : x, steep ? x : y);
   }
 }

@@ -3,9 +3,8 @@
 layout(local_size_x = FOREST_GROUP) in;
 
 bool hidden(Capsule c) {
-  vec2 p = to_pixel(c.a), q = to_pixel(c.b);
-  float reach = 1.0 + 1.05 * half_width(c);
-  return hidden(min(p, q) - reach, max(p, q) + reach, max(min(c.a.z - c.ra, c.b.z - c.rb), view.near), 16u);
+  vec2 p = to_pixel(c.a), q = to_pixel(c.b), r = reaches(c);
+  return hidden(min(p - r.x, q - r.y), max(p + r.x, q + r.y), max(min(c.a.z - c.ra, c.b.z - c.rb), view.near), 16u);
 }
 
 void main() {
