@@ -785,6 +785,12 @@ TEST_P(RendererLaws, AStrawLiesInTheWorldAndLooksAsItsOwner) {
   const std::vector<frame::Instance> elsewhere{{500, 0, 0, 0, 0, 0, 0, 1}, {0, 0, 900, 0, 0, 0, 0, 1}};
   const std::vector<frame::Owner> owners{{0, 0}, {1, 1}};
   EXPECT_EQ(draw(straws, elsewhere, states, owners).pixels, expected.pixels);
+  const std::vector<frame::Item> mixed{{0, 0, 1, 0, 0, 0, 0, 200}, {FOREST_IN_WORLD, 1, 1, 0, 0, 0, 0, 200}};
+  EXPECT_EQ(draw(mixed, f.instances, states, std::span(owners).last(1)).pixels, expected.pixels);
+  // Nor does what was loaded before.
+  const std::vector<frame::Segment> many(40, f.segments[0]);
+  f.renderer->load({many, f.instances, std::vector<frame::Owner>(30, frame::Owner{0, 0})});
+  EXPECT_EQ(draw(straws, elsewhere, states, owners).pixels, expected.pixels);
   EXPECT_THROW(draw(straws, elsewhere, states, std::span(owners).last(1)), Error);
 }
 

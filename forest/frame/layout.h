@@ -139,6 +139,13 @@ FOREST_SHARED uint forest_scrambled(uint x, uint seed) {
   return x ^ (x * 0x8d22f6e6u);
 }
 
+// Rank of a dot, in [0, 1): a dot of less than a pixel is drawn where its area is more. The ranks of neurons with numbers in a row,
+// and of the branches of one, are spread evenly (Roberts 2018, "The unreasonable effectiveness of quasirandom sequences"), and
+// integers keep that for any number of them.
+FOREST_SHARED float forest_dot_rank(uint instance, uint branch) {
+  return float((instance * 0xc13fa9a9u + branch * 0x91e10da6u) >> 8) * 5.9604645e-8f;
+}
+
 FOREST_SHARED uint forest_branch_key(uint instance, uint meta) {
   return forest_mixed(forest_mixed(instance) + meta);
 }

@@ -265,13 +265,13 @@ class Gatherer {
     const frame::Constants& c = picture_.constants;
     const float depth = picture_.to_camera.row(2).dot(Vec3(item.x, item.y, item.z) - picture_.eye);
     const Beads beads(r_, c.focal / lens(c, std::max(depth, c.near)));
-    const float of_branch = (r_.entry[0] & 7) == 1 ? 0.f : float(item.first_segment & 0xffff) * .5698403f;
+    const float of_item =
+        frame::forest_dot_rank(item.instance, (r_.entry[0] & 7) == 1 ? 0u : item.first_segment);
     bool any = false;
     for (std::uint32_t k = 0; k < beads.count; ++k) {
       beads.put(k, r_);
       place(c, turn, at, r_);
-      const float rank = fraction(float(item.instance) * .7548777f + of_branch + float(k) * .3819660f +
-                                  golden * float(c.subframe));
+      const float rank = fraction(of_item + float(k) * .3819660f + golden * float(c.subframe));
       if (r_.opacity[0] && r_.width[0] >= 0.f) any |= put(Dot(c, r_, rank), chunk.dots, chunk.ranges_of_dots);
     }
     return any;

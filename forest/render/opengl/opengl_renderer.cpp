@@ -45,6 +45,8 @@ std::size_t texel_size(GLenum format) {
     case GL_RGBA32UI:
     case GL_RGBA32F:
       return 16;
+    case GL_RG32UI:
+      return 8;
     case GL_RG8UI:
       return 2;
     case GL_R8UI:
@@ -54,7 +56,7 @@ std::size_t texel_size(GLenum format) {
   }
 }
 
-// A buffer on the device that grows and never shrinks.
+// A buffer on the device that grows and never shrinks; as texels it is what was uploaded last.
 class Buffer {
  public:
   Buffer() { glCreateBuffers(1, &name_); }
@@ -67,13 +69,16 @@ class Buffer {
 
   void reserve(std::size_t bytes) {
     if (bytes <= size_) return;
-    size_ = bytes;
+    size_ = shown_ = bytes;
     texel_format_ = 0;
     glNamedBufferData(name_, GLsizeiptr(bytes), nullptr, GL_DYNAMIC_DRAW);
   }
   template <class T>
   void upload(std::span<const T> values) {
-    reserve(std::max<std::size_t>(values.size_bytes(), 16));
+    constexpr std::size_t least = 16;
+    reserve(std::max(values.size_bytes(), least));
+    if (const std::size_t shown = values.empty() ? least : values.size_bytes(); shown != shown_)
+      shown_ = shown, texel_format_ = 0;
     if (!values.empty()) glNamedBufferSubData(name_, 0, GLsizeiptr(values.size_bytes()), values.data());
   }
   void bind(GLuint slot) const { glBindBufferBase(GL_SHADER_STORAGE_BUFFER, slot, name_); }
@@ -81,13 +86,13 @@ class Buffer {
   /// the beginning, which it would not say.
   void bind_texels(GLuint unit, GLenum format) {
     const std::size_t most = std::size_t(limit(GL_MAX_TEXTURE_BUFFER_SIZE));
-    if (size_ > most * texel_size(format))
+    if (shown_ > most * texel_size(format))
       throw Error(fmt::format(
           "this forest or picture is too large for the graphics driver ({}), which reads {} bytes of "
           "a list of {}; take a smaller picture, or --renderer cpu",
-          driver(), most * texel_size(format), size_));
+          driver(), most * texel_size(format), shown_));
     if (!texels_) glCreateTextures(GL_TEXTURE_BUFFER, 1, &texels_);
-    if (texel_format_ != format) glTextureBuffer(texels_, format, name_);
+    if (texel_format_ != format) glTextureBufferRange(texels_, format, name_, 0, GLsizeiptr(shown_));
     texel_format_ = format;
     glBindTextureUnit(unit, texels_);
   }
@@ -96,7 +101,7 @@ class Buffer {
  private:
   GLuint name_ = 0, texels_ = 0;
   GLenum texel_format_ = 0;
-  std::size_t size_ = 0;
+  std::size_t size_ = 0, shown_ = 0;  // bytes
 };
 
 // Memory of the processor that the device copies into. Reading its own buffers makes drivers move them, or wait for more than

@@ -29,9 +29,11 @@ void main() {
   Capsule c;
   if (!fetch_queued(c)) return;
   uint code = texelFetch(queue_seen, int(4u + thread_index())).x;
-  float rank = float(code / 64u) * 0.7548777 + golden * float(view.subframe);
+  uvec4 item = texelFetch(items, int(2u * (code / 64u)));
+  float rank = forest_dot_rank(item.x, (c.entry & 7u) == 1u ? 0u : item.y);
   if ((view.flags & FOREST_BALLS) != 0u)  // as ball_rank in frame/constants.h
-    rank = float(forest_mixed(code / 64u * FOREST_CLUSTER_SIZE + code % 64u) >> 8) / 16777216.0 + golden * float(view.subframe);
+    rank = float(forest_mixed(code / 64u * FOREST_CLUSTER_SIZE + code % 64u) >> 8) / 16777216.0;
+  rank += golden * float(view.subframe);
   float len = distance(c.a, c.b), width = c.ra + c.rb;
   vec3 from = c.a, way = c.b - c.a;
   uint count = 1u;
