@@ -30,14 +30,13 @@ const frame::Image& Foveated::draw(const scene::View& view, std::uint32_t width,
   figures_ = {};
   auto start = Clock::now();
   std::vector<scene::Eye> eyes;
-  std::vector<frame::Viewport> viewports;
   std::vector<scene::Chooser*> choosers;
   for (std::size_t i = 0; i < plan.size(); ++i) {
-    viewports.push_back({float(plan[i].width), float(plan[i].height)});
-    eyes.emplace_back(view.camera, viewports[i], scene::detail_for(view, plan[i], width, height));
+    eyes.emplace_back(view.camera, frame::Viewport{float(plan[i].width), float(plan[i].height)},
+                      scene::detail_for(view, plan[i], width, height));
     choosers.push_back(&layers_[i]->chooser);
   }
-  if (first == 0) scene::Chooser::choose(choosers, eyes, viewports, colouring.shown(), painter);
+  if (first == 0) scene::Chooser::choose(choosers, eyes, colouring.shown(), painter);
   // Outlines are drawn over the picture, but for what the finest layer shows of them.
   std::vector<frame::Overlay> outlines, others;
   for (const frame::Overlay& overlay : overlays)

@@ -45,7 +45,7 @@ TEST_P(Picture, LooksAsItDid) {
   view.colour_by = golden.colour_by, view.background = golden.background, view.samples = 16;
   const scene::Colouring colouring = scene::colour(forest, view.colour_by, view.background);
   const frame::Viewport viewport{float(width), float(height)};
-  const scene::Cut cut = scene::choose(forest, scene::Eye(view.camera, viewport, view.detail), viewport);
+  const scene::Cut cut = scene::choose(forest, scene::Eye(view.camera, viewport, view.detail));
   const auto lines = scene::outline(forest);
   const frame::Frame frame = scene::compose(forest, view, colouring, cut, width, height, lines);
 
@@ -101,11 +101,11 @@ class Remembered {
   Both draw(const scene::View& view, const scene::Colouring& colouring) {
     const frame::Viewport viewport{float(width), float(height)};
     const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-    const scene::Cut cut = scene::choose(forest, eye, viewport, colouring.shown());
+    const scene::Cut cut = scene::choose(forest, eye, colouring.shown());
     renderer_.draw(scene::compose(forest, view, colouring, cut, width, height));
     Both both{{}, renderer_.read().pixels};
     segments = cut.segments;
-    const scene::Cut& guessed = chooser_.choose(eye, viewport, colouring.shown());
+    const scene::Cut& guessed = chooser_.choose(eye, colouring.shown());
     frame::Frame frame = scene::compose(forest, view, colouring, guessed, width, height);
     chooser_.complete(frame);
     renderer_.draw(frame);

@@ -34,7 +34,7 @@ TEST(SkinInPictures, ComesWithoutAJump) {
   const frame::Viewport viewport{320.f, 240.f};
   const auto picture = [&](bool with_skin) {
     const scene::Eye eye(view.camera, viewport, scene::detail_for(view, 320, 240));
-    const scene::Cut cut = scene::choose(forest, eye, viewport, colouring.shown());
+    const scene::Cut cut = scene::choose(forest, eye, colouring.shown());
     frame::Frame frame = scene::compose(forest, view, colouring, cut, 320, 240);
     if (with_skin) skin.show(frame, cut, eye, colouring);
     renderer.draw(frame);

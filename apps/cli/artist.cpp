@@ -85,7 +85,7 @@ Drawn Artist::draw(const scene::View& view, std::uint32_t width, std::uint32_t h
   }
   const frame::Viewport viewport{float(width), float(height)};
   const scene::Eye eye(view.camera, viewport, scene::detail_for(view, width, height));
-  const scene::Cut& cut = chooser_.choose(eye, viewport, colouring.shown(), painter);
+  const scene::Cut& cut = chooser_.choose(eye, colouring.shown(), painter);
   drawn.cull = milliseconds_since(start);
   frame::Frame frame = scene::compose(forest_, view, colouring, cut, width, height, lines);
   frame.glass = glass;

@@ -149,7 +149,7 @@ class Walk {
   }
   scene::Cut cut(const scene::View& view) const {
     const scene::Detail detail = scene::detail_for(view, size_.first, size_.second);
-    return scene::choose(artist_.forest(), scene::Eye(view.camera, viewport_, detail), viewport_);
+    return scene::choose(artist_.forest(), scene::Eye(view.camera, viewport_, detail));
   }
 
   const Options& options_;

@@ -370,7 +370,7 @@ void Viewport::draw_part(const scene::View& of, std::uint32_t first, std::uint32
     };
   if (first == 0 && !layered(view))
     chooser_.choose(scene::Eye(view.camera, {float(w), float(h)}, scene::detail_for(view, w, h)),
-                    {float(w), float(h)}, colouring_.shown(), painter);
+                    colouring_.shown(), painter);
   std::vector<frame::Overlay> overlays = visible(highlight_, view.camera, float(h));
   // What a branch does is seen beside the mark of the picked section, not under that of its subarbor.
   if (playback_)

@@ -165,7 +165,7 @@ TEST(Brick, ANeuronIsDrawnByClustersOrByStraws) {
   for (float far = .05f; far < 100.f; far *= 1.25f) {
     view.camera.eye = view.camera.target + far * way;
     view.detail.error = view.detail.thinnest = 3.f;
-    const Drawn drawn = drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail), viewport));
+    const Drawn drawn = drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail)));
     std::vector<std::uint32_t> both;
     std::ranges::set_intersection(drawn.clusters, drawn.straws, std::back_inserter(both));
     EXPECT_TRUE(both.empty()) << far;
@@ -185,8 +185,7 @@ TEST(Brick, AHiddenNeuronHasNoStraws) {
   std::vector<frame::State> states(forest.instances().size());
   for (std::size_t i = 0; i < states.size(); i += 3) states[i].flags = 0;
   states[1].kind = frame::Kind::capsules;  // of its own, also from afar
-  const Drawn drawn =
-      drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail), viewport, {states, {}}));
+  const Drawn drawn = drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail), {states, {}}));
   EXPECT_GT(drawn.straws.size(), 20u);
   for (const std::uint32_t i : drawn.straws) EXPECT_TRUE(i % 3 != 0 && i != 1) << i;
   EXPECT_EQ(drawn.clusters, std::set<std::uint32_t>{1});
@@ -198,8 +197,7 @@ TEST(Brick, StrawsCanBeForcedFromNearby) {
   view.camera.eye = view.camera.target + .3f * (view.camera.eye - view.camera.target);
   std::vector<frame::State> states(forest.instances().size());
   for (frame::State& s : states) s.kind = frame::Kind::bricks;
-  const Drawn drawn =
-      drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail), viewport, {states, {}}));
+  const Drawn drawn = drawn_of(forest, choose(forest, Eye(view.camera, viewport, view.detail), {states, {}}));
   EXPECT_TRUE(drawn.clusters.empty());
   EXPECT_GT(drawn.straws.size(), 10u);
 }

@@ -34,15 +34,14 @@ Chooser::Horizons Chooser::first_horizons(const Forest& forest, const Eye& eye) 
   return {nearest + 150.f, nearest + 300.f, nearest + 600.f};
 }
 
-const Cut& Chooser::choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown,
-                           Painter painter) {
+const Cut& Chooser::choose(const Eye& eye, const Shown& shown, Painter painter) {
   Chooser* one[] = {this};
-  choose(one, {&eye, 1}, {&viewport, 1}, shown, painter);
+  choose(one, {&eye, 1}, shown, painter);
   return cut_;
 }
 
-void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
-                     std::span<const frame::Viewport> viewports, const Shown& shown, const Painter& painter) {
+void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes, const Shown& shown,
+                     const Painter& painter) {
   Chooser& front = *choosers.front();
   const auto& first = front.eye_;
   const std::uint32_t turns = eyes.front().detail().turns;
@@ -69,7 +68,7 @@ void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> ey
   for (std::size_t i = 0; i < choosers.size(); ++i) {
     Chooser& c = *choosers[i];
     c.closeness_ = closeness;
-    c.eye_ = eyes[i], c.viewport_ = viewports[i], c.shown_ = shown, c.painter_ = painter;
+    c.eye_ = eyes[i], c.shown_ = shown, c.painter_ = painter;
     c.revealed_segments_ = c.drawings_ = 0;
     c.cut_ = std::move(cuts[i]);
     c.in_sight_.clear(c.forest_.instances().size());
@@ -81,7 +80,7 @@ void Chooser::choose(std::span<Chooser* const> choosers, std::span<const Eye> ey
 void Chooser::complete(frame::Frame& frame) {
   frame.rest = [this](const frame::DepthMap& seen, std::uint32_t round) {
     if (round == 0) round_ = 0, ++drawings_;
-    const Occluders now(seen, eye_->camera(), viewport_);
+    const Occluders now(seen, eye_->camera(), eye_->viewport());
     do {
       const std::span<const LeftOut> left = round_ ? revealed_.left_out : cut_.left_out;
       if (left.empty()) return frame::Lists{};
@@ -100,7 +99,7 @@ void Chooser::complete(frame::Frame& frame) {
 
 void Chooser::remember(const frame::DepthMap& seen, std::span<const std::uint8_t> reached) {
   reached_.assign(reached.begin(), reached.end());
-  before_.emplace(seen, eye_->camera(), viewport_);
+  before_.emplace(seen, eye_->camera(), eye_->viewport());
   horizons_ = horizons_of(seen);
 }
 

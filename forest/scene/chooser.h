@@ -21,11 +21,9 @@ class Chooser {
   using Painter = std::function<void(Cut&, const Eye&)>;
 
   /// The cut of the next picture; valid until the one after it. What `shown` points to must last until it is drawn.
-  const Cut& choose(const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {},
-                    Painter painter = {});
-  /// The same for parts of one view, seen by one camera, all at once: chooser i, of the same forest, for eye i and viewport i.
-  static void choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes,
-                     std::span<const frame::Viewport> viewports, const Shown& shown = {},
+  const Cut& choose(const Eye& eye, const Shown& shown = {}, Painter painter = {});
+  /// The same for parts of one view, seen by one camera, all at once: chooser i, of the same forest, for eye i.
+  static void choose(std::span<Chooser* const> choosers, std::span<const Eye> eyes, const Shown& shown = {},
                      const Painter& painter = {});
   const Cut& cut() const { return cut_; }
   /// Gives the frame composed of that cut what reveals the rest. The frame must not be drawn once this object is gone.
@@ -41,7 +39,6 @@ class Chooser {
  private:
   Forest forest_;
   std::optional<Eye> eye_;
-  frame::Viewport viewport_;
   Shown shown_;
   std::optional<Occluders> before_;
   std::shared_ptr<Closeness> closeness_;  // of all that are asked together

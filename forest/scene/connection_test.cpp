@@ -34,7 +34,7 @@ TEST(Connection, NoChoiceOfDetailBreaksABranchOnAWholeDolly) {
       for (const float thinnest : {0.f, .5f, 1.f, 6.f}) {
         const frame::Camera camera = dolly.at(float(i) / 40.f).camera;
         const Detail detail{.error = error, .gaze = {}, .thinnest = thinnest};
-        const Cut cut = choose(forest, Eye(camera, viewport, detail), viewport);
+        const Cut cut = choose(forest, Eye(camera, viewport, detail));
         EXPECT_EQ(connectedness(cut, camera, viewport).disconnected, 0u)
             << i << " " << error << " " << thinnest;
       }

@@ -686,7 +686,7 @@ std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, con
   return cuts;
 }
 
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport&, const Shown& shown) {
+Cut choose(const Forest& forest, const Eye& eye, const Shown& shown) {
   const Sight sight{eye};
   return std::move(choose(forest, std::span(&sight, 1), shown).front());
 }

@@ -110,7 +110,7 @@ struct Turn {
 /// @param turn       neurons that do not have it are as if they were not there
 std::vector<Cut> choose(const Forest& forest, std::span<const Sight> sights, const Shown& shown = {},
                         Closeness* closeness = nullptr, const Turn& turn = {});
-Cut choose(const Forest& forest, const Eye& eye, const frame::Viewport& viewport, const Shown& shown = {});
+Cut choose(const Forest& forest, const Eye& eye, const Shown& shown = {});
 
 /// Of what was left out, that which `now`, a picture of the same view with all else drawn, does not hide; what lies beyond its
 /// horizon is left out again. Drawn besides until nothing is left out, it gives the picture without any guess.

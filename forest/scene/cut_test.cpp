@@ -172,7 +172,7 @@ TEST(Cut, DrawsEverySegmentInSightOnce) {
   const CameraPath path = walk(forest);
   for (const float t : {0.f, .3f, .6f, 1.f}) {
     const View view = path.at(t);
-    const Cut cut = choose(forest, Eye(view.camera, viewport, view.detail), viewport);
+    const Cut cut = choose(forest, Eye(view.camera, viewport, view.detail));
     // Of every instance: the segments that are drawn, none twice, and the original ones they stand for. None in sight is
     // missing of either.
     std::vector<std::set<std::uint32_t>> drawn(forest.instances().size()), shown(drawn.size());
@@ -212,7 +212,7 @@ TEST(Cut, ShowsNothingWorseThanAccepted) {
   const Forest forest = sample();
   const View view = overview(forest);
   const Eye eye(view.camera, viewport, view.detail);
-  const Cut cut = choose(forest, eye, viewport);
+  const Cut cut = choose(forest, eye);
   for (const frame::Item& item : cut.lines)
     for (const Cluster& c : forest.clusters())
       if (c.first_segment <= item.first_segment && item.first_segment < c.first_segment + c.segment_count &&
@@ -227,7 +227,7 @@ TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
   const Forest forest = Forest::from_bytes(pack(testing::sample_circuit(500), testing::sample_neurons()));
   const View view = overview(forest);
   const Eye eye(view.camera, viewport, view.detail);
-  const Cut all = choose(forest, eye, viewport);
+  const Cut all = choose(forest, eye);
   ASSERT_FALSE(all.lines.empty());
   EXPECT_GT(all.bands.size(), 1u);
   for (std::size_t i = 1; i < all.lines.size(); ++i) {
@@ -237,7 +237,7 @@ TEST(Cut, IsNearToFarAndTheSameAtAnyNumberOfThreads) {
     EXPECT_LE(depth(all.lines[i - 1]), depth(all.lines[i]) * 1.03f);
   }
   const ThreadLimit one(1);
-  const Cut single = choose(forest, eye, viewport);
+  const Cut single = choose(forest, eye);
   EXPECT_TRUE(same(all.lines, single.lines) && same(all.capsules, single.capsules) &&
               same(all.dots, single.dots));
 }
@@ -249,7 +249,7 @@ TEST(Cut, ShowsEveryNeuronInItsTurn) {
   const Sight sight{eye};
   std::vector<std::uint8_t> seen(forest.instances().size());
   for (std::size_t i = 0; i < seen.size(); i += 5) seen[i] = 1;
-  const Cut whole = choose(forest, eye, viewport);
+  const Cut whole = choose(forest, eye);
   std::map<std::uint32_t, std::uint64_t> times, all;  // of every instance, items
   const auto count = [](const Cut& cut, std::map<std::uint32_t, std::uint64_t>& of) {
     for (const auto* list : {&cut.dots, &cut.lines, &cut.capsules})
@@ -272,14 +272,13 @@ TEST(Chooser, LooksAtAllNeuronsUnlessAllPartsOfThePictureTellWhatWasSeen) {
   Chooser one(forest), other(forest);
   Chooser* both[] = {&one, &other};
   const std::vector<Eye> eyes(2, Eye(view.camera, viewport, view.detail));
-  const std::vector<frame::Viewport> viewports(2, viewport);
   const std::vector<std::uint8_t> nothing(forest.instances().size());
   const auto segments = [&](std::size_t parts) {
-    Chooser::choose(std::span(both, parts), std::span(eyes).first(parts), std::span(viewports).first(parts));
+    Chooser::choose(std::span(both, parts), std::span(eyes).first(parts));
     for (Chooser* c : std::span(both, parts)) c->remember({}, nothing);
     return one.cut().segments;
   };
-  const std::uint64_t all = choose(forest, eyes[0], viewport).segments;
+  const std::uint64_t all = choose(forest, eyes[0]).segments;
   (void)segments(2);  // to a first horizon
   EXPECT_LT(segments(2), all);
   EXPECT_EQ(segments(1), all);  // the other one told of a part
@@ -312,9 +311,9 @@ TEST(Cut, GazeDrawsLess) {
   const Forest forest = sample();
   View view = overview(forest);
   view.camera.eye = view.camera.target + .4f * (view.camera.eye - view.camera.target);
-  const Cut whole = choose(forest, Eye(view.camera, viewport, view.detail), viewport);
+  const Cut whole = choose(forest, Eye(view.camera, viewport, view.detail));
   view.detail.gaze = Vec2(.5f, .5f);
-  const Cut gazed = choose(forest, Eye(view.camera, viewport, detail_for(view, 640, 360)), viewport);
+  const Cut gazed = choose(forest, Eye(view.camera, viewport, detail_for(view, 640, 360)));
   EXPECT_LT(gazed.segments, whole.segments);
 }
 

@@ -219,7 +219,7 @@ TEST(ForestFile, WhatIsChangedBehindRightChecksumsIsRefusedOrCanBeSeen) {
         View view = overview(f);
         for (const float thinnest : {0.f, 2.f}) {
           view.detail.thinnest = thinnest;
-          (void)choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+          (void)choose(f, Eye(view.camera, {320, 200}, view.detail));
         }
         (void)pick(f, view.camera, {320, 200}, {160, 100});
         ++seen;

@@ -220,7 +220,7 @@ TEST(Layers, InTheFoveaTheSameClustersAreChosen) {
   const auto layers = layers_of(view, width, height);
   const Eye gazing(view.camera, viewport, detail_for(view, layers[0], width, height)),
       seeing(view.camera, viewport, detail_for(without, width, height));
-  const Cut fine = choose(forest, gazing, viewport), all = choose(forest, seeing, viewport);
+  const Cut fine = choose(forest, gazing), all = choose(forest, seeing);
   EXPECT_LT(fine.segments, all.segments);
   const Gaze gaze(view.camera, viewport, detail_for(view, width, height));
   std::size_t looked_at = 0;
@@ -268,7 +268,7 @@ TEST(Layers, ChosenTogetherAreWhatEachChoosesAlone) {
     const std::vector<Cut> together = choose(forest, sights);
     ASSERT_EQ(together.size(), eyes.size());
     for (std::size_t i = 0; i < eyes.size(); ++i) {
-      const Cut alone = choose(forest, eyes[i], {});
+      const Cut alone = choose(forest, eyes[i]);
       const auto same = [](const std::vector<frame::Item>& a, const std::vector<frame::Item>& b) {
         return std::ranges::equal(a, b, [](const frame::Item& x, const frame::Item& y) {
           return x.instance == y.instance && x.first_segment == y.first_segment && x.drawn == y.drawn;

@@ -43,6 +43,7 @@ float Gaze::where_resolved(float pixels, const Detail& detail) const {
 
 Eye::Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Detail& detail)
     : camera_(camera),
+      viewport_(viewport),
       detail_(detail),
       frustum_(detail.area ? frame::Frustum(camera, viewport, *detail.area)
                            : frame::Frustum(camera, viewport)),

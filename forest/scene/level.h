@@ -87,6 +87,7 @@ class Eye {
   Eye(const frame::Camera& camera, const frame::Viewport& viewport, const Detail& detail);
 
   const frame::Camera& camera() const { return camera_; }
+  const frame::Viewport& viewport() const { return viewport_; }
   const Detail& detail() const { return detail_; }
   const frame::Frustum& frustum() const { return frustum_; }  // of what is wanted of the picture
 
@@ -132,6 +133,7 @@ class Eye {
 
  private:
   frame::Camera camera_;
+  frame::Viewport viewport_;
   Detail detail_;
   frame::Frustum frustum_;
   Viewer viewer_;

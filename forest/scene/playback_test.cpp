@@ -157,7 +157,7 @@ TEST(Playback, EverySegmentHasTheColourOfItsCompartmentAtEveryLevelOfShape) {
   for (const float error : {.05f, 1.f, 8.f}) {
     view.time = 20.;
     const Eye eye = eye_at(whole.camera, error);
-    Cut cut = choose(sample.forest, eye, viewport);
+    Cut cut = choose(sample.forest, eye);
     playback.colour(cut, eye, view, {.pixels = 0.f});
     std::set<std::uint32_t> colours;
     std::size_t seen = 0;
@@ -184,7 +184,7 @@ TEST(Playback, WhileANeuronStandsOutTheOthersShowTheSameInQuietColours) {
   view.low = -72.f, view.high = -40.f, view.threshold = -69.f, view.time = 20., view.neuron = 1,
   view.speed = 0.f;
   const Eye eye = eye_at(whole.camera, 1.f);
-  Cut cut = choose(sample.forest, eye, viewport);
+  Cut cut = choose(sample.forest, eye);
   playback.colour(cut, eye, view, {.pixels = 0.f});
   std::set<std::uint32_t> own, other;
   for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
@@ -232,7 +232,7 @@ TEST(Playback, FarNeuronsAreColouredByMeansThatAreNearTheirCompartments) {
   for (const float farther : {1.f, 4.f, 30.f, 200.f}) {
     camera.eye = camera.target + farther * back;
     const Eye eye = eye_at(camera, 1.f);
-    Cut means = choose(sample.forest, eye, viewport), exact = means;
+    Cut means = choose(sample.forest, eye), exact = means;
     playback.colour(exact, eye, view, {.pixels = 0.f});
     playback.begin_picture();
     playback.colour(means, eye, view);
@@ -259,7 +259,7 @@ TEST(Playback, OnlyWhatTheCutShowsIsTouched) {
     const Activity activity = sample.activity();
     Playback playback(sample.forest, activity);
     const Eye eye = eye_at(from, 1.f);
-    Cut cut = choose(sample.forest, eye, viewport);
+    Cut cut = choose(sample.forest, eye);
     const std::uint64_t before = activity.touched();
     playback.colour(cut, eye, view, {.pixels = 0.f});
     EXPECT_EQ(playback.figures().segments, cut.segments);
@@ -285,7 +285,7 @@ TEST(Playback, IsTheSameAtAnyNumberOfThreads) {
   const Eye eye = eye_at(whole.camera, 1.f);
   const auto entries = [&] {
     Playback playback(sample.forest, sample.activity());
-    Cut cut = choose(sample.forest, eye, viewport);
+    Cut cut = choose(sample.forest, eye);
     playback.colour(cut, eye, playback.view());
     return all_entries(cut);
   };
@@ -314,7 +314,7 @@ TEST(Playback, WhatIsNoNumberAndWhoWasNotReportedIsNeutral) {
   Playback playback(sample.forest, activity);
   const View whole = overview(sample.forest);
   const Eye eye = eye_at(whole.camera, 1.f);
-  Cut cut = choose(sample.forest, eye, viewport);
+  Cut cut = choose(sample.forest, eye);
   const ActivityView view = playback.view();
   playback.colour(cut, eye, view, {.pixels = 0.f});
   std::size_t neutral = 0, other = 0;
@@ -346,7 +346,7 @@ TEST(Playback, WhatIsNotSimulatedIsNeutral) {
     Playback playback(sample.forest, sample.activity({spikes}));
     ActivityView view = playback.view();
     view.time = .7;
-    Cut cut = choose(sample.forest, eye, viewport);
+    Cut cut = choose(sample.forest, eye);
     playback.colour(cut, eye, view, {.pixels = 0.f, .states = of});
     values = playback.figures().values, flashes = playback.figures().flashes;
     std::vector<std::pair<std::uint32_t, std::uint32_t>> all;
@@ -415,7 +415,7 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
     for (const double time : {4.9, 5., 6., 8., 10., 12.5}) {
       view.time = time;
       const Eye eye = eye_at(camera, error);
-      Cut cut = choose(forest, eye, viewport);
+      Cut cut = choose(forest, eye);
       playback.colour(cut, eye, view);
       std::size_t lit = 0;
       for_each_segment(cut, [&](const frame::Item& item, std::uint32_t i, std::uint32_t entry) {
@@ -448,7 +448,7 @@ TEST(Playback, ASpikeTravelsAlongTheAxonAtItsSpeedAndFades) {
     }
   view.speed = 0.f, view.time = 6.;
   const Eye eye = eye_at(camera, .01f);
-  Cut cut = choose(forest, eye, viewport);
+  Cut cut = choose(forest, eye);
   playback.colour(cut, eye, view);
   for (const std::uint32_t entry : all_entries(cut)) EXPECT_LT(entry, flash_entry);
 }
@@ -473,7 +473,7 @@ TEST(Playback, ValuesThatAreNoNumbersAreShownAsSuch) {
   Playback playback = sample.played({});
   EXPECT_TRUE(playback.has_values());
   EXPECT_FALSE(playback.numbers());
-  Cut cut = choose(forest, eye_at(overview(forest).camera, 1.f), viewport);
+  Cut cut = choose(forest, eye_at(overview(forest).camera, 1.f));
   playback.colour(cut, eye_at(overview(forest).camera, 1.f), playback.view());
   ASSERT_FALSE(all_entries(cut).empty());
   for (const std::uint32_t entry : all_entries(cut)) EXPECT_EQ(entry, no_value_entry);
@@ -543,7 +543,7 @@ TEST(Playback, APictureOfALongWhileShowsTheGreatest) {
   ActivityView view = playback.view();
   view.time = 30.;
   const Eye eye = eye_at(overview(sample.forest).camera, 1.f);
-  Cut now = choose(sample.forest, eye, viewport), longer = now;
+  Cut now = choose(sample.forest, eye), longer = now;
   playback.colour(now, eye, view, {.pixels = 0.f});
   playback.colour(longer, eye, view, {.window = 2.5, .pixels = 0.f});
   const auto at_once = all_entries(now), greatest = all_entries(longer);

@@ -164,7 +164,7 @@ struct Close {
   }
   Eye eye() const { return {view.camera, {640.f, 360.f}, detail_for(view, 640, 360)}; }
   std::span<const frame::Surface> show(const SkinLimits& limits = {}) {
-    cut = choose(forest, eye(), {640.f, 360.f}, colouring.shown());
+    cut = choose(forest, eye(), colouring.shown());
     frame = compose(forest, view, colouring, cut, 640, 360);
     skin.show(frame, cut, eye(), colouring, {}, limits);
     EXPECT_NO_THROW(frame::check(frame, forest.geometry()));

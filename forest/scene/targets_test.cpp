@@ -289,7 +289,7 @@ TEST(Appearance, EveryWayOfColouringKeepsTheContract) {
     view.colour_by =
         parse_view(std::string(R"({"eye":[0,0,1],"target":[0,0,0],"colour_by":")") + word + "\"}").colour_by;
     const Colouring c = colour(targets, view);
-    const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
+    const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), c.shown());
     EXPECT_NO_THROW(frame::check(compose(f, view, c, cut, 320, 200), f.geometry())) << word;
     EXPECT_GT(cut.segments, 100u);
   }
@@ -349,10 +349,10 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   const Targets targets(f);
   View view = overview(f);
   const Eye eye(view.camera, {320, 200}, view.detail);
-  const Cut whole = choose(f, eye, {320, 200});
+  const Cut whole = choose(f, eye);
   view.targets = with(R"([{"name":"first","visible":false}])").targets;
   const Colouring c = colour(targets, view);
-  const Cut half = choose(f, eye, {320, 200}, c.shown());
+  const Cut half = choose(f, eye, c.shown());
   EXPECT_LT(half.segments, whole.segments);
   for (const auto& list : {half.dots, half.lines, half.capsules})
     for (const frame::Item& item : list) EXPECT_EQ(f.types()[item.instance], 1u);
@@ -370,7 +370,7 @@ TEST(Appearance, WhatIsNotVisibleCostsNothingAndIsNotPicked) {
   EXPECT_GT(hidden, 5);
   view.targets = with(R"([{"name":"all","visible":false}])").targets;
   const Colouring nothing = colour(targets, view);
-  const Cut empty = choose(f, eye, {320, 200}, nothing.shown());
+  const Cut empty = choose(f, eye, nothing.shown());
   EXPECT_EQ(empty.segments, 0u);
   EXPECT_TRUE(empty.left_out.empty());
 }
@@ -383,7 +383,7 @@ TEST(Appearance, AKindIsDrawnWithItsOwnPrimitives) {
   const auto cut_of = [&](const std::string& kind) {
     view.targets = with(R"([{"name":"all","kind":")" + kind + "\"}]").targets;
     const Colouring c = colour(targets, view);
-    return choose(f, eye, {320, 200}, c.shown());
+    return choose(f, eye, c.shown());
   };
   const Cut lines = cut_of("lines"), capsules = cut_of("capsules"), dots = cut_of("dots"),
             somata = cut_of("somata");
@@ -411,7 +411,7 @@ TEST(Appearance, ABranchIsShownByItself) {
                       R"(,"visible":true,"colour":"#00ff00","opacity":0.5}])")
                      .targets;
   Colouring c = colour(targets, view);
-  const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
+  const Cut cut = choose(f, Eye(view.camera, {320, 200}, view.detail), c.shown());
   std::multiset<std::uint32_t> drawn, expected;
   for (const auto& list : {cut.dots, cut.lines, cut.capsules})
     for (const frame::Item& item : list) {
@@ -428,7 +428,7 @@ TEST(Appearance, ABranchIsShownByItself) {
   // A target that is named later shows the whole neuron again.
   view.targets.push_back(with(R"([{"name":"all","visible":true,"opacity":1}])").targets[0]);
   c = colour(targets, view);
-  const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), {320, 200}, c.shown());
+  const Cut again = choose(f, Eye(view.camera, {320, 200}, view.detail), c.shown());
   NeuronsInSight in_sight;
   in_sight.clear(f.instances().size());
   in_sight.add(again);

@@ -382,7 +382,7 @@ TEST(View, EveryFrameKeepsTheContract) {
       View view = overview(forest);
       view.colour_by = by, view.background = background;
       const Colouring colouring = colour(forest, by, background);
-      const Cut cut = choose(forest, Eye(view.camera, {320, 200}, view.detail), {320, 200});
+      const Cut cut = choose(forest, Eye(view.camera, {320, 200}, view.detail));
       EXPECT_NO_THROW(
           frame::check(compose(forest, view, colouring, cut, 320, 200, lines), forest.geometry()));
     }

@@ -223,7 +223,7 @@ io::Picture without_a_window(scene::View view, std::uint32_t width, std::uint32_
   const frame::Viewport pixels{float(width), float(height)};
   const scene::Colouring colouring = scene::colour(sample(), view.colour_by, view.background);
   const scene::Eye eye(view.camera, pixels, scene::detail_for(view, width, height));
-  scene::Cut cut = scene::choose(sample(), eye, pixels);
+  scene::Cut cut = scene::choose(sample(), eye);
   if (playback) playback->colour(cut, eye, view.activity.value());
   renderer.draw(scene::compose(sample(), view, colouring, cut, width, height));
   return {width, height, renderer.read().pixels};
