@@ -2,13 +2,16 @@
 #include "forest/io/new_folder.h"
 
 #include <cerrno>
+#include <chrono>
 #include <cstdio>
 #include <cstring>
 #include <fcntl.h>
 #include <fstream>
 #include <stdlib.h>
 #include <string>
+#include <unistd.h>
 
+#include <sys/file.h>
 #include <sys/stat.h>
 
 #include "forest/core/error.h"
@@ -18,14 +21,38 @@ namespace forest::io {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+// Removes what programs that were killed left behind: of that name, with nobody who holds it, and not made just now, when its
+// maker might be about to.
+void sweep(const fs::path& above, const std::string& prefix) {
+  std::error_code ignored;
+  for (const fs::directory_entry& e : fs::directory_iterator(above.empty() ? "." : above, ignored)) {
+    const std::string name = e.path().filename().string();
+    if (!name.starts_with(prefix) || name.size() != prefix.size() + 6 || e.is_symlink(ignored)) continue;
+    const auto age = fs::file_time_type::clock::now() - e.last_write_time(ignored);
+    const int folder = ::open(e.path().c_str(), O_RDONLY | O_DIRECTORY | O_NOFOLLOW | O_CLOEXEC);
+    if (folder < 0) continue;
+    if (age > std::chrono::minutes(1) && ::flock(folder, LOCK_EX | LOCK_NB) == 0)
+      fs::remove_all(e.path(), ignored);
+    ::close(folder);
+  }
+}
+
+}  // namespace
+
 NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
   if (!wanted_.has_filename()) wanted_ = wanted_.parent_path();  // "circuit/"
   wanted_ = followed(wanted_);
   if (std::error_code none; fs::exists(wanted_, none) && !fs::is_directory(wanted_, none))
     throw Error(wanted_.string() + ": is there and no folder; name another");
-  std::string name = (wanted_.parent_path() / ("." + wanted_.filename().string() + ".XXXXXX")).string();
+  const std::string prefix = "." + wanted_.filename().string() + ".unfinished-";
+  sweep(wanted_.parent_path(), prefix);
+  std::string name = (wanted_.parent_path() / (prefix + "XXXXXX")).string();
   if (!::mkdtemp(name.data())) fail("created");
   part_ = name;
+  lock_ = ::open(name.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC);
+  if (lock_ >= 0) ::flock(lock_, LOCK_EX | LOCK_NB);
   unfinished_.emplace(part_);
   ::chmod(name.c_str(), permissions(0777));
 }
@@ -33,6 +60,7 @@ NewFolder::NewFolder(const fs::path& wanted) : wanted_(wanted) {
 NewFolder::~NewFolder() {
   std::error_code ignored;
   if (!part_.empty()) fs::remove_all(part_, ignored);
+  if (lock_ >= 0) ::close(lock_);
 }
 
 void NewFolder::write(const fs::path& name, std::string_view bytes) const {

@@ -11,8 +11,8 @@
 namespace forest::io {
 
 /// Collects files in a hidden folder beside the one that is wanted. commit() puts it in its place at once; without it
-/// (an exception, an interruption) the hidden folder goes away and what was there before stays. A program that is killed (SIGKILL) leaves
-/// it behind: `.NAME.` and six letters, which may be removed.
+/// (an exception, an interruption) the hidden folder goes away and what was there before stays. A program that is killed
+/// (SIGKILL) leaves it behind, `.NAME.unfinished-` and six letters, until the next one writes to the same place.
 class NewFolder {
  public:
   /// Throws Error when the folder above is missing or cannot be written.
@@ -33,6 +33,7 @@ class NewFolder {
   [[noreturn]] void fail(const char* what) const;
 
   std::filesystem::path wanted_, part_;
+  int lock_ = -1;  // held as long as this lives: nobody takes it for one that was left behind
   std::optional<Unfinished> unfinished_;
 };
 
