@@ -170,8 +170,6 @@ void NewFile::give_name() {
   }
 }
 
-std::filesystem::path NewFile::path() const { return part_.empty() ? own_name() : part_.string(); }
-
 void NewFile::write(std::span<const std::byte> bytes) {
   if (!write_all(file_, bytes)) fail("written");
   // Piece by piece, as they fill up.
@@ -194,7 +192,7 @@ void NewFile::overwrite(std::uint64_t at, std::span<const std::byte> bytes) {
 
 void NewFile::commit() {
   if (stream_) {
-    const MappedFile whole(path());
+    const MappedFile whole(part_.empty() ? std::filesystem::path(own_name()) : part_);
     const int open = open_file_at(place_);
     const int stream = open >= 0 ? ::fcntl(open, F_DUPFD_CLOEXEC, 0)
                                  : ::open(place_.c_str(), O_WRONLY | O_CLOEXEC | O_NOCTTY);

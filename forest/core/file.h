@@ -42,9 +42,6 @@ class NewFile {
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
-  /// Where to write until then, for libraries of this program that ask for a name: its own may be that of an open file, under
-  /// which it can be opened again, but not replaced.
-  std::filesystem::path path() const;
   /// Appends. Throws Error when the disk is full.
   void write(std::span<const std::byte> bytes);
   /// Writes over what is there, or beyond, by any thread; the next write() still goes behind the last.

@@ -27,8 +27,8 @@ void append(std::vector<double>& values, const cortex::Place& place) {
 }  // namespace
 
 void write_elements(const std::filesystem::path& path, const Cortex& cortex, double volume) {
-  forest::NewFile place(path);
-  hdf5::NewFile file(place.path(), path);
+  forest::NewFile place(path);  // first: where none can be made is told before anything is done
+  hdf5::NewFile file;
   file.attribute("/", "magic", std::string(magic));
   file.attribute("/", "version", 1u);
   std::vector<double> numbers;
@@ -68,7 +68,8 @@ void write_elements(const std::filesystem::path& path, const Cortex& cortex, dou
                          double(cortex.mending.before)};
   file.write("/facts", std::span<const double>(facts));
   file.attribute("/facts", "names", std::string(fact_names));
-  file.close();
+  const std::string bytes = file.bytes();
+  place.write(std::as_bytes(std::span(bytes)));
   place.commit();
 }
 
