@@ -104,6 +104,21 @@ void tell_far_faces(const cortex::Elements& elements, const cortex::Report& r, d
     }
 }
 
+double wall_share(const cortex::Cortex& cortex) {
+  return cortex.between > 0. ? std::max(0., cortex.wall) / cortex.between : 0.;
+}
+
+// A medial wall is some hundredths of a surface, and hardly anything of the volume.
+void tell_wall(const cortex::Cortex& cortex, Console& console) {
+  constexpr double much = .02;
+  if (const double share = wall_share(cortex); share > much)
+    console.warn(
+        fmt::format("{:.1f} % of what lies between the surfaces, {:.1f} mm³, is too thin for elements and "
+                    "has none; where that is "
+                    "cortex and no medial wall, give a lower --thinnest to cortex build",
+                    100. * share, cortex.wall / 1e9));
+}
+
 std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Report& r, double volume) {
   using Faces = std::optional<cortex::FaceDistance>;
   const auto in_mm = [](const Faces& faces, double cortex::FaceDistance::*which) {
@@ -117,7 +132,9 @@ std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Repor
       {"uncertified", r.uncertified, "uncertified", std::to_string(r.uncertified),
        "not proven to have a positive Jacobian everywhere"},
       {"volume_error", r.volume_error, "volume error", fmt::format("{:.5f}", r.volume_error),
-       "of all, as a share of what lies between the surfaces"},
+       "of elements and wall, as a share of what lies between the surfaces"},
+      {"wall", wall_share(cortex), "wall", fmt::format("{:.5f}", wall_share(cortex)),
+       "share of what lies between the surfaces that is too thin for elements, as under the medial wall"},
       {"volume_mean", r.volume_mean / 1e9, "volume mean", fmt::format("{:.4f}", r.volume_mean / 1e9), "mm³"},
       {"volume_within", r.volume_within, "volume within", fmt::format("{:.4f}", r.volume_within),
        fmt::format("share of elements of {:.2f}–{:.2f} mm³", cortex::least_volume * volume / 1e9,
@@ -139,9 +156,10 @@ std::vector<Figure> figures_of(const cortex::Cortex& cortex, const cortex::Repor
        fmt::format("{:.3f} / {:.3f}", r.jacobian_least, r.jacobian_p1),
        "least / 1st percentile"},
       {"crest_angle",
-       {{"median", r.crest_angle.median}, {"p99", r.crest_angle.p99}},
+       {{"median", r.crest_angle ? Json(r.crest_angle->median) : Json()},
+        {"p99", r.crest_angle ? Json(r.crest_angle->p99) : Json()}},
        "crest angle",
-       fmt::format("{:.2f} / {:.1f}", r.crest_angle.median, r.crest_angle.p99),
+       r.crest_angle ? fmt::format("{:.2f} / {:.1f}", r.crest_angle->median, r.crest_angle->p99) : "-",
        "degrees between v-isolines and the right angle to crests, median / 99th percentile"},
       {"face_distance_p99",
        {{"outer", in_mm(r.outer, &cortex::FaceDistance::p99)},
@@ -201,7 +219,7 @@ void tell(const cortex::Cortex& cortex, const cortex::Report& r, const Deeper& d
 std::function<void()> build(CLI::App& command, Console& console) {
   struct Options {
     fs::path outer, inner, out;
-    double volume = 1., spacing = .3, scale = 3.;
+    double volume = 1., spacing = .3, scale = 3., thinnest = .5;
     bool force = false;
   };
   const auto o = std::make_shared<Options>();
@@ -219,6 +237,11 @@ std::function<void()> build(CLI::App& command, Console& console) {
   must_be_within(*command.add_option("--scale", o->scale, "What is smaller is no crest and no valley, mm")
                       ->capture_default_str(),
                  .1, 20.);
+  must_be_within(*command
+                      .add_option("--thinnest", o->thinnest,
+                                  "What is thinner over 1 cm² is no cortex but its medial wall, mm")
+                      ->capture_default_str(),
+                 0., 5.);
   add_force(command, o->force);
   return [o, &console] {
     if (extension_of(o->out) != ".h5")
@@ -226,9 +249,12 @@ std::function<void()> build(CLI::App& command, Console& console) {
     must_take_files({o->out}, o->force);
     const auto begin = Clock::now();
     const Mesh outer = read_mesh(o->outer), inner = read_mesh(o->inner);
-    const cortex::Cortex built = cortex::build_cortex(
-        outer, inner, {.volume = o->volume * 1e9, .spacing = o->spacing * 1e3, .line_scale = o->scale * 1e3},
-        console.progress());
+    const cortex::Cortex built = cortex::build_cortex(outer, inner,
+                                                      {.volume = o->volume * 1e9,
+                                                       .spacing = o->spacing * 1e3,
+                                                       .line_scale = o->scale * 1e3,
+                                                       .thinnest = o->thinnest * 1e3},
+                                                      console.progress());
     for (const std::string& oddity : built.oddities) console.warn(oddity);
     io::write_elements(o->out, built, o->volume * 1e9);
     const TriangleTree outer_tree(outer), inner_tree(inner);
@@ -243,6 +269,7 @@ std::function<void()> build(CLI::App& command, Console& console) {
           "only {:.1f} % of the elements have about the wanted volume; look at them by 'brainforest "
           "cortex faces --measure volume', and at the surfaces",
           100. * r.volume_within));
+    tell_wall(built, console);
     tell_far_faces(built.elements, r, o->volume * 1e9, console);
     tell(built, r, deeper, o->volume * 1e9, seconds_since(begin), console);
   };
@@ -289,6 +316,7 @@ std::function<void()> report(CLI::App& command, Console& console) {
     if (outer && inner) tell_foreign(file.cortex, outer_mesh, inner_mesh, console);
     const cortex::Report r = cortex::report(file.cortex, file.volume, outer ? &*outer : nullptr,
                                             inner ? &*inner : nullptr, console.progress());
+    tell_wall(file.cortex, console);
     tell_far_faces(file.cortex.elements, r, file.volume, console);
     deeper.symmetry = cortex::symmetry(file.cortex.elements, file.cortex.lines);
     deeper.bok = cortex::bok(file.cortex.elements);

@@ -159,16 +159,15 @@ void refuse_unused(const Options& options, bool one, bool in_space) {
 
 void run(const Options& options, Console& console) {
   check_out(options);
-  if (options.domain.empty() && options.elements.empty()) {
-    refuse_unused(options, false, options.dimensions != 2);
-    return compare(options, console);
-  }
+  const bool all = options.domain.empty() && options.elements.empty();
+  if (all) refuse_unused(options, false, options.dimensions != 2);
   constexpr int most_of_all = 100;
-  if (options.generator == "best" && options.steps > most_of_all)
+  if ((all || options.generator == "best") && options.steps > most_of_all)
     throw Error(
-        fmt::format("--generator best tries all that there are, which takes minutes for more than {} steps; "
-                    "name one of them",
+        fmt::format("every generator is tried, which takes minutes for more than {} steps; "
+                    "name a block and one of them",
                     most_of_all));
+  if (all) return compare(options, console);
   const auto [name, boundary] = block(options);
   refuse_unused(options, true, boundary.dimensions() == 3);
   const Filled filled = fill(options.generator, boundary);

@@ -13,6 +13,7 @@
 #include <nlohmann/json.hpp>
 
 #include "forest/core/error.h"
+#include "forest/core/file.h"
 #include "forest/cortex/check_surfaces.h"
 #include "forest/cortex/folds.h"
 #include "forest/io/border_file.h"
@@ -88,9 +89,17 @@ std::string as_obj(std::span<const Carried> lines) {
   return text;
 }
 
-std::string as_borders(std::span<const Carried> lines, const Mesh& outer) {
+std::string as_borders(std::span<const Carried> lines, const Mesh& outer, const fs::path& file,
+                       Console& console) {
   const TriangleTree tree(outer);
   io::Borders all{outer.positions.size(), {}};
+  if (std::string told = io::surface_structure(MappedFile(file).text(), file.string()); !told.empty())
+    all.structure = std::move(told);
+  else
+    console.warn(
+        fmt::format("{} does not say which hemisphere it is of, so that Workbench will not draw the borders "
+                    "on it; 'wb_command -set-structure' tells it of both",
+                    file.string()));
   for (std::size_t i = 0; i < lines.size(); ++i) {
     const Kind& kind = kind_of(lines[i].line);
     io::Border border{fmt::format("{} {}", kind.one, i), {}, kind.all, kind.colour, lines[i].line.closed};
@@ -166,9 +175,10 @@ void run(const Options& o, Console& console) {
     const auto& locator = line.kind == Line::Kind::sulcus ? on_outer : on_middle;
     for (const Place& p : line.points) lines.back().points.push_back(on(level, ribbon, locator.nearest(p)));
   }
-  std::vector<std::pair<fs::path, std::string>> files{{o.out, ending == ".csv"   ? as_csv(lines)
-                                                              : ending == ".obj" ? as_obj(lines)
-                                                                                 : as_borders(lines, outer)}};
+  std::vector<std::pair<fs::path, std::string>> files{
+      {o.out, ending == ".csv"   ? as_csv(lines)
+              : ending == ".obj" ? as_obj(lines)
+                                 : as_borders(lines, outer, o.outer, console)}};
   if (!o.sheet.empty()) {
     Mesh sheet;
     sheet.triangles = ribbon.triangles;

@@ -48,11 +48,25 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
       order.emplace_back((middles[e] - near).squaredNorm(), e);
     const auto count = std::min<std::size_t>(options.count, order.size());
     std::partial_sort(order.begin(), order.begin() + std::ptrdiff_t(count), order.end());
-    constexpr double farthest = 2e3;  // an element is about a mm wide, and its middle the cortex's
-    if (const double away = std::sqrt(order.front().first); !(away <= farthest))
-      throw Error(
-          fmt::format("the element nearest to ({:g}, {:g}, {:g}) µm is {:.3g} mm away; give --near in µm",
-                      near.x(), near.y(), near.z(), away / 1e3));
+    const auto beside = [&](const Place& place) {  // µm from the cortex, about
+      const auto nearest =
+          std::ranges::min_element(middles, {}, [&](const Place& m) { return (m - place).norm(); });
+      const cortex::Hexahedron& element = elements[std::size_t(nearest - middles.begin())];
+      double reach = 0.;
+      for (const double u : {0., 1.})
+        for (const double v : {0., 1.})
+          for (const double w : {0., 1.}) reach = std::max(reach, (element.at(u, v, w) - *nearest).norm());
+      return (*nearest - place).norm() - reach;
+    };
+    constexpr double farthest = 1e3;
+    if (const double away = beside(near); !(away <= farthest))
+      throw Error(fmt::format("({:g}, {:g}, {:g}) µm is {:.3g} mm away from all elements; {}", near.x(),
+                              near.y(), near.z(), away / 1e3,
+                              beside(1e3 * near) <= farthest
+                                  ? fmt::format("in mm it is among them: --near {:g} {:g} {:g}",
+                                                1e3 * near.x(), 1e3 * near.y(), 1e3 * near.z())
+                                  : fmt::format("the first has its middle at ({:.0f}, {:.0f}, {:.0f}) µm",
+                                                middles[0].x(), middles[0].y(), middles[0].z())));
     for (std::size_t i = 0; i < count; ++i) chosen.push_back(order[i].second);
     return chosen;
   }
@@ -79,6 +93,17 @@ std::vector<std::uint32_t> choose(const ElementOptions& options,
         options.file.string(), options.box.empty() ? "sphere" : "box", low.x(), low.y(), low.z(), high.x(),
         high.y(), high.z()));
   return chosen;
+}
+
+// In elements that fold themselves there is no telling where anything is.
+void refuse_uncertified(const cortex::Elements& elements, std::span<const std::uint32_t> chosen,
+                        const std::filesystem::path& file) {
+  const std::vector<std::uint32_t> bad = cortex::uncertified(elements, chosen);
+  if (bad.empty()) return;
+  const auto first = std::span(bad).first(std::min<std::size_t>(bad.size(), 5));
+  throw Error(
+      fmt::format("{} of those chosen of {} may fold, the first {}; choose others, or build them anew",
+                  counted(bad.size(), "element"), file.string(), fmt::join(first, ", ")));
 }
 
 // Each neuron becomes a shape of its own.
@@ -241,18 +266,27 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
         fmt::format("there are {} and no {} elements in {}", all.elements.size(), asked,
                     options.row > 1 ? "that row, which ends or comes back there" : options.file.string()));
 
-  double scale = options.scale;
-  if (options.density > 0.) {
-    const double mean = circuit::mean_density(recipe);
-    if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
-    scale = options.density / mean;
+  refuse_uncertified(file.cortex.elements, all.elements, options.file);
+  const auto measured = measured_borders(options, recipe, file.cortex.elements);
+  double mean = circuit::mean_density(recipe), scale = options.scale;
+  if (!(mean > 0.)) throw Error("no layer of the recipe has neurons; give one a density");
+  if (measured) {
+    std::vector<double> volumes(recipe.layers.size(), 0.);
+    for (const std::uint32_t e : all.elements) {
+      const cortex::Borders borders = measured->of(file.cortex.elements, e);
+      for (std::size_t l = 0; l < volumes.size(); ++l) volumes[l] += borders.volume(elements[e], l);
+    }
+    mean = circuit::mean_density(recipe, volumes);
   }
+  if (options.density > 0. && !(mean > 0.))
+    throw Error(
+        "no layer that has neurons by the recipe was measured there; leave --density or --layers out");
+  if (options.density > 0.) scale = options.density / mean;
   // Far too many are told before anything is loaded; how many exactly follows from the borders of layers.
   std::vector<double> volumes(all.elements.size());
   parallel_for(volumes.size(), 64,
                [&](std::size_t i) { volumes[i] = elements[all.elements[i]].volume() * 1e-9; });
-  refuse_too_many(all.elements.size(),
-                  scale * circuit::mean_density(recipe) * std::accumulate(volumes.begin(), volumes.end(), 0.),
+  refuse_too_many(all.elements.size(), scale * mean * std::accumulate(volumes.begin(), volumes.end(), 0.),
                   bent, 1.5);
   std::vector<bool> wanted_types(recipe.types.size());
   for (const auto& layer : recipe.layers)
@@ -263,14 +297,13 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
   all.planted.unflattened = stock.unflattened;
   const auto start = Clock::now();
   const circuit::ElementPlanter planter(recipe, stock.candidates, seed,
-                                        {.scale = scale, .element = file.volume});
+                                        {.scale = scale, .element = file.volume, .bent = bent});
   for (std::size_t l = 0; l < recipe.layers.size(); ++l)
     if (planter.left_out(l))
       all.left_out.push_back(fmt::format(
           "somata of {} are too wide for the density of layer {}, and not planted there; those that "
           "are have radii of up to {:.3g} µm",
           counted(planter.left_out(l), "neuron"), recipe.layers[l].name, planter.widest(l)));
-  const auto measured = measured_borders(options, recipe, file.cortex.elements);
   all.measured = measured.has_value();
   if (const std::string doubt =
           measured ? circuit::doubt_of_maps(recipe, options.layers.size()) : std::string();

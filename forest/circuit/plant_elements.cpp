@@ -94,16 +94,21 @@ struct ElementPlanter::Spot {
   }
 };
 
-double mean_density(const Recipe& recipe) {
+double mean_density(const Recipe& recipe, std::span<const double> volumes) {
   const auto densities = densities_of(recipe);
-  double sum = 0.;
-  for (std::size_t l = 0; l < densities.size(); ++l) sum += densities[l] * double(recipe.layers[l].thickness);
-  return sum / double(slabs(recipe).front().top);
+  return std::inner_product(densities.begin(), densities.end(), volumes.begin(), 0.) /
+         std::accumulate(volumes.begin(), volumes.end(), 0.);
+}
+
+double mean_density(const Recipe& recipe) {
+  std::vector<double> thickness;
+  for (const Recipe::Layer& layer : recipe.layers) thickness.push_back(double(layer.thickness));
+  return mean_density(recipe, thickness);
 }
 
 ElementPlanter::ElementPlanter(const Recipe& recipe, std::span<const Candidate> candidates,
                                std::uint64_t seed, const ElementPlanting& options)
-    : recipe_(recipe), candidates_(candidates), seed_(seed) {
+    : recipe_(recipe), candidates_(candidates), seed_(seed), bent_(options.bent) {
   check(recipe);
   if (!(options.scale > 0. && std::isfinite(options.scale)))
     throw Error(fmt::format("densities cannot be scaled by {}; give a positive number", options.scale));
@@ -286,7 +291,7 @@ std::vector<Rooted> ElementPlanter::plant(const cortex::Hexahedron& element, std
       neuron.position = here.at.cast<float>();
       neuron.depth = float(cortex::below_outer_face(element, place.uvw));
       neuron.orientation = Eigen::Quaterniond(cortex::axes(here.jacobian, neuron.turn)).cast<float>();
-      const double height = place.uvw[2] * here.jacobian.col(2).norm();
+      const double height = bent_ ? place.uvw[2] * here.jacobian.col(2).norm() : double(neuron.depth);
       neuron.candidate = choose(choices_[l][neuron.type], height, room_for_soma(l, spot), random);
     });
   }

@@ -31,6 +31,8 @@ namespace forest::circuit {
 struct ElementPlanting {
   double scale = 1.;     // of all densities
   double element = 1e9;  // µm³, an element's usual volume: smaller layers get more places to choose from
+  bool bent =
+      false;  // arbors will be bent by the grid: what is above a soma is stretched as the grid is there
 };
 
 /// A neuron in an element. `turn` is its angle about its own axis, as in cortex::Seat.
@@ -43,8 +45,9 @@ struct Rooted {
   std::uint32_t candidate = 0, type = 0, layer = 0;
 };
 
-/// Neurons/mm³ over all layers of a recipe, by their thickness.
+/// Neurons/mm³ over all layers of a recipe: by their thickness, or where they have volumes of their own.
 double mean_density(const Recipe& recipe);
+double mean_density(const Recipe& recipe, std::span<const double> volumes);
 
 class ElementPlanter {
  public:
@@ -93,6 +96,7 @@ class ElementPlanter {
   Recipe recipe_;
   std::span<const Candidate> candidates_;
   std::uint64_t seed_;
+  bool bent_;
   std::vector<double> depths_, densities_;  // of layers
   std::vector<double> radii_,
       narrow_;  // of their widest somata, and of those that stand by their borders, µm

@@ -311,18 +311,29 @@ TEST(PlantElements, NeuronsPointToThePiaAlongW) {
   EXPECT_LT(farthest, .01);
 }
 
+// Rigid ones go as far up as they are tall, bent ones as the grid does right at the soma.
 TEST(PlantElements, NeuronsEndUnderThePiaWhereTheirTypeHasAnyThatDo) {
-  const ElementPlanter planter(layered(), candidates, 4);
-  const Hexahedron element = cortex::folded_sheet(2, 1)[0];
-  std::array<std::size_t, 5> seen{};
-  for (const Rooted& r : planter.plant(element, 0)) {
-    ++seen[r.candidate];
-    const double room = r.uvw[2] * element.jacobian(r.uvw).col(2).norm();
-    EXPECT_GE(room, r.candidate == 1 ? 600. : r.candidate == 3 ? 900. : 0.);
-  }
-  for (const std::size_t c : {0, 1, 2, 3}) EXPECT_GT(seen[c], 100u) << c;
-  EXPECT_EQ(seen[4], 0u);  // its soma is too wide for both layers
-  EXPECT_EQ(planter.left_out(1), 1u);
+  // w grows slowly under the pia and fast above the white matter.
+  const auto uneven = [](const Place& p) {
+    return Place(p.x(), p.y(), p.z() * (1. - .3 * (2000. + p.z()) / 2000.));
+  };
+  const Hexahedron sheet = cortex::folded_sheet(2, 1)[0], slab = cortex::make_slab(1, uneven).hexahedron(0);
+  for (const Hexahedron& element : {sheet, slab})
+    for (const bool bent : {false, true}) {
+      const ElementPlanter planter(layered(), candidates, 4, {.bent = bent});
+      std::array<std::size_t, 5> seen{};
+      std::size_t tall = 0, beyond = 0;
+      for (const Rooted& r : planter.plant(element, 0)) {
+        ++seen[r.candidate];
+        const double room = bent ? r.uvw[2] * element.jacobian(r.uvw).col(2).norm() : double(r.depth);
+        EXPECT_GE(room, r.candidate == 1 ? 600. : r.candidate == 3 ? 900. : 0.);
+        tall += r.candidate == 3, beyond += r.candidate == 3 && room < 930.;
+      }
+      for (const std::size_t c : {0, 1, 2, 3}) EXPECT_GT(seen[c], 100u) << c;
+      EXPECT_GT(beyond, tall / 1000) << tall;  // as soon as there is room
+      EXPECT_EQ(seen[4], 0u);                  // its soma is too wide for both layers
+      EXPECT_EQ(planter.left_out(1), 1u);
+    }
 }
 
 TEST(PlantElements, CountsOfARecipeAreThoseOfItsColumn) {

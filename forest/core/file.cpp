@@ -170,6 +170,11 @@ void NewFile::give_name() {
   }
 }
 
+const std::filesystem::path& NewFile::path() {
+  give_name();
+  return part_;
+}
+
 void NewFile::write(std::span<const std::byte> bytes) {
   if (!write_all(file_, bytes)) fail("written");
   // Piece by piece, as they fill up.

@@ -30,9 +30,9 @@ class MappedFile {
 bool standard_output_taken();
 
 /// A file on its way: written without a name on the disk of its place, put there by commit(), so that a killed program
-/// leaves the old file or the new one, and nothing else. (Where the file system knows no files without names it has a passing
-/// name beside its place until then, which a kill leaves behind.) Links are followed: what they point to is replaced, they
-/// stay. Where no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the
+/// leaves the old file or the new one, and nothing else. (Where the file system knows no files without names, and after
+/// path(), it has a passing name beside its place until then, which a kill leaves behind.) Links are followed: what they
+/// point to is replaced, they stay. Where no file can lie (a pipe, a terminal, /dev/null, /dev/stdout) commit() sends the
 /// bytes into what is there.
 class NewFile {
  public:
@@ -42,6 +42,7 @@ class NewFile {
   NewFile(const NewFile&) = delete;
   NewFile& operator=(const NewFile&) = delete;
 
+  const std::filesystem::path& path();  // where to write until then, for libraries that ask for a name
   /// Appends. Throws Error when the disk is full.
   void write(std::span<const std::byte> bytes);
   /// Writes over what is there, or beyond, by any thread; the next write() still goes behind the last.

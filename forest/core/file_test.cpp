@@ -126,6 +126,23 @@ TEST_F(FileInAFolder, WhatIsWrittenBeyondTheEndStaysThere) {
   EXPECT_TRUE(MappedFile(place).text() == whole);
 }
 
+TEST_F(FileInAFolder, ALibraryThatAsksForANameGetsOne) {
+  const auto place = folder_ / "film";
+  {
+    NewFile file(place);
+    std::ofstream(file.path()) << "moving";
+    EXPECT_EQ(entries(folder_), 1);
+    EXPECT_FALSE(std::filesystem::exists(place));
+    file.commit();
+  }
+  EXPECT_EQ(MappedFile(place).text(), "moving");
+  {
+    NewFile file(folder_ / "other");
+    EXPECT_TRUE(std::filesystem::exists(file.path()));
+  }
+  EXPECT_EQ(entries(folder_), 1);
+}
+
 // Who writes "-" means standard output, and would find a file of that name instead.
 TEST_F(FileInAFolder, ADashIsNoPlace) {
   EXPECT_NE(refused([] { NewFile("-"); }).find("/dev/stdout"), std::string::npos);

@@ -40,7 +40,8 @@ Cortex build_cortex(const Mesh& outer, const Mesh& inner, const BuildOptions& op
   const Boundary outside(outer, progress), inside(inner, progress);
   const SurfaceTrees surfaces{outside.tree(), inside.tree()};
   const WCurves curves(field, outside, inside);
-  const Ribbon dropped = make_ribbon(outer, curves, {.edge = ribbon_edge(options.volume)}, progress);
+  const Ribbon dropped = make_ribbon(
+      outer, curves, {.edge = ribbon_edge(options.volume), .least_thickness = options.thinnest}, progress);
 
   Cortex cortex;
   cortex.oddities = oddities;

@@ -16,6 +16,7 @@ struct BuildOptions {
   double volume = 1e9;        // µm³ of an element
   double spacing = 300.;      // µm between nodes of the field
   double line_scale = 3000.;  // µm, at which crests and valleys are looked for
+  double thinnest = 500.;     // µm: what is thinner over an area is the medial wall (RibbonOptions)
 };
 
 struct Cortex {

@@ -76,7 +76,7 @@ Report report(const Cortex& cortex, double wanted, const TriangleTree* outer, co
         angles.push_back(
             std::abs(90. - degrees_between(h.jacobian(.5, .5, .5).col(0), along[hit->triangle])));
     }
-    result.crest_angle = spread_of(angles);
+    if (!angles.empty()) result.crest_angle = spread_of(angles);
   }
   return result;
 }

@@ -32,7 +32,8 @@ struct Report {
   double equivolume_p99 = 0.;    // and of 99 of 100 elements
   double jacobian_least = 0.,
          jacobian_p1 = 0.;  // scaled Jacobian: the least of each element over a lattice of places
-  Spread crest_angle;       // degrees between v-isolines of elements by a crest and the right angle to it
+  std::optional<Spread>
+      crest_angle;  // degrees between v-isolines of elements by a crest and the right angle to it; none: no crests
   std::optional<FaceDistance> outer, inner;  // of faces from surfaces; none where these are not given
 };
 

@@ -3,6 +3,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <map>
 #include <pugixml.hpp>
 #include <sstream>
 
@@ -94,6 +95,7 @@ Borders read_borders(std::string_view bytes, const std::string& name) {
   if (vertices.size() != 1 || vertices[0] == 0)
     reader.refuse("does not say of how many vertices its surface is; write it anew with Workbench");
   result.surface_vertices = vertices[0];
+  if (const auto structure = root.attribute("Structure")) result.structure = structure.value();
   for (const pugi::xml_node& group : root.children("Class"))
     for (const pugi::xml_node& border : group.children("Border"))
       for (const pugi::xml_node& part : border.children("BorderPart")) {
@@ -112,15 +114,17 @@ std::string write_borders(const Borders& borders) {
   auto declaration = document.append_child(pugi::node_declaration);
   declaration.append_attribute("version") = "1.0", declaration.append_attribute("encoding") = "UTF-8";
   auto root = document.append_child("BorderFile");
-  root.append_attribute("Version") = "3", root.append_attribute("Structure") = "CORTEX";
+  root.append_attribute("Version") = "3";
+  root.append_attribute("Structure") = borders.structure.c_str();
   root.append_attribute("SurfaceNumberOfVertices") = std::uint64_t(borders.surface_vertices);
   const auto paint = [](pugi::xml_node node, const Vec3& colour) {
     node.append_attribute("Red") = colour.x(), node.append_attribute("Green") = colour.y();
     node.append_attribute("Blue") = colour.z();
   };
-  pugi::xml_node group;
+  std::map<std::string, pugi::xml_node> groups;  // Workbench takes each name once
   for (const Border& border : borders.borders) {
-    if (!group || group.attribute("Name").value() != border.group) {
+    pugi::xml_node& group = groups[border.group];
+    if (!group) {
       group = root.append_child("Class");
       group.append_attribute("Name") = border.group.c_str();
       paint(group, border.colour);

@@ -34,11 +34,13 @@ struct Border {
 struct Borders {
   std::size_t surface_vertices = 0;  // of the surface on which they are drawn
   std::vector<Border> borders;       // at least one
+  std::string structure =
+      "CORTEX";  // as surface_structure: Workbench draws borders on surfaces of their structure only
 };
 
 /// Throws InputError: what is no such file, is cut off, or names vertices that are not there.
 Borders read_borders(std::string_view bytes, const std::string& name);
-/// Borders of one group must follow one another.
+/// Groups stand in the order of their first borders, and have the colour of these.
 std::string write_borders(const Borders& borders);
 
 }  // namespace forest::io

@@ -117,6 +117,9 @@ ElementsFile read_elements(const std::filesystem::path& path) {
   if (file.kind("/corners/depths") != hdf5::Kind::none && cortex.elements.corners > 0)
     cortex.elements.depth = {tables("/corners/depths", cortex.elements.corners),
                              tables("/elements/depths", cortex.elements.size())};
+  for (const cortex::Depth::Table& table : cortex.elements.depth.corners)
+    if (table.front() < 0.f || !std::ranges::is_sorted(table))
+      file.refuse("/corners/depths has a table in which w falls");
   for (const auto& e : cortex.elements.elements)
     for (const std::size_t k : {0, 3, 12, 15})
       if (e[k] >= cortex.elements.corners) file.refuse("/elements/curves has a corner that is none");

@@ -48,7 +48,7 @@ struct Array {
   std::string_view intent;
   std::size_t rows = 0, columns = 1;
   std::vector<double> numbers;  // row by row
-  std::string_view name = {};   // what its metadata call it
+  std::string name = {};        // what its metadata call it
 };
 
 constexpr auto whole = number_of<std::uint64_t>;
@@ -106,6 +106,15 @@ class Reader {
       if (wanted(intent)) return read(element, intent);
     }
     return {};
+  }
+
+  // What the metadata of the points, or else of the file, call something; empty when they do not.
+  std::string about(std::string_view what) const {
+    std::string found = about(root_, what);
+    for (const pugi::xml_node& element : root_.children("DataArray"))
+      if (std::string_view(element.attribute("Intent").value()) == points_intent)
+        if (std::string own = about(element, what); !own.empty()) found = std::move(own);
+    return found;
   }
 
   std::vector<SurfaceLabel> labels() const {
@@ -178,9 +187,14 @@ class Reader {
           rows[r * array.columns + c] = array.numbers[c * array.rows + r];
       array.numbers = std::move(rows);
     }
-    for (const pugi::xml_node& about : element.child("MetaData").children("MD"))
-      if (std::string_view(about.child_value("Name")) == "Name") array.name = about.child_value("Value");
+    array.name = about(element, "Name");
     return array;
+  }
+
+  static std::string about(const pugi::xml_node& of, std::string_view what) {
+    for (const pugi::xml_node& pair : of.child("MetaData").children("MD"))
+      if (std::string_view(pair.child_value("Name")) == what) return pair.child_value("Value");
+    return {};
   }
 
   std::vector<double> numbers_of(std::string_view text, std::uint64_t count, std::string_view intent) const {
@@ -259,6 +273,16 @@ Mesh read_gifti_surface(std::string_view text, const std::string& name) {
   }
   if (mesh.triangles.empty()) throw InputError(name, 0, "has no triangle; give a surface that is not empty");
   return mesh;
+}
+
+std::string gifti_structure(std::string_view text, const std::string& name) {
+  std::string structure;
+  for (const char c : Reader(text, name).about("AnatomicalStructurePrimary")) {  // CortexLeft
+    const bool large = c >= 'A' && c <= 'Z';
+    if (large && !structure.empty()) structure += '_';
+    structure += c >= 'a' && c <= 'z' ? char(c - 'a' + 'A') : c;
+  }
+  return structure;
 }
 
 SurfaceValues read_gifti_values(std::string_view text, const std::string& name) {

@@ -17,6 +17,8 @@ namespace forest::io {
 /// Throw InputError.
 Mesh read_gifti_surface(std::string_view text, const std::string& name);  // in µm
 std::string write_gifti_surface(const Mesh& mesh);
+/// surface_structure.
+std::string gifti_structure(std::string_view text, const std::string& name);
 /// Of several arrays the first.
 SurfaceValues read_gifti_values(std::string_view text, const std::string& name);
 

@@ -112,6 +112,15 @@ Mesh read_surface(std::string_view bytes, const std::string& name) {
                    "(lh.pial), PLY, STL or OBJ; mris_convert makes some of them of many others");
 }
 
+std::string surface_structure(std::string_view bytes, const std::string& name) {
+  std::string place;
+  const std::string_view content = unpacked(bytes, place, name);
+  if (is_gifti(content))
+    if (std::string told = gifti_structure(content, name); !told.empty()) return told;
+  const std::string file = name.substr(name.rfind('/') + 1);
+  return file.starts_with("lh.") ? "CORTEX_LEFT" : file.starts_with("rh.") ? "CORTEX_RIGHT" : "";
+}
+
 SurfaceValues read_surface_values(std::string_view bytes, const std::string& name) {
   std::string place;
   const std::string_view content = unpacked(bytes, place, name);

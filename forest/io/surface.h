@@ -41,6 +41,9 @@ bool may_be_surface(std::string_view bytes);
 
 /// Positions in µm, labels 0. Throws InputError: what is no surface, cut off, or has coordinates or corners that cannot be.
 Mesh read_surface(std::string_view bytes, const std::string& name);
+/// The part of a brain that a surface is of, as Connectome Workbench names it (CORTEX_LEFT, CORTEX_RIGHT): from GIFTI's
+/// metadata, or FreeSurfer's names of files (lh., rh.). Empty: nothing says. Throws InputError.
+std::string surface_structure(std::string_view bytes, const std::string& name);
 /// Throws InputError. Infinite values become none.
 SurfaceValues read_surface_values(std::string_view bytes, const std::string& name);
 

@@ -27,6 +27,9 @@ write("large", ([tuple(x * 1000 for x in q) for q in p], f))
 write("cut_itself", ([tuple(x * (1 + .05 * math.sin(1e4 * x)) for x in q) for q in p], f))
 p, f = ball(7)
 write("spike", ([tuple(1.5 * x for x in q) if i == 20 else q for i, q in enumerate(p)], f))
+six, of_six = ball(6)
+write("six", (six, of_six))
+write("thin", ([tuple(x * (.8 + .14 / (1 + math.exp(-4 * q[0]))) for x in q) for q in six], of_six))  # .36 mm on one side
 write("beside", ([(q[0] + 5, q[1], q[2]) for q in ball(7)[0]], f))
 write("nan", ([(math.nan if i == 7 else q[0], q[1], q[2]) for i, q in enumerate(p)], f))
 with open("inner.obj", "w") as o:
@@ -45,6 +48,16 @@ PY
 
 $BRAINFOREST cortex build outer inner -o e.h5 --json >built.json
 $BRAINFOREST cortex report e.h5 --outer outer --inner inner --json >report.json
+
+# Where it is thin there is no cortex, unless that is said; it is told how much.
+$BRAINFOREST cortex build six thin -o half.h5 --json >half.json 2>half.err
+grep -q 'is too thin for elements and has none' half.err
+$BRAINFOREST cortex build six thin -o all.h5 --thinnest .2 --json >all.json 2>all.err
+[ ! -s all.err ] || fail "$(cat all.err)"
+told half.json '.05 < d["wall"] < .3'
+told all.json "d['wall'] == 0 and d['elements'] > 1.05 * json.load(open('half.json'))['elements']"
+told all.json 'd["crest_angle"]["median"] is None or d["lines_mm"]["crests"] > 0'
+
 python3 - <<'PY'
 import json
 built, report = json.load(open("built.json")), json.load(open("report.json"))
@@ -241,6 +254,7 @@ PY
 refuses 'has 1 section; two are compared' $BRAINFOREST cortex compare one.contours
 : >empty.nii
 refuses 'empty.nii: is empty' $BRAINFOREST cortex contours empty.nii --threshold 1 -o no.contours
+refuses 'more than 100 steps' $BRAINFOREST cortex grid --dimensions 3 --steps 120
 refuses 'no ending that can be written' $BRAINFOREST cortex grid -o no.obj
 refuses 'dimensions is of all blocks together' $BRAINFOREST cortex grid swan --dimensions 3
 refuses 'up is of drawings' $BRAINFOREST cortex grid swan --up x -o no.svg

@@ -23,7 +23,8 @@ $BRAINFOREST cortex build outer inner -o e.h5 >/dev/null
 
 for population in pyramidal interneuron; do two_cells $population 3; done
 
-plant() { $BRAINFOREST plant --elements e.h5 --recipe human-frontal --repo cells.db "$@"; }
+plant_in() { $BRAINFOREST plant --elements "$1" --recipe human-frontal --repo cells.db "${@:2}"; }
+plant() { plant_in e.h5 "$@"; }
 plant --element 3,7 --seed 2 --scale .1 --out two --json >two.json
 plant --element 7 --seed 2 --scale .1 --out one --json --threads 1 >one.json
 python3 - <<'PY'
@@ -89,7 +90,8 @@ PY
 # A row ends where it would meet itself.
 plant --near 0 0 8000 --row 10000 --scale .0001 --out round --json >round.json
 python3 -c 'import json; e = [x["element"] for x in json.load(open("round.json"))["tissue"]["elements"]]; assert len(e) == len(set(e)) > 3, e'
-refuses "mm away; give --near in" plant --near 1e9 0 0 --out no
+refuses 'mm away from all elements; the first has its middle at' plant --near 1e9 0 0 --out no
+refuses 'in mm it is among them: --near 0 0 7500' plant --near 0 0 7.5 --out no
 
 plant --near 0 0 8000 --row 3 --scale .002 --bend grid --out bent --json >bent.json
 python3 - <<'PY'
@@ -111,6 +113,9 @@ for side in front back; do
   plant --near 0 $y 0 --seed 2 --scale .1 --out volume_$side --json >volume_$side.json
 done
 told front.json 'd["tissue"]["layers"] == "measured"'
+# The density that is asked for is that of the layers which are there.
+plant --element 3,7,20-29 --seed 2 --density 3000 --out dense --json $measured >dense.json
+told dense.json 'abs(d["neurons"] / d["tissue"]["volume"] - 3000) < 15'
 told volume_front.json 'd["tissue"]["layers"] == "by volume"'
 /usr/bin/python3 - <<'PY'
 import h5py, numpy as np
@@ -135,6 +140,19 @@ sed '3s/.*/-2/' layer2.txt >below.txt
 fails_with 1 'below.txt: has -2 at vertex 2' plant --element 1 ${measured/layer2/below} --out no
 fails_with 1 'two.json' plant --element 1 ${measured/layer2.txt/two.json} --out no
 fails_with 2 'layers-on' plant --element 1 --layers layer1.txt --out no
+
+# Elements that fold themselves, and tables of depth that turn back.
+/usr/bin/python3 - <<'PY'
+import h5py, shutil
+for name in ("folded", "turned"): shutil.copy("e.h5", name + ".h5")
+with h5py.File("folded.h5", "r+") as f:
+    curve = f["elements/curves"][16 * 7 + 5]
+    f["curves/places"][12 * curve + 9:12 * curve + 12] *= 1.5
+with h5py.File("turned.h5", "r+") as f: f["corners/depths"][3] = .9
+PY
+refuses '1 element of those chosen of folded.h5 may fold, the first 7;' plant_in folded.h5 --element 3,7 --out no
+plant_in folded.h5 --element 3 --scale .01 --out whole >/dev/null
+refuses 'turned.h5: /corners/depths has a table in which w falls' plant_in turned.h5 --element 3 --out no
 
 # What is wrong is said in a sentence with what to do, and nothing is left behind.
 fails_with 1 'e.h5 has elements 0 to' plant --element 1000000 --out no
