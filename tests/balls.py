@@ -29,6 +29,16 @@ def ball(radius, halvings=4, dent=0.0):
     return out, f
 
 
+def areas(name, of_vertices, names):
+    """FreeSurfer's file of areas: of each vertex the place of its area among the names."""
+    with open(name, "wb") as o:
+        o.write(struct.pack(">i", len(of_vertices)))
+        for v, area in enumerate(of_vertices): o.write(struct.pack(">ii", v, area + 1))
+        o.write(struct.pack(">iiii", 1, -2, len(names), 2) + b"t\0" + struct.pack(">i", len(names)))
+        for i, text in enumerate(names):
+            o.write(struct.pack(">ii", i, len(text) + 1) + text.encode() + b"\0" + struct.pack(">iiii", i + 1, 0, 0, 0))
+
+
 def write(name, mesh):
     p, f = mesh
     with open(name, "wb") as o:

@@ -52,8 +52,23 @@ constexpr Measure measures[] = {
     {"equivolume", "largest |V(0 → depth)/V − depth|", "equivolume error", cortex::depth_error},
 };
 
+// Of each element where its middle is, µm, as `plant --near` takes it, and all that is measured.
+std::string table_of(const Elements& elements) {
+  std::string text = "element,x,y,z";
+  for (const Measure& m : measures) text += fmt::format(",{}", m.name);
+  text += '\n';
+  std::vector<std::string> lines(elements.size());
+  parallel_for(elements.size(), 64, [&](std::size_t e) {
+    const cortex::Place at = elements.hexahedron(e).at(.5, .5, .5);
+    lines[e] = fmt::format("{},{:.0f},{:.0f},{:.0f}", e, at.x(), at.y(), at.z());
+    for (const Measure& m : measures) lines[e] += fmt::format(",{:.5g}", m.of(elements, e));
+  });
+  for (const std::string& line : lines) text += line + '\n';
+  return text;
+}
+
 struct Options {
-  fs::path file, out, values;
+  fs::path file, out, values, table;
   std::string measure = "volume";
   double depth = .5;
   std::string edges;   // of which elements
@@ -102,9 +117,13 @@ Mesh edges_of(const cortex::Elements& elements, std::span<const std::uint32_t> o
 
 void run(const Options& o, Console& console) {
   must_take_surfaces({o.out}, true);
-  if (!o.values.empty()) must_take_files({o.out, o.values}, true);
+  std::vector<fs::path> all{o.out};
+  for (const fs::path& other : {o.values, o.table})
+    if (!other.empty()) all.push_back(other);
+  must_take_files(all, true);
   must_not_be_read("--out", o.out, {o.file});
   must_not_be_read("--values", o.values, {o.file});
+  must_not_be_read("--table", o.table, {o.file});
   const io::ElementsFile file = io::read_elements(o.file);
   const cortex::Elements& elements = file.cortex.elements;
   if (!o.edges.empty()) {
@@ -140,6 +159,7 @@ void run(const Options& o, Console& console) {
     for (const double value : values) each.insert(each.end(), 5, value);
     files.emplace_back(o.values, io::write_surface_values(measure->title, each));
   }
+  if (!o.table.empty()) files.emplace_back(o.table, table_of(elements));
   write_unless_there(files, o.force);
   const auto [least, most] = std::ranges::minmax(values);
   console.say(fmt::format("{} at depth {} in {}; {} ({}) from {:.4g} to {:.4g}{}",
@@ -167,6 +187,11 @@ std::function<void()> cortex_faces(CLI::App& command, Console& console) {
   CLI::Option* const values =
       command.add_option("--values", o->values, "Text, a number a vertex, as render --overlay takes it")
           ->type_name("FILE");
+  CLI::Option* const table = command
+                                 .add_option("--table", o->table,
+                                             "A row of each element: its number, where its middle is (µm, as "
+                                             "plant --near takes it), all that is told")
+                                 ->type_name("FILE.csv");
   CLI::Option* const depth =
       command.add_option("--depth", o->depth, "By volume: 0 the outer surface, 1 the inner one")
           ->capture_default_str();
@@ -179,6 +204,7 @@ std::function<void()> cortex_faces(CLI::App& command, Console& console) {
                       "Instead of a level the edges of these elements, as tubes: 7,12,20-29 or all")
           ->type_name("LIST")
           ->excludes(values)
+          ->excludes(table)
           ->excludes(depth)
           ->excludes(measure);
   must_be_within(

@@ -35,9 +35,44 @@ namespace {
 
 using Place = Eigen::Vector3d;
 
+// Those with the middle of their outer face in areas that a map of labels names.
+std::vector<std::uint32_t> in_areas(const ElementOptions& options,
+                                    std::span<const cortex::Hexahedron> elements) {
+  const Mesh surface = io::read_surface(MappedFile(options.labels_on).text(), options.labels_on.string());
+  const std::string name = options.labels.string();
+  const io::SurfaceValues areas = io::read_surface_values(MappedFile(options.labels).text(), name);
+  if (areas.labels.empty())
+    throw InputError(name, 0, "names no areas; give labels, GIFTI (.label.gii) or FreeSurfer's (.annot)");
+  if (areas.values.size() != surface.positions.size())
+    throw InputError(
+        name, 0,
+        fmt::format("has areas of {} vertices and {} has {}; give the surface they were drawn on",
+                    areas.values.size(), options.labels_on.string(), surface.positions.size()));
+  std::set<float> keys;
+  for (const std::string& wanted : options.areas) {
+    const std::size_t before = keys.size();
+    for (const io::SurfaceLabel& label : areas.labels)
+      if (label.name == wanted) keys.insert(float(label.key));
+    if (keys.size() > before) continue;
+    std::vector<std::string> names;
+    for (const io::SurfaceLabel& label : areas.labels) names.push_back(io::printable(label.name));
+    throw InputError(name, 0,
+                     fmt::format("has no area '{}'; its areas are {}", wanted, fmt::join(names, ", ")));
+  }
+  const std::vector<float> of = cortex::values_at(elements, surface, areas.values);
+  std::vector<std::uint32_t> chosen;
+  for (std::uint32_t e = 0; e < of.size(); ++e)
+    if (keys.contains(of[e])) chosen.push_back(e);
+  if (chosen.empty())
+    throw Error(
+        fmt::format("no element of {} lies in {}", options.file.string(), fmt::join(options.areas, ", ")));
+  return chosen;
+}
+
 std::vector<std::uint32_t> choose(const ElementOptions& options,
                                   std::span<const cortex::Hexahedron> elements) {
   if (!options.elements.empty()) return parse_elements(options.elements, options.file, elements.size());
+  if (!options.areas.empty()) return in_areas(options, elements);
   std::vector<std::uint32_t> chosen;
   const std::vector<Place> middles = cortex::middles_of(elements);
   if (!options.near.empty()) {
@@ -242,8 +277,9 @@ PlantedElements plant_in_elements(const ElementOptions& options, const circuit::
                       "elements; grow some "
                       "into a repository (brainforest grow), and name their population instead",
                       recipe.types[t].name, grammar));
-  if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty())
-    throw Error("say which elements are planted: --element, --near, --sphere or --box");
+  if (options.elements.empty() && options.near.empty() && options.sphere.empty() && options.box.empty() &&
+      options.areas.empty())
+    throw Error("say which elements are planted: --element, --region, --near, --sphere or --box");
   const io::ElementsFile file = io::read_elements(options.file);
   const bool bent = options.bend == "grid";
   std::vector<cortex::Hexahedron> elements(file.cortex.elements.size());
@@ -380,8 +416,23 @@ CLI::Option* add_elements(CLI::App& command, ElementOptions& o) {
       one_of_them(command.add_option("--box", o.box, "… or in a box, µm: two opposite corners")
                       ->expected(6)
                       ->type_name("X Y Z X Y Z"));
-  for (CLI::Option* a : {element, near, sphere, box})
-    for (CLI::Option* b : {element, near, sphere, box})
+  CLI::Option* const region =
+      one_of_them(command.add_option("--region", o.areas, "… or in areas of a map of labels, by their names")
+                      ->type_name("NAME..."));
+  CLI::Option* const labels =
+      command
+          .add_option(
+              "--labels", o.labels,
+              "… that map: areas of a surface's vertices, GIFTI (.label.gii) or FreeSurfer's (.annot)")
+          ->type_name("FILE");
+  CLI::Option* const labels_on =
+      command
+          .add_option("--labels-on", o.labels_on,
+                      "… that surface: the outer one that the elements were built from")
+          ->type_name("OUTER");
+  region->needs(labels), labels->needs(region)->needs(labels_on), labels_on->needs(labels);
+  for (CLI::Option* a : {element, region, near, sphere, box})
+    for (CLI::Option* b : {element, region, near, sphere, box})
       if (a != b) a->excludes(b);
   CLI::Option* const row =
       command.add_option("--row", o.row, "So many elements in a row across the fold, through the one chosen");

@@ -22,8 +22,10 @@ namespace forest::cli {
 
 struct ElementOptions {
   std::filesystem::path file;
-  std::string elements;                   // "7,12,20-29" or "all"
-  std::vector<double> near, sphere, box;  // µm
+  std::string elements;                     // "7,12,20-29" or "all"
+  std::vector<double> near, sphere, box;    // µm
+  std::vector<std::string> areas;           // names of the areas of `labels`
+  std::filesystem::path labels, labels_on;  // and the surface on whose vertices they are
   std::uint32_t count = 1, row = 1;
   double scale = 1.,
          density = 0.;         // density: neurons/mm³ in the mean, instead of scale; 0: as the recipe says

@@ -54,7 +54,7 @@ void add_surfaces(CLI::App& command, SurfaceOptions& options) {
   each(command.add_option(
       "--overlay", options.overlays,
       "Values or areas that colour the surfaces, in their order: GIFTI (.shape.gii, .func.gii, .label.gii), "
-      "FreeSurfer (lh.thickness, lh.curv), or text of a value a line"));
+      "FreeSurfer (lh.thickness, lh.curv, lh.aparc.annot), or text of a value a line"));
   command.add_option("--colour-map", options.map, "Of the values: " + map_names());
   command.add_option("--range", options.range,
                      "Values at the ends of the colour map, LOW:HIGH; by default nearly all are within");

@@ -2,9 +2,14 @@
 #include "forest/cortex/region.h"
 
 #include <algorithm>
+#include <limits>
 #include <set>
 
+#include <fmt/format.h>
+
+#include "forest/core/error.h"
 #include "forest/core/parallel.h"
+#include "forest/geometry/triangle_tree.h"
 
 namespace forest::cortex {
 
@@ -14,6 +19,29 @@ std::vector<Place> middles_of(std::span<const Hexahedron> elements) {
   std::vector<Place> middles(elements.size());
   parallel_for(elements.size(), 256, [&](std::size_t e) { middles[e] = elements[e].at(.5, .5, .5); });
   return middles;
+}
+
+std::vector<float> values_at(std::span<const Hexahedron> elements, const Mesh& outer,
+                             std::span<const float> values) {
+  constexpr double near = 300.;  // µm
+  const TriangleTree tree(outer);
+  std::vector<float> result(elements.size());
+  std::vector<std::uint8_t> away(elements.size(), 0);
+  parallel_for(elements.size(), 256, [&](std::size_t e) {
+    const auto hit = tree.nearest(elements[e].at(.5, .5, 0.), near);
+    away[e] = !hit;
+    if (!hit) return void(result[e] = std::numeric_limits<float>::quiet_NaN());
+    const Triangle& t = outer.triangles[hit->triangle];
+    const auto vertex = *std::ranges::min_element(
+        t, {}, [&](std::uint32_t v) { return (outer.positions[v].cast<double>() - hit->at).squaredNorm(); });
+    result[e] = values[vertex];
+  });
+  if (const auto count = std::ranges::count(away, 1); 100 * count > std::ptrdiff_t(elements.size()))
+    throw Error(fmt::format(
+        "{} of {} elements lie more than .3 mm from the surface of the areas; give the outer surface "
+        "that they were built from",
+        count, elements.size()));
+  return result;
 }
 
 std::vector<std::uint32_t> row_through(const Sheet& sheet, std::uint32_t middle, std::size_t count) {

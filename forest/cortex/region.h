@@ -8,11 +8,19 @@
 
 #include "forest/core/vec.h"
 #include "forest/cortex/warp.h"
+#include "forest/geometry/mesh.h"
 
 namespace forest::cortex {
 
 /// Of each element where (½, ½, ½) is, µm.
 std::vector<Eigen::Vector3d> middles_of(std::span<const Hexahedron> elements);
+
+/// Of each element the value at the vertex nearest to the middle of its outer face; none (NaN) where the surface is more than
+/// .3 mm away. Throws Error where that is so of more than a few: the values are of another surface.
+/// @param outer  that the elements were built from
+/// @param values  one a vertex
+std::vector<float> values_at(std::span<const Hexahedron> elements, const Mesh& outer,
+                             std::span<const float> values);
 
 /// So many elements in a row, across the fold (along u), with this one in the middle; fewer where the sheet ends or the row would
 /// meet itself.

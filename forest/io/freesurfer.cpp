@@ -1,8 +1,11 @@
 // SPDX-License-Identifier: Apache-2.0
 #include "forest/io/freesurfer.h"
 
+#include <algorithm>
 #include <bit>
 #include <cstdint>
+#include <limits>
+#include <map>
 
 #include <fmt/format.h>
 
@@ -34,6 +37,13 @@ class Words {
     skip(4);
     return value;
   }
+  std::string text(std::uint32_t count) {
+    need(count);
+    std::string result(bytes_.substr(0, count));
+    skip(count);
+    return result.substr(0, result.find('\0'));
+  }
+  std::size_t left() const { return bytes_.size(); }
   float real() { return std::bit_cast<float>(word()); }
   std::uint32_t count(const char* of) {
     const auto value = std::int32_t(word());
@@ -51,6 +61,71 @@ class Words {
 
 bool is_freesurfer_surface(std::string_view bytes) { return bytes.starts_with(surface_mark); }
 bool is_freesurfer_values(std::string_view bytes) { return bytes.starts_with(values_mark); }
+
+// No mark says so: pairs that name vertices, of which there are as many, and what follows them.
+bool is_freesurfer_areas(std::string_view bytes) {
+  const auto word = [&](std::uint64_t i) {
+    std::uint32_t value = 0;
+    for (std::uint64_t k = 4 * i; k < 4 * i + 4; ++k)
+      value = value << 8 | static_cast<unsigned char>(bytes[k]);
+    return value;
+  };
+  if (bytes.size() < 16) return false;
+  const std::uint64_t vertices = word(0);
+  if (vertices == 0 || bytes.size() / 4 < 2 * vertices + 2 || word(2 * vertices + 1) != 1) return false;
+  for (std::uint64_t i = 0; i < vertices; ++i)
+    if (word(2 * i + 1) >= vertices) return false;
+  return true;
+}
+
+SurfaceValues read_freesurfer_areas(std::string_view bytes, const std::string& name) {
+  Words words(bytes, name);
+  const std::uint32_t vertices = words.count("vertices");
+  words.need(8 * std::uint64_t(vertices) + 8);
+  std::vector<std::uint32_t> colours(vertices, 0);
+  for (std::uint32_t i = 0; i < vertices; ++i) {
+    const std::uint32_t vertex = words.word(), colour = words.word();
+    if (vertex >= vertices)
+      throw InputError(name, 0, fmt::format("names vertex {} of {}; get the whole file", vertex, vertices));
+    colours[vertex] = colour;
+  }
+  words.word();  // there is a table
+  auto entries = std::int32_t(words.word());
+  const bool numbered = entries < 0;
+  if (numbered) {
+    if (entries != -2)
+      throw InputError(
+          name, 0,
+          fmt::format("has a table of colours of version {}, and 2 is read", -std::int64_t(entries)));
+    words.word();  // the largest number
+  }
+  words.text(words.count("letters"));  // the file that the table is of
+  if (numbered) entries = std::int32_t(words.count("areas"));
+  if (std::uint64_t(entries) > words.left() / 20)
+    throw InputError(
+        name, 0,
+        fmt::format("says that it has {} areas, for which it is too short; get the whole file", entries));
+  SurfaceValues result;
+  std::map<std::uint32_t, std::int32_t> keys;  // of colours
+  for (std::int32_t key = 0; key < entries; ++key) {
+    if (numbered) words.word();
+    SurfaceLabel label{.key = key, .name = words.text(words.count("letters"))};
+    std::uint32_t packed = 0;
+    for (int k = 0; k < 3; ++k) {
+      const std::uint32_t level = words.word();
+      packed |= (level & 255) << (8 * k);
+      label.colour[k] = float(std::min(level, 255u)) / 255.f;
+    }
+    label.alpha = 1.f - float(std::min(words.word(), 255u)) / 255.f;
+    keys.emplace(packed, key);
+    result.labels.push_back(std::move(label));
+  }
+  for (const std::uint32_t colour : colours) {
+    const auto key = keys.find(colour);
+    result.values.push_back(key == keys.end() ? std::numeric_limits<float>::quiet_NaN() : float(key->second));
+  }
+  return result;
+}
 
 Mesh read_freesurfer_surface(std::string_view bytes, const std::string& name) {
   Words words(bytes, name);

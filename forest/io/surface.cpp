@@ -92,8 +92,8 @@ std::string without_folders(const std::string& title) {
 }  // namespace
 
 bool may_be_surface(std::string_view bytes) {
-  return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) || is_gifti(bytes) ||
-         is_ply(bytes) || is_stl(bytes) || is_obj(bytes);
+  return is_packed(bytes) || is_freesurfer_surface(bytes) || is_freesurfer_values(bytes) ||
+         is_freesurfer_areas(bytes) || is_gifti(bytes) || is_ply(bytes) || is_stl(bytes) || is_obj(bytes);
 }
 
 Mesh read_surface(std::string_view bytes, const std::string& name) {
@@ -127,6 +127,8 @@ SurfaceValues read_surface_values(std::string_view bytes, const std::string& nam
   SurfaceValues result;
   if (is_freesurfer_values(content))
     result = {.values = read_freesurfer_values(content, name), .title = title_of(name), .labels = {}};
+  else if (is_freesurfer_areas(content))
+    result = read_freesurfer_areas(content, name);
   else if (is_gifti(content))
     result = read_gifti_values(content, name), result.title = title_in(without_folders(result.title));
   else

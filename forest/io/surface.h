@@ -5,7 +5,7 @@
 //   GIFTI (gifti.h)           lh.pial.surf.gii, lh.thickness.shape.gii, lh.aparc.label.gii, …
 //   OBJ (obj.h)               surfaces only, of Wavefront and of the Montreal Neurological Institute
 //   PLY (ply.h), STL (stl.h)  surfaces only, as text or as bytes
-//   FreeSurfer (freesurfer.h) lh.pial, lh.white, lh.inflated; lh.curv, lh.thickness, lh.sulc, lh.area
+//   FreeSurfer (freesurfer.h) lh.pial, lh.white, lh.inflated; lh.curv, lh.thickness, lh.sulc, lh.area; lh.aparc.annot
 //   text                      values only, one a line; behind # what they are, such as "# thickness (mm)"
 //
 // All of them measure in mm, to the right, to the front and upwards; a Mesh of this project is in µm, along the same axes.

@@ -50,6 +50,29 @@ std::string freesurfer_values(std::initializer_list<float> values) {
   return bytes;
 }
 
+// Areas of three vertices, the last of a colour that no area has.
+std::string freesurfer_areas(bool numbered) {
+  const auto text = [](const std::string& what) {
+    return big_endian(std::uint32_t(what.size() + 1)) + what + '\0';
+  };
+  std::string bytes = big_endian(3u);
+  for (const auto& [vertex, colour] : {std::pair(1u, 0x0a0019u), {0u, 0xff8040u}, {2u, 7u}})
+    bytes += big_endian(vertex) + big_endian(colour);
+  bytes += big_endian(1u) + big_endian(numbered ? 0xfffffffeu : 2u);
+  if (numbered) bytes += big_endian(9u);
+  bytes += text("table.ctab");
+  if (numbered) bytes += big_endian(2u);
+  const auto entry = [&](std::uint32_t number, const std::string& name,
+                         std::initializer_list<std::uint32_t> levels) {
+    if (numbered) bytes += big_endian(number);
+    bytes += text(name);
+    for (const std::uint32_t level : levels) bytes += big_endian(level);
+  };
+  entry(1, "FD", {0x19, 0, 0x0a, 0});
+  entry(8, "FA", {0x40, 0x80, 0xff, 255});
+  return bytes;
+}
+
 std::string base64(const std::string& bytes) {
   constexpr const char* signs = "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
   std::string text;
@@ -373,6 +396,40 @@ TEST(Surface, ValuesAreReadFromEveryFormat) {
   EXPECT_EQ(labels.labels[1].key, 7);
   EXPECT_EQ(labels.labels[1].colour, Vec3(.5f, 0.f, .7f));  // "x" is none
   EXPECT_EQ(labels.labels[0].alpha, 0.f);
+}
+
+TEST(Surface, AreasOfFreeSurferHaveTheirNamesAndColours) {
+  for (const bool numbered : {true, false}) {
+    const SurfaceValues areas = read_surface_values(freesurfer_areas(numbered), "lh.economo.annot");
+    ASSERT_EQ(areas.values.size(), 3u);
+    ASSERT_EQ(areas.labels.size(), 2u);
+    EXPECT_EQ(areas.labels[std::size_t(areas.values[1])].name, "FD");
+    EXPECT_EQ(areas.labels[std::size_t(areas.values[0])].name, "FA");
+    EXPECT_TRUE(std::isnan(areas.values[2]));
+    EXPECT_LT((areas.labels[1].colour - Vec3(64, 128, 255) / 255.f).norm(), 1e-6f);
+    EXPECT_EQ(areas.labels[0].alpha, 1.f);
+    EXPECT_EQ(areas.labels[1].alpha, 0.f);
+    const std::string whole = freesurfer_areas(numbered);
+    for (std::size_t size = 1; size < whole.size(); ++size)
+      EXPECT_NE(values_error(whole.substr(0, size)), "") << size;
+    for (std::size_t at = 0; at + 4 <= whole.size(); at += 4)  // sizes that lie
+      for (const std::uint32_t lie : {0x7fffffffu, 0x80000000u, 0xffffffffu}) {
+        std::string other = whole;
+        (void)values_error(other.replace(at, 4, big_endian(lie)));
+      }
+  }
+}
+
+TEST(Surface, WhichPartOfTheBrainIsToldByItsFile) {
+  const auto gifti_of = [](const std::string& data) {
+    return "<GIFTI><DataArray "
+           "Intent=\"NIFTI_INTENT_POINTSET\"><MetaData><MD><Name>AnatomicalStructurePrimary</Name><Value>" +
+           data + "</Value></MD></MetaData></DataArray></GIFTI>";
+  };
+  EXPECT_EQ(surface_structure(gifti_of("CortexRight"), "a.gii"), "CORTEX_RIGHT");
+  EXPECT_EQ(surface_structure(gifti_of(""), "x/lh.a.gii"), "CORTEX_LEFT");
+  EXPECT_EQ(surface_structure(freesurfer_surface(), "rh.pial"), "CORTEX_RIGHT");
+  EXPECT_EQ(surface_structure(freesurfer_surface(), "lh./pial"), "");
 }
 
 TEST(Surface, ValuesSayWhatTheyAreWhereTheirFileDoes) {

@@ -9,9 +9,12 @@ python3 - <<'PY'
 import os, sys
 sys.dont_write_bytecode = True
 sys.path.append(os.environ["FOREST_SOURCE_DIR"] + "/tests")
-from balls import ball, write
+from balls import areas, ball, write
 write("outer", ball(8))
 write("inner", ball(6))
+# Three areas: in front, behind, and a spot on top.
+areas("all.annot", [2 if z > 7 else 0 if y > 0 else 1 for x, y, z in ball(8)[0]], ["FA", "OC", "HA"])
+areas("small.annot", [0, 0], ["FA"])
 # Six measured layers: the fourth is thick in front and thin behind.
 for k, share in enumerate((.1, .1, .3, 0, .15, .15)):
     with open(f"layer{k + 1}.txt", "w") as o:
@@ -86,6 +89,26 @@ u, v, w = (weights(group[k][:].astype(float)) for k in "uvw")
 found = np.einsum("ni,nj,nk,njikx->nx", u, v, w, lattice)
 assert np.abs(found - np.stack([group[k][:] for k in "xyz"], 1)).max() < .01
 PY
+
+# By the areas of a map, and by a table of all elements.
+areas="--labels all.annot --labels-on outer"
+plant --region HA $areas --scale .001 --out spot --json >spot.json
+plant --region HA OC FA $areas --scale .001 --out every --json >every.json
+$BRAINFOREST cortex faces e.h5 -o faces.gii --table table.csv >/dev/null
+/usr/bin/python3 - <<'PY'
+import csv, json
+rows = [{k: float(v) for k, v in r.items()} for r in csv.DictReader(open("table.csv"))]
+of = lambda name: [e["element"] for e in json.load(open(name))["tissue"]["elements"]]
+assert [r["element"] for r in rows] == list(range(len(rows))) == of("every.json"), len(rows)
+spot = {r["element"] for r in rows if r["z"] > 7000 / 8000 * 7000}
+assert len(spot) > 20 and len(spot ^ set(of("spot.json"))) < .2 * len(spot), (len(spot), of("spot.json"))
+assert all(.5 < r["volume"] < 2 and abs(r["thickness"] - 2) < .1 and r["jacobian"] > .2 for r in rows)
+PY
+refuses "has no area 'FX'; its areas are FA, OC, HA" plant --region FX $areas --out no
+refuses 'has areas of 2 vertices and outer has 2562' plant --region FA --labels small.annot --labels-on outer --out no
+refuses 'names no areas' plant --region FA --labels layer1.txt --labels-on outer --out no
+refuses 'more than .3 mm from the surface of the areas' plant --region FA --labels all.annot --labels-on inner --out no
+fails_with 2 'labels' plant --region FA --out no
 
 # A row ends where it would meet itself.
 plant --near 0 0 8000 --row 10000 --scale .0001 --out round --json >round.json
